@@ -1,0 +1,73 @@
+# `make demo` and `make test` are each all that a fresh machine with Python 3.11 needs:
+# they make .venv, install into it and see to an OpenCL device, without root or a compiler.
+
+PYTHON ?= python3
+VENV ?= .venv
+PY := $(VENV)/bin/python
+PIP := $(PY) -m pip --disable-pip-version-check -qq
+
+.PHONY: help demo test slow lint docs cpu clean
+
+help:
+	@echo "make demo    textures from real samples, into ./demo"
+	@echo "make test    the tests"
+	@echo "make slow    the tests that take long or need the package index"
+	@echo "make lint    ruff and mypy"
+	@echo "make docs    the documentation, into docs/_build/html"
+	@echo "make cpu     the CPU runtime of the package index, beside what is here already"
+	@echo "make clean   remove what these commands made, except $(VENV)"
+	@echo "Another Python: make PYTHON=python3.12 ..."
+
+# $(call install,NAME,EXTRAS): install once, again only when pyproject.toml or Python's version changed.
+define install
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	    { echo "simdtex needs Python 3.11 or newer; name one with make PYTHON=python3.11"; exit 1; }
+	@test "$$($(PY) -V 2>&1)" = "$$($(PYTHON) -V)" || \
+	    { echo "Making the environment $(VENV) ..." && $(PYTHON) -m venv --clear $(VENV); }
+	@cmp -s pyproject.toml $(VENV)/installed-$(1) || \
+	    { echo "Installing simdtex$(2) into $(VENV) ..." && $(PIP) install --editable '.$(2)' && \
+	      cp pyproject.toml $(VENV)/installed-$(1); }
+endef
+
+# A usable device already here (a GPU, PoCL) is used; else the Intel CPU runtime is installed, once.
+ENSURE := $(PY) -c 'import sys; from simdtex.device import main; sys.exit(main(["--ensure"]))'
+define device
+	@$(ENSURE) 2>/dev/null || \
+	    { echo "No OpenCL device works here yet: installing a CPU runtime from the package index (about 250 MB) ..." && \
+	      $(PIP) install --editable '.[cpu]' && $(ENSURE); } || \
+	    { echo "No OpenCL device works here: install a GPU driver or PoCL (Debian: apt install pocl-opencl-icd;" \
+	           "conda: conda install pocl), or set SIMDTEX_DEVICE=reference to run slowly without."; exit 1; }
+endef
+
+demo:
+	$(call install,base,)
+	$(device)
+	@$(VENV)/bin/simdtex demo
+
+test:
+	$(call install,test,[test])
+	$(device)
+	@$(PY) -m pytest
+
+slow:
+	$(call install,test,[test])
+	$(device)
+	@$(PY) -m pytest -m slow
+
+lint:
+	$(call install,dev,[dev])
+	$(PY) -m ruff check
+	$(PY) -m ruff format --check
+	$(PY) -m mypy --strict simdtex
+
+docs:
+	$(call install,docs,[docs])
+	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	@echo "The documentation is in docs/_build/html/index.html"
+
+cpu:
+	$(call install,cpu,[cpu])
+
+clean:
+	rm -rf build dist demo docs/_build docs/generated .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -not -path './$(VENV)/*' -prune -exec rm -rf {} +

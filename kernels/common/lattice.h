@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The lattice of one level, equations (10) and (11): sites (spacing * i, spacing * j) of a picture that is
+// `width` pixels wide, 0 <= i < rows, 0 <= j < cols. Images stay at full size; a level only reads through it.
+#ifndef SIMDTEX_LATTICE_H
+#define SIMDTEX_LATTICE_H
+
+// The five numbers every lattice kernel takes, in this order.
+#define GRID const int rows, const int cols, const int spacing, const int width, const int torus
+
+// Pixel index of grid site (i, j).
+#define SITE(i, j) (((i) * width + (j)) * spacing)
+#define ROW_OF(site) ((site) / width / spacing)
+#define COL_OF(site) ((site) % width / spacing)
+
+inline int wrap(const int i, const int n)
+{
+    const int k = i % n;
+    return k < 0 ? k + n : k;
+}
+
+// Pixel index of the neighbour of grid site (i, j) at grid offset (di, dj), equation (3).
+// -1 outside an open lattice, and where a small torus wraps the offset back onto the site itself.
+inline int neighbour(const int i, const int j, const int di, const int dj, GRID)
+{
+    int k = i + di, l = j + dj;
+    if (torus) {
+        k = wrap(k, rows);
+        l = wrap(l, cols);
+    } else if (k < 0 || k >= rows || l < 0 || l >= cols)
+        return -1;
+    return k == i && l == j ? -1 : SITE(k, l);
+}
+
+#endif

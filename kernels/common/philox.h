@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Philox4x32-10 (Salmon et al., SC 2011): 128 random bits as a pure function of a counter and a key.
+// Key: the 64-bit seed. Counter: (site, sweep, level and purpose, attempt), so that no schedule, tile or
+// device changes a draw.
+#ifndef SIMDTEX_PHILOX_H
+#define SIMDTEX_PHILOX_H
+
+inline uint4 philox(uint4 counter, uint2 key)
+{
+    for (int round = 0; round < 10; ++round) {
+        const uint hi0 = mul_hi(0xD2511F53u, counter.x), lo0 = 0xD2511F53u * counter.x;
+        const uint hi1 = mul_hi(0xCD9E8D57u, counter.z), lo1 = 0xCD9E8D57u * counter.z;
+        counter = (uint4)(hi1 ^ counter.y ^ key.x, lo1, hi0 ^ counter.w ^ key.y, lo0);
+        key += (uint2)(0x9E3779B9u, 0xBB67AE85u);
+    }
+    return counter;
+}
+
+// What a draw is for; the same numbers stand in simdtex/random.py.
+#define PURPOSE_START 1u
+#define PURPOSE_DRAW 2u
+#define PURPOSE_COLOR 3u
+
+inline uint4 draw4(const ulong seed, const uint level, const uint sweep, const uint site, const uint purpose,
+                   const uint attempt)
+{
+    return philox((uint4)(site, sweep, level << 8 | purpose, attempt), (uint2)((uint)seed, (uint)(seed >> 32)));
+}
+
+// A whole number 0 .. n-1 from 64 random bits; the bias is below n / 2^64.
+inline ulong below(const uint lo, const uint hi, const ulong n)
+{
+    return mul_hi((ulong)hi << 32 | lo, n);
+}
+
+#endif

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// V sites side by side in one work-item (-D V=1, 4, 8 or 16): the same arithmetic in the same order for each.
+#ifndef SIMDTEX_VECTOR_H
+#define SIMDTEX_VECTOR_H
+
+#ifndef V
+#define V 1
+#endif
+#define JOIN_(a, b) a##b
+#define JOIN(a, b) JOIN_(a, b)
+
+#if V == 1
+typedef float vec;
+#define LOAD(p) (*(p))
+#define STORE(x, p) (*(p) = (x))
+#else
+typedef JOIN(float, V) vec;
+#define LOAD(p) JOIN(vload, V)(0, p)
+#define STORE(x, p) JOIN(vstore, V)(x, 0, p)
+#endif
+
+#endif

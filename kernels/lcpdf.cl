@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The local conditional probability density function, equations (6) to (8) and (12), and what relaxation takes
+// from it: a draw (Gibbs), its mode (ICM), or the whole table of probabilities.
+//
+//   P(x) ~ sum_p w_p exp(-|x - y_p|^2 / 2h^2),   w_p = exp(-d_p / 2h^2),   d_p = sum_r ((x_r - y_r)(1 - t_r))^2
+//
+// Weights are whole numbers: W_p = floor(2^40 w_p / w_max). Whole numbers add up to the same sum in any order, so
+// no work-group size, chunking or reduction can change a draw. A weight below 2^-40 of the largest is zero by this definition.
+#pragma OPENCL FP_CONTRACT OFF
+#include "common/exp.h"
+#include "common/philox.h"
+#include "common/vector.h"
+
+#ifndef C
+#define C 1 // channels of a pixel
+#endif
+#ifndef BLOCK
+#define BLOCK 64 // candidates to a block, each with its smallest distance
+#endif
+#ifndef STEP
+#define STEP 4 // candidates that are kept in registers together
+#endif
+
+// Equation (12): d_p for V sites and one block of candidates, neighbours in canonical order, channels inside.
+//
+// confidence (N, P), weighted (N, C, P)   from neighbourhood.cl
+// sample     (C, plane)                   working grey levels as float
+// candidates (blocks * BLOCK,)            pixel index in the sample; past `count` they repeat and get d = infinity
+// reach      (N,)                         pixel offset in the sample of each neighbour
+// distance   (blocks * BLOCK, P)          out
+// nearest    (blocks, P)                  out: smallest d of each block
+// One work-item per (V sites, block). This loop is the cost of the whole program.
+__kernel void lcpdf_distance(__global const float *restrict confidence, __global const float *restrict weighted,
+                             const int N, const int P, __global const float *restrict sample, const int plane,
+                             __global const int *restrict candidates, const int count,
+                             __global const int *restrict reach, const int blocks,
+                             __global float *restrict distance, __global float *restrict nearest)
+{
+    const int s = get_global_id(0) * V;
+    const int block = get_global_id(1);
+    if (s >= P || block >= blocks)
+        return;
+    vec least = INFINITY;
+    for (int p = block * BLOCK; p < (block + 1) * BLOCK; p += STEP) {
+        __global const float *y[STEP];
+        vec d[STEP];
+#pragma unroll
+        for (int q = 0; q < STEP; ++q) {
+            y[q] = sample + candidates[p + q];
+            d[q] = 0.0f;
+        }
+        for (int k = 0; k < N; ++k) {
+            const int o = reach[k];
+            const vec u = LOAD(confidence + k * P + s);
+#pragma unroll
+            for (int c = 0; c < C; ++c) {
+                const vec xu = LOAD(weighted + (k * C + c) * P + s);
+#pragma unroll
+                for (int q = 0; q < STEP; ++q) {
+                    const vec e = fma((vec)(-y[q][c * plane + o]), u, xu);
+                    d[q] = fma(e, e, d[q]);
+                }
+            }
+        }
+#pragma unroll
+        for (int q = 0; q < STEP; ++q) {
+            const vec dq = p + q < count ? d[q] : (vec)INFINITY;
+            STORE(dq, distance + (p + q) * P + s);
+            least = fmin(least, dq);
+        }
+    }
+    STORE(least, nearest + block * P + s);
+}
+
+// Distances that coherence has divided carry the sign bit as a mark.
+#define DISTANCE(p) fabs(distance[(p) * P + s])
+#define NO_WEIGHT 28.0f // exp(-28) 2^40 < 1
+
+// W_p: Gaussian of equation (7) relative to the best candidate.
+inline ulong weight(const float d, const float smallest, const float scale)
+{
+    const float a = (d - smallest) * scale;
+    return a < NO_WEIGHT ? (ulong)(exp32(-a) * 0x1p40f) : 0ul;
+}
+
+inline float smallest_of(__global const float *nearest, const int blocks, const int P, const int s)
+{
+    float least = INFINITY;
+    for (int b = 0; b < blocks; ++b)
+        least = fmin(least, nearest[b * P + s]);
+    return least;
+}
+
+// Loop over the candidates that can have weight, in ascending order.
+#define FOR_CANDIDATES(p)                                                                                              \
+    for (int b_ = 0; b_ < blocks; ++b_)                                                                                \
+        if ((nearest[b_ * P + s] - smallest) * scale < NO_WEIGHT)                                                      \
+            for (int p = b_ * BLOCK; p < (b_ + 1) * BLOCK; ++p)
+
+// The Gibbs sampler: a candidate drawn with probability W_p / sum W, and its grey level plus a step of the
+// kernel, redrawn together until the grey level is legal. Exact for the mixture over the legal levels.
+//
+// noise    (2 * radius + 1,)  cumulative probabilities of the steps -radius..radius in 2^-32; radius < 0: no step,
+//                             the pixel is the sample's own
+// choice   (S,)               out: pixel index in the sample
+// values   (C, S)             out: working grey level
+__kernel void lcpdf_draw(__global const float *restrict distance, __global const float *restrict nearest,
+                         const int blocks, const int S, const int P, const float scale,
+                         __global const float *restrict sample, const int plane,
+                         __global const int *restrict candidates, __global const int *restrict sites,
+                         const ulong seed, const uint level, const uint sweep, __global const uint *restrict noise,
+                         const int radius, const int top, __global int *restrict choice,
+                         __global ushort *restrict values)
+{
+    const int s = get_global_id(0);
+    if (s >= S)
+        return;
+    const float smallest = smallest_of(nearest, blocks, P, s);
+    ulong total = 0;
+    FOR_CANDIDATES(p) total += weight(DISTANCE(p), smallest, scale);
+
+    for (uint attempt = 0; attempt < 64; ++attempt) {
+        const uint4 bits = draw4(seed, level, sweep, sites[s], PURPOSE_DRAW, attempt * (1 + C));
+        const ulong target = below(bits.x, bits.y, total);
+        ulong sum = 0;
+        int chosen = -1;
+        for (int b = 0; b < blocks && chosen < 0; ++b) {
+            if ((nearest[b * P + s] - smallest) * scale >= NO_WEIGHT)
+                continue;
+            for (int p = b * BLOCK; p < (b + 1) * BLOCK && chosen < 0; ++p) {
+                sum += weight(DISTANCE(p), smallest, scale);
+                chosen = sum > target ? p : -1;
+            }
+        }
+        const int from = candidates[chosen];
+        bool legal = true;
+        for (int c = 0; c < C; ++c) {
+            int x = (int)sample[c * plane + from];
+            if (radius >= 0) {
+                const uint u = draw4(seed, level, sweep, sites[s], PURPOSE_DRAW, attempt * (1 + C) + 1 + c).x;
+                int lo = 0, hi = 2 * radius; // the first step whose cumulative probability exceeds u
+                while (lo < hi) {
+                    const int mid = (lo + hi) / 2;
+                    if (noise[mid] > u)
+                        hi = mid;
+                    else
+                        lo = mid + 1;
+                }
+                x += lo - radius;
+            }
+            legal = legal && x >= 0 && x <= top;
+            values[c * S + s] = (ushort)clamp(x, 0, top);
+        }
+        choice[s] = from;
+        if (legal)
+            return;
+    }
+}
+
+// ICM over sample positions: the heaviest candidate, the lowest index where several are.
+__kernel void lcpdf_best(__global const float *restrict distance, __global const float *restrict nearest,
+                         const int blocks, const int S, const int P, __global const float *restrict sample,
+                         const int plane, __global const int *restrict candidates, __global int *restrict choice,
+                         __global ushort *restrict values)
+{
+    const int s = get_global_id(0);
+    if (s >= S)
+        return;
+    const float smallest = smallest_of(nearest, blocks, P, s);
+    int p = 0;
+    while (nearest[p / BLOCK * P + s] > smallest)
+        p += BLOCK;
+    while (DISTANCE(p) > smallest)
+        ++p;
+    choice[s] = candidates[p];
+    for (int c = 0; c < C; ++c)
+        values[c * S + s] = (ushort)sample[c * plane + candidates[p]];
+}
+
+// f(x) for one grey level: the weights per grey level, smoothed by the kernel of equation (7), level 0 first.
+inline float density(__private const ushort *level_of, __private const float *mass, const int m, const int x,
+                     __global const float *kernel_, const int radius)
+{
+    float f = 0.0f;
+    for (int i = 0; i < m; ++i) {
+        const int step = abs(x - (int)level_of[i]);
+        f = step <= radius ? fma(mass[i], kernel_[step], f) : f;
+    }
+    return f;
+}
+
+#define LEVELS 256
+
+// ICM over grey levels (one channel, 256 levels): the mode of P(x), lowest level where several are. The source is
+// the candidate that answers for most of the density there.
+//
+// window (radius + 1,)  exp(-k^2 / 2h^2), k = 0..radius
+__kernel void lcpdf_mode(__global const float *restrict distance, __global const float *restrict nearest,
+                         const int blocks, const int S, const int P, const float scale,
+                         __global const float *restrict sample, const int plane,
+                         __global const int *restrict candidates, __global const float *restrict window,
+                         const int radius, __global int *restrict choice, __global ushort *restrict values)
+{
+    const int s = get_global_id(0);
+    if (s >= S)
+        return;
+    const float smallest = smallest_of(nearest, blocks, P, s);
+    ulong weights[LEVELS];
+    for (int x = 0; x < LEVELS; ++x)
+        weights[x] = 0;
+    FOR_CANDIDATES(p)
+    {
+        const ulong w = weight(DISTANCE(p), smallest, scale);
+        if (w)
+            weights[(int)sample[candidates[p]]] += w;
+    }
+    ushort level_of[LEVELS];
+    float mass[LEVELS];
+    int m = 0;
+    for (int x = 0; x < LEVELS; ++x)
+        if (weights[x]) {
+            level_of[m] = (ushort)x;
+            mass[m++] = (float)weights[x];
+        }
+    int mode = 0;
+    float highest = -1.0f;
+    for (int x = level_of[0]; x <= level_of[m - 1]; ++x) { // a mixture of Gaussians peaks between its extremes
+        const float f = density(level_of, mass, m, x, window, radius);
+        if (f > highest) {
+            highest = f;
+            mode = x;
+        }
+    }
+    float share = -1.0f;
+    FOR_CANDIDATES(p)
+    {
+        const ulong w = weight(DISTANCE(p), smallest, scale);
+        const int step = w ? abs(mode - (int)sample[candidates[p]]) : 0;
+        const float here = w && step <= radius ? (float)w * window[step] : -1.0f;
+        if (here > share) {
+            share = here;
+            choice[s] = candidates[p];
+        }
+    }
+    values[s] = (ushort)mode;
+}
+
+#ifndef HEAVIEST
+#define HEAVIEST 16
+#endif
+
+// ICM over pixel vectors: the mode of P(x) among the values of the HEAVIEST heaviest candidates, the density summed
+// over all candidates. Heavier first, then the lower index.
+__kernel void lcpdf_mode_vector(__global const float *restrict distance, __global const float *restrict nearest,
+                                const int blocks, const int S, const int P, const float scale,
+                                __global const float *restrict sample, const int plane,
+                                __global const int *restrict candidates, __global int *restrict choice,
+                                __global ushort *restrict values)
+{
+    const int s = get_global_id(0);
+    if (s >= S)
+        return;
+    const float smallest = smallest_of(nearest, blocks, P, s);
+    ulong heaviest[HEAVIEST];
+    int at[HEAVIEST];
+    int m = 0;
+    FOR_CANDIDATES(p)
+    {
+        const ulong w = weight(DISTANCE(p), smallest, scale);
+        if (!w || (m == HEAVIEST && w <= heaviest[m - 1]))
+            continue;
+        int i = m < HEAVIEST ? m++ : m - 1;
+        for (; i > 0 && heaviest[i - 1] < w; --i) {
+            heaviest[i] = heaviest[i - 1];
+            at[i] = at[i - 1];
+        }
+        heaviest[i] = w;
+        at[i] = candidates[p];
+    }
+    float f[HEAVIEST];
+    for (int i = 0; i < m; ++i)
+        f[i] = 0.0f;
+    FOR_CANDIDATES(p)
+    {
+        const ulong w = weight(DISTANCE(p), smallest, scale);
+        if (!w)
+            continue;
+        for (int i = 0; i < m; ++i) {
+            float gap = 0.0f; // |y_q - y_p|^2
+            for (int c = 0; c < C; ++c) {
+                const float e = sample[c * plane + at[i]] - sample[c * plane + candidates[p]];
+                gap = fma(e, e, gap);
+            }
+            const float a = gap * scale;
+            f[i] = a < NO_WEIGHT ? fma((float)w, exp32(-a), f[i]) : f[i];
+        }
+    }
+    int mode = 0;
+    for (int i = 1; i < m; ++i)
+        mode = f[i] > f[mode] ? i : mode;
+    choice[s] = at[mode];
+    for (int c = 0; c < C; ++c)
+        values[c * S + s] = (ushort)sample[c * plane + at[mode]];
+}
+
+// The whole table of probabilities of one channel, (S, levels).
+//
+// window  (radius + 1,)   exp(-k^2 / 2h^2)
+// mass    (S, levels)     scratch: sum of the weights per grey level
+// table   (S, levels)     out: P(x), adds up to 1 over each row to float32's precision
+__kernel void lcpdf_table(__global const float *restrict distance, __global const float *restrict nearest,
+                          const int blocks, const int S, const int P, const float scale,
+                          __global const float *restrict sample, __global const int *restrict candidates,
+                          __global const float *restrict window, const int radius, const int levels,
+                          __global ulong *restrict mass, __global float *restrict table)
+{
+    const int s = get_global_id(0);
+    if (s >= S)
+        return;
+    const float smallest = smallest_of(nearest, blocks, P, s);
+    __global ulong *m = mass + (size_t)s * levels;
+    __global float *f = table + (size_t)s * levels;
+    for (int x = 0; x < levels; ++x)
+        m[x] = 0;
+    FOR_CANDIDATES(p)
+    {
+        const ulong w = weight(DISTANCE(p), smallest, scale);
+        if (w)
+            m[(int)sample[candidates[p]]] += w;
+    }
+    float total = 0.0f;
+    for (int x = 0; x < levels; ++x) {
+        float here = 0.0f;
+        for (int v = max(0, x - radius); v <= min(levels - 1, x + radius); ++v)
+            here = m[v] ? fma((float)m[v], window[abs(x - v)], here) : here;
+        f[x] = here;
+        total += here;
+    }
+    for (int x = 0; x < levels; ++x)
+        f[x] /= total;
+}

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma OPENCL FP_CONTRACT OFF
+#include "common/lattice.h"
+
+// The neighbourhoods of the sites to relax, ready for the distance of equation (12).
+//
+// For site s and neighbour r = N_s[k]:  u = 1 - t_r  and  xu = x_r * (1 - t_r), exact in float32 because pixels
+// are whole numbers below 2^12 and temperatures whole multiples of 2^-10. A neighbour outside an open lattice has u = 0.
+//
+// sites       (S,)        pixel index of each site
+// values      (C, H, W)   working grey levels
+// temperature (H, W)      in 1/1024
+// offsets     (N, 2)      (row, column) on the level's grid, canonical order
+// confidence  (N, P)      out: u; P is S rounded up to whole vectors, the rest is 0
+// weighted    (N, C, P)   out: x * u
+// One work-item per (site, neighbour).
+__kernel void neighbourhood(__global const int *restrict sites, const int S, const int P,
+                            __global const ushort *restrict values, __global const ushort *restrict temperature,
+                            const int channels, const int plane, __global const int2 *restrict offsets, GRID,
+                            __global float *restrict confidence, __global float *restrict weighted)
+{
+    const int s = get_global_id(0), k = get_global_id(1);
+    if (s >= P)
+        return;
+    int r = -1;
+    if (s < S) {
+        const int i = ROW_OF(sites[s]), j = COL_OF(sites[s]);
+        const int2 o = offsets[k];
+        r = neighbour(i, j, o.x, o.y, rows, cols, spacing, width, torus);
+    }
+    const float u = r < 0 ? 0.0f : (float)(1024 - temperature[r]) * 0x1p-10f;
+    confidence[k * P + s] = u;
+    for (int c = 0; c < channels; ++c)
+        weighted[(k * channels + c) * P + s] = r < 0 ? 0.0f : (float)values[c * plane + r] * u;
+}

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "common/philox.h"
+
+// Algorithm 1, before the first level: every site takes a pixel of the sample at random.
+//
+// sample (C, plane) working grey levels; pixels (count,) pixel indices in it to take from
+// values (C, sites), source (sites,)  out
+// One work-item per site.
+__kernel void start(const ulong seed, __global const float *restrict sample, const int plane, const int channels,
+                    __global const int *restrict pixels, const int count, const int sites, __global ushort *restrict values, __global int *restrict source)
+{
+    const int s = get_global_id(0);
+    if (s >= sites)
+        return;
+    const uint4 bits = draw4(seed, 0, 0, s, PURPOSE_START, 0);
+    const int from = pixels[below(bits.x, bits.y, count)];
+    source[s] = from;
+    for (int c = 0; c < channels; ++c)
+        values[c * sites + s] = (ushort)sample[c * plane + from];
+}

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "common/lattice.h"
+
+// Equation (13): t_s = max(0, (xi + sum of t_r over r in N_s) / |N_s|), in whole 1/1024, rounded down.
+// N_s holds the neighbours on the lattice: a neighbour outside an open lattice is no member.
+//
+// sites (S,), temperature (H, W) in 1/1024, offsets (N, 2), xi in 1/1024 (negative)
+// cooled (S,)  out
+// One work-item per site.
+__kernel void temperature(__global const int *restrict sites, const int S,
+                          __global const ushort *restrict temperature, __global const int2 *restrict offsets,
+                          const int N, GRID, const int xi, __global ushort *restrict cooled)
+{
+    const int s = get_global_id(0);
+    if (s >= S)
+        return;
+    const int i = ROW_OF(sites[s]), j = COL_OF(sites[s]);
+    int sum = xi, members = 0;
+    for (int k = 0; k < N; ++k) {
+        const int r = neighbour(i, j, offsets[k].x, offsets[k].y, rows, cols, spacing, width, torus);
+        if (r < 0)
+            continue;
+        sum += temperature[r];
+        ++members;
+    }
+    cooled[s] = sum > 0 ? (ushort)(sum / members) : (ushort)0;
+}

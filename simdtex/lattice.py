@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Lattices, neighbourhoods and boundaries: equations (3), (10) and (11)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def neighbourhood_offsets(order: int) -> NDArray[np.int32]:
+    """Offsets r - s of the neighbourhood of an order, equation (3).
+
+    Parameters
+    ----------
+    order : int
+        o >= 1: the neighbours are the sites within the distance sqrt(o).
+
+    Returns
+    -------
+    (N, 2) int32 array
+        (row, column) offsets in canonical order: by distance, then row, then column. o = 1 has 4, o = 8
+        has 24, o = 18 has 60.
+    """
+    check_order(order)
+    radius = isqrt(order)
+    row, col = np.mgrid[-radius : radius + 1, -radius : radius + 1].reshape(2, -1)
+    squared = row * row + col * col
+    inside = (squared > 0) & (squared <= order)
+    row, col, squared = row[inside], col[inside], squared[inside]
+    canonical = np.lexsort((col, row, squared))
+    return np.stack([row, col], 1)[canonical].astype(np.int32)
+
+
+def check_order(order: Any) -> None:
+    """Raise unless `order` is a whole number from 1 up."""
+    if isinstance(order, bool) or not isinstance(order, (int, np.integer)):
+        raise TypeError(f"order must be a whole number, not {type(order).__name__}")
+    if order < 1:
+        raise ValueError(f"order {order} has no neighbours; give 1 (4 neighbours) or more, say 8 or 18")
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The lattice of one level within a picture, equation (10): sites (spacing i, spacing j).
+
+    Parameters
+    ----------
+    height, width : int
+        The whole picture, in pixels.
+    spacing : int
+        2**level.
+    torus : bool
+        Whether rows and columns wrap around.
+    """
+
+    height: int
+    width: int
+    spacing: int = 1
+    torus: bool = True
+
+    @property
+    def rows(self) -> int:
+        """Rows of the grid."""
+        return -(-self.height // self.spacing)
+
+    @property
+    def cols(self) -> int:
+        """Columns of the grid."""
+        return -(-self.width // self.spacing)
+
+    @property
+    def plane(self) -> int:
+        """Pixels of the whole picture."""
+        return self.height * self.width
+
+    @property
+    def args(self) -> tuple[np.int32, ...]:
+        """The GRID arguments of a kernel (kernels/common/lattice.h)."""
+        numbers = (self.rows, self.cols, self.spacing, self.width, self.torus)
+        return tuple(np.int32(n) for n in numbers)
+
+    def sites(self) -> NDArray[np.int32]:
+        """Pixel index of every site, (rows * cols,), row by row."""
+        row = np.arange(self.rows, dtype=np.int32)[:, None] * np.int32(self.width)
+        col = np.arange(self.cols, dtype=np.int32)[None, :]
+        sites: NDArray[np.int32] = ((row + col) * np.int32(self.spacing)).ravel()
+        return sites
+
+    def view(self, picture: NDArray[Any]) -> NDArray[Any]:
+        """The sites of this grid as a view of a picture (..., H, W)."""
+        return picture[..., :: self.spacing, :: self.spacing]
+
+    def neighbours(self, sites: NDArray[np.int32], offsets: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Pixel index of each neighbour, (N, S); -1 outside an open lattice and for the site itself."""
+        row = sites // self.width // self.spacing
+        col = sites % self.width // self.spacing
+        k = row[None, :] + offsets[:, 0, None]
+        m = col[None, :] + offsets[:, 1, None]
+        if self.torus:
+            k, m = k % self.rows, m % self.cols
+        inside = (k >= 0) & (k < self.rows) & (m >= 0) & (m < self.cols)
+        itself = (k == row) & (m == col)
+        return np.where(inside & ~itself, (k * self.width + m) * self.spacing, -1).astype(np.int32)
+
+
+@dataclass(frozen=True)
+class Sublattice:
+    """The sites n (a, 0) + m (b, c), (row, column); its a * c cosets are the colours of a lattice colouring."""
+
+    a: int
+    b: int
+    c: int
+
+    @property
+    def index(self) -> int:
+        """Number of cosets."""
+        return self.a * self.c
+
+    def shortest(self) -> int:
+        """Squared length of its shortest vector."""
+        reach = isqrt(2 * self.index) + 1
+        best = self.a * self.a
+        for m in range(1, reach // self.c + 2):
+            row = (m * self.b) % self.a
+            row = min(row, self.a - row)
+            best = min(best, row * row + (m * self.c) ** 2)
+        return best
+
+    def fits(self, rows: int, cols: int) -> bool:
+        """Whether a torus of this size holds the pattern without a seam."""
+        return rows % self.a == 0 and cols % self.c == 0 and (cols // self.c * self.b) % self.a == 0
+
+
+def coloring_sublattice(
+    order: int, rows: int | None = None, cols: int | None = None, limit: int | None = None
+) -> Sublattice | None:
+    """The sublattice of fewest cosets whose shortest vector is longer than a neighbourhood reaches.
+
+    Parameters
+    ----------
+    order : int
+        Of the neighbourhood.
+    rows, cols : int, optional
+        A torus that the pattern must fit; without them, the best of the plane.
+    limit : int, optional
+        Most cosets to look at; a square pattern needs no more than the default, (isqrt(order) + 1)**2.
+
+    Returns
+    -------
+    Sublattice or None
+        Index 2 for order 1, 4 for 2, 9 for 8, 20 for 18; None where no torus of this size has one.
+    """
+    for index in range(1, (limit or (isqrt(order) + 1) ** 2) + 1):
+        for c in range(1, index + 1):
+            if index % c or (cols is not None and cols % c):
+                continue
+            for b in range(index // c):
+                found = Sublattice(index // c, b, c)
+                fitting = rows is None or cols is None or found.fits(rows, cols)
+                if fitting and found.shortest() > order:
+                    return found
+    return None

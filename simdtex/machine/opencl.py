@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The machine on an OpenCL device: compiles kernels, holds arrays, launches."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyopencl as cl
+import pyopencl.array as cl_array
+import pyopencl.tools as cl_tools
+
+from simdtex.device import DeviceError, DeviceInfo
+from simdtex.ops.operation import Array, Operation, P, R
+
+OUT_OF_MEMORY = (
+    cl.status_code.MEM_OBJECT_ALLOCATION_FAILURE,
+    cl.status_code.OUT_OF_RESOURCES,
+    cl.status_code.OUT_OF_HOST_MEMORY,
+    cl.status_code.INVALID_BUFFER_SIZE,
+)
+
+
+def kernel_folder() -> Path:
+    """Where the .cl files are: inside the package in a wheel, beside it in a checkout."""
+    package = Path(__file__).resolve().parent.parent
+    inside = package / "kernels"
+    return inside if inside.is_dir() else package.parent / "kernels"
+
+
+class OpenCL:
+    """One OpenCL device.
+
+    Parameters
+    ----------
+    info : DeviceInfo
+        From `simdtex.device.find`.
+    work_group : int, optional
+        Forces the work-group size of every launch; changes no bit of any result.
+    scratch : int, optional
+        Bytes that distances may take at a time; changes no bit of any result.
+    vector : int, optional
+        Sites side by side in a work-item (1, 4, 8 or 16); changes no bit of any result.
+    step : int, optional
+        Candidates kept in registers together, a divisor of 64; changes no bit of any result.
+    """
+
+    def __init__(
+        self,
+        info: DeviceInfo,
+        *,
+        work_group: int | None = None,
+        scratch: int | None = None,
+        vector: int | None = None,
+        step: int | None = None,
+    ) -> None:
+        self.info = info
+        self.name = f"{info.name.strip()} ({info.platform})"
+        self.context = cl.Context([info.handle])
+        self.queue = cl.CommandQueue(self.context)
+        self.work_group = work_group
+        on_gpu = info.kind == "gpu"
+        self.scratch = scratch or (2**28 if on_gpu else 2**24)
+        self.vector = vector or (1 if on_gpu else 16)
+        self.step = step or 4
+        self.tile = (64, 1) if on_gpu else (1, 8)
+        self._pool = cl_tools.MemoryPool(cl_tools.ImmediateAllocator(self.queue))
+        self._pending, self._burst, self._synced = 0, 1e8, time.perf_counter()
+        self._constants: dict[tuple[str, bytes], Array] = {}
+        self._programs: dict[tuple[str, str], Any] = {}
+        self._kernels: dict[tuple[str, str, str], Any] = {}
+
+    def run(self, operation: Operation[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+        """Launch the operation's kernels."""
+        with self._memory_errors():
+            return operation.launch(self, *args, **kwargs)
+
+    def put(self, array: Any) -> Array:
+        """Copy to the device."""
+        with self._memory_errors():
+            return cl_array.to_device(self.queue, np.ascontiguousarray(array))
+
+    def get(self, array: Array) -> Any:
+        """Copy from the device."""
+        return array.get(self.queue)
+
+    def empty(self, shape: Any, dtype: Any) -> Array:
+        """An array whose contents do not matter yet, from a pool."""
+        return cl_array.empty(self.queue, shape, dtype, allocator=self._pool)
+
+    def constant(self, array: Any) -> Array:
+        """A small table on the device, uploaded once."""
+        key = (array.dtype.str, array.tobytes())
+        if key not in self._constants:
+            self._constants[key] = self.put(array)
+        return self._constants[key]
+
+    def sync(self, work: int = 0) -> None:
+        """Wait until the queue is empty; given the fma just asked for, only when a tenth of a second is due."""
+        self._pending += work
+        if work and self._pending < self._burst:
+            return
+        with self._memory_errors():
+            self.queue.finish()
+        seconds = time.perf_counter() - self._synced
+        if work:
+            rate = self._pending / max(seconds, 1e-6)
+            self._burst = min(max(rate * 0.1, self._burst / 2), self._burst * 2)
+        self._pending, self._synced = 0, time.perf_counter()
+
+    def require(self, size: int) -> None:
+        """Raise DeviceError where this many bytes are more than the device has."""
+        if size > self.info.memory:
+            raise DeviceError(
+                f"this needs about {size / 2**20:.0f} MiB and {self.name} has {self.info.memory / 2**20:.0f}; "
+                "give a smaller size or another --device"
+            )
+
+    @contextmanager
+    def _memory_errors(self) -> Iterator[None]:
+        """Say in one sentence that the device ran out of memory."""
+        try:
+            yield
+        except cl.Error as error:
+            if error.code not in OUT_OF_MEMORY:
+                raise
+            raise DeviceError(
+                f"{self.name} ran out of memory; give a smaller size or sample, or another --device"
+            ) from error
+
+    def chunk(self, candidates: int, values: int) -> int:
+        """Whole vectors of sites: bounded by scratch memory, and by 4e9 fma so that no launch is long."""
+        fit = min(self.scratch // (4 * candidates), int(4e9) // (2 * candidates * values))
+        return max(1, fit // self.vector) * self.vector
+
+    def kernel(self, file: str, name: str, **defines: int) -> Any:
+        """A kernel of ``kernels/FILE.cl``, compiled once for these -D constants."""
+        options = " ".join(f"-D {key}={value}" for key, value in sorted(defines.items()))
+        key = (file, name, options)
+        if key not in self._kernels:
+            if key[::2] not in self._programs:
+                self._programs[key[::2]] = self._build(file, options)
+            self._kernels[key] = cl.Kernel(self._programs[key[::2]], name)
+        return self._kernels[key]
+
+    def _build(self, file: str, options: str) -> Any:
+        folder = kernel_folder()
+        source = (folder / f"{file}.cl").read_text(encoding="utf-8")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", cl.CompilerWarning)
+            return cl.Program(self.context, source).build(
+                [*options.split(), "-I", str(folder)]
+            )
+
+    def launch(
+        self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None
+    ) -> None:
+        """Enqueue a kernel over a range of work-items, rounded up to whole work-groups where one is given."""
+        if self.work_group:
+            local = (self.work_group,) + (1,) * (len(size) - 1)
+        if local:
+            size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
+        data = [a.data if isinstance(a, cl_array.Array) else a for a in args]
+        kernel(self.queue, size, local, *data)

@@ -1,0 +1,408 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Nonparametric multiscale Markov random field: Algorithm 1 of Paget and Longstaff (1998).
+
+`synthesize` is the algorithm, step by step; `_relax` is its body, steps 6.2.2.1 to 6.2.2.3. The numbers in the comments are
+the algorithm's own.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields, replace
+from math import log2, prod
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex import schedules
+from simdtex.lattice import Grid, check_order, neighbourhood_offsets
+from simdtex.machine import Machine
+from simdtex.ops import lcpdf
+from simdtex.ops.coherence import coherence
+from simdtex.ops.commit import commit
+from simdtex.ops.neighbourhood import Field, neighbourhood
+from simdtex.ops.operation import Array
+from simdtex.ops.start import start
+from simdtex.ops.temperature import temperature
+from simdtex.options import one_of, real, whole
+from simdtex.run import Callback, Output, Progress, Stage
+from simdtex.sample import Candidates, Sample
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "paper": {
+        "relaxation": "gibbs",
+        "bandwidth": 1.0,
+        "coherence": 0.0,
+        "xi": -1.0,
+        "free_sweeps": 0,
+        "pixel": "density",
+        "phases": "decimated",
+        "edges": "whole",
+        "coarsest": "same",
+    },
+}
+"""``paper`` keeps the 1998 rules to the letter."""
+
+ENOUGH = 64
+"""Candidates that the sample must still have at the coarsest of the default levels."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """The options of the method ``mrf``.
+
+    Parameters
+    ----------
+    order : int
+        o of equation (3): neighbours within the distance sqrt(o).
+    levels : int, optional
+        M of Algorithm 1. None: the most levels at which the sample still has 64 candidates.
+    relaxation : {"icm", "gibbs"}
+        Take the LCPDF's mode, or draw from it.
+    bandwidth : float
+        h in units of h_opt, equation (8).
+    coherence : float
+        The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence.
+    xi : float
+        xi < 0 of equation (13): the further below 0, the fewer sweeps.
+    free_sweeps : int
+        Sweeps over all sites of a level, held ones too, after its equilibrium.
+    pixel : {"source", "density"}
+        A relaxed site takes the pixel of its source in the sample, or a grey level of the Parzen density, whose
+        kernel also spreads over x_s.
+    phases : {"all", "decimated"}
+        Candidates at coarse levels: every sample position, or those of the decimated sample, equation (10).
+    edges : {"auto", "reflect", "whole"}
+        Candidates are those sample positions whose whole neighbourhood lies in the sample, equation (4)
+        (``whole``), or all, those near the edge with a neighbourhood completed by reflection (``reflect``);
+        ``auto`` reflects at the levels at which fewer than half of the positions have a whole neighbourhood.
+    coarsest : {"gibbs", "same"}
+        How the coarsest level relaxes: by draws, or as the other levels. Its mode says nothing while all is unknown.
+    schedule : {"coloring"}
+        Which sites relax together.
+    boundary : {"torus", "open"}
+        Whether the output wraps around.
+    """
+
+    order: int = 18
+    levels: int | None = None
+    relaxation: str = "icm"
+    bandwidth: float = 0.15
+    coherence: float = 1.0
+    xi: float = -1.0
+    free_sweeps: int = 2
+    pixel: str = "source"
+    phases: str = "decimated"
+    edges: str = "auto"
+    coarsest: str = "gibbs"
+    schedule: str = "coloring"
+    boundary: str = "torus"
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        check_order(self.order)
+        if self.levels is not None:
+            whole("levels", self.levels, 1)
+        one_of("relaxation", self.relaxation, ("icm", "gibbs"))
+        real("bandwidth", self.bandwidth, 0, above=True)
+        real("coherence", self.coherence, 0)
+        real("-xi", -self.xi if isinstance(self.xi, (int, float)) else self.xi, 0, above=True)
+        whole("free_sweeps", self.free_sweeps, 0)
+        one_of("pixel", self.pixel, ("source", "density"))
+        one_of("phases", self.phases, ("all", "decimated"))
+        one_of("edges", self.edges, ("auto", "reflect", "whole"))
+        one_of("coarsest", self.coarsest, ("gibbs", "same"))
+        one_of("boundary", self.boundary, ("torus", "open"))
+        schedules.get(self.schedule)
+
+
+def make_options(preset: str = "default", **given: Any) -> Options:
+    """Options from a preset and what the user gave; unknown names are a TypeError that lists the valid ones."""
+    one_of("preset", preset, PRESETS)
+    valid = [f.name for f in fields(Options)]
+    unknown = [name for name in given if name not in valid]
+    if unknown:
+        raise TypeError(
+            f"unknown option {unknown[0]!r} of the method 'mrf'; choose from: preset, {', '.join(valid)}"
+        )
+    return replace(Options(**PRESETS[preset]), **given)
+
+
+class Level(NamedTuple):
+    """What the relaxation of one level needs; equations (10) and (11)."""
+
+    number: int
+    grid: Grid
+    offsets: Array
+    candidates: Candidates
+    window: lcpdf.Window
+
+
+def synthesize(
+    machine: Machine,
+    pixels: NDArray[Any],
+    shape: tuple[int, int],
+    options: Options,
+    seed: int,
+    callback: Callback | None = None,
+) -> tuple[NDArray[Any], Output]:
+    """Algorithm 1: nonparametric multiscale MRF texture synthesis.
+
+    Parameters
+    ----------
+    machine : Machine
+        What executes the steps.
+    pixels : (rows, cols, channels) array
+        Y, the sample.
+    shape : (int, int)
+        Rows and columns of X, the output.
+    options : Options
+    seed : int
+        Key of every random number.
+    callback : callable, optional
+        Called with a `simdtex.run.Progress` after every piece of a step.
+
+    Returns
+    -------
+    image : (rows, cols, channels) array
+        In the sample's type.
+    output : simdtex.run.Output
+        Source map, temperatures, stages and statistics.
+
+    Notes
+    -----
+    Cost: sweeps x sites x candidates x |N| x channels x 2 fma, 6 to 7 sweeps a level. Memory on the device: 8 + 2
+    channels bytes per output pixel, 4 channels + 8 bytes per sample pixel, and the machine's scratch memory or, if
+    that is more, 64 bytes per sample pixel.
+    """
+    began = time.perf_counter()
+    offsets = neighbourhood_offsets(options.order)
+    channels = pixels.shape[-1]
+    levels = _number_of_levels(pixels.shape[:2], offsets, shape, options)  # 1
+    reflected = int(offsets.max()) * 2 ** (levels - 1) if options.edges != "whole" else 0
+    sample = Sample(pixels, channels * len(offsets), reflected)
+    _check_memory(machine, sample, shape)
+    schedule = schedules.get(options.schedule)
+    device_offsets = machine.put(offsets)
+    meter = _Meter(sample, shape, levels, len(offsets), options)
+    stages: list[Stage] = []
+    reports: list[dict[str, Any]] = []
+
+    picture = Grid(*shape)  # 2
+    everywhere = machine.put(sample.positions(np.zeros((1, 2), np.int32), 1))
+    planes = machine.put(sample.working.astype(np.float32))
+    field = start(machine, planes, everywhere, picture, seed)  # 5
+    for number in reversed(range(levels)):  # 6
+        grid = Grid(*shape, 2**number, options.boundary == "torus")  # 3, 6.1
+        candidates = sample.candidates(
+            machine, offsets, 2**number, options.phases, options.edges
+        )  # 4
+        h = options.bandwidth * lcpdf.optimal_bandwidth(
+            sample.variance, candidates.count, channels * (len(offsets) + 1)
+        )
+        level = Level(number, grid, device_offsets, candidates, lcpdf.window(h, sample.top))
+        by_draw = number == levels - 1 and options.coarsest == "gibbs"
+        level_options = replace(options, relaxation="gibbs") if by_draw else options
+        state = schedule.init(machine, grid, offsets, options.order, seed, number)
+        report = {"level": number, "rows": grid.rows, "cols": grid.cols, "bandwidth": h}
+        report |= {"candidates": candidates.count, "sweeps": 0, "steps": 0, "relaxations": 0}
+        level_began = time.perf_counter()
+
+        def hot(field: Field = field, grid: Grid = grid) -> NDArray[np.uint16]:
+            return np.ascontiguousarray(grid.view(machine.get(field.temperature)))
+
+        sweeps_left = options.free_sweeps
+        while True:
+            temperatures = hot()
+            phase = "relax" if temperatures.any() else "free"
+            if phase == "free":
+                if not sweeps_left:
+                    break
+                sweeps_left -= 1
+            active = temperatures > 0 if phase == "relax" else np.ones(temperatures.shape, bool)
+            last = False
+            while not last:  # 6.2, one sweep
+                state, info = schedule.step(state, lambda active=active: active)  # 6.2.1
+                last = info.last
+                for done in _pieces(machine, level, info.sites):  # 6.2.2
+                    field = _relax(machine, level, field, done, level_options, seed, info.sweep)
+                    report["relaxations"] += done.size
+                    machine.sync(done.size * meter.fma(candidates))
+                    if callback:
+                        piece_last = last and done[-1] == info.sites[-1]
+                        callback(
+                            Progress(
+                                number,
+                                levels,
+                                info.sweep,
+                                phase,
+                                float(temperatures.mean()) / 1024,
+                                bool(piece_last),
+                                meter.fraction(report),
+                                _image_reader(machine, sample, field, grid),
+                                lambda: hot() / 1024,
+                            )
+                        )
+                report["steps"] += 1
+            report["sweeps"] += 1
+        report["fma"] = report["relaxations"] * meter.fma(candidates)
+        report["seconds"] = time.perf_counter() - level_began
+        reports.append(report)
+        meter.finish(report)
+        stages.append(Stage(number, _image_reader(machine, sample, field, grid)()))
+
+    source = machine.get(field.source)
+    image = sample.picture(machine.get(field.values), source)
+    statistics = {
+        "device": machine.name,
+        "seed": seed,
+        "options": asdict(options),
+        "seconds": time.perf_counter() - began,
+        "levels": reports,
+    }
+    return image, Output(sample.place(source), machine.get(field.temperature) / 1024, stages, statistics)
+
+
+def _relax(
+    machine: Machine,
+    level: Level,
+    field: Field,
+    sites: NDArray[np.int32],
+    options: Options,
+    seed: int,
+    sweep: int,
+) -> Field:
+    """Steps 6.2.2.1 to 6.2.2.3 for sites that relax together."""
+    number, grid, offsets, candidates, window = level
+    here = machine.put(sites)
+    near = neighbourhood(machine, here, field, offsets, grid)  # 6.2.2.1
+    distances = lcpdf.distance(machine, near, candidates)
+    if options.coherence:
+        favour = np.float32(1 / (1 + options.coherence))
+        distances = coherence(machine, distances, candidates, here, field, offsets, grid, favour)
+    density = options.pixel == "density"
+    if options.relaxation == "gibbs":  # 6.2.2.2
+        relaxed = lcpdf.draw(
+            machine, distances, candidates, here, window, density, seed, number, sweep
+        )
+    elif not density:
+        relaxed = lcpdf.best(machine, distances, candidates)
+    elif len(candidates.pixels) == 1 and window.top == 255:
+        relaxed = lcpdf.mode(machine, distances, candidates, window)
+    else:
+        relaxed = lcpdf.mode_vector(machine, distances, candidates, window)
+    xi = min(-1, round(options.xi * 1024))
+    cooled = temperature(machine, here, field, offsets, grid, xi)  # 6.2.2.3
+    return commit(machine, here, field, relaxed, cooled)
+
+
+def _pieces(machine: Machine, level: Level, sites: NDArray[np.int32]) -> list[NDArray[np.int32]]:
+    """The sites of a step in pieces that the machine's scratch memory holds."""
+    values = level.candidates.pixels.shape[0] * level.offsets.shape[0]
+    size = machine.chunk(level.candidates.count, values)
+    return [sites[i : i + size] for i in range(0, len(sites), size)]
+
+
+def _number_of_levels(
+    sample: tuple[int, ...], offsets: NDArray[np.int32], shape: tuple[int, int], options: Options
+) -> int:
+    """M, checked against the sample's rows and columns and against M <= 1 + log2(min(Mx, My))."""
+    check_fit(sample, int(offsets.max()), options.order)
+    step = 1 if options.phases == "all" else 2
+
+    def candidates(levels: int) -> int:
+        spacing = 2 ** (levels - 1)
+        margin = 0 if options.edges != "whole" else 2 * int(offsets.max()) * spacing
+        return prod(max(0, n - margin) // (spacing if step == 2 else 1) for n in sample)
+
+    most = 1 + int(log2(min(*shape, *sample)))
+    while most > 1 and not candidates(most):
+        most -= 1
+    if options.levels is None:
+        levels = 1
+        while levels < most and candidates(levels + 1) >= ENOUGH:
+            levels += 1
+        return levels
+    if options.levels > most:
+        raise ValueError(
+            f"levels={options.levels} is too many for this sample, output and order; give at most {most}"
+        )
+    return options.levels
+
+
+def check_fit(sample: tuple[int, ...], radius: int, order: int) -> None:
+    """Raise unless the sample holds one whole neighbourhood at least."""
+    side = min(sample)
+    if side > 2 * radius:
+        return
+    largest = ((side - 1) // 2 + 1) ** 2 - 1 if side > 2 else 0
+    raise ValueError(
+        f"a neighbourhood of order {order} does not fit the sample of {sample[0]} rows x {sample[1]} columns; "
+        + (f"the largest order that fits is {largest}" if largest else "give at least 3x3 pixels")
+    )
+
+
+def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int]) -> None:
+    pixels = shape[0] * shape[1]
+    if pixels * sample.channels >= 2**31:
+        raise ValueError(
+            f"an output of {shape[0]} rows x {shape[1]} columns is beyond 2**31 values; give a smaller size"
+        )
+    machine.require(
+        pixels * (8 + 2 * sample.channels + 4)
+        + sample.rows * sample.cols * (4 * sample.channels + 8 + 64)
+    )
+
+
+def _image_reader(
+    machine: Machine, sample: Sample, field: Field, grid: Grid
+) -> Callable[[], NDArray[Any]]:
+    def image() -> NDArray[Any]:
+        values, source = machine.get(field.values), machine.get(field.source)
+        return sample.picture(grid.view(values), grid.view(source))
+
+    return image
+
+
+class _Meter:
+    """Work done and expected: relaxations times candidates, as a level is expected to take 7 sweeps."""
+
+    def __init__(
+        self,
+        sample: Sample,
+        shape: tuple[int, int],
+        levels: int,
+        neighbours: int,
+        options: Options,
+    ) -> None:
+        self.values = sample.channels * neighbours
+        offsets = neighbourhood_offsets(options.order)
+        self.expected = {}
+        self.work = {}
+        for number in range(levels):
+            grid = Grid(*shape, 2**number)
+            sweeps = 7 * 0.75 if number < levels - 1 else min(1024, neighbours / -options.xi)
+            self.expected[number] = grid.rows * grid.cols * (sweeps + options.free_sweeps)
+            self.work[number] = sample.positions(
+                offsets, 2**number, options.phases, options.edges
+            ).size
+        self.total = sum(self.expected[n] * self.work[n] for n in self.expected)
+        self.done = 0.0
+
+    def fma(self, candidates: Candidates) -> int:
+        """Of equation (12), for one site."""
+        return 2 * candidates.count * self.values
+
+    def fraction(self, report: dict[str, Any]) -> float:
+        """Share of all the work."""
+        number = report["level"]
+        here = min(1.0, report["relaxations"] / self.expected[number])
+        return min(1.0, (self.done + here * self.expected[number] * self.work[number]) / self.total)
+
+    def finish(self, report: dict[str, Any]) -> None:
+        """Count a level as done."""
+        number = report["level"]
+        self.done += self.expected[number] * self.work[number]

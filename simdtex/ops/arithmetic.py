@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""float32 arithmetic with the bits that a device gives: the twins of fma() and of kernels/common/exp.h."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def fma32(a: Any, b: Any, c: Any) -> NDArray[np.float32]:
+    """a * b + c in float32, rounded once.
+
+    The product of two float32 is exact in float64. The sum is rounded to odd there, which makes the second
+    rounding, to float32, the right one (Boldo and Melquiond, 2008).
+    """
+    product = np.asarray(a, np.float64) * np.asarray(b, np.float64)
+    c = np.asarray(c, np.float64)
+    total = np.atleast_1d(product + c)
+    part = total - product
+    error = np.atleast_1d((product - (total - part)) + (c - part))
+    bits = total.view(np.int64)
+    even = (bits & 1) == 0
+    outward = (error > 0) == (total > 0)
+    bits = np.where((error != 0) & even, np.where(outward, bits + 1, bits - 1), bits)
+    result: NDArray[np.float32] = bits.view(np.float64).astype(np.float32)
+    return result.reshape(np.broadcast_shapes(product.shape, c.shape))
+
+
+def exp32(x: Any) -> NDArray[np.float32]:
+    """exp(x) for -87 < x <= 0, bit for bit as on the device; relative error below 2.5e-7."""
+    x = np.asarray(x, np.float32)
+    k = np.rint(x * np.float32(1.44269502))
+    r = fma32(k, np.float32(-0.693145752), x)
+    r = fma32(k, np.float32(-1.42860677e-6), r)
+    p = np.float32(1.38888892e-3)
+    for coefficient in (8.33333377e-3, 4.16666679e-2, 1.66666672e-1, 0.5, 1.0, 1.0):
+        p = fma32(p, r, np.float32(coefficient))
+    p = np.asarray(p, np.float32)
+    return (p.view(np.int32) + (k.astype(np.int32) << 23)).view(np.float32)

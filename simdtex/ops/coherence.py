@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A preference for candidates that continue the source of a neighbour; the 1998 paper has none."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.lattice import Grid
+from simdtex.ops.lcpdf import Distances
+from simdtex.ops.neighbourhood import Field
+from simdtex.ops.operation import Array, Operation
+from simdtex.sample import BLOCK, Candidates
+
+if TYPE_CHECKING:
+    from simdtex.machine.opencl import OpenCL
+
+
+def _reference(
+    distances: Distances,
+    candidates: Candidates,
+    sites: NDArray[np.int32],
+    field: Field,
+    offsets: NDArray[np.int32],
+    grid: Grid,
+    favour: np.float32,
+) -> Distances:
+    r = grid.neighbours(sites, offsets)
+    source = field.source.ravel()[r]
+    row = source // candidates.cols - offsets[:, 0, None] * grid.spacing
+    col = source % candidates.cols - offsets[:, 1, None] * grid.spacing
+    inside = (row >= 0) & (row < candidates.rows) & (col >= 0) & (col < candidates.cols)
+    relaxed = (r >= 0) & (field.temperature.ravel()[r] < 1024)
+    p = candidates.index_of[np.where(inside, row * candidates.cols + col, 0)]
+    k, s = np.nonzero(inside & relaxed & (p >= 0))
+    coherent = np.zeros(distances.distance.shape, bool)
+    coherent[p[k, s], s] = True
+    d = distances.distance
+    return distances._replace(distance=np.where(coherent, d * favour, d))
+
+
+def _launch(
+    machine: OpenCL,
+    distances: Distances,
+    candidates: Candidates,
+    sites: Array,
+    field: Field,
+    offsets: Array,
+    grid: Grid,
+    favour: np.float32,
+) -> Distances:
+    machine.launch(
+        machine.kernel("coherence", "coherence", BLOCK=BLOCK),
+        (sites.size,),
+        *(sites, np.int32(sites.size), np.int32(distances.distance.shape[1])),
+        *(field.source, field.temperature, offsets, np.int32(offsets.shape[0]), *grid.args),
+        *(candidates.index_of, np.int32(candidates.rows), np.int32(candidates.cols), favour),
+        *(distances.distance, distances.nearest),
+    )
+    return distances
+
+
+coherence = Operation("coherence", _reference, _launch)

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The end of a step: what the relaxed sites have become goes into the field, all at once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.ops.lcpdf import Relaxed
+from simdtex.ops.neighbourhood import Field
+from simdtex.ops.operation import Array, Operation
+
+if TYPE_CHECKING:
+    from simdtex.machine.opencl import OpenCL
+
+
+def _reference(
+    sites: NDArray[np.int32], field: Field, relaxed: Relaxed, cooled: NDArray[np.uint16]
+) -> Field:
+    field.values.reshape(len(field.values), -1)[:, sites] = relaxed.values
+    field.source.ravel()[sites] = relaxed.choice
+    field.temperature.ravel()[sites] = cooled
+    return field
+
+
+def _launch(machine: OpenCL, sites: Array, field: Field, relaxed: Relaxed, cooled: Array) -> Field:
+    channels, height, width = field.values.shape
+    machine.launch(
+        machine.kernel("commit", "commit"),
+        (sites.size,),
+        *(sites, np.int32(sites.size), np.int32(channels), np.int32(height * width)),
+        *(relaxed.values, relaxed.choice, cooled, *field),
+    )
+    return field
+
+
+commit = Operation("commit", _reference, _launch)

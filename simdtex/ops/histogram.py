@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The LCPDF by counting exact matches: F(x, neighbours) of equations (4) and (5)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.ops.lcpdf import Distances
+from simdtex.ops.operation import Array, Operation
+from simdtex.sample import BLOCK, Candidates
+
+if TYPE_CHECKING:
+    from simdtex.machine.opencl import OpenCL
+
+
+def _reference(
+    distances: Distances, candidates: Candidates, levels: int
+) -> NDArray[np.uint32]:
+    grey = candidates.pixels[0][candidates.list[: candidates.count]].astype(np.int64)
+    counts = np.zeros((distances.count, levels), np.uint32)
+    p, s = np.nonzero(distances.distance == 0)
+    np.add.at(counts, (s, grey[p]), 1)
+    return counts
+
+
+def _launch(
+    machine: OpenCL, distances: Distances, candidates: Candidates, levels: int
+) -> Array:
+    counts = machine.empty((distances.count, levels), np.uint32)
+    blocks, padded = distances.nearest.shape
+    machine.launch(
+        machine.kernel("histogram", "histogram", BLOCK=BLOCK),
+        (distances.count,),
+        *(distances.distance, distances.nearest, np.int32(blocks), np.int32(distances.count)),
+        *(np.int32(padded), candidates.pixels, candidates.list, np.int32(levels), counts),
+    )
+    return counts
+
+
+histogram = Operation("histogram", _reference, _launch)

@@ -1,0 +1,377 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The local conditional probability density function, equations (6) to (8) and (12), on the machine.
+
+`distance` gives d_p for every site and candidate; `draw`, `best`, `mode`, `mode_vector` and `table` are what
+relaxation and users take from it. The kernels are in ``kernels/lcpdf.cl``.
+"""
+
+from __future__ import annotations
+
+from math import ceil, exp, log, pow, sqrt
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex import random
+from simdtex.ops.arithmetic import exp32, fma32
+from simdtex.ops.neighbourhood import Neighbourhoods
+from simdtex.ops.operation import Array, Operation
+from simdtex.sample import BLOCK, Candidates
+
+if TYPE_CHECKING:
+    from simdtex.machine.opencl import OpenCL
+
+HEAVIEST = 16
+"""Candidates whose values compete for the mode of a pixel vector."""
+
+NO_WEIGHT = np.float32(28)
+"""exp(-28) 2**40 < 1."""
+
+
+class Distances(NamedTuple):
+    """``distance`` (candidates, P) d_p of equation (12); ``nearest`` (blocks, P), devices only; ``count`` sites."""
+
+    distance: Array
+    nearest: Array
+    count: int
+
+
+class Relaxed(NamedTuple):
+    """``choice`` (S,) pixel index in the sample; ``values`` (C, S) working grey levels."""
+
+    choice: Array
+    values: Array
+
+
+class Window(NamedTuple):
+    """The Gaussian of equation (7) at a bandwidth h, as tables over whole grey levels.
+
+    ``scale`` 1 / 2h^2; ``noise`` (2 radius + 1,) uint32 cumulative probabilities of the steps -radius..radius in
+    2**-32; ``gauss`` (radius + 1,) float32 exp(-k^2 / 2h^2); ``top`` the highest legal level.
+    """
+
+    scale: np.float32
+    noise: NDArray[np.uint32]
+    gauss: NDArray[np.float32]
+    radius: int
+    top: int
+
+
+def optimal_bandwidth(variance: float, candidates: int, dimensions: int) -> float:
+    """h_opt of equation (8).
+
+    Parameters
+    ----------
+    variance : float
+        sigma^2, the mean marginal variance.
+    candidates : int
+        n, the number of sample data.
+    dimensions : int
+        d = channels (N + 1).
+    """
+    return sqrt(variance) * pow(4 / (candidates * (2 * dimensions + 1)), 1 / (dimensions + 4))
+
+
+def window(bandwidth: float, top: int) -> Window:
+    """The tables for a bandwidth h in working grey levels; h = 0 (a constant sample) stands for 1.
+
+    math.exp is rounded to 2**-24 or coarser here, so the last bit of a platform's libm does not show.
+    """
+    h = bandwidth or 1.0
+    scale = np.float32(1 / (2 * h * h))
+    radius = min(top, ceil(h * sqrt(2 * log(2.0**33))))
+    gauss = [exp(-k * k / (2 * h * h)) for k in range(radius + 1)]
+    steps = gauss[:0:-1] + gauss
+    total, running, noise = sum(steps), 0.0, []
+    for value in steps:
+        running += value
+        noise.append(min(2**32 - 1, round(running / total * 2**32)))
+    noise[-1] = 2**32 - 1
+    return Window(
+        scale, np.array(noise, np.uint32), np.array(gauss, np.float32), radius, top
+    )
+
+
+# -- distances, equation (12) ---------------------------------------------------------------------------------
+
+
+def _distance_reference(near: Neighbourhoods, candidates: Candidates) -> Distances:
+    confidence, weighted, count = near
+    position = candidates.list[: candidates.count]
+    d = np.zeros((position.size, count), np.float32)
+    for k, offset in enumerate(candidates.reach):
+        u = confidence[k].astype(np.float64)
+        for c, y in enumerate(candidates.pixels):
+            e = weighted[k, c] - u * y[position + offset][:, None].astype(np.float64)
+            d = (e * e + d).astype(np.float32)  # fits 53 bits, so this is the device's fma: see Sample
+    return Distances(d, None, count)
+
+
+def _distance_launch(machine: OpenCL, near: Neighbourhoods, candidates: Candidates) -> Distances:
+    neighbours, channels, padded = near.weighted.shape
+    blocks = candidates.list.size // BLOCK
+    distance = machine.empty((blocks * BLOCK, padded), np.float32)
+    nearest = machine.empty((blocks, padded), np.float32)
+    machine.launch(
+        _kernel(machine, "distance", candidates),
+        (padded // machine.vector, blocks),
+        *(near.confidence, near.weighted, np.int32(neighbours), np.int32(padded)),
+        *(candidates.pixels, _plane(candidates), candidates.list, np.int32(candidates.count)),
+        *(candidates.reach, np.int32(blocks), distance, nearest),
+        local=machine.tile,
+    )
+    return Distances(distance, nearest, near.count)
+
+
+distance = Operation("distance", _distance_reference, _distance_launch)
+
+
+# -- weights, equation (7) ------------------------------------------------------------------------------------
+
+
+def weights(distance: NDArray[np.float32], scale: np.float32) -> NDArray[np.uint64]:
+    """W_p = floor(2^40 exp(-(d_p - min d) / 2h^2)), (candidates, S)."""
+    a = (distance - distance.min(0)) * scale
+    near = np.minimum(a, NO_WEIGHT)
+    return np.where(a < NO_WEIGHT, exp32(-near) * np.float32(2**40), 0).astype(np.uint64)
+
+
+# -- the Gibbs sampler ----------------------------------------------------------------------------------------
+
+
+def _draw_reference(
+    distances: Distances,
+    candidates: Candidates,
+    sites: NDArray[np.int32],
+    win: Window,
+    noisy: bool,
+    seed: int,
+    level: int,
+    sweep: int,
+) -> Relaxed:
+    cumulative = np.cumsum(weights(distances.distance, win.scale), 0, dtype=np.uint64)
+    channels = len(candidates.pixels)
+    choice = np.zeros(sites.size, np.int32)
+    values = np.zeros((channels, sites.size), np.uint16)
+    left = np.arange(sites.size)
+    for attempt in range(64):
+        base = attempt * (1 + channels)
+        bits = random.draw4(seed, level, sweep, sites[left], random.DRAW, base)
+        target = random.below(bits[0], bits[1], cumulative[-1, left])
+        chosen = (cumulative[:, left] > target).argmax(0)
+        choice[left] = candidates.list[chosen]
+        legal = np.ones(left.size, bool)
+        for c in range(channels):
+            x = candidates.pixels[c][choice[left]].astype(np.int64)
+            if noisy:
+                u = random.draw4(seed, level, sweep, sites[left], random.DRAW, base + 1 + c)[0]
+                step = np.searchsorted(win.noise, u, side="right")
+                x = x + np.minimum(step, 2 * win.radius) - win.radius
+            legal &= (x >= 0) & (x <= win.top)
+            values[c, left] = np.clip(x, 0, win.top)
+        left = left[~legal]
+        if not left.size:
+            break
+    return Relaxed(choice, values)
+
+
+def _draw_launch(
+    machine: OpenCL,
+    distances: Distances,
+    candidates: Candidates,
+    sites: Array,
+    win: Window,
+    noisy: bool,
+    seed: int,
+    level: int,
+    sweep: int,
+) -> Relaxed:
+    out = _relaxed(machine, distances, candidates)
+    machine.launch(
+        _kernel(machine, "draw", candidates),
+        (distances.count,),
+        *_weighing(distances, win),
+        *(candidates.pixels, _plane(candidates), candidates.list, sites),
+        *(np.uint64(seed), np.uint32(level), np.uint32(sweep), machine.constant(win.noise)),
+        *(np.int32(win.radius if noisy else -1), np.int32(win.top), *out),
+    )
+    return out
+
+
+draw = Operation("draw", _draw_reference, _draw_launch)
+
+
+# -- iterated conditional modes -------------------------------------------------------------------------------
+
+
+def _best_reference(distances: Distances, candidates: Candidates) -> Relaxed:
+    choice = candidates.list[distances.distance.argmin(0)]
+    return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
+
+
+def _best_launch(machine: OpenCL, distances: Distances, candidates: Candidates) -> Relaxed:
+    out = _relaxed(machine, distances, candidates)
+    machine.launch(
+        _kernel(machine, "best", candidates),
+        (distances.count,),
+        *_weighing(distances, None),
+        *(candidates.pixels, _plane(candidates), candidates.list, *out),
+    )
+    return out
+
+
+best = Operation("best", _best_reference, _best_launch)
+
+
+def _density(mass: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
+    """f(x) = sum over v of mass[v] exp(-(x - v)^2 / 2h^2), (levels,), level 0 first."""
+    levels = np.arange(mass.size)
+    f = np.zeros(mass.size, np.float32)
+    for v in np.flatnonzero(mass):
+        gap = abs(levels - v)
+        reached = gap <= win.radius
+        f[reached] = fma32(mass[v].astype(np.float32), win.gauss[gap[reached]], f[reached])
+    return f
+
+
+def _mode_reference(distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
+    w = weights(distances.distance, win.scale)
+    position = candidates.list[: candidates.count]
+    grey = candidates.pixels[0][position].astype(np.int64)
+    choice = np.zeros(distances.count, np.int32)
+    values = np.zeros((1, distances.count), np.uint16)
+    for s in range(distances.count):
+        mass = np.zeros(256, np.uint64)
+        np.add.at(mass, grey, w[:, s])
+        f = _density(mass, win)
+        mode = int(f.argmax())
+        gap = abs(grey - mode)
+        share = w[:, s].astype(np.float32) * win.gauss[np.minimum(gap, win.radius)]
+        share[(w[:, s] == 0) | (gap > win.radius)] = -1
+        choice[s] = position[share.argmax()]
+        values[0, s] = mode
+    return Relaxed(choice, values)
+
+
+def _mode_launch(
+    machine: OpenCL, distances: Distances, candidates: Candidates, win: Window
+) -> Relaxed:
+    out = _relaxed(machine, distances, candidates)
+    machine.launch(
+        _kernel(machine, "mode", candidates),
+        (distances.count,),
+        *_weighing(distances, win),
+        *(candidates.pixels, _plane(candidates), candidates.list),
+        *(machine.constant(win.gauss), np.int32(win.radius), *out),
+    )
+    return out
+
+
+mode = Operation("mode", _mode_reference, _mode_launch)
+
+
+def _mode_vector_reference(distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
+    w = weights(distances.distance, win.scale)
+    position = candidates.list[: candidates.count]
+    y = candidates.pixels[:, position]
+    choice = np.zeros(distances.count, np.int32)
+    for s in range(distances.count):
+        heavy = np.flatnonzero(w[:, s])
+        heaviest = heavy[np.argsort(~w[heavy, s], kind="stable")][:HEAVIEST]
+        f = np.zeros(heaviest.size, np.float32)
+        for p in heavy:
+            gap = np.zeros(heaviest.size, np.float32)
+            for c in range(len(y)):
+                e = y[c, heaviest] - y[c, p]
+                gap = fma32(e, e, gap)
+            a = gap * win.scale
+            more = fma32(w[p, s].astype(np.float32), exp32(-np.minimum(a, NO_WEIGHT)), f)
+            f = np.where(a < NO_WEIGHT, more, f)
+        choice[s] = position[heaviest[f.argmax()]]
+    return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
+
+
+def _mode_vector_launch(
+    machine: OpenCL, distances: Distances, candidates: Candidates, win: Window
+) -> Relaxed:
+    out = _relaxed(machine, distances, candidates)
+    machine.launch(
+        _kernel(machine, "mode_vector", candidates),
+        (distances.count,),
+        *_weighing(distances, win),
+        *(candidates.pixels, _plane(candidates), candidates.list, *out),
+    )
+    return out
+
+
+mode_vector = Operation("mode_vector", _mode_vector_reference, _mode_vector_launch)
+
+
+# -- the table of probabilities -------------------------------------------------------------------------------
+
+
+def _table_reference(
+    distances: Distances, candidates: Candidates, win: Window
+) -> NDArray[np.float32]:
+    w = weights(distances.distance, win.scale)
+    grey = candidates.pixels[0][candidates.list[: candidates.count]].astype(np.int64)
+    table = np.zeros((distances.count, win.top + 1), np.float32)
+    for s in range(distances.count):
+        mass = np.zeros(win.top + 1, np.uint64)
+        np.add.at(mass, grey, w[:, s])
+        f = _density(mass, win)
+        table[s] = f / np.cumsum(f, dtype=np.float32)[-1]
+    return table
+
+
+def _table_launch(
+    machine: OpenCL, distances: Distances, candidates: Candidates, win: Window
+) -> Array:
+    shape = (distances.count, win.top + 1)
+    mass, table = machine.empty(shape, np.uint64), machine.empty(shape, np.float32)
+    machine.launch(
+        _kernel(machine, "table", candidates),
+        (distances.count,),
+        *_weighing(distances, win),
+        *(candidates.pixels, candidates.list, machine.constant(win.gauss)),
+        *(np.int32(win.radius), np.int32(win.top + 1), mass, table),
+    )
+    return table
+
+
+table = Operation("table", _table_reference, _table_launch)
+
+
+# -- what the launchers share ---------------------------------------------------------------------------------
+
+
+def _kernel(machine: OpenCL, name: str, candidates: Candidates) -> Any:
+    return machine.kernel(
+        "lcpdf",
+        f"lcpdf_{name}",
+        V=machine.vector,
+        C=candidates.pixels.shape[0],
+        BLOCK=BLOCK,
+        STEP=machine.step,
+        HEAVIEST=HEAVIEST,
+    )
+
+
+def _plane(candidates: Candidates) -> np.int32:
+    return np.int32(candidates.rows * candidates.cols)
+
+
+def _weighing(distances: Distances, win: Window | None) -> list[Any]:
+    """The arguments that every kernel on distances begins with."""
+    blocks, padded = distances.nearest.shape
+    sizes = [np.int32(blocks), np.int32(distances.count), np.int32(padded)]
+    return [distances.distance, distances.nearest, *sizes, *([win.scale] if win else [])]
+
+
+def _relaxed(machine: OpenCL, distances: Distances, candidates: Candidates) -> Relaxed:
+    channels = candidates.pixels.shape[0]
+    return Relaxed(
+        machine.empty((distances.count,), np.int32),
+        machine.empty((channels, distances.count), np.uint16),
+    )

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The temperature of a site after its relaxation, equation (13)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.lattice import Grid
+from simdtex.ops.neighbourhood import Field
+from simdtex.ops.operation import Array, Operation
+
+if TYPE_CHECKING:
+    from simdtex.machine.opencl import OpenCL
+
+
+def _reference(
+    sites: NDArray[np.int32], field: Field, offsets: NDArray[np.int32], grid: Grid, xi: int
+) -> NDArray[np.uint16]:
+    r = grid.neighbours(sites, offsets)
+    t = np.where(r < 0, 0, field.temperature.ravel()[r].astype(np.int32))
+    members = np.maximum(1, (r >= 0).sum(0))
+    return (np.maximum(0, xi + t.sum(0)) // members).astype(np.uint16)
+
+
+def _launch(
+    machine: OpenCL, sites: Array, field: Field, offsets: Array, grid: Grid, xi: int
+) -> Array:
+    cooled = machine.empty((sites.size,), np.uint16)
+    machine.launch(
+        machine.kernel("temperature", "temperature"),
+        (sites.size,),
+        *(sites, np.int32(sites.size), field.temperature, offsets, np.int32(offsets.shape[0])),
+        *(*grid.args, np.int32(xi), cooled),
+    )
+    return cooled
+
+
+temperature = Operation("temperature", _reference, _launch)

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checks that options share: one sentence that says what is wrong and what would be right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import isfinite
+from numbers import Integral, Real
+from typing import Any
+
+
+def one_of(name: str, value: Any, valid: Iterable[str]) -> None:
+    """Raise ValueError unless the value is one of the valid ones, and list them."""
+    valid = list(valid)
+    if value not in valid:
+        raise ValueError(f"unknown {name} {value!r}; choose one of: {', '.join(valid)}")
+
+
+def whole(name: str, value: Any, least: int) -> None:
+    """Raise unless the value is a whole number of at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise TypeError(f"{name} must be a whole number, not {value!r}")
+    if value < least:
+        raise ValueError(f"{name} is {value}; give {least} or more")
+
+
+def real(name: str, value: Any, least: float, *, above: bool = False) -> None:
+    """Raise unless the value is a finite number of at least (or above) `least`."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise TypeError(f"{name} must be a number, not {value!r}")
+    if not isfinite(value) or value < least or (above and value == least):
+        raise ValueError(f"{name} is {value}; give a number {'above' if above else 'of at least'} {least}")

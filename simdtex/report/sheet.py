@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Contact sheets, animations and false colours, all 8-bit and all for the eye alone."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import PIL.Image
+import PIL.ImageDraw
+import PIL.ImageFont
+from numpy.typing import ArrayLike, NDArray
+
+from simdtex.image import atomic_path, check_writable, to_display, write
+
+__all__ = [
+    "animation",
+    "contact_sheet",
+    "enlarged",
+    "fitted",
+    "heat",
+    "reduction",
+    "source_colours",
+    "thinned",
+]
+
+Picture = NDArray[np.uint8]
+PathLike = str | os.PathLike[str]
+
+LEAST_SIDE = 96  # a picture smaller than this is enlarged on a sheet, pixels
+MOST_SIDE = 1024  # a picture larger than this is reduced on a sheet, pixels
+GAP = 8  # between the cells of a sheet, pixels
+TEXT = 13  # height of a label's letters, pixels
+FRAMES = 200  # most frames of an animation
+FRAME_SIDE = 512  # longest side of an animation's frames, pixels
+
+
+# ---------------------------------------------------------------- sheets
+
+
+def contact_sheet(
+    pictures: Sequence[tuple[str, ArrayLike]],
+    path: PathLike | None = None,
+    *,
+    columns: int | None = None,
+) -> Picture:
+    """Lay labelled pictures out on one sheet, each under its label.
+
+    Parameters
+    ----------
+    pictures : sequence of (label, picture)
+        Pictures are (rows, cols) or (rows, cols, channels) of any size and type; types other than
+        uint8 are stretched over their own range, channels past the third are not shown.
+    path : path, optional
+        Where to write the sheet as well; the suffix names the format.
+    columns : int, optional
+        Pictures in a row; by default as many as make the sheet about square.
+
+    Returns
+    -------
+    ndarray of uint8, (rows, cols, 3)
+        Pictures stand at their own size; those of less than 96 pixels are enlarged by a whole
+        factor without smoothing, those of more than 1024 reduced.
+
+    Raises
+    ------
+    ValueError
+        There are no pictures, `columns` is less than 1, or `path` cannot be written.
+    """
+    if not pictures:
+        raise ValueError("there are no pictures for the sheet: give at least one")
+    if columns is not None and columns < 1:
+        raise ValueError(f"columns is {columns}: give 1 or more")
+    if path is not None:
+        check_writable(path, np.uint8, 3)
+    shown = [(label, _cell(_rgb(to_display(picture)))) for label, picture in pictures]
+    font = PIL.ImageFont.load_default(TEXT)
+    strip = TEXT + 6
+    height = max(picture.shape[0] for _, picture in shown) + strip + GAP
+    width = GAP + max(
+        max(picture.shape[1], int(np.ceil(font.getlength(label)))) for label, picture in shown
+    )
+    across = columns or max(1, round(float(np.sqrt(len(shown) * height / width))))
+    across = min(across, len(shown))
+    down = -(-len(shown) // across)
+    sheet = PIL.Image.new("RGB", (GAP + across * width, GAP + down * height), "white")
+    draw = PIL.ImageDraw.Draw(sheet)
+    for number, (label, picture) in enumerate(shown):
+        top, left = GAP + number // across * height, GAP + number % across * width
+        draw.text((left, top), label, fill="black", font=font)
+        sheet.paste(PIL.Image.fromarray(picture), (left, top + strip))
+    pixels = np.array(sheet, dtype=np.uint8)
+    if path is not None:
+        write(path, pixels)
+    return pixels
+
+
+def _cell(picture: Picture) -> Picture:
+    factor = -(-LEAST_SIDE // max(picture.shape[:2]))
+    if factor > 1:
+        return picture.repeat(factor, axis=0).repeat(factor, axis=1)
+    return fitted(picture, MOST_SIDE)
+
+
+def _rgb(picture: Picture) -> Picture:
+    if picture.ndim == 2:
+        picture = picture[..., np.newaxis]
+    if picture.shape[2] < 3:  # grey, or grey and alpha
+        return np.repeat(picture[..., :1], 3, axis=2)
+    return np.ascontiguousarray(picture[..., :3])
+
+
+def reduction(shape: tuple[int, ...], side: int) -> int:
+    """Give the whole factor by which `fitted` reduces a picture of that shape."""
+    return -(-max(shape[:2]) // side)
+
+
+def fitted(picture: Picture, side: int) -> Picture:
+    """Reduce a picture by a whole factor so that neither side is longer than `side` pixels.
+
+    Parameters
+    ----------
+    picture : ndarray of uint8, (rows, cols[, channels])
+    side : int
+        Pixels.
+
+    Returns
+    -------
+    ndarray of uint8, (rows, cols[, channels])
+        Means of square blocks; the picture itself where it fits.
+    """
+    factor = reduction(picture.shape, side)
+    if factor == 1:
+        return picture
+    for axis in (0, 1):
+        starts = np.arange(0, picture.shape[axis], factor)
+        counts = np.diff(np.append(starts, picture.shape[axis]))
+        sums = np.add.reduceat(picture.astype(np.float32), starts, axis=axis)
+        shape = [-1 if i == axis else 1 for i in range(picture.ndim)]
+        picture = np.round(sums / counts.reshape(shape)).astype(np.uint8)
+    return picture
+
+
+def enlarged(picture: Picture, shape: tuple[int, int], step: float) -> Picture:
+    """Show a decimated picture at full size, each of its pixels as a square without smoothing.
+
+    Parameters
+    ----------
+    picture : ndarray of uint8, (rows, cols[, channels])
+        Pixel (i, j) stands for the full picture's sites from (step i, step j) on.
+    shape : (rows, cols)
+        Of the result.
+    step : float
+        Pixels of the result per pixel of `picture`, 1 or more.
+
+    Returns
+    -------
+    ndarray of uint8, (rows, cols[, channels])
+    """
+    rows, cols = (
+        np.minimum((np.arange(length) / step).astype(np.intp), limit - 1)
+        for length, limit in zip(shape, picture.shape[:2], strict=True)
+    )
+    return np.asarray(picture[rows[:, np.newaxis], cols], dtype=np.uint8)
+
+
+def animation(frames: Iterable[ArrayLike], path: PathLike, *, ms: int = 120) -> None:
+    """Write frames as an animation that repeats for ever.
+
+    Parameters
+    ----------
+    frames : iterable of (rows, cols[, channels])
+        All of one shape. They are reduced to at most 512 pixels a side, and of more than 200
+        evenly spread ones are kept, with the last.
+    path : path
+        ``.gif``, ``.webp``, ``.apng`` or ``.png`` (an APNG).
+    ms : int
+        Time of one frame, milliseconds.
+
+    Raises
+    ------
+    ValueError
+        There are no frames, they differ in shape, `ms` is less than 1, or `path` cannot be
+        written.
+
+    Notes
+    -----
+    Holds at most 400 reduced frames, 315 MB for the largest in colour.
+    """
+    check_writable(path, suffixes=(".gif", ".webp", ".apng", ".png"))
+    if ms < 1:
+        raise ValueError(f"ms is {ms}: give the time of a frame, 1 millisecond or more")
+    kept = thinned(fitted(_rgb(to_display(frame)), FRAME_SIDE) for frame in frames)
+    if not kept:
+        raise ValueError("there are no frames for the animation: give at least one")
+    if len({frame.shape for frame in kept}) > 1:
+        raise ValueError("the frames differ in shape: enlarge them to one shape first")
+    pictures = [PIL.Image.fromarray(frame) for frame in kept]
+    suffix = Path(path).suffix.lower()
+    kind = {".gif": "GIF", ".webp": "WEBP"}.get(suffix, "PNG")
+    options: dict[str, Any] = {"lossless": True} if kind == "WEBP" else {}
+    with atomic_path(path) as temporary:
+        pictures[0].save(
+            temporary,
+            format=kind,
+            save_all=True,
+            append_images=pictures[1:],
+            duration=ms,
+            loop=0,
+            **options,
+        )
+
+
+def thinned(frames: Iterable[Picture]) -> list[Picture]:
+    """Keep at most about 200 frames, evenly spread, and always the last."""
+    kept: list[Picture] = []
+    every, last = 1, None
+    for number, frame in enumerate(frames):
+        last = frame
+        if number % every == 0:
+            kept.append(frame)
+        if len(kept) == FRAMES:
+            kept, every = kept[::2], every * 2
+    return kept if last is None or kept[-1] is last else [*kept, last]
+
+
+# ---------------------------------------------------------------- colours
+
+
+def heat(temperature: ArrayLike) -> Picture:
+    """Show temperatures as colours from near black (0, cold) to pale yellow (1, hot).
+
+    Parameters
+    ----------
+    temperature : array_like
+        Any shape; values outside 0 to 1 are clipped.
+
+    Returns
+    -------
+    ndarray of uint8, temperature.shape + (3,)
+        sRGB. Lightness grows in equal perceptual steps, so the map also reads in grey.
+    """
+    share = np.clip(np.asarray(temperature, dtype=np.float64), 0.0, 1.0)
+    return _heat_table()[np.round(share * 255.0).astype(np.intp)]
+
+
+@cache
+def _heat_table() -> Picture:
+    t = np.linspace(0.0, 1.0, 256)
+    # a path through OKLab: lightness a straight line, hue from violet over red to yellow
+    lightness = 0.16 + 0.79 * t
+    hue = np.radians(290.0 + 180.0 * t)
+    chroma = np.interp(t, [0.0, 0.3, 0.55, 0.8, 1.0], [0.03, 0.13, 0.18, 0.15, 0.10])
+    return _srgb(lightness, chroma * np.cos(hue), chroma * np.sin(hue))
+
+
+def source_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
+    """Colour each output pixel by the sample position it was taken from.
+
+    Neighbours in the sample have neighbouring colours of one lightness, so a patch copied whole
+    shows as a smooth area and a join as an edge.
+
+    Parameters
+    ----------
+    source : array_like of int, (rows, cols, 2)
+        The (row, column) in the sample; a negative one (not set) is black.
+    sample_shape : (rows, cols)
+        Of the sample, pixels.
+
+    Returns
+    -------
+    ndarray of uint8, (rows, cols, 3)
+    """
+    positions = np.asarray(source)
+    if positions.ndim != 3 or positions.shape[2] != 2:
+        raise ValueError("the source map is not (rows, cols, 2): pass the one of the run")
+    extent = np.maximum(np.asarray(sample_shape[:2]) - 1, 1)
+    across = np.clip(positions / extent, 0.0, 1.0) - 0.5
+    colours = _srgb(
+        np.full(positions.shape[:2], 0.72), 0.19 * across[..., 0], 0.19 * across[..., 1]
+    )
+    colours[(positions < 0).any(axis=2)] = 0
+    return colours
+
+
+def _srgb(lightness: NDArray[Any], a: NDArray[Any], b: NDArray[Any]) -> Picture:
+    # OKLab to sRGB, B. Ottosson, "A perceptual color space for image processing", 2020
+    long = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3
+    medium = (lightness - 0.1055613458 * a - 0.0638541728 * b) ** 3
+    short = (lightness - 0.0894841775 * a - 1.2914855480 * b) ** 3
+    linear = np.stack(
+        [
+            4.0767416621 * long - 3.3077115913 * medium + 0.2309699292 * short,
+            -1.2684380046 * long + 2.6097574011 * medium - 0.3413193965 * short,
+            -0.0041960863 * long - 0.7034186147 * medium + 1.7076147010 * short,
+        ],
+        axis=-1,
+    ).clip(0.0, 1.0)
+    curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.round(curve * 255.0).astype(np.uint8)

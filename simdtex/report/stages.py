@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The stages of a run as pictures: every level, every sweep, and where it was still hot."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.image import to_display, write
+from simdtex.report.sheet import (
+    FRAME_SIDE,
+    FRAMES,
+    animation,
+    contact_sheet,
+    enlarged,
+    fitted,
+    heat,
+    reduction,
+)
+
+__all__ = ["Progress", "StageWriter"]
+
+Picture = NDArray[np.uint8]
+
+_STAGE = re.compile(r"(temperature-)?level\d+-sweep\d+\.png|sheet\.png|animation\.gif")
+
+
+class Progress(Protocol):
+    """What a run tells its callback, as far as the stages need it.
+
+    Attributes
+    ----------
+    level, sweep : int
+        The level, 0 is the finest, and the sweep within it.
+    end_of_sweep : bool
+        Whether a sweep has just ended.
+    """
+
+    @property
+    def level(self) -> int: ...  # noqa: D102
+    @property
+    def sweep(self) -> int: ...  # noqa: D102
+    @property
+    def end_of_sweep(self) -> bool: ...  # noqa: D102
+
+    def image(self) -> NDArray[Any]:
+        """Pixels of the level's grid, (rows, cols[, channels]), the sample's type."""
+        ...
+
+    def temperature(self) -> NDArray[Any]:
+        """Pixel temperatures of the level's grid, (rows, cols), 0 to 1."""
+        ...
+
+
+class StageWriter:
+    """A callback that writes the picture and the temperatures of every sweep into a folder.
+
+    It writes ``level{l}-sweep{k}.png`` and ``temperature-level{l}-sweep{k}.png`` at the end of
+    each sweep, and on `finish` ``sheet.png``, the last picture of each level at one size, and
+    ``animation.gif``. Pictures are 8-bit previews; each file is written whole or not at all.
+
+    Parameters
+    ----------
+    folder : path
+        Made at the first picture. It may exist if it is empty or holds only the stages of an
+        earlier run; those are removed at the first picture.
+    limits : (low, high), optional
+        The values shown as black and white where pixels are not uint8: the sample's smallest and
+        largest. By default those of the first picture.
+
+    Raises
+    ------
+    ValueError
+        `folder` is a file, holds other files, or its parent is missing or not writable.
+
+    Notes
+    -----
+    Holds at most 200 frames of at most 512 pixels a side for the animation, 160 MB in colour.
+    """
+
+    def __init__(
+        self, folder: str | os.PathLike[str], *, limits: tuple[float, float] | None = None
+    ) -> None:
+        self.folder = Path(folder)
+        self._limits = limits
+        self._earlier = _earlier_stages(self.folder)
+        self._started = False
+        self._frames: list[tuple[int, Picture]] = []
+        self._every = 1
+        self._seen = 0
+        self._last: dict[int, Picture] = {}
+        self._shapes: dict[int, tuple[int, ...]] = {}
+
+    def __call__(self, progress: Progress) -> None:
+        """Write one stage if a sweep has ended; else do nothing."""
+        if not progress.end_of_sweep:
+            return
+        self._start()
+        values = progress.image()
+        if self._limits is None and values.dtype.kind != "b":
+            self._limits = float(values.min()), float(values.max())
+        picture = to_display(values, self._limits)
+        name = f"level{progress.level}-sweep{progress.sweep:02d}.png"
+        write(self.folder / name, _savable(picture))
+        write(self.folder / f"temperature-{name}", heat(progress.temperature()))
+        self._keep(progress.level, picture)
+
+    def finish(self) -> None:
+        """Write the sheet and the animation of what was seen; nothing if nothing was."""
+        if not self._last:
+            return
+        finest = min(self._last)
+        reference = self._last[finest]
+
+        def shown(level: int, picture: Picture) -> Picture:
+            # a frame's pixel stands for a block of its own level's sites, 2^level pixels apart
+            step = 2.0 ** (level - finest) * self._reduction(level) / self._reduction(finest)
+            return enlarged(picture, (reference.shape[0], reference.shape[1]), step)
+
+        sheet = [
+            ("level {}: {} x {}".format(level, *self._shapes[level]), shown(level, picture))
+            for level, picture in sorted(self._last.items(), reverse=True)
+        ]
+        contact_sheet(sheet, self.folder / "sheet.png")
+        frames = [shown(level, frame) for level, frame in self._frames]
+        animation([*frames, reference], self.folder / "animation.gif")
+
+    def _reduction(self, level: int) -> int:
+        return reduction(self._shapes[level], FRAME_SIDE)
+
+    def _start(self) -> None:
+        if self._started:
+            return
+        self._started = True
+        try:
+            self.folder.mkdir(exist_ok=True)
+            for path in self._earlier:
+                path.unlink(missing_ok=True)
+        except OSError as error:
+            raise ValueError(
+                f"the folder {self.folder} cannot be written ({error.strerror}): choose another"
+            ) from None
+
+    def _keep(self, level: int, picture: Picture) -> None:
+        small = fitted(picture, FRAME_SIDE)
+        self._last[level] = small
+        self._shapes[level] = picture.shape[:2]
+        if self._seen % self._every == 0:
+            self._frames.append((level, small))
+        if len(self._frames) == FRAMES:  # every other one from here on
+            self._frames, self._every = self._frames[::2], self._every * 2
+        self._seen += 1
+
+
+def _earlier_stages(folder: Path) -> list[Path]:
+    try:
+        if folder.is_dir():
+            found = list(folder.iterdir())
+        elif folder.exists():
+            raise ValueError(f"{folder} is a file: give a folder for the stages")
+        elif not folder.parent.is_dir():
+            raise ValueError(f"the folder {folder.parent} does not exist: create it first")
+        else:
+            found = []
+    except OSError as error:
+        raise ValueError(
+            f"{folder} cannot be used ({error.strerror}): give another folder"
+        ) from None
+    others = sorted(path.name for path in found if not _STAGE.fullmatch(path.name))
+    if others:
+        raise ValueError(
+            f"the folder {folder} holds other files ({others[0]}): give an empty or a new one"
+        )
+    if not os.access(folder if folder.is_dir() else folder.parent, os.W_OK | os.X_OK):
+        raise ValueError(f"the folder {folder} is not writable: choose another folder")
+    return found
+
+
+def _savable(picture: Picture) -> Picture:
+    # a PNG has at most four channels
+    return picture if picture.ndim == 2 or picture.shape[2] <= 4 else picture[..., :3]

@@ -1,0 +1,270 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The two functions that most users need: `synthesize` and `lcpdf`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simdtex.image import check_sample
+from simdtex.lattice import Grid, neighbourhood_offsets
+from simdtex.machine import Machine, open_machine
+from simdtex.methods import mrf
+from simdtex.ops import lcpdf as parzen
+from simdtex.ops.histogram import histogram
+from simdtex.ops.neighbourhood import Field, neighbourhood
+from simdtex.options import one_of, real, whole
+from simdtex.random import as_seed
+from simdtex.run import Callback, Output
+from simdtex.sample import Sample
+
+METHODS = ("mrf",)
+
+
+def synthesize(
+    sample: ArrayLike,
+    shape: tuple[int, int],
+    *,
+    method: str = "mrf",
+    channel_axis: int | None = None,
+    rng: int | np.random.Generator | None = None,
+    device: str | Machine | None = None,
+    callback: Callback | None = None,
+    full_output: bool = False,
+    **options: Any,
+) -> NDArray[Any] | tuple[NDArray[Any], Output]:
+    """Make more of a texture from a sample of it.
+
+    Parameters
+    ----------
+    sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
+        The texture; any real type, any size that holds a neighbourhood, finite.
+    shape : (int, int)
+        Rows and columns of the output, each 1 or more; smaller or larger than the sample.
+    method : {"mrf"}
+        Paget and Longstaff's nonparametric multiscale Markov random field (1998), Algorithm 1.
+    channel_axis : int, optional
+        The axis of the sample that holds channels; None for a grey sample.
+    rng : int or numpy.random.Generator, optional
+        The seed. The same seed gives the same bytes on every device. None takes a fresh one.
+    device : str, optional
+        Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
+        SIMDTEX_DEVICE, else a GPU, else a CPU.
+    callback : callable, optional
+        Called with a `simdtex.run.Progress` several times a second.
+    full_output : bool
+        Return the source map, temperatures, stages and statistics too.
+    **options
+        Of the method: ``preset``, ``order``, ``levels``, ``relaxation``, ``bandwidth``, ``coherence``, ``xi``,
+        ``free_sweeps``, ``pixel``, ``phases``, ``coarsest``, ``schedule``, ``boundary``; see
+        `simdtex.methods.mrf.Options`.
+
+    Returns
+    -------
+    image : array of the sample's type
+        `shape` plus the channel axis, where the sample has it.
+    output : simdtex.run.Output
+        Only with ``full_output=True``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        What is wrong and what would be right, in one sentence.
+
+    Notes
+    -----
+    Cost: output pixels x sample pixels x neighbours x channels x about 14 fma at the finest level and a third
+    of that at all others together. Memory grows with output pixels plus sample pixels, never with their product.
+
+    Examples
+    --------
+    >>> from skimage import data
+    >>> import simdtex
+    >>> brick = data.brick()[:64, :64]
+    >>> more = simdtex.synthesize(brick, (80, 96), order=2, rng=1)
+    >>> more.shape
+    (80, 96)
+    """
+    one_of("method", method, METHODS)
+    pixels = check_sample(sample, channel_axis)
+    size = _check_shape(shape)
+    chosen = mrf.make_options(**options)
+    seed = as_seed(rng)
+    image, output = mrf.synthesize(open_machine(device), pixels, size, chosen, seed, _squeezed(callback, channel_axis))
+    stages = [s.__class__(s.level, _restored(s.image, channel_axis)) for s in output.stages]
+    image = _restored(image, channel_axis)
+    if full_output:
+        return image, Output(output.source, output.temperature, stages, output.statistics)
+    return image
+
+
+def lcpdf(
+    image: ArrayLike,
+    sample: ArrayLike,
+    sites: ArrayLike,
+    *,
+    order: int,
+    bandwidth: float = 1.0,
+    temperature: ArrayLike | None = None,
+    levels: int = 256,
+    estimator: str = "parzen",
+    boundary: str = "torus",
+    device: str | Machine | None = None,
+) -> NDArray[np.float64]:
+    """The local conditional probability density function of a nonparametric MRF.
+
+    Parameters
+    ----------
+    image : (rows, cols) array of whole numbers, 0 .. levels - 1
+        x, whose neighbourhoods are looked at.
+    sample : (rows, cols) array of whole numbers, 0 .. levels - 1
+        y, which the density is estimated from.
+    sites : (S, 2) array of whole numbers
+        (row, column) of the sites s.
+    order : int
+        o of equation (3).
+    bandwidth : float
+        h in units of h_opt, equation (8). 1.0 is the paper's.
+    temperature : (rows, cols) array, 0 to 1, optional
+        t of equation (12), taken in steps of 1/1024; None is 0 everywhere.
+    levels : int
+        Number of grey levels, 2 to 4096.
+    estimator : {"parzen", "histogram"}
+        Equations (6) to (8), or counts of exact matches, (4) and (5); the latter disregards `bandwidth`, and
+        neighbours with a temperature of 1 need not match.
+    boundary : {"torus", "open"}
+        Of the image. Neighbours outside an open one have no weight.
+    device : str, optional
+        As in `synthesize`.
+
+    Returns
+    -------
+    (S, levels) float64 array
+        P(x_s = x | x_r, r in N_s); every row adds up to 1. Computed in float32: the same bits on every
+        device, within 1e-5 of the formula in exact arithmetic.
+
+    Raises
+    ------
+    ValueError
+        A neighbourhood that does not fit the sample, grey levels out of range, or no exact match at a site.
+
+    Notes
+    -----
+    Cost: S x sample pixels x neighbours x 2 fma, and 12 S x levels bytes for a piece of the sites.
+    """
+    whole("levels", levels, 2)
+    if levels > 4096:
+        raise ValueError(f"levels is {levels}; give 4096 or fewer")
+    real("bandwidth", bandwidth, 0, above=True)
+    one_of("estimator", estimator, ("parzen", "histogram"))
+    one_of("boundary", boundary, ("torus", "open"))
+    x = _check_grey("image", image, levels)
+    y = _check_grey("sample", sample, levels)
+    where = _check_sites(sites, x.shape)
+    offsets = neighbourhood_offsets(order)
+    grey = Sample.of_levels(y, levels)
+    mrf.check_fit(y.shape, int(offsets.max()), order)
+
+    machine = open_machine(device)
+    grid = Grid(*x.shape, 1, boundary == "torus")
+    field = Field(
+        machine.put(x[None].astype(np.uint16)),
+        machine.put(np.zeros(x.shape, np.int32)),
+        machine.put(_check_temperature(temperature, x.shape)),
+    )
+    candidates = grey.candidates(machine, offsets, 1)
+    h = bandwidth * parzen.optimal_bandwidth(
+        grey.variance, candidates.count, len(offsets) + 1
+    )
+    window = parzen.window(h, levels - 1)
+    device_offsets = machine.put(offsets)
+    rows = [np.zeros((0, levels))]
+    step = min(machine.chunk(candidates.count, len(offsets)), 4096)
+    for first in range(0, len(where), step):
+        here = machine.put(where[first : first + step])
+        near = neighbourhood(machine, here, field, device_offsets, grid)
+        distances = parzen.distance(machine, near, candidates)
+        if estimator == "parzen":
+            table = machine.get(parzen.table(machine, distances, candidates, window))
+            rows.append(table.astype(np.float64))
+        else:
+            counts = machine.get(histogram(machine, distances, candidates, levels))
+            rows.append(_shares(counts, where[first : first + step], grid))
+    return np.concatenate(rows)
+
+
+def _shares(
+    counts: NDArray[np.uint32], sites: NDArray[np.int32], grid: Grid
+) -> NDArray[np.float64]:
+    total = counts.sum(1, keepdims=True)
+    if not total.all():
+        row, col = divmod(int(sites[(total[:, 0] == 0).argmax()]), grid.width)
+        raise ValueError(
+            f"no neighbourhood of the sample equals that of site ({row}, {col}); "
+            'use fewer grey levels, a smaller order, or estimator="parzen"'
+        )
+    return counts / total
+
+
+def _squeezed(callback: Callback | None, channel_axis: int | None) -> Callback | None:
+    """The callback, which sees pictures with the sample's own axes."""
+    if callback is None:
+        return None
+    from dataclasses import replace
+
+    def seen(progress: Any) -> Any:
+        read: Callable[[], NDArray[Any]] = progress.image
+        return callback(replace(progress, image=lambda: _restored(read(), channel_axis)))
+
+    return seen
+
+
+def _restored(image: NDArray[Any], channel_axis: int | None) -> NDArray[Any]:
+    return image[..., 0] if channel_axis is None else np.moveaxis(image, -1, channel_axis)
+
+
+def _check_shape(shape: Any) -> tuple[int, int]:
+    try:
+        rows, cols = shape
+    except (TypeError, ValueError):
+        raise ValueError(f"shape must be two whole numbers (rows, columns), not {shape!r}") from None
+    whole("rows of the output", rows, 1)
+    whole("columns of the output", cols, 1)
+    return int(rows), int(cols)
+
+
+def _check_grey(name: str, array: ArrayLike, levels: int) -> NDArray[np.int64]:
+    a = np.asarray(array)
+    if a.ndim != 2 or not a.size:
+        raise ValueError(f"{name} must be a (rows, cols) array that is not empty, not shape {a.shape}")
+    if not np.issubdtype(a.dtype, np.integer) and a.dtype != np.bool_:
+        raise TypeError(f"{name} must hold whole numbers 0 to {levels - 1}, not {a.dtype}")
+    if a.min() < 0 or a.max() >= levels:
+        raise ValueError(
+            f"{name} holds {a.min()} to {a.max()}, beyond 0 to {levels - 1}; give levels or rescale it"
+        )
+    return a.astype(np.int64)
+
+
+def _check_sites(sites: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.int32]:
+    a = np.asarray(sites)
+    if a.size == 0:
+        return np.zeros(0, np.int32)
+    if a.ndim != 2 or a.shape[1] != 2 or not np.issubdtype(a.dtype, np.integer):
+        raise ValueError(f"sites must be an (S, 2) array of whole (row, column), not {a.dtype} {a.shape}")
+    if (a < 0).any() or (a >= np.array(shape)).any():
+        raise ValueError(f"a site lies outside the image of {shape[0]} rows x {shape[1]} columns")
+    flat: NDArray[np.int32] = (a[:, 0] * shape[1] + a[:, 1]).astype(np.int32)
+    return flat
+
+
+def _check_temperature(temperature: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.uint16]:
+    t = np.zeros(shape) if temperature is None else np.asarray(temperature, np.float64)
+    if t.shape != shape:
+        raise ValueError(f"temperature has shape {t.shape}; give the image's, {shape}")
+    if not ((t >= 0) & (t <= 1)).all():
+        raise ValueError("temperatures must lie between 0 and 1")
+    return np.rint(t * 1024).astype(np.uint16)

@@ -1,0 +1,113 @@
+"""Fixtures that run a test on every usable OpenCL device, and say in the end which ones did."""
+
+import os
+
+# PoCL then gives two devices, one thread and many; it reads this when first asked for platforms.
+os.environ.setdefault("POCL_DEVICES", "basic pthread")
+
+import functools
+
+import hypothesis
+import pytest
+
+from simdtex import device as device_module
+from simdtex.device import DeviceInfo
+
+REQUIRE = "SIMDTEX_REQUIRE_OPENCL"
+RAN = pytest.StashKey[dict[str, int]]()
+
+# The same examples on every machine and every run; a first build on a device may take seconds.
+hypothesis.settings.register_profile(
+    "simdtex",
+    derandomize=True,
+    deadline=None,
+    database=None,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
+)
+hypothesis.settings.load_profile("simdtex")
+
+
+@functools.cache
+def usable_devices() -> tuple[DeviceInfo, ...]:
+    """Every usable OpenCL device but the simulators, best first."""
+    real = [info for info in device_module.devices(probe=False) if info.handle is not None]
+    probed = [device_module.probe(info) for info in real if not info.simulated]
+    return tuple(info for info in probed if info.usable)
+
+
+def pytest_configure(config):
+    config.stash[RAN] = {}
+
+
+def pytest_generate_tests(metafunc):
+    if "cl_device" not in metafunc.fixturenames:
+        return
+    found = usable_devices()
+    names = [info.name for info in found]
+    params = [
+        pytest.param(
+            info,
+            id=info.name.replace(" ", "-")
+            + (f"-{info.index}" if names.count(info.name) > 1 else ""),
+        )
+        for info in found
+    ]
+    nothing = pytest.param(None, id="no-device")
+    metafunc.parametrize("cl_device", params or [nothing], indirect=True, scope="session")
+
+
+def _take(info: DeviceInfo | None) -> DeviceInfo:
+    """Hand a device to a test; where there is none, fail if one is required, else skip."""
+    if info is None:
+        message = "no usable OpenCL device here; `python -m simdtex.device` says why"
+        if os.environ.get(REQUIRE):
+            pytest.fail(message)
+        pytest.skip(message)
+    return info
+
+
+@pytest.fixture(scope="session")
+def cl_device(request) -> DeviceInfo:
+    """Every usable OpenCL device in turn."""
+    return _take(request.param)
+
+
+@pytest.fixture(scope="session")
+def any_device() -> DeviceInfo:
+    """The usable OpenCL device that is preferred here."""
+    return _take(next(iter(usable_devices()), None))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item):
+    """Count a passed test for the device of its fixtures, direct or through other fixtures."""
+    result = yield  # a test that raised or skipped does not come back here
+    callspec = getattr(item, "callspec", None)
+    info = callspec.params.get("cl_device") if callspec else None
+    if info is None and "any_device" in item.fixturenames:
+        info = next(iter(usable_devices()), None)
+    if info is not None:
+        ran = item.config.stash[RAN]
+        ran[str(info)] = ran.get(str(info), 0) + 1
+    return result
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session, exitstatus):
+    if os.environ.get(REQUIRE) and not session.config.option.collectonly:
+        ran = session.config.stash[RAN]
+        if not ran and exitstatus == pytest.ExitCode.OK:
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    ran = config.stash[RAN]
+    if ran:
+        each = ", ".join(f"{name}: {count} passed" for name, count in ran.items())
+        terminalreporter.write_line(f"OpenCL devices that ran tests: {each}")
+    else:
+        failed = os.environ.get(REQUIRE)
+        terminalreporter.write_line(
+            f"No OpenCL device ran a test{f', and {REQUIRE} is set' if failed else ''}.",
+            red=bool(failed),
+        )

@@ -1,0 +1,383 @@
+"""Listing, probing and choosing devices, with broken platforms among them."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from rich.console import Console
+
+from simdtex import device, runtimes
+from simdtex.device import DeviceError, DeviceInfo
+
+
+def fake(index, name, platform="Acme OpenCL", kind="cpu", usable=True, **more):
+    reason = "" if usable else "it does not build"
+    return DeviceInfo(index, platform, name, kind, usable=usable, reason=reason, **more)
+
+
+LISTING = [
+    fake(0, "Turbo 4090", kind="gpu", usable=False),
+    fake(1, "Slow 10", kind="gpu"),
+    fake(2, "pthread-epyc", "Portable Computing Language", version="OpenCL 3.0 PoCL HSTR"),
+    fake(3, "pthread-epyc", "Portable Computing Language", usable=False),
+    fake(4, "reference", "NumPy", "reference"),
+]
+
+
+@pytest.fixture(autouse=True)
+def no_variable(monkeypatch):
+    monkeypatch.delenv(device.VARIABLE, raising=False)
+
+
+# Choosing
+
+
+@pytest.mark.parametrize(
+    ("text", "index"),
+    [
+        (None, 1),  # the first usable
+        ("slow", 1),
+        ("SLOW 10", 1),
+        ("pocl", 2),  # by the version; of two matches the only usable one
+        ("portable", 2),
+        ("pthread-epyc", 2),
+        ("2", 2),
+        (" 2 ", 2),
+        ("10", 1),  # no such index, so part of a name
+        ("4", 4),
+        ("refer", 4),
+    ],
+)
+def test_choose(text, index):
+    assert device.choose(text, LISTING) is LISTING[index]
+
+
+def test_choose_prefers_the_whole_name():
+    listing = [fake(0, "Ultra"), fake(1, "Ultra Max")]
+    assert device.choose("ultra", listing) is listing[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("nonesuch", '"nonesuch"; choose one of: 0 = Turbo 4090 (Acme OpenCL), 1 = Slow 10'),
+        ("99", 'No device matches "99"; choose one of: 0 = '),
+        ("-1", "choose one of"),
+        ("", "choose one of"),
+        ("turbo", "cannot be used (Turbo 4090 (Acme OpenCL): it does not build); choose one of"),
+        ("0", "it does not build"),
+        ("e", "matches several devices; give the index of one of: 1 = Slow 10 (Acme OpenCL), 2 ="),
+    ],
+)
+def test_choose_says_what_there_is(text, words):
+    with pytest.raises(DeviceError) as caught:
+        device.choose(text, LISTING)
+    assert words in str(caught.value)
+    assert str(caught.value).endswith(".")
+    assert "\n" not in str(caught.value)
+    assert isinstance(caught.value, ValueError)
+
+
+def test_choose_probes_no_further_than_needed():
+    probed = []
+
+    def check(info):
+        probed.append(info.index)
+        return info
+
+    device.choose(None, LISTING, check)
+    assert probed == [0, 1]
+    probed.clear()
+    device.choose("slow", LISTING, check)
+    assert probed == [1]
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "present", "absent"),
+    [
+        ("linux", "x86_64", ["pip install simdtex[cpu]", "apt install pocl-opencl-icd"], []),
+        ("linux", "aarch64", ["apt install pocl-opencl-icd"], ["pip install"]),
+        ("win32", "AMD64", ["pip install simdtex[cpu]"], ["apt"]),
+        ("darwin", "arm64", ["driver of your GPU"], ["pip install", "apt"]),
+    ],
+)
+def test_nothing_usable_says_what_to_install(monkeypatch, system, machine, present, absent):
+    monkeypatch.setattr(device.sys, "platform", system)
+    monkeypatch.setattr(device.platform, "machine", lambda: machine)
+    with pytest.raises(DeviceError) as caught:
+        device.choose(None, [LISTING[0], LISTING[4]])
+    message = str(caught.value)
+    assert "Turbo 4090: it does not build" in message
+    assert 'device="reference"' in message
+    assert all(words in message for words in present)
+    assert not any(words in message for words in absent)
+
+
+def test_simulators_and_single_threads_come_last():
+    infos = [
+        fake(0, "", "Hollow"),
+        fake(0, "Oclgrind Simulator", "Oclgrind", "gpu"),
+        fake(0, "llvmpipe (LLVM 15)", "rusticl"),
+        fake(0, "board", kind="accelerator"),
+        fake(0, "basic-epyc", "Portable Computing Language"),
+        fake(0, "pthread-epyc", "Portable Computing Language"),
+        fake(0, "Turbo", kind="gpu"),
+    ]
+    names = [info.name for info in sorted(infos, key=device._preference)]
+    assert names == [
+        "Turbo",
+        "pthread-epyc",
+        "basic-epyc",
+        "board",
+        "Oclgrind Simulator",
+        "llvmpipe (LLVM 15)",
+        "",
+    ]
+
+
+# find
+
+
+def test_find_reads_the_variable_only_when_nothing_is_asked(monkeypatch):
+    monkeypatch.setattr(device, "devices", lambda probe: list(LISTING))
+    monkeypatch.setattr(device, "probe", lambda info: info)
+    assert device.find().index == 1
+    monkeypatch.setenv(device.VARIABLE, "portable")
+    assert device.find().index == 2
+    assert device.find("slow").index == 1
+    assert device.find(2).index == 2
+    monkeypatch.setenv(device.VARIABLE, "")
+    assert device.find().index == 1
+    monkeypatch.setenv(device.VARIABLE, "Reference")
+    assert device.find().kind == "reference"
+    monkeypatch.setenv(device.VARIABLE, "nonesuch")
+    with pytest.raises(DeviceError, match="nonesuch"):
+        device.find()
+
+
+def test_find_reference_asks_no_runtime(monkeypatch):
+    monkeypatch.setattr(device, "devices", lambda probe: pytest.fail("a runtime was asked"))
+    found = device.find("reference")
+    assert found.usable
+    assert found.handle is None
+
+
+def test_find_takes_a_line_of_the_listing():
+    assert device.find(LISTING[1]) is LISTING[1]
+    with pytest.raises(DeviceError, match="it does not build"):
+        device.find(LISTING[0])
+
+
+@pytest.mark.parametrize("wrong", [True, 1.5, ["0"], b"0"])
+def test_find_refuses_other_types(wrong):
+    with pytest.raises(TypeError, match="device must be a text, an index"):
+        device.find(wrong)
+
+
+# Broken platforms
+
+
+class Broken:
+    """A platform, or a device, that raises whatever it is asked."""
+
+    def __getattr__(self, name):
+        raise RuntimeError(f"broken {name}\nlog:\nerror: unknown target CPU")
+
+
+class NoDevices(SimpleNamespace):
+    def get_devices(self):
+        raise RuntimeError("CL_OUT_OF_HOST_MEMORY")
+
+
+@pytest.fixture
+def platforms(monkeypatch):
+    """Let a test say which platforms there are."""
+    device._enumerate.cache_clear()
+    yield lambda *found: monkeypatch.setattr(runtimes, "platforms", lambda: list(found))
+    device._enumerate.cache_clear()
+
+
+def test_a_broken_platform_does_not_stop_the_working_one(any_device, platforms):
+    working = any_device.handle.platform
+    hollow = SimpleNamespace(name=" Hollow\0", get_devices=list)
+    platforms(Broken(), NoDevices(name="Sick"), hollow, working)
+    listing = device.devices(probe=False)
+    broken = [info for info in listing if not info.name]
+    assert [info.platform for info in broken] == ["Hollow", "Sick", "platform 0"]
+    assert broken[0].reason == "the platform reports no device"
+    assert broken[1].reason == "CL_OUT_OF_HOST_MEMORY"
+    assert broken[2].reason == "broken name - error: unknown target CPU"
+    assert [info.index for info in listing] == list(range(len(listing)))
+    assert listing[-1].kind == "reference"
+    assert device.find().usable
+    assert device.find().kind != "reference"
+
+
+def test_a_device_that_cannot_build_is_passed_over(any_device, platforms):
+    mute = Broken()
+    sick = SimpleNamespace(name="AAA", get_devices=lambda: [mute])
+    platforms(sick, any_device.handle.platform)
+    listing = device.devices(probe=False)
+    unnamed = next(info for info in listing if info.handle is mute)
+    assert unnamed.name == "unnamed device"
+    assert not device.probe(unnamed).usable
+    assert device.probe(unnamed).reason
+    assert device.find().name == any_device.name
+
+
+def test_a_wrong_answer_is_not_usable(any_device, monkeypatch):
+    unfused = runtimes._SOURCE.replace("fma(a[i], a[i], -", "(a[i] * 2.0f -")
+    monkeypatch.setattr(runtimes, "_SOURCE", unfused)
+    runtimes.failure.cache_clear()
+    try:
+        assert "wrong answer" in device.probe(any_device).reason
+    finally:
+        runtimes.failure.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("code", "reason"),
+    [
+        ("print('noise\\nsimdtex-probe:', flush=True)", ""),
+        ("print('simdtex-probe:it does not build')", "it does not build"),
+        ("import os; os.abort()", "crashed on a tiny program (SIGABRT)"),
+        ("raise SystemExit(7)", "crashed on a tiny program (exit code 7)"),
+        ("import time; time.sleep(60)", "did not finish within 2 seconds"),
+    ],
+)
+def test_a_runtime_that_crashes_or_hangs_is_a_reason(monkeypatch, code, reason):
+    monkeypatch.setattr(runtimes, "_SECONDS", 2.0)
+    with subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    ) as child:
+        answer = runtimes._answer(child)
+    assert answer.endswith(reason) if reason else answer == ""
+
+
+def run_with_icds(folder: Path, *args: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *args],
+        env={**os.environ, "OCL_ICD_VENDORS": str(folder)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+
+
+SAY = """
+from simdtex import device
+try:
+    print(device.find().kind)
+except device.DeviceError as error:
+    print(error)
+print(device.find("reference").kind)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the loader reads .icd files on Linux only")
+def test_an_icd_that_names_no_library(tmp_path):
+    (tmp_path / "broken.icd").write_text("/nonexistent/libbroken.so\n")
+    alone = run_with_icds(tmp_path, "-c", SAY)
+    assert alone.returncode == 0, alone.stderr
+    assert alone.stdout.startswith("No usable OpenCL device was found: install")
+    assert alone.stdout.endswith("\nreference\n")
+    assert run_with_icds(tmp_path, "-m", "simdtex.device", "--ensure").returncode == 1
+    pocl = Path("/etc/OpenCL/vendors/pocl.icd")
+    if pocl.exists():
+        (tmp_path / "pocl.icd").write_text(pocl.read_text())
+        beside = run_with_icds(tmp_path, "-c", SAY)
+        assert beside.stdout == "cpu\nreference\n"
+        assert run_with_icds(tmp_path, "-m", "simdtex.device", "--ensure").returncode == 0
+
+
+# The Intel CPU runtime of the package index
+
+
+@pytest.fixture
+def intel(monkeypatch, tmp_path):
+    """Pretend that the runtime lies in this environment."""
+    library = tmp_path / "lib" / "libintelocl.so"
+    library.parent.mkdir()
+    library.touch()
+    monkeypatch.setattr(runtimes.sys, "prefix", str(tmp_path))
+    monkeypatch.setattr(runtimes.sys, "platform", "linux")
+    for name in runtimes._FOLDERS:
+        monkeypatch.delenv(name, raising=False)
+    return library
+
+
+def test_intel_is_added_to_what_the_loader_reads(intel, tmp_path):
+    conda = tmp_path / "etc" / "OpenCL" / "vendors"
+    conda.mkdir(parents=True)
+    (conda / "named.icd").write_text("libnamed.so.1\n")
+    (conda / "intel-cpu.icd").write_text("/wrong/place/libintelocl.so\n")
+    (conda / "gone.icd").write_text("/nonexistent/libgone.so\n")
+    (conda / "text.icd").write_bytes(b"\xff\xfe\xff")
+    assert runtimes.intel_library() == intel
+    with runtimes._folder():
+        folder = Path(os.environ["OCL_ICD_VENDORS"])
+        lines = [icd.read_text().strip() for icd in folder.iterdir()]
+        assert str(intel) in lines
+        assert "libnamed.so.1" in lines
+        assert not any("wrong" in line or "gone" in line for line in lines)
+    assert "OCL_ICD_VENDORS" not in os.environ
+    assert not folder.exists()
+
+
+def test_a_folder_of_the_users_own_wins(intel, monkeypatch):
+    monkeypatch.setenv("OCL_ICD_VENDORS", "/my/own")
+    with runtimes._folder():
+        assert os.environ["OCL_ICD_VENDORS"] == "/my/own"
+
+
+def test_other_systems_are_left_alone(intel, monkeypatch):
+    monkeypatch.setattr(runtimes.sys, "platform", "win32")
+    with runtimes._folder():
+        assert "OCL_ICD_VENDORS" not in os.environ
+
+
+def test_without_a_temporary_folder_the_loader_is_asked_all_the_same(intel, monkeypatch):
+    def full(**kwargs):
+        raise OSError("no space left")
+
+    monkeypatch.setattr(runtimes.tempfile, "TemporaryDirectory", full)
+    assert isinstance(runtimes.platforms(), list)
+
+
+# The listing on this machine, and how it is shown
+
+
+def test_every_usable_device_is_in_the_isolated_listing(cl_device):
+    line = device.devices()[cl_device.index]
+    assert replace(line, handle=None) == replace(cl_device, handle=None)
+    assert line.compute_units > 0
+    assert line.memory > 0
+    assert line.version.startswith("OpenCL ")
+    assert device.find(cl_device.index) == cl_device
+
+
+def test_render(capsys):
+    listing = [*LISTING[:3], fake(3, "Oclgrind [bold]"), fake(4, "", "Hollow", usable=False)]
+    device.render(Console(width=200, color_system=None), listing)
+    lines = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
+    assert lines[0].split() == [column for column in device.COLUMNS if column]
+    assert lines[1].endswith("no: it does not build")
+    assert lines[2].startswith("*  1")
+    assert lines[4].endswith("yes (simulator)")
+    assert "[bold]" in lines[4]
+    assert lines[5].split()[1:4] == ["Hollow", "-", "-"]
+    assert lines[6] == "Chosen by default: Slow 10 (Acme OpenCL)"
+
+
+def test_render_names_the_variable(monkeypatch):
+    monkeypatch.setenv(device.VARIABLE, "pocl")
+    assert device._default(LISTING)[1].startswith("Chosen by SIMDTEX_DEVICE: pthread-epyc")
+    monkeypatch.setenv(device.VARIABLE, "nonesuch")
+    assert not any(row[0] for row in device.table(LISTING))

@@ -1,0 +1,430 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Pictures go from file to array and back without a value changed, and errors say what to do."""
+
+import contextlib
+import io
+import logging
+import os
+import stat
+import struct
+import zlib
+
+import imagecodecs
+import numpy as np
+import PIL.Image
+import PIL.ImageOps
+import pytest
+import tifffile
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simdtex import image
+
+
+def noise(shape, dtype, seed=0):
+    rng = np.random.default_rng(seed)
+    dtype = np.dtype(dtype)
+    if dtype.kind == "b":
+        return rng.random(shape) < 0.5
+    if dtype.kind == "f":
+        return rng.normal(size=shape).astype(dtype)
+    limits = np.iinfo(dtype)
+    native = dtype.newbyteorder("=")
+    return rng.integers(limits.min, limits.max, shape, native, endpoint=True).astype(dtype)
+
+
+ROUND_TRIPS = [
+    *[(".png", dtype, c) for dtype in ("uint8", "uint16") for c in (None, 1, 2, 3, 4)],
+    *[
+        (".tif", dtype, c)
+        for dtype in ("uint8", "uint16", "int32", "float16", "float32", "float64", "int64")
+        for c in (None, 2, 3, 4, 5)
+    ],
+    (".tiff", "uint16", 3),
+    (".bmp", "uint8", None),
+    (".bmp", "uint8", 3),
+    (".webp", "uint8", 3),
+    (".webp", "uint8", 4),
+    (".ppm", "uint8", 3),
+    (".ppm", "uint16", 3),
+    (".pgm", "uint8", None),
+    (".pgm", "uint16", None),
+    (".npy", "bool", None),
+    (".npy", "float64", 7),
+    (".NPY", ">i4", 1),
+]
+
+
+@pytest.mark.parametrize(("suffix", "dtype", "channels"), ROUND_TRIPS)
+def test_values_and_types_survive_a_file(tmp_path, suffix, dtype, channels):
+    shape = (11, 6) if channels is None else (11, 6, channels)
+    pixels = noise(shape, dtype)
+    path = tmp_path / f"picture{suffix}"
+    image.write(path, pixels)
+    picture = image.read(path)
+    if channels == 1 and suffix != ".NPY":
+        pixels = pixels[..., 0]
+    assert picture.channel_axis == (-1 if pixels.ndim == 3 else None)
+    assert picture.pixels.dtype == pixels.dtype.newbyteorder("=")
+    assert picture.pixels.dtype.isnative
+    np.testing.assert_array_equal(picture.pixels, pixels)
+    assert os.listdir(tmp_path) == [path.name]
+
+
+@pytest.mark.parametrize(("suffix", "channels"), [(".jpg", None), (".jpeg", 3)])
+def test_jpeg_is_close(tmp_path, suffix, channels):
+    ramp = np.add.outer(np.arange(32), 2 * np.arange(40)).astype(np.uint8)
+    pixels = ramp if channels is None else np.stack([ramp] * channels, axis=-1)
+    image.write(tmp_path / f"a{suffix}", pixels)
+    back = image.read(tmp_path / f"a{suffix}").pixels
+    assert back.shape == pixels.shape
+    assert np.abs(back.astype(int) - pixels).max() <= 4
+
+
+def test_bool_becomes_black_and_white(tmp_path):
+    pixels = noise((5, 7), bool)
+    for suffix in (".png", ".tif", ".bmp", ".gif"):
+        image.write(tmp_path / f"a{suffix}", pixels)
+        back = image.read(tmp_path / f"a{suffix}").pixels
+        assert back.dtype == np.uint8
+        np.testing.assert_array_equal(back if back.ndim == 2 else back[..., 0], pixels * 255)
+
+
+def test_grey_webp_reads_as_equal_colours(tmp_path):
+    pixels = noise((5, 7), np.uint8)
+    image.write(tmp_path / "a.webp", pixels)
+    np.testing.assert_array_equal(
+        image.read(tmp_path / "a.webp").pixels, pixels[..., None] + [0] * 3
+    )
+
+
+# ---------------------------------------------------------------- other people's files
+
+
+def test_one_bit_and_palette_and_print_colours(tmp_path):
+    rgb = PIL.Image.fromarray(noise((8, 9, 3), np.uint8))
+    rgb.convert("1").save(tmp_path / "bit.png")
+    bit = image.read(tmp_path / "bit.png").pixels
+    assert bit.dtype == np.uint8
+    assert set(np.unique(bit)) <= {0, 255}
+    palette = rgb.quantize(16)
+    for suffix in ("png", "gif", "tif"):
+        palette.save(tmp_path / f"palette.{suffix}")
+        read = image.read(tmp_path / f"palette.{suffix}")
+        assert read.channel_axis == -1
+        np.testing.assert_array_equal(read.pixels, np.asarray(palette.convert("RGB")))
+    for suffix in ("tif", "jpg"):
+        rgb.convert("CMYK").save(tmp_path / f"cmyk.{suffix}")
+        assert image.read(tmp_path / f"cmyk.{suffix}").pixels.shape == (8, 9, 3)
+
+
+def test_first_frame_of_an_animation(tmp_path):
+    frames = [PIL.Image.new("RGB", (4, 3), colour) for colour in ("red", "blue")]
+    for suffix in ("gif", "webp", "tif"):
+        path = tmp_path / f"a.{suffix}"
+        frames[0].save(path, save_all=True, append_images=frames[1:])
+        assert image.read(path).pixels[1, 1].tolist()[0] > 200
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize("colours", [1, 3])
+@pytest.mark.parametrize("suffix", [".png", ".tif"])
+def test_alpha_is_dropped_only_where_opaque(tmp_path, dtype, colours, suffix):
+    pixels = noise((6, 5, colours + 1), dtype)
+    pixels[..., -1] = np.iinfo(dtype).max
+    image.write(tmp_path / f"a{suffix}", pixels)
+    read = image.read(tmp_path / f"a{suffix}")
+    np.testing.assert_array_equal(read.pixels, pixels[..., 0] if colours == 1 else pixels[..., :3])
+    pixels[2, 3, -1] = 0
+    image.write(tmp_path / f"b{suffix}", pixels)
+    np.testing.assert_array_equal(image.read(tmp_path / f"b{suffix}").pixels, pixels)
+
+
+def test_transparent_colour_becomes_alpha(tmp_path):
+    grey = PIL.Image.fromarray(np.array([[0, 7], [7, 9]], np.uint8))
+    grey.save(tmp_path / "a.png", transparency=7)
+    np.testing.assert_array_equal(
+        image.read(tmp_path / "a.png").pixels[..., 1], [[255, 0], [0, 255]]
+    )
+
+
+@pytest.mark.parametrize("orientation", range(1, 9))
+@pytest.mark.parametrize("suffix", ["png", "tif", "jpg"])
+def test_orientation_is_applied(tmp_path, orientation, suffix):
+    picture = PIL.Image.fromarray(np.arange(6 * 4, dtype=np.uint8).reshape(6, 4) * 10)
+    exif = picture.getexif()
+    exif[0x0112] = orientation
+    path = tmp_path / f"a.{suffix}"
+    # turned in memory, for Pillow turns a TIFF already while it loads it
+    expected = np.asarray(PIL.ImageOps.exif_transpose(picture)).astype(int)
+    picture.save(path, exif=exif, quality=100)
+    upright = image.read(path).pixels
+    assert upright.shape == expected.shape
+    assert np.abs(upright - expected).max() <= (2 if suffix == "jpg" else 0)
+
+
+def test_orientation_of_a_16_bit_png(tmp_path):
+    pixels = noise((6, 4, 3), np.uint16)
+    exif = PIL.Image.Exif()
+    exif[0x0112] = 6
+    body = b"eXIf" + exif.tobytes().removeprefix(b"Exif\0\0")
+    chunk = struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+    data = imagecodecs.png_encode(pixels)
+    (tmp_path / "a.png").write_bytes(data[:33] + chunk + data[33:])
+    np.testing.assert_array_equal(image.read(tmp_path / "a.png").pixels, np.rot90(pixels, -1))
+
+
+def test_tiff_kinds(tmp_path):
+    path = tmp_path / "a.tif"
+    planar = noise((3, 6, 4), np.uint16)
+    tifffile.imwrite(path, planar, photometric="rgb", planarconfig="separate", byteorder=">")
+    np.testing.assert_array_equal(image.read(path).pixels, np.moveaxis(planar, 0, -1))
+    grey = noise((6, 4), np.uint8)
+    tifffile.imwrite(path, grey, photometric="miniswhite", compression="lzw")
+    np.testing.assert_array_equal(image.read(path).pixels, 255 - grey)
+    tifffile.imwrite(path, noise((16, 16, 3), np.uint8), photometric="rgb", compression="jpeg")
+    assert image.read(path).pixels.shape == (16, 16, 3)
+
+
+def test_pnm_of_10_bits_with_a_comment(tmp_path):
+    values = np.array([[0, 1023], [512, 1]], ">u2")
+    (tmp_path / "a.pgm").write_bytes(b"P5\n# made by hand\n2 2\n1023\n" + values.tobytes())
+    np.testing.assert_array_equal(image.read(tmp_path / "a.pgm").pixels, [[0, 65535], [32800, 64]])
+
+
+def test_format_is_told_by_content(tmp_path):
+    pixels = noise((5, 4, 3), np.uint16)
+    image.write(tmp_path / "a.png", pixels)
+    (tmp_path / "a.png").rename(tmp_path / "a.jpg")
+    np.testing.assert_array_equal(image.read(tmp_path / "a.jpg").pixels, pixels)
+
+
+# ---------------------------------------------------------------- bad files
+
+
+def encoded(suffix, dtype, tmp_path):
+    path = tmp_path / f"whole{suffix}"
+    image.write(path, noise((40, 30, 3), dtype))
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("suffix", "dtype"),
+    [(s, "uint8") for s in (".png", ".tif", ".jpg", ".bmp", ".webp", ".ppm", ".npy")]
+    + [(s, "uint16") for s in (".png", ".tif", ".ppm")],
+)
+@pytest.mark.parametrize("share", [0.02, 0.5, 0.95])
+def test_truncated_files(tmp_path, suffix, dtype, share):
+    data = encoded(suffix, dtype, tmp_path)
+    path = tmp_path / f"part{suffix}"
+    path.write_bytes(data[: max(9, int(len(data) * share))])
+    with pytest.raises(ValueError, match="part") as caught:
+        image.read(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_truncated_jpeg_in_tiff(tmp_path):
+    path = tmp_path / "a.tif"
+    tifffile.imwrite(path, noise((64, 64, 3), np.uint8), photometric="rgb", compression="jpeg")
+    path.write_bytes(path.read_bytes()[:-30])
+    with pytest.raises(ValueError, match="ends before its last pixel"):
+        image.read(path)
+
+
+def test_damaged_tiff_says_one_sentence(tmp_path, caplog):
+    data = bytearray(encoded(".tif", "uint8", tmp_path))
+    data[8:60] = bytes(range(52))
+    (tmp_path / "a.tif").write_bytes(data)
+    with pytest.raises(ValueError, match="cannot be decoded"):
+        image.read(tmp_path / "a.tif")
+    assert [r.message for r in caplog.records if r.levelno >= logging.WARNING] == []
+
+
+def test_files_that_are_no_images(tmp_path):
+    with pytest.raises(ValueError, match="does not exist"):
+        image.read(tmp_path / "none.png")
+    with pytest.raises(ValueError, match="is a folder"):
+        image.read(tmp_path)
+    (tmp_path / "empty.png").touch()
+    with pytest.raises(ValueError, match="is empty"):
+        image.read(tmp_path / "empty.png")
+    (tmp_path / "text.png").write_text("not a picture")
+    with pytest.raises(ValueError, match="is not an image"):
+        image.read(tmp_path / "text.png")
+    np.save(tmp_path / "o.npy", np.array([{}, {}], object), allow_pickle=True)
+    with pytest.raises(ValueError, match="cannot be decoded"):
+        image.read(tmp_path / "o.npy")
+    np.save(tmp_path / "line.npy", np.zeros(4))
+    with pytest.raises(ValueError, match=r"line\.npy: the sample is 1-dimensional"):
+        image.read(tmp_path / "line.npy")
+    tifffile.imwrite(tmp_path / "nan.tif", np.array([[0, np.nan], [np.inf, 1]], np.float32))
+    with pytest.raises(ValueError, match=r"nan\.tif: .* 2 values .* row 0, column 1"):
+        image.read(tmp_path / "nan.tif")
+    with pytest.raises(ValueError, match="null"):
+        image.read("a\0b")
+
+
+@given(st.binary(max_size=200), st.sampled_from([b"", b"\x93NUMPY", b"II*\0", b"P5 2 2 65535 "]))
+def test_no_bytes_escape_the_errors(tmp_path_factory, data, start):
+    path = tmp_path_factory.getbasetemp() / "any.bin"
+    path.write_bytes(start + data)
+    with contextlib.suppress(ValueError):
+        assert image.read(path).pixels.ndim in (2, 3)
+
+
+# ---------------------------------------------------------------- check_sample, parse_size
+
+
+def test_check_sample_brings_channels_last():
+    pixels = noise((3, 5, 4), ">u2")
+    checked = image.check_sample(pixels, 0)
+    assert checked.shape == (5, 4, 3)
+    assert checked.dtype == np.uint16
+    assert checked.flags.c_contiguous
+    np.testing.assert_array_equal(checked[..., 1], pixels[1])
+    assert image.check_sample([[1, 2], [3, 4]], None).shape == (2, 2, 1)
+
+
+def test_check_sample_errors():
+    grey = np.zeros((4, 4))
+    for bad in (grey.astype(complex), np.array([["a"]]), grey.astype(object)):
+        with pytest.raises(TypeError, match="convert it"):
+            image.check_sample(bad, None)
+    with pytest.raises(ValueError, match="channel_axis=-1"):
+        image.check_sample(np.zeros((4, 4, 3)), None)
+    with pytest.raises(ValueError, match="give three axes"):
+        image.check_sample(grey, -1)
+    with pytest.raises(ValueError, match="-3 to 2"):
+        image.check_sample(np.zeros((4, 4, 3)), 3)
+    with pytest.raises(TypeError, match="channel_axis"):
+        image.check_sample(np.zeros((4, 4, 3)), "last")
+    with pytest.raises(ValueError, match="empty"):
+        image.check_sample(np.zeros((0, 4)), None)
+    with pytest.raises(ValueError, match="ragged"):
+        image.check_sample([[1, 2], [3]], None)
+    grey[2, 3] = np.nan
+    with pytest.raises(ValueError, match=r"1 value that is NaN or infinite, .* row 2, column 3"):
+        image.check_sample(grey, None)
+
+
+@given(st.integers(1, 10**8 - 1), st.integers(1, 10**8 - 1))
+def test_parse_size(width, height):
+    assert image.parse_size(f"{width}x{height}") == (height, width)
+    assert image.parse_size(f" {width} X {height} ") == (height, width)
+    assert image.parse_size(str(width)) == (width, width)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "0", "0x5", "5x0", "-3x4", "3x", "x3", "1x2x3", "a", "1.5", "9" * 9]
+)
+def test_parse_size_errors(text):
+    with pytest.raises(ValueError, match="WIDTHxHEIGHT"):
+        image.parse_size(text)
+
+
+# ---------------------------------------------------------------- writing
+
+
+@pytest.mark.parametrize(
+    ("suffix", "dtype", "channels", "remedy"),
+    [
+        (".jpg", "uint16", 3, ".png"),
+        (".png", "float32", 3, ".tif"),
+        (".png", "uint8", 5, ".tif"),
+        (".jpg", "uint8", 4, ".png"),
+        (".tif", "longdouble", 1, ".npy"),
+        (".gif", "uint8", 3, ".png"),
+        (".pgm", "uint8", 3, ".png"),
+    ],
+)
+def test_formats_that_cannot_hold_the_pixels(tmp_path, suffix, dtype, channels, remedy):
+    with pytest.raises(ValueError, match=rf"cannot hold .* in \{remedy} instead"):
+        image.check_writable(tmp_path / f"a{suffix}", dtype, channels)
+    with pytest.raises(ValueError, match="cannot hold"):
+        image.write(tmp_path / f"a{suffix}", np.zeros((2, 2, channels), dtype))
+    image.check_writable(tmp_path / f"a{remedy}", dtype, channels)
+    assert os.listdir(tmp_path) == []
+
+
+def test_places_that_cannot_be_written(tmp_path):
+    for path, words in [
+        (tmp_path / "none" / "a.png", "does not exist"),
+        (tmp_path / "a.xyz", "ends in .xyz"),
+        (tmp_path / "a", "has no suffix"),
+        (tmp_path, "is a folder"),
+        (tmp_path / ("a" * 300 + ".png"), "cannot be written"),
+        ("/dev/null", "not a regular file"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            image.check_writable(path, np.uint8, 3)
+    (tmp_path / "file").touch()
+    with pytest.raises(ValueError, match="is not a folder"):
+        image.check_writable(tmp_path / "file" / "a.png")
+    image.check_writable(tmp_path / "a.npz", suffixes={".npz"})
+    with pytest.raises(ValueError, match=r"\.npz"):
+        image.check_writable(tmp_path / "a.png", suffixes={".npz"})
+
+
+def test_folder_without_permission(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write anywhere
+    with pytest.raises(ValueError, match="not writable"):
+        image.check_writable(tmp_path / "a.png")
+
+
+def fail_halfway(path, error):
+    with image.atomic_path(path) as temporary:
+        assert temporary.parent == path.parent
+        assert temporary.suffix == path.suffix
+        temporary.write_bytes(b"half")
+        raise error
+
+
+def test_failure_leaves_the_old_file_alone(tmp_path, monkeypatch):
+    path = tmp_path / "a.png"
+    path.write_bytes(b"old")
+    for error in (KeyboardInterrupt, RuntimeError):
+        with pytest.raises(error):
+            fail_halfway(path, error)
+    assert path.read_bytes() == b"old"
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(image, "_encode", full)
+    with pytest.raises(ValueError, match="No space left"):
+        image.write(path, np.zeros((2, 2), np.uint8))
+    assert path.read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["a.png"]
+
+
+def test_written_file_has_the_usual_permissions_and_follows_links(tmp_path):
+    (tmp_path / "usual").touch()
+    (tmp_path / "link.png").symlink_to(tmp_path / "real.png")
+    image.write(tmp_path / "link.png", np.zeros((2, 2), np.uint8))
+    assert (tmp_path / "link.png").is_symlink()
+    modes = [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("usual", "real.png")]
+    assert modes[0] == modes[1]
+
+
+def test_write_checks_its_array(tmp_path):
+    with pytest.raises(TypeError, match="real"):
+        image.write(tmp_path / "a.npy", np.zeros((2, 2), complex))
+    with pytest.raises(ValueError, match="shape"):
+        image.write(tmp_path / "a.npy", np.zeros(4))
+
+
+def test_to_display():
+    assert image.to_display(np.array([0, 3, 255], np.uint8)).tolist() == [0, 3, 255]
+    assert image.to_display(np.array([False, True])).tolist() == [0, 255]
+    values = np.array([-5.0, 0.0, 5.0, 10.0, 20.0])
+    assert image.to_display(values, (0.0, 10.0)).tolist() == [0, 0, 128, 255, 255]
+    assert image.to_display(np.array([0, 65535], np.uint16)).tolist() == [0, 255]
+    assert image.to_display(np.full(2, 7.0)).tolist() == [128, 128]
+    assert image.to_display(np.array([-1.7e308, 1.7e308])).tolist() == [0, 255]
+
+
+def test_image_is_read_from_a_path_object_and_text(tmp_path):
+    buffer = io.BytesIO()
+    PIL.Image.new("L", (3, 2), 9).save(buffer, "PNG")
+    (tmp_path / "a.png").write_bytes(buffer.getvalue())
+    assert image.read(str(tmp_path / "a.png")).pixels.shape == (2, 3)

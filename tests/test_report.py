@@ -1,0 +1,212 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Sheets, animations, false colours and stages are whole files of the right pictures."""
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+import PIL.Image
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simdtex import image
+from simdtex.report import sheet
+from simdtex.report.stages import StageWriter
+
+
+def contains(picture, part):
+    rows, cols = part.shape[:2]
+    corners = np.argwhere((picture == part[0, 0]).all(axis=-1))
+    return any(np.array_equal(picture[i : i + rows, j : j + cols], part) for i, j in corners)
+
+
+def test_contact_sheet_shows_every_picture_at_its_own_size(tmp_path):
+    rng = np.random.default_rng(0)
+    grey = rng.integers(0, 256, (100, 120), dtype=np.uint8)
+    colour = rng.integers(0, 256, (130, 96, 3), dtype=np.uint8)
+    tiny = rng.integers(0, 256, (20, 30, 4), dtype=np.uint8)
+    deep = rng.integers(0, 65536, (110, 110), dtype=np.uint16)
+    pictures = [("grey", grey), ("a long label, longer than the picture", colour), ("tiny", tiny),
+                ("deep", deep)]  # fmt: skip
+    laid = sheet.contact_sheet(pictures, tmp_path / "sheet.png", columns=3)
+    np.testing.assert_array_equal(image.read(tmp_path / "sheet.png").pixels, laid)
+    assert contains(laid, np.stack([grey] * 3, axis=-1))
+    assert contains(laid, colour)
+    assert contains(laid, tiny[..., :3].repeat(4, axis=0).repeat(4, axis=1))
+    assert contains(laid, np.stack([image.to_display(deep)] * 3, axis=-1))
+    assert sheet.contact_sheet(pictures, columns=1).shape[0] > laid.shape[0]
+    assert os.listdir(tmp_path) == ["sheet.png"]
+
+
+def test_contact_sheet_errors(tmp_path):
+    picture = np.zeros((4, 4), np.uint8)
+    with pytest.raises(ValueError, match="no pictures"):
+        sheet.contact_sheet([])
+    with pytest.raises(ValueError, match="columns is 0"):
+        sheet.contact_sheet([("a", picture)], columns=0)
+    with pytest.raises(ValueError, match="does not exist"):
+        sheet.contact_sheet([("a", picture)], tmp_path / "none" / "a.png")
+
+
+@given(st.integers(1, 60), st.integers(1, 60), st.integers(1, 20))
+def test_fitted_keeps_the_bound_and_the_flat(rows, cols, side):
+    flat = np.full((rows, cols, 3), 77, np.uint8)
+    reduced = sheet.fitted(flat, side)
+    assert max(reduced.shape[:2]) <= side
+    assert (reduced == 77).all()
+
+
+@given(st.integers(1, 40), st.integers(1, 40), st.integers(0, 4))
+def test_enlarged_puts_decimated_pixels_back(rows, cols, level):
+    full = np.arange(rows * cols, dtype=np.uint8).reshape(rows, cols)
+    step = 2**level
+    shown = sheet.enlarged(full[::step, ::step], (rows, cols), step)
+    assert shown.shape == full.shape
+    i, j = np.indices(full.shape)
+    np.testing.assert_array_equal(shown, full[i // step * step, j // step * step])
+
+
+@pytest.mark.parametrize("suffix", [".gif", ".png", ".apng", ".webp"])
+def test_animation(tmp_path, suffix):
+    frames = [np.full((6, 8), shade, np.uint8) for shade in (0, 80, 160, 240)]
+    path = tmp_path / f"a{suffix}"
+    sheet.animation(iter(frames), path, ms=50)
+    with PIL.Image.open(path) as film:
+        assert film.n_frames == 4
+        assert film.size == (8, 6)
+        film.seek(2)
+        assert abs(np.asarray(film.convert("L"))[0, 0] - 160.0) <= 2
+    assert os.listdir(tmp_path) == [path.name]
+
+
+def test_animation_is_bounded_and_checked(tmp_path):
+    sheet.animation([np.zeros((1030, 600), np.uint8)] * 2, tmp_path / "a.gif")
+    with PIL.Image.open(tmp_path / "a.gif") as film:
+        assert max(film.size) <= 512
+    kept = sheet.thinned(np.full((1, 1, 3), n % 256, np.uint8) for n in range(1003))
+    assert len(kept) <= 201
+    assert kept[-1][0, 0, 0] == 1002 % 256
+    frame = np.zeros((4, 4), np.uint8)
+    for frames, name, ms, words in [
+        ([], "b.gif", 50, "no frames"),
+        ([frame, frame[1:]], "b.gif", 50, "differ in shape"),
+        ([frame], "b.jpg", 50, r"\.gif"),
+        ([frame], "b.gif", 0, "ms is 0"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            sheet.animation(frames, tmp_path / name, ms=ms)
+    assert os.listdir(tmp_path) == ["a.gif"]
+
+
+@pytest.mark.parametrize("count", [1, 2, 199, 200, 201, 399, 400, 401])
+def test_thinned_keeps_first_and_last(count):
+    frames = [np.array([n]) for n in range(count)]
+    kept = [int(f[0]) for f in sheet.thinned(iter(frames))]
+    assert (kept[0], kept[-1]) == (0, count - 1)
+    assert len(set(np.diff(kept)[:-1])) <= 1
+
+
+def test_heat_grows_in_lightness():
+    colours = sheet.heat(np.linspace(0, 1, 256)).astype(float)
+    assert colours.shape == (256, 3)
+    grey = colours @ [0.2126, 0.7152, 0.0722]
+    assert (np.diff(grey) > -1.0).all()  # rounding to 8 bits
+    assert grey[0] < 30
+    assert grey[-1] > 220
+    np.testing.assert_array_equal(sheet.heat([-1.0, 2.0]), sheet.heat([0.0, 1.0]))
+
+
+def test_source_colours_tell_positions_apart():
+    source = np.stack(np.indices((16, 24)), axis=-1)
+    colours = sheet.source_colours(source, (16, 24))
+    assert len(np.unique(colours.reshape(-1, 3), axis=0)) == 16 * 24
+    steps = np.abs(np.diff(colours.astype(int), axis=1))
+    assert steps.max() < 40
+    source[3, 4] = -1
+    assert (sheet.source_colours(source, (16, 24))[3, 4] == 0).all()
+    with pytest.raises(ValueError, match="source map"):
+        sheet.source_colours(source[..., 0], (16, 24))
+
+
+@dataclass
+class Moment:
+    """What a run would tell its callback."""
+
+    level: int
+    sweep: int
+    full: np.ndarray
+    end_of_sweep: bool = True
+    levels: int = 3
+    phase: str = "relax"
+    temperature_left: float = 0.5
+
+    def image(self):
+        return self.full[:: 2**self.level, :: 2**self.level]
+
+    def temperature(self):
+        return np.full(self.image().shape[:2], 0.5)
+
+
+@pytest.mark.parametrize(
+    ("dtype", "channels"), [("uint8", (3,)), ("uint16", ()), ("float32", (5,))]
+)
+def test_stages(tmp_path, dtype, channels):
+    folder = tmp_path / "stages"
+    full = (np.random.default_rng(0).random((101, 130, *channels)) * 255).astype(dtype)
+    writer = StageWriter(folder, limits=(0.0, 255.0))
+    assert not folder.exists()
+    for level in (2, 1, 0):
+        for sweep in (1, 2):
+            writer(Moment(level, sweep, full, end_of_sweep=False))
+            writer(Moment(level, sweep, full))
+    writer.finish()
+    names = {f"{kind}level{level}-sweep{sweep:02d}.png" for kind in ("", "temperature-")
+             for level in range(3) for sweep in (1, 2)}  # fmt: skip
+    assert set(os.listdir(folder)) == names | {"sheet.png", "animation.gif"}
+    shown = image.read(folder / "level1-sweep02.png").pixels
+    np.testing.assert_array_equal(shown[..., :3] if channels else shown,
+                                  image.to_display(full, (0, 255))[::2, ::2][..., :3] if channels
+                                  else image.to_display(full, (0, 255))[::2, ::2])  # fmt: skip
+    assert image.read(folder / "temperature-level2-sweep01.png").pixels.shape == (26, 33, 3)
+    finest = image.to_display(full, (0, 255))
+    finest = finest[..., :3] if channels else np.stack([finest] * 3, axis=-1)
+    laid = image.read(folder / "sheet.png").pixels
+    i, j = np.indices((101, 130))
+    for step in (1, 2, 4):
+        assert contains(laid, finest[i // step * step, j // step * step])
+    with PIL.Image.open(folder / "animation.gif") as film:
+        assert film.size == (130, 101)
+
+
+def test_stages_of_a_large_or_interrupted_run(tmp_path):
+    writer = StageWriter(tmp_path / "a")
+    writer.finish()
+    assert not (tmp_path / "a").exists()
+    full = np.add.outer(np.arange(1101), np.arange(700)).astype(np.uint16)
+    for level in (2, 1):
+        writer(Moment(level, 1, full))
+    writer.finish()
+    with PIL.Image.open(tmp_path / "a" / "animation.gif") as film:
+        assert max(film.size) <= 512
+
+
+def test_stage_folder_is_checked_and_cleared(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(ValueError, match="is a file"):
+        StageWriter(tmp_path / "file")
+    with pytest.raises(ValueError, match="does not exist"):
+        StageWriter(tmp_path / "none" / "stages")
+    with pytest.raises(ValueError, match="holds other files"):
+        StageWriter(tmp_path)
+    folder = tmp_path / "stages"
+    folder.mkdir()
+    for name in ("level3-sweep01.png", "temperature-level3-sweep120.png", "sheet.png"):
+        (folder / name).touch()
+    writer = StageWriter(folder)
+    assert len(os.listdir(folder)) == 3
+    writer(Moment(0, 1, np.zeros((4, 4), bool)))
+    assert sorted(os.listdir(folder)) == ["level0-sweep01.png", "temperature-level0-sweep01.png"]
+    (folder / "notes.txt").touch()
+    with pytest.raises(ValueError, match=r"notes\.txt"):
+        StageWriter(folder)
