@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """More of a texture from a sample of it, by parallel relaxation on any OpenCL device."""
 
+from importlib.metadata import version
+
 from simdtex.device import DeviceError, devices
 from simdtex.machine import open_machine
 from simdtex.run import Output, Progress
 from simdtex.synthesis import lcpdf, synthesize
 
-__version__ = "0.1.0.dev0"
+__version__ = version("simdtex")
 
 __all__ = [
     "DeviceError",

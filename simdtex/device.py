@@ -172,10 +172,7 @@ def find(text: str | int | DeviceInfo | None = None) -> DeviceInfo:
             return text
         raise DeviceError(f"The device {text} cannot be used: {text.reason}.")
     if isinstance(text, bool) or not isinstance(text, str | int | None):
-        raise TypeError(
-            "device must be a text, an index, a DeviceInfo or None, "
-            f"but it is a {type(text).__name__}."
-        )
+        raise TypeError(f"device must be a text, an index, a DeviceInfo or None, but it is a {type(text).__name__}.")
     wanted = str(text) if text is not None else os.environ.get(VARIABLE) or None
     if wanted is not None and wanted.strip().lower() == "reference":
         return _reference(0)  # no runtime is asked, so that it works where all are broken
@@ -219,9 +216,7 @@ def choose(
         raise DeviceError(f'No device matches "{text}"; choose one of: {choices}.')
     if not usable:
         reasons = "; ".join(f"{info}: {info.reason}" for info in matches)
-        raise DeviceError(
-            f'The device "{text}" cannot be used ({reasons}); choose one of: {choices}.'
-        )
+        raise DeviceError(f'The device "{text}" cannot be used ({reasons}); choose one of: {choices}.')
     several = ", ".join(f"{info.index} = {info}" for info in usable)
     raise DeviceError(f'"{text}" matches several devices; give the index of one of: {several}.')
 
@@ -245,9 +240,7 @@ def table(listing: Sequence[DeviceInfo]) -> list[tuple[str, ...]]:
             info.version.removeprefix("OpenCL ").partition(" ")[0] or "-",
             str(info.compute_units or "-"),
             f"{info.memory / 2**30:.1f} GiB" if info.memory else "-",
-            ("yes (simulator)" if info.simulated else "yes")
-            if info.usable
-            else f"no: {info.reason}",
+            ("yes (simulator)" if info.simulated else "yes") if info.usable else f"no: {info.reason}",
         )
         for info in listing
     ]
@@ -297,9 +290,7 @@ def _enumerate() -> tuple[DeviceInfo, ...]:
             handles = vendor.get_devices()
             found += [_describe(title, handle) for handle in handles]
             if not handles:
-                found.append(
-                    DeviceInfo(0, title, "", "other", reason="the platform reports no device")
-                )
+                found.append(DeviceInfo(0, title, "", "other", reason="the platform reports no device"))
         except Exception as error:  # a broken platform must never stop the working ones
             found.append(DeviceInfo(0, title, "", "other", reason=runtimes.one_line(error)))
     found.sort(key=lambda info: info.driver, reverse=True)  # of two versions, the newer first
@@ -357,9 +348,7 @@ def _matching(text: str, listing: Sequence[DeviceInfo]) -> list[DeviceInfo]:
         return [listing[int(word)]]
     named = [info for info in listing if info.name.lower() == word]
     return named or [
-        info
-        for info in listing
-        if word and word in f"{info.platform}\n{info.name}\n{info.version}".lower()
+        info for info in listing if word and word in f"{info.platform}\n{info.name}\n{info.version}".lower()
     ]
 
 

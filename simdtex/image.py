@@ -97,9 +97,7 @@ def read(path: PathLike) -> Image:
             warnings.simplefilter("ignore")
             pixels = np.asarray(_decoder(data)(data))
     except PIL.UnidentifiedImageError:
-        raise ValueError(
-            f"{name} is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF, PPM or .npy file"
-        ) from None
+        raise ValueError(f"{name} is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF, PPM or .npy file") from None
     except MemoryError:
         raise ValueError(f"{name} is too large for the memory: crop it first") from None
     except Exception as error:  # every decoder has its own exceptions for a damaged file
@@ -300,9 +298,7 @@ def check_sample(array: ArrayLike, channel_axis: int | None) -> Array:
     except ValueError:
         raise ValueError("the sample is ragged: give rows of equal length") from None
     if pixels.dtype.kind not in "buif":
-        raise TypeError(
-            f"the sample holds {pixels.dtype} values: convert it to integers or real floats"
-        )
+        raise TypeError(f"the sample holds {pixels.dtype} values: convert it to integers or real floats")
     if channel_axis is None and pixels.ndim != 2:
         hint = ", or channel_axis=-1 if its last axis holds the channels" * (pixels.ndim == 3)
         raise ValueError(f"the sample is {pixels.ndim}-dimensional: give (rows, cols){hint}")
@@ -318,10 +314,7 @@ def check_sample(array: ArrayLike, channel_axis: int | None) -> Array:
             raise ValueError(f"channel_axis is {channel_axis}: give one of -3 to 2")
     if pixels.size == 0:
         raise ValueError(f"the sample is empty, of shape {pixels.shape}: give at least one pixel")
-    if channel_axis is None:
-        planes = pixels[..., np.newaxis]
-    else:
-        planes = np.moveaxis(pixels, channel_axis, -1)
+    planes = pixels[..., np.newaxis] if channel_axis is None else np.moveaxis(pixels, channel_axis, -1)
     _check_finite(planes)
     return _native(planes)
 
@@ -335,8 +328,7 @@ def _check_finite(planes: Array) -> None:
         row, column = (int(i) for i in np.unravel_index(int(bad.argmax()), bad.shape)[:2])
         what = "value that is" if count == 1 else "values that are"
         raise ValueError(
-            f"the sample has {count} {what} NaN or infinite, the first at row {row}, "
-            f"column {column}: fill them first"
+            f"the sample has {count} {what} NaN or infinite, the first at row {row}, column {column}: fill them first"
         )
 
 
@@ -462,9 +454,7 @@ def _check_place(target: Path) -> None:
     except FileNotFoundError:
         pass
     except OSError as error:
-        raise ValueError(
-            f"{_shortened(target)} cannot be written ({error.strerror}): give another path"
-        ) from None
+        raise ValueError(f"{_shortened(target)} cannot be written ({error.strerror}): give another path") from None
     if not os.access(os.path.dirname(os.path.realpath(target)), os.W_OK | os.X_OK):
         raise ValueError(f"the folder {folder} is not writable: choose another folder")
 
@@ -531,9 +521,7 @@ def write(path: PathLike, array: ArrayLike) -> None:
     if pixels.dtype.kind not in "buif":
         raise TypeError(f"the picture holds {pixels.dtype} values: give integers or real floats")
     if pixels.ndim not in (2, 3) or pixels.size == 0:
-        raise ValueError(
-            f"the picture has the shape {pixels.shape}: give (rows, cols) or (rows, cols, channels)"
-        )
+        raise ValueError(f"the picture has the shape {pixels.shape}: give (rows, cols) or (rows, cols, channels)")
     channels = 1 if pixels.ndim == 2 else pixels.shape[2]
     check_writable(path, pixels.dtype, channels)
     suffix = Path(path).suffix.lower()

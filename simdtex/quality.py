@@ -155,9 +155,7 @@ def coverage(sample: ArrayLike, output: ArrayLike, *, stride: int | None = None)
     return _mean_nearest(sample, output, of_output=False, stride=stride)
 
 
-def _mean_nearest(
-    sample: ArrayLike, output: ArrayLike, *, of_output: bool, stride: int | None
-) -> float:
+def _mean_nearest(sample: ArrayLike, output: ArrayLike, *, of_output: bool, stride: int | None) -> float:
     if stride is not None and stride < 1:
         raise ValueError(f"stride is {stride}: give 1 or more")
     first, second = _pair(sample, output, PATCH)
@@ -180,14 +178,10 @@ def _nearest(queries: Planes, candidates: Planes, stride: int | None) -> NDArray
     step = max(1, min(BLOCK_ROWS, BLOCK_BYTES // (4 * size)))
     width = max(1, min(BLOCK_BYTES // (4 * step), BLOCK_BYTES // (4 * size)))
     starts = range(0, len(asked), step)
-    return np.concatenate(
-        [_nearest_of(asked[i : i + step], queries, candidates, width) for i in starts]
-    )
+    return np.concatenate([_nearest_of(asked[i : i + step], queries, candidates, width) for i in starts])
 
 
-def _nearest_of(
-    asked: Indices, queries: Planes, candidates: Planes, width: int
-) -> NDArray[np.float64]:
+def _nearest_of(asked: Indices, queries: Planes, candidates: Planes, width: int) -> NDArray[np.float64]:
     wanted = _patches(queries, asked)
     least = np.full(len(asked), np.inf, dtype=np.float32)
     where = np.zeros(len(asked), dtype=np.intp)
@@ -394,8 +388,7 @@ def source_use(source: ArrayLike, sample_shape: tuple[int, ...]) -> SourceUse:
         raise ValueError("the source map is not (rows, cols, 2) integers: pass the one of the run")
     if positions.size == 0 or (positions < 0).any() or (positions >= (rows, cols)).any():
         raise ValueError(
-            f"the source map points outside a sample of {rows} x {cols} pixels: pass the sample "
-            "that it was made from"
+            f"the source map points outside a sample of {rows} x {cols} pixels: pass the sample that it was made from"
         )
     flat = positions[..., 0].astype(np.intp) * cols + positions[..., 1].astype(np.intp)
     uses = np.bincount(flat.ravel(), minlength=rows * cols)
@@ -408,9 +401,7 @@ def _planes(array: ArrayLike) -> Array:
     return check_sample(array, None if np.ndim(array) == 2 else -1)
 
 
-def _pair(
-    sample: ArrayLike, output: ArrayLike, side: int, *, keep_type: bool = False
-) -> tuple[Array, Array]:
+def _pair(sample: ArrayLike, output: ArrayLike, side: int, *, keep_type: bool = False) -> tuple[Array, Array]:
     first, second = _planes(sample), _planes(output)
     if first.shape[2] != second.shape[2]:
         raise ValueError(
@@ -420,8 +411,7 @@ def _pair(
     for name, planes in (("sample", first), ("output", second)):
         if min(planes.shape[:2]) < side:
             raise ValueError(
-                f"the {name} is {planes.shape[0]} x {planes.shape[1]} pixels: "
-                f"give at least {side} x {side}"
+                f"the {name} is {planes.shape[0]} x {planes.shape[1]} pixels: give at least {side} x {side}"
             )
     if keep_type:
         return first, second

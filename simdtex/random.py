@@ -46,9 +46,7 @@ def philox(counter: list[NDArray[np.uint32]], key: tuple[int, int]) -> list[NDAr
     return [c.astype(np.uint32) for c in (c0, c1, c2, c3)]
 
 
-def draw4(
-    seed: int, level: int, sweep: int, site: Any, purpose: int, attempt: Any = 0
-) -> list[NDArray[np.uint32]]:
+def draw4(seed: int, level: int, sweep: int, site: Any, purpose: int, attempt: Any = 0) -> list[NDArray[np.uint32]]:
     """Four random 32-bit numbers per site, the counter being (site, sweep, level and purpose, attempt)."""
     site, attempt = np.broadcast_arrays(np.asarray(site), np.asarray(attempt))
     counter = [
@@ -92,6 +90,4 @@ def as_seed(rng: Any = None) -> int:
         if 0 <= int(rng) < 2**64:
             return int(rng)
         raise ValueError(f"the seed {rng} is out of range; give a whole number from 0 to 2**64 - 1")
-    raise TypeError(
-        f"rng must be None, a whole number or a numpy.random.Generator, not {type(rng).__name__}"
-    )
+    raise TypeError(f"rng must be None, a whole number or a numpy.random.Generator, not {type(rng).__name__}")

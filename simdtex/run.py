@@ -3,11 +3,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 from numpy.typing import NDArray
+
+from simdtex.lattice import Grid
 
 
 @dataclass(frozen=True)
@@ -70,11 +73,60 @@ class Output:
         Each level's picture at its end, the coarsest first.
     statistics : dict
         ``device``, ``seed``, ``options``, ``seconds``, and ``levels``: one dict per level with
-        ``level``, ``rows``, ``cols``, ``candidates``, ``bandwidth``, ``colors`` (steps of the first sweep),
-        ``sweeps``, ``relaxations``, ``fma`` (of equation (12)) and ``seconds``.
+        ``level``, ``rows``, ``cols``, ``candidates``, ``sweeps``, ``relaxations``, ``fma`` (of equation (12)) and
+        ``seconds``.
     """
 
     source: NDArray[Any]
     temperature: NDArray[Any]
     stages: list[Stage] = field(default_factory=list)
     statistics: dict[str, Any] = field(default_factory=dict)
+
+
+class Meter:
+    """Counts what a run does, level by level, and tells how far it has come.
+
+    Parameters
+    ----------
+    expected : dict
+        Level -> expected relaxations times candidates.
+    """
+
+    def __init__(self, expected: dict[int, float]) -> None:
+        self.reports: list[dict[str, Any]] = []
+        self._expected = expected
+        self._ended = 0.0
+        self._began = self._level_began = time.perf_counter()
+
+    def begin(self, level: int, grid: Grid, candidates: int) -> None:
+        """Begin a level."""
+        self._level_began = time.perf_counter()
+        sizes = {"level": level, "rows": grid.rows, "cols": grid.cols, "candidates": candidates}
+        self.reports.append(sizes | {"sweeps": 0, "relaxations": 0, "fma": 0, "seconds": 0.0})
+
+    def add(self, relaxations: int, fma: int) -> None:
+        """Count sites that were relaxed."""
+        self.reports[-1]["relaxations"] += relaxations
+        self.reports[-1]["fma"] += fma
+
+    def sweeps(self, number: int) -> None:
+        """Note how many sweeps the level has had."""
+        self.reports[-1]["sweeps"] = number
+
+    def end(self) -> None:
+        """End the level."""
+        self.reports[-1]["seconds"] = time.perf_counter() - self._level_began
+        self._ended += self._expected[self.reports[-1]["level"]]
+
+    @property
+    def seconds(self) -> float:
+        """Since the beginning."""
+        return time.perf_counter() - self._began
+
+    @property
+    def fraction(self) -> float:
+        """Share of the expected work that is done, 0 to 1; never falls."""
+        report = self.reports[-1]
+        expected = self._expected[report["level"]]
+        here = min(float(expected), float(report["relaxations"] * report["candidates"]))
+        return min(1.0, (self._ended + here) / sum(self._expected.values()))

@@ -14,18 +14,22 @@ from simdtex.ops.operation import Array
 BLOCK = 64
 """Candidates to a block (kernels/lcpdf.cl); lists of candidates are padded to whole blocks."""
 
+ENOUGH_WHOLE = 0.75
+"""Share of positions that must have a whole neighbourhood for ``edges="auto"`` not to reflect."""
+
 
 class Candidates(NamedTuple):
     """The sample positions p that a site may be taken from, at one level.
 
-    ``pixels`` (C, rows * cols) float32 working grey levels, margin and all; ``list`` (n rounded up to blocks,) int32
-    pixel index of each p, row by row; ``count`` n; ``reach`` (N,) int32 pixel offset of each neighbour; ``index_of``
-    (rows * cols,) int32 position of a pixel in the list or -1; ``rows``, ``cols`` of the sample with its margin.
+    ``pixels`` (C, rows * cols) float32 working grey levels, margin and all; ``positions`` (n rounded up to
+    blocks,) int32 pixel index of each p, row by row; ``size`` n; ``reach`` (N,) int32 pixel offset of each
+    neighbour; ``index_of`` (rows * cols,) int32 place of a pixel in ``positions`` or -1; ``rows``, ``cols`` of the
+    sample with its margin.
     """
 
     pixels: Array
-    list: Array
-    count: int
+    positions: Array
+    size: int
     reach: Array
     index_of: Array
     rows: int
@@ -94,8 +98,9 @@ class Sample:
         n = self.height * self.width
         total = 0.0
         for channel in self.levels.astype(np.int64):  # whole numbers: the same sum on every machine
-            total += (n * int((channel * channel).sum()) - int(channel.sum()) ** 2) / n**2
-        return total / self.channels
+            squares, values = int((channel * channel).sum()), int(channel.sum())
+            total += (n * squares - values * values) / n**2
+        return float(total / self.channels)
 
     def positions(
         self,
@@ -124,7 +129,7 @@ class Sample:
         col = np.arange(0, self.width, step, dtype=np.int32)
         whole_row = row[(row + top >= 0) & (row + bottom < self.height)]
         whole_col = col[(col + left >= 0) & (col + right < self.width)]
-        few = 2 * whole_row.size * whole_col.size < row.size * col.size
+        few = whole_row.size * whole_col.size < ENOUGH_WHOLE * row.size * col.size
         if not (edges == "reflect" or (edges == "auto" and few)):
             row, col = whole_row, whole_col
         row, col = row + np.int32(self.margin), col + np.int32(self.margin)
@@ -185,4 +190,5 @@ class Sample:
         if np.issubdtype(self.pixels.dtype, np.integer):
             bounds = np.iinfo(self.pixels.dtype)
             moved = np.clip(np.rint(moved), bounds.min, bounds.max)
-        return np.where(step == 0, own, moved.astype(self.pixels.dtype))
+        result: NDArray[Any] = np.where(step == 0, own, moved.astype(self.pixels.dtype))
+        return result

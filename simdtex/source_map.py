@@ -55,10 +55,7 @@ def apply_source_map(
     positions = _checked(source)
     values = np.asarray(other_map)
     if values.ndim not in (2, 3):
-        raise ValueError(
-            f"the other map is {values.ndim}-dimensional: give (rows, cols) or "
-            "(rows, cols, channels)"
-        )
+        raise ValueError(f"the other map is {values.ndim}-dimensional: give (rows, cols) or (rows, cols, channels)")
     rows, cols = values.shape[:2]
     if sample_shape is not None and (rows, cols) != tuple(sample_shape[:2]):
         raise ValueError(
@@ -141,12 +138,7 @@ def load_source_map(path: PathLike) -> SourceMap:
 
 def _checked(source: ArrayLike) -> SourceMap:
     positions = np.asarray(source)
-    if (
-        positions.ndim != 3
-        or positions.shape[2] != 2
-        or positions.size == 0
-        or positions.dtype.kind not in "iu"
-    ):
+    if positions.ndim != 3 or positions.shape[2] != 2 or positions.size == 0 or positions.dtype.kind not in "iu":
         raise ValueError(
             f"a source map is (rows, cols, 2) integers, not {positions.shape} of "
             f"{positions.dtype}: pass the one of a run"

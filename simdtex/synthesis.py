@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,16 @@ from simdtex.run import Callback, Output
 from simdtex.sample import Sample
 
 METHODS = ("mrf",)
+
+
+@overload
+def synthesize(
+    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[True], **options: Any
+) -> tuple[NDArray[Any], Output]: ...
+
+
+@overload
+def synthesize(sample: ArrayLike, shape: tuple[int, int], **options: Any) -> NDArray[Any]: ...
 
 
 def synthesize(
@@ -169,20 +179,18 @@ def lcpdf(
     mrf.check_fit(y.shape, int(offsets.max()), order)
 
     machine = open_machine(device)
-    grid = Grid(*x.shape, 1, boundary == "torus")
+    grid = Grid(x.shape[0], x.shape[1], 1, boundary == "torus")
     field = Field(
         machine.put(x[None].astype(np.uint16)),
         machine.put(np.zeros(x.shape, np.int32)),
         machine.put(_check_temperature(temperature, x.shape)),
     )
     candidates = grey.candidates(machine, offsets, 1)
-    h = bandwidth * parzen.optimal_bandwidth(
-        grey.variance, candidates.count, len(offsets) + 1
-    )
+    h = bandwidth * parzen.optimal_bandwidth(grey.variance, candidates.size, len(offsets) + 1)
     window = parzen.window(h, levels - 1)
     device_offsets = machine.put(offsets)
     rows = [np.zeros((0, levels))]
-    step = min(machine.chunk(candidates.count, len(offsets)), 4096)
+    step = min(machine.chunk(candidates.size, len(offsets)), 4096)
     for first in range(0, len(where), step):
         here = machine.put(where[first : first + step])
         near = neighbourhood(machine, here, field, device_offsets, grid)
@@ -196,9 +204,7 @@ def lcpdf(
     return np.concatenate(rows)
 
 
-def _shares(
-    counts: NDArray[np.uint32], sites: NDArray[np.int32], grid: Grid
-) -> NDArray[np.float64]:
+def _shares(counts: NDArray[np.uint32], sites: NDArray[np.int32], grid: Grid) -> NDArray[np.float64]:
     total = counts.sum(1, keepdims=True)
     if not total.all():
         row, col = divmod(int(sites[(total[:, 0] == 0).argmax()]), grid.width)
@@ -206,7 +212,8 @@ def _shares(
             f"no neighbourhood of the sample equals that of site ({row}, {col}); "
             'use fewer grey levels, a smaller order, or estimator="parzen"'
         )
-    return counts / total
+    shares: NDArray[np.float64] = counts / total
+    return shares
 
 
 def _squeezed(callback: Callback | None, channel_axis: int | None) -> Callback | None:
@@ -243,9 +250,7 @@ def _check_grey(name: str, array: ArrayLike, levels: int) -> NDArray[np.int64]:
     if not np.issubdtype(a.dtype, np.integer) and a.dtype != np.bool_:
         raise TypeError(f"{name} must hold whole numbers 0 to {levels - 1}, not {a.dtype}")
     if a.min() < 0 or a.max() >= levels:
-        raise ValueError(
-            f"{name} holds {a.min()} to {a.max()}, beyond 0 to {levels - 1}; give levels or rescale it"
-        )
+        raise ValueError(f"{name} holds {a.min()} to {a.max()}, beyond 0 to {levels - 1}; give levels or rescale it")
     return a.astype(np.int64)
 
 

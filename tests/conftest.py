@@ -47,8 +47,7 @@ def pytest_generate_tests(metafunc):
     params = [
         pytest.param(
             info,
-            id=info.name.replace(" ", "-")
-            + (f"-{info.index}" if names.count(info.name) > 1 else ""),
+            id=info.name.replace(" ", "-") + (f"-{info.index}" if names.count(info.name) > 1 else ""),
         )
         for info in found
     ]
@@ -70,6 +69,14 @@ def _take(info: DeviceInfo | None) -> DeviceInfo:
 def cl_device(request) -> DeviceInfo:
     """Every usable OpenCL device in turn."""
     return _take(request.param)
+
+
+@pytest.fixture(scope="session")
+def machine(cl_device):
+    """An OpenCL machine on every usable device in turn; its programs are built once a session."""
+    from cases import opencl
+
+    return opencl(cl_device)
 
 
 @pytest.fixture(scope="session")

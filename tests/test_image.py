@@ -93,9 +93,7 @@ def test_bool_becomes_black_and_white(tmp_path):
 def test_grey_webp_reads_as_equal_colours(tmp_path):
     pixels = noise((5, 7), np.uint8)
     image.write(tmp_path / "a.webp", pixels)
-    np.testing.assert_array_equal(
-        image.read(tmp_path / "a.webp").pixels, pixels[..., None] + [0] * 3
-    )
+    np.testing.assert_array_equal(image.read(tmp_path / "a.webp").pixels, pixels[..., None] + [0] * 3)
 
 
 # ---------------------------------------------------------------- other people's files
@@ -143,9 +141,7 @@ def test_alpha_is_dropped_only_where_opaque(tmp_path, dtype, colours, suffix):
 def test_transparent_colour_becomes_alpha(tmp_path):
     grey = PIL.Image.fromarray(np.array([[0, 7], [7, 9]], np.uint8))
     grey.save(tmp_path / "a.png", transparency=7)
-    np.testing.assert_array_equal(
-        image.read(tmp_path / "a.png").pixels[..., 1], [[255, 0], [0, 255]]
-    )
+    np.testing.assert_array_equal(image.read(tmp_path / "a.png").pixels[..., 1], [[255, 0], [0, 255]])
 
 
 @pytest.mark.parametrize("orientation", range(1, 9))
@@ -314,9 +310,7 @@ def test_parse_size(width, height):
     assert image.parse_size(str(width)) == (width, width)
 
 
-@pytest.mark.parametrize(
-    "text", ["", "0", "0x5", "5x0", "-3x4", "3x", "x3", "1x2x3", "a", "1.5", "9" * 9]
-)
+@pytest.mark.parametrize("text", ["", "0", "0x5", "5x0", "-3x4", "3x", "x3", "1x2x3", "a", "1.5", "9" * 9])
 def test_parse_size_errors(text):
     with pytest.raises(ValueError, match="WIDTHxHEIGHT"):
         image.parse_size(text)

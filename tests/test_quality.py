@@ -29,16 +29,9 @@ def deviation(sample):
 
 def naive_nearest(queries, candidates, scale):
     def patches(p):
-        return [
-            p[i : i + 7, j : j + 7] for i in range(p.shape[0] - 6) for j in range(p.shape[1] - 6)
-        ]
+        return [p[i : i + 7, j : j + 7] for i in range(p.shape[0] - 6) for j in range(p.shape[1] - 6)]
 
-    return np.mean(
-        [
-            min(np.sqrt(((a - b) ** 2).mean()) for b in patches(candidates)) / scale
-            for a in patches(queries)
-        ]
-    )
+    return np.mean([min(np.sqrt(((a - b) ** 2).mean()) for b in patches(candidates)) / scale for a in patches(queries)])
 
 
 def naive_mean_nearest(queries, candidates, scale):
@@ -51,10 +44,7 @@ def naive_mean_nearest(queries, candidates, scale):
         queries, candidates = (
             np.array(
                 [
-                    [
-                        p[2 * i : 2 * i + 2, 2 * j : 2 * j + 2].mean((0, 1))
-                        for j in range(p.shape[1] // 2)
-                    ]
+                    [p[2 * i : 2 * i + 2, 2 * j : 2 * j + 2].mean((0, 1)) for j in range(p.shape[1] // 2)]
                     for i in range(p.shape[0] // 2)
                 ]
             )
@@ -96,9 +86,7 @@ def test_a_cut_of_the_sample_is_plausible_and_incomplete():
 def test_units_do_not_matter():
     sample, output = noise(6, (20, 20), float), noise(7, (24, 22), float)
     for figure in (quality.plausibility, quality.coverage, quality.histogram_distance):
-        assert figure(100 + 3 * sample, 100 + 3 * output) == pytest.approx(
-            figure(sample, output), rel=RNG_TOLERANCE
-        )
+        assert figure(100 + 3 * sample, 100 + 3 * output) == pytest.approx(figure(sample, output), rel=RNG_TOLERANCE)
 
 
 def test_stride_takes_every_kth_patch(monkeypatch):
@@ -131,18 +119,14 @@ def test_copying_is_exact_under_hash_collisions(monkeypatch):
     output[2:13, 2:13] = sample[1:12, 3:14]
     expected = quality.copying(sample, output)
     assert 0 < expected < 1
-    monkeypatch.setattr(
-        quality, "_hashes", lambda p: np.zeros((p.shape[0] - 8) * (p.shape[1] - 8), np.uint64)
-    )
+    monkeypatch.setattr(quality, "_hashes", lambda p: np.zeros((p.shape[0] - 8) * (p.shape[1] - 8), np.uint64))
     assert quality.copying(sample, output) == expected
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["uint8", "float64"]))
 def test_histogram_distance_against_scipy(seed, dtype):
     sample, output = noise(seed, (9, 8, 2), dtype), noise(seed + 1, (7, 11, 2), dtype) // 2
-    expected = np.mean(
-        [wasserstein_distance(sample[..., k].ravel(), output[..., k].ravel()) for k in range(2)]
-    )
+    expected = np.mean([wasserstein_distance(sample[..., k].ravel(), output[..., k].ravel()) for k in range(2)])
     assert quality.histogram_distance(sample, output) == pytest.approx(expected / deviation(sample))
 
 

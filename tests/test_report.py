@@ -148,9 +148,7 @@ class Moment:
         return np.full(self.image().shape[:2], 0.5)
 
 
-@pytest.mark.parametrize(
-    ("dtype", "channels"), [("uint8", (3,)), ("uint16", ()), ("float32", (5,))]
-)
+@pytest.mark.parametrize(("dtype", "channels"), [("uint8", (3,)), ("uint16", ()), ("float32", (5,))])
 def test_stages(tmp_path, dtype, channels):
     folder = tmp_path / "stages"
     full = (np.random.default_rng(0).random((101, 130, *channels)) * 255).astype(dtype)

@@ -61,7 +61,7 @@ class OpenCL:
     ) -> None:
         self.info = info
         self.name = f"{info.name.strip()} ({info.platform})"
-        self.context = cl.Context([info.handle])
+        self.context = cl.Context([info.handle])  # type: ignore[list-item]
         self.queue = cl.CommandQueue(self.context)
         self.work_group = work_group
         on_gpu = info.kind == "gpu"
@@ -153,13 +153,9 @@ class OpenCL:
         source = (folder / f"{file}.cl").read_text(encoding="utf-8")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", cl.CompilerWarning)
-            return cl.Program(self.context, source).build(
-                [*options.split(), "-I", str(folder)]
-            )
+            return cl.Program(self.context, source).build([*options.split(), "-I", str(folder)])
 
-    def launch(
-        self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None
-    ) -> None:
+    def launch(self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None) -> None:
         """Enqueue a kernel over a range of work-items, rounded up to whole work-groups where one is given."""
         if self.work_group:
             local = (self.work_group,) + (1,) * (len(size) - 1)

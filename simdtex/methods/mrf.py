@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Nonparametric multiscale Markov random field: Algorithm 1 of Paget and Longstaff (1998).
 
-`synthesize` is the algorithm, step by step; `_relax` is its body, steps 6.2.2.1 to 6.2.2.3. The numbers in the comments are
-the algorithm's own.
+`synthesize` is the algorithm, step by step; `_relax` is its body, steps 6.2.2.1 to 6.2.2.3. The numbers in
+the comments are the algorithm's own.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
+from functools import partial
 from math import log2, prod
 from typing import Any, NamedTuple
 
@@ -27,7 +26,7 @@ from simdtex.ops.operation import Array
 from simdtex.ops.start import start
 from simdtex.ops.temperature import temperature
 from simdtex.options import one_of, real, whole
-from simdtex.run import Callback, Output, Progress, Stage
+from simdtex.run import Callback, Meter, Output, Progress, Stage
 from simdtex.sample import Candidates, Sample
 
 PRESETS: dict[str, dict[str, Any]] = {
@@ -125,13 +124,26 @@ def make_options(preset: str = "default", **given: Any) -> Options:
     valid = [f.name for f in fields(Options)]
     unknown = [name for name in given if name not in valid]
     if unknown:
-        raise TypeError(
-            f"unknown option {unknown[0]!r} of the method 'mrf'; choose from: preset, {', '.join(valid)}"
-        )
+        raise TypeError(f"unknown option {unknown[0]!r} of the method 'mrf'; choose from: preset, {', '.join(valid)}")
     return replace(Options(**PRESETS[preset]), **given)
 
 
-class Level(NamedTuple):
+@dataclass(frozen=True)
+class _Run:
+    """What stays the same throughout a run."""
+
+    machine: Machine
+    sample: Sample
+    shape: tuple[int, int]
+    offsets: NDArray[np.int32]
+    options: Options
+    schedule: schedules.Schedule
+    seed: int
+    levels: int
+    callback: Callback | None
+
+
+class _Level(NamedTuple):
     """What the relaxation of one level needs; equations (10) and (11)."""
 
     number: int
@@ -139,6 +151,7 @@ class Level(NamedTuple):
     offsets: Array
     candidates: Candidates
     window: lcpdf.Window
+    relaxation: str
 
 
 def synthesize(
@@ -174,109 +187,98 @@ def synthesize(
 
     Notes
     -----
-    Cost: sweeps x sites x candidates x |N| x channels x 2 fma, 6 to 7 sweeps a level. Memory on the device: 8 + 2
-    channels bytes per output pixel, 4 channels + 8 bytes per sample pixel, and the machine's scratch memory or, if
-    that is more, 64 bytes per sample pixel.
+    Cost: sweeps x sites x candidates x |N| x channels x 2 fma, about 7 sweeps a level. Memory on the device: 12 + 2
+    channels bytes per output pixel, 4 channels + 8 bytes per sample pixel, and the machine's scratch memory or,
+    if that is more, 64 bytes per sample pixel.
     """
-    began = time.perf_counter()
     offsets = neighbourhood_offsets(options.order)
-    channels = pixels.shape[-1]
     levels = _number_of_levels(pixels.shape[:2], offsets, shape, options)  # 1
-    reflected = int(offsets.max()) * 2 ** (levels - 1) if options.edges != "whole" else 0
-    sample = Sample(pixels, channels * len(offsets), reflected)
+    margin = int(offsets.max()) * 2 ** (levels - 1) if options.edges != "whole" else 0
+    sample = Sample(pixels, pixels.shape[-1] * len(offsets), margin)
     _check_memory(machine, sample, shape)
     schedule = schedules.get(options.schedule)
-    device_offsets = machine.put(offsets)
-    meter = _Meter(sample, shape, levels, len(offsets), options)
-    stages: list[Stage] = []
-    reports: list[dict[str, Any]] = []
+    run = _Run(machine, sample, shape, offsets, options, schedule, seed, levels, callback)
+    meter = Meter(_expected_work(run))
+    stages = []
 
-    picture = Grid(*shape)  # 2
     everywhere = machine.put(sample.positions(np.zeros((1, 2), np.int32), 1))
     planes = machine.put(sample.working.astype(np.float32))
-    field = start(machine, planes, everywhere, picture, seed)  # 5
+    field = start(machine, planes, everywhere, Grid(*shape), seed)  # 2, 5
     for number in reversed(range(levels)):  # 6
-        grid = Grid(*shape, 2**number, options.boundary == "torus")  # 3, 6.1
-        candidates = sample.candidates(
-            machine, offsets, 2**number, options.phases, options.edges
-        )  # 4
-        h = options.bandwidth * lcpdf.optimal_bandwidth(
-            sample.variance, candidates.count, channels * (len(offsets) + 1)
-        )
-        level = Level(number, grid, device_offsets, candidates, lcpdf.window(h, sample.top))
-        by_draw = number == levels - 1 and options.coarsest == "gibbs"
-        level_options = replace(options, relaxation="gibbs") if by_draw else options
-        state = schedule.init(machine, grid, offsets, options.order, seed, number)
-        report = {"level": number, "rows": grid.rows, "cols": grid.cols, "bandwidth": h}
-        report |= {"candidates": candidates.count, "sweeps": 0, "steps": 0, "relaxations": 0}
-        level_began = time.perf_counter()
-
-        def hot(field: Field = field, grid: Grid = grid) -> NDArray[np.uint16]:
-            return np.ascontiguousarray(grid.view(machine.get(field.temperature)))
-
-        sweeps_left = options.free_sweeps
-        while True:
-            temperatures = hot()
-            phase = "relax" if temperatures.any() else "free"
-            if phase == "free":
-                if not sweeps_left:
-                    break
-                sweeps_left -= 1
-            active = temperatures > 0 if phase == "relax" else np.ones(temperatures.shape, bool)
-            last = False
-            while not last:  # 6.2, one sweep
-                state, info = schedule.step(state, lambda active=active: active)  # 6.2.1
-                last = info.last
-                for done in _pieces(machine, level, info.sites):  # 6.2.2
-                    field = _relax(machine, level, field, done, level_options, seed, info.sweep)
-                    report["relaxations"] += done.size
-                    machine.sync(done.size * meter.fma(candidates))
-                    if callback:
-                        piece_last = last and done[-1] == info.sites[-1]
-                        callback(
-                            Progress(
-                                number,
-                                levels,
-                                info.sweep,
-                                phase,
-                                float(temperatures.mean()) / 1024,
-                                bool(piece_last),
-                                meter.fraction(report),
-                                _image_reader(machine, sample, field, grid),
-                                lambda: hot() / 1024,
-                            )
-                        )
-                report["steps"] += 1
-            report["sweeps"] += 1
-        report["fma"] = report["relaxations"] * meter.fma(candidates)
-        report["seconds"] = time.perf_counter() - level_began
-        reports.append(report)
-        meter.finish(report)
-        stages.append(Stage(number, _image_reader(machine, sample, field, grid)()))
+        level = _level(run, number)  # 3, 4, 6.1
+        meter.begin(number, level.grid, level.candidates.size)
+        state = schedule.init(machine, level.grid, offsets, options.order, seed, number)
+        while (temperatures := _temperatures(run, level, field)).any():  # 6.2
+            field, state = _sweep(run, level, field, state, temperatures, "relax", meter)
+        for _ in range(options.free_sweeps):
+            field, state = _sweep(run, level, field, state, temperatures, "free", meter)
+        stages.append(Stage(number, _picture(run, level, field)))
+        meter.end()
 
     source = machine.get(field.source)
     image = sample.picture(machine.get(field.values), source)
     statistics = {
         "device": machine.name,
         "seed": seed,
-        "options": asdict(options),
-        "seconds": time.perf_counter() - began,
-        "levels": reports,
+        "options": asdict(options) | {"levels": levels},
+        "seconds": meter.seconds,
+        "levels": meter.reports,
     }
     return image, Output(sample.place(source), machine.get(field.temperature) / 1024, stages, statistics)
 
 
-def _relax(
-    machine: Machine,
-    level: Level,
+def _level(run: _Run, number: int) -> _Level:
+    """Define the lattice, the candidates and the bandwidth of a level."""
+    options, sample, offsets = run.options, run.sample, run.offsets
+    grid = Grid(*run.shape, 2**number, options.boundary == "torus")
+    candidates = sample.candidates(run.machine, offsets, grid.spacing, options.phases, options.edges)
+    dimensions = sample.channels * (len(offsets) + 1)
+    h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, candidates.size, dimensions)
+    by_draw = number == run.levels - 1 and options.coarsest == "gibbs"
+    relaxation = "gibbs" if by_draw else options.relaxation
+    window = lcpdf.window(h, sample.top)
+    return _Level(number, grid, run.machine.put(offsets), candidates, window, relaxation)
+
+
+def _sweep(
+    run: _Run,
+    level: _Level,
     field: Field,
-    sites: NDArray[np.int32],
-    options: Options,
-    seed: int,
-    sweep: int,
-) -> Field:
+    state: Any,
+    temperatures: NDArray[np.uint16],
+    phase: str,
+    meter: Meter,
+) -> tuple[Field, Any]:
+    """Relax every site with t > 0 once, or, in the phase ``"free"``, every site."""
+    machine, schedule = run.machine, run.schedule
+    active = temperatures > 0 if phase == "relax" else np.ones(temperatures.shape, bool)
+    left = float(temperatures.mean()) / 1024
+    values = run.sample.channels * len(run.offsets)
+    size = machine.chunk(level.candidates.size, values)
+    while True:
+        state, info = schedule.step(state, partial(np.copy, active))  # 6.2.1
+        for first in range(0, len(info.sites), size):  # 6.2.2, as many sites at a time as scratch memory holds
+            sites = info.sites[first : first + size]
+            field = _relax(run, level, field, sites, info.sweep)
+            work = 2 * level.candidates.size * values * len(sites)
+            machine.sync(work)
+            meter.add(len(sites), work)
+            if run.callback:
+                last = info.last and first + size >= len(info.sites)
+                image = partial(_picture, run, level, field)
+                warmth = partial(_warmth, run, level, field)
+                run.callback(
+                    Progress(level.number, run.levels, info.sweep, phase, left, last, meter.fraction, image, warmth)
+                )
+        if info.last:
+            meter.sweeps(info.sweep)
+            return field, state
+
+
+def _relax(run: _Run, level: _Level, field: Field, sites: NDArray[np.int32], sweep: int) -> Field:
     """Steps 6.2.2.1 to 6.2.2.3 for sites that relax together."""
-    number, grid, offsets, candidates, window = level
+    machine, options = run.machine, run.options
+    number, grid, offsets, candidates, window, relaxation = level
     here = machine.put(sites)
     near = neighbourhood(machine, here, field, offsets, grid)  # 6.2.2.1
     distances = lcpdf.distance(machine, near, candidates)
@@ -284,13 +286,11 @@ def _relax(
         favour = np.float32(1 / (1 + options.coherence))
         distances = coherence(machine, distances, candidates, here, field, offsets, grid, favour)
     density = options.pixel == "density"
-    if options.relaxation == "gibbs":  # 6.2.2.2
-        relaxed = lcpdf.draw(
-            machine, distances, candidates, here, window, density, seed, number, sweep
-        )
+    if relaxation == "gibbs":  # 6.2.2.2
+        relaxed = lcpdf.draw(machine, distances, candidates, here, window, density, run.seed, number, sweep)
     elif not density:
         relaxed = lcpdf.best(machine, distances, candidates)
-    elif len(candidates.pixels) == 1 and window.top == 255:
+    elif run.sample.channels == 1 and window.top == 255:
         relaxed = lcpdf.mode(machine, distances, candidates, window)
     else:
         relaxed = lcpdf.mode_vector(machine, distances, candidates, window)
@@ -299,11 +299,31 @@ def _relax(
     return commit(machine, here, field, relaxed, cooled)
 
 
-def _pieces(machine: Machine, level: Level, sites: NDArray[np.int32]) -> list[NDArray[np.int32]]:
-    """The sites of a step in pieces that the machine's scratch memory holds."""
-    values = level.candidates.pixels.shape[0] * level.offsets.shape[0]
-    size = machine.chunk(level.candidates.count, values)
-    return [sites[i : i + size] for i in range(0, len(sites), size)]
+def _temperatures(run: _Run, level: _Level, field: Field) -> NDArray[np.uint16]:
+    return np.ascontiguousarray(level.grid.view(run.machine.get(field.temperature)))
+
+
+def _warmth(run: _Run, level: _Level, field: Field) -> NDArray[np.float64]:
+    return _temperatures(run, level, field) / np.float64(1024)
+
+
+def _picture(run: _Run, level: _Level, field: Field) -> NDArray[Any]:
+    """Read the level's picture back, in the sample's type."""
+    values, source = run.machine.get(field.values), run.machine.get(field.source)
+    return run.sample.picture(level.grid.view(values), level.grid.view(source))
+
+
+def _expected_work(run: _Run) -> dict[int, float]:
+    """Relaxations times candidates that each level should take: 7 sweeps, the coarsest |N| / -xi."""
+    work = {}
+    for number in range(run.levels):
+        grid = Grid(*run.shape, 2**number)
+        options = run.options
+        coarsest = number == run.levels - 1
+        sweeps = min(1024, len(run.offsets) / -options.xi) if coarsest else 7 * 0.75
+        candidates = run.sample.positions(run.offsets, grid.spacing, options.phases, options.edges).size
+        work[number] = grid.rows * grid.cols * (sweeps + options.free_sweeps) * candidates
+    return work
 
 
 def _number_of_levels(
@@ -327,9 +347,7 @@ def _number_of_levels(
             levels += 1
         return levels
     if options.levels > most:
-        raise ValueError(
-            f"levels={options.levels} is too many for this sample, output and order; give at most {most}"
-        )
+        raise ValueError(f"levels={options.levels} is too many for this sample, output and order; give at most {most}")
     return options.levels
 
 
@@ -351,58 +369,4 @@ def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int]) -> N
         raise ValueError(
             f"an output of {shape[0]} rows x {shape[1]} columns is beyond 2**31 values; give a smaller size"
         )
-    machine.require(
-        pixels * (8 + 2 * sample.channels + 4)
-        + sample.rows * sample.cols * (4 * sample.channels + 8 + 64)
-    )
-
-
-def _image_reader(
-    machine: Machine, sample: Sample, field: Field, grid: Grid
-) -> Callable[[], NDArray[Any]]:
-    def image() -> NDArray[Any]:
-        values, source = machine.get(field.values), machine.get(field.source)
-        return sample.picture(grid.view(values), grid.view(source))
-
-    return image
-
-
-class _Meter:
-    """Work done and expected: relaxations times candidates, as a level is expected to take 7 sweeps."""
-
-    def __init__(
-        self,
-        sample: Sample,
-        shape: tuple[int, int],
-        levels: int,
-        neighbours: int,
-        options: Options,
-    ) -> None:
-        self.values = sample.channels * neighbours
-        offsets = neighbourhood_offsets(options.order)
-        self.expected = {}
-        self.work = {}
-        for number in range(levels):
-            grid = Grid(*shape, 2**number)
-            sweeps = 7 * 0.75 if number < levels - 1 else min(1024, neighbours / -options.xi)
-            self.expected[number] = grid.rows * grid.cols * (sweeps + options.free_sweeps)
-            self.work[number] = sample.positions(
-                offsets, 2**number, options.phases, options.edges
-            ).size
-        self.total = sum(self.expected[n] * self.work[n] for n in self.expected)
-        self.done = 0.0
-
-    def fma(self, candidates: Candidates) -> int:
-        """Of equation (12), for one site."""
-        return 2 * candidates.count * self.values
-
-    def fraction(self, report: dict[str, Any]) -> float:
-        """Share of all the work."""
-        number = report["level"]
-        here = min(1.0, report["relaxations"] / self.expected[number])
-        return min(1.0, (self.done + here * self.expected[number] * self.work[number]) / self.total)
-
-    def finish(self, report: dict[str, Any]) -> None:
-        """Count a level as done."""
-        number = report["level"]
-        self.done += self.expected[number] * self.work[number]
+    machine.require(pixels * (8 + 2 * sample.channels + 4) + sample.rows * sample.cols * (4 * sample.channels + 8 + 64))

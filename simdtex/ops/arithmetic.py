@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 
 def fma32(a: Any, b: Any, c: Any) -> NDArray[np.float32]:
-    """a * b + c in float32, rounded once.
+    """A * b + c in float32, rounded once.
 
     The product of two float32 is exact in float64. The sum is rounded to odd there, which makes the second
     rounding, to float32, the right one (Boldo and Melquiond, 2008).
@@ -34,8 +34,8 @@ def exp32(x: Any) -> NDArray[np.float32]:
     k = np.rint(x * np.float32(1.44269502))
     r = fma32(k, np.float32(-0.693145752), x)
     r = fma32(k, np.float32(-1.42860677e-6), r)
-    p = np.float32(1.38888892e-3)
+    p = np.asarray(1.38888892e-3, np.float32)
     for coefficient in (8.33333377e-3, 4.16666679e-2, 1.66666672e-1, 0.5, 1.0, 1.0):
         p = fma32(p, r, np.float32(coefficient))
-    p = np.asarray(p, np.float32)
-    return (p.view(np.int32) + (k.astype(np.int32) << 23)).view(np.float32)
+    result: NDArray[np.float32] = (p.view(np.int32) + (k.astype(np.int32) << 23)).view(np.float32)
+    return result

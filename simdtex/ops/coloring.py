@@ -23,9 +23,7 @@ def _flat(grid: Grid) -> Grid:
     return Grid(grid.rows, grid.cols, 1, grid.torus)
 
 
-def _lattice_reference(
-    grid: Grid, offsets: NDArray[np.int32], pattern: Sublattice
-) -> NDArray[np.int32]:
+def _lattice_reference(grid: Grid, offsets: NDArray[np.int32], pattern: Sublattice) -> NDArray[np.int32]:
     site = np.arange(grid.rows * grid.cols, dtype=np.int32)
     row, col = np.divmod(site, grid.cols)
     own = (row - col // pattern.c * pattern.b) % pattern.a * pattern.c + col % pattern.c
@@ -109,10 +107,10 @@ def coloring(machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, s
     while (result == UNCOLORED).any():
         colors = greedy_coloring(machine, grid, device_offsets, colors, seed)
         result = machine.get(colors)
-    used = np.unique(result)
-    if grid.torus and used.size > best.index:
-        seamless = coloring_sublattice(order, grid.rows, grid.cols, limit=used.size)
+    used = np.bincount(result.ravel()) > 0
+    if grid.torus and used.sum() > best.index:
+        seamless = coloring_sublattice(order, grid.rows, grid.cols, limit=int(used.sum()))
         if seamless:
             result = machine.get(lattice_coloring(machine, grid, device_offsets, seamless))
-            used = np.unique(result)
-    return np.searchsorted(used, result).astype(np.int32)
+            used = np.bincount(result.ravel()) > 0
+    return (np.cumsum(used) - 1).astype(np.int32)[result]

@@ -16,9 +16,7 @@ if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
 
 
-def _reference(
-    sites: NDArray[np.int32], field: Field, relaxed: Relaxed, cooled: NDArray[np.uint16]
-) -> Field:
+def _reference(sites: NDArray[np.int32], field: Field, relaxed: Relaxed, cooled: NDArray[np.uint16]) -> Field:
     field.values.reshape(len(field.values), -1)[:, sites] = relaxed.values
     field.source.ravel()[sites] = relaxed.choice
     field.temperature.ravel()[sites] = cooled

@@ -16,26 +16,22 @@ if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
 
 
-def _reference(
-    distances: Distances, candidates: Candidates, levels: int
-) -> NDArray[np.uint32]:
-    grey = candidates.pixels[0][candidates.list[: candidates.count]].astype(np.int64)
-    counts = np.zeros((distances.count, levels), np.uint32)
+def _reference(distances: Distances, candidates: Candidates, levels: int) -> NDArray[np.uint32]:
+    grey = candidates.pixels[0][candidates.positions[: candidates.size]].astype(np.int64)
+    counts = np.zeros((distances.sites, levels), np.uint32)
     p, s = np.nonzero(distances.distance == 0)
     np.add.at(counts, (s, grey[p]), 1)
     return counts
 
 
-def _launch(
-    machine: OpenCL, distances: Distances, candidates: Candidates, levels: int
-) -> Array:
-    counts = machine.empty((distances.count, levels), np.uint32)
+def _launch(machine: OpenCL, distances: Distances, candidates: Candidates, levels: int) -> Array:
+    counts = machine.empty((distances.sites, levels), np.uint32)
     blocks, padded = distances.nearest.shape
     machine.launch(
         machine.kernel("histogram", "histogram", BLOCK=BLOCK),
-        (distances.count,),
-        *(distances.distance, distances.nearest, np.int32(blocks), np.int32(distances.count)),
-        *(np.int32(padded), candidates.pixels, candidates.list, np.int32(levels), counts),
+        (distances.sites,),
+        *(distances.distance, distances.nearest, np.int32(blocks), np.int32(distances.sites)),
+        *(np.int32(padded), candidates.pixels, candidates.positions, np.int32(levels), counts),
     )
     return counts
 

@@ -30,11 +30,11 @@ NO_WEIGHT = np.float32(28)
 
 
 class Distances(NamedTuple):
-    """``distance`` (candidates, P) d_p of equation (12); ``nearest`` (blocks, P), devices only; ``count`` sites."""
+    """``distance`` (candidates, P) d_p of equation (12); ``nearest`` (blocks, P), devices only; ``sites`` S."""
 
     distance: Array
     nearest: Array
-    count: int
+    sites: int
 
 
 class Relaxed(NamedTuple):
@@ -88,40 +88,38 @@ def window(bandwidth: float, top: int) -> Window:
         running += value
         noise.append(min(2**32 - 1, round(running / total * 2**32)))
     noise[-1] = 2**32 - 1
-    return Window(
-        scale, np.array(noise, np.uint32), np.array(gauss, np.float32), radius, top
-    )
+    return Window(scale, np.array(noise, np.uint32), np.array(gauss, np.float32), radius, top)
 
 
 # -- distances, equation (12) ---------------------------------------------------------------------------------
 
 
 def _distance_reference(near: Neighbourhoods, candidates: Candidates) -> Distances:
-    confidence, weighted, count = near
-    position = candidates.list[: candidates.count]
-    d = np.zeros((position.size, count), np.float32)
+    confidence, weighted, sites = near
+    position = candidates.positions[: candidates.size]
+    d = np.zeros((position.size, sites), np.float32)
     for k, offset in enumerate(candidates.reach):
         u = confidence[k].astype(np.float64)
         for c, y in enumerate(candidates.pixels):
             e = weighted[k, c] - u * y[position + offset][:, None].astype(np.float64)
             d = (e * e + d).astype(np.float32)  # fits 53 bits, so this is the device's fma: see Sample
-    return Distances(d, None, count)
+    return Distances(d, None, sites)
 
 
 def _distance_launch(machine: OpenCL, near: Neighbourhoods, candidates: Candidates) -> Distances:
-    neighbours, channels, padded = near.weighted.shape
-    blocks = candidates.list.size // BLOCK
+    neighbours, _, padded = near.weighted.shape
+    blocks = candidates.positions.size // BLOCK
     distance = machine.empty((blocks * BLOCK, padded), np.float32)
     nearest = machine.empty((blocks, padded), np.float32)
     machine.launch(
         _kernel(machine, "distance", candidates),
         (padded // machine.vector, blocks),
         *(near.confidence, near.weighted, np.int32(neighbours), np.int32(padded)),
-        *(candidates.pixels, _plane(candidates), candidates.list, np.int32(candidates.count)),
+        *(candidates.pixels, _plane(candidates), candidates.positions, np.int32(candidates.size)),
         *(candidates.reach, np.int32(blocks), distance, nearest),
         local=machine.tile,
     )
-    return Distances(distance, nearest, near.count)
+    return Distances(distance, nearest, near.sites)
 
 
 distance = Operation("distance", _distance_reference, _distance_launch)
@@ -160,7 +158,7 @@ def _draw_reference(
         bits = random.draw4(seed, level, sweep, sites[left], random.DRAW, base)
         target = random.below(bits[0], bits[1], cumulative[-1, left])
         chosen = (cumulative[:, left] > target).argmax(0)
-        choice[left] = candidates.list[chosen]
+        choice[left] = candidates.positions[chosen]
         legal = np.ones(left.size, bool)
         for c in range(channels):
             x = candidates.pixels[c][choice[left]].astype(np.int64)
@@ -190,9 +188,9 @@ def _draw_launch(
     out = _relaxed(machine, distances, candidates)
     machine.launch(
         _kernel(machine, "draw", candidates),
-        (distances.count,),
+        (distances.sites,),
         *_weighing(distances, win),
-        *(candidates.pixels, _plane(candidates), candidates.list, sites),
+        *(candidates.pixels, _plane(candidates), candidates.positions, sites),
         *(np.uint64(seed), np.uint32(level), np.uint32(sweep), machine.constant(win.noise)),
         *(np.int32(win.radius if noisy else -1), np.int32(win.top), *out),
     )
@@ -206,7 +204,7 @@ draw = Operation("draw", _draw_reference, _draw_launch)
 
 
 def _best_reference(distances: Distances, candidates: Candidates) -> Relaxed:
-    choice = candidates.list[distances.distance.argmin(0)]
+    choice = candidates.positions[distances.distance.argmin(0)]
     return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
 
 
@@ -214,9 +212,9 @@ def _best_launch(machine: OpenCL, distances: Distances, candidates: Candidates) 
     out = _relaxed(machine, distances, candidates)
     machine.launch(
         _kernel(machine, "best", candidates),
-        (distances.count,),
+        (distances.sites,),
         *_weighing(distances, None),
-        *(candidates.pixels, _plane(candidates), candidates.list, *out),
+        *(candidates.pixels, _plane(candidates), candidates.positions, *out),
     )
     return out
 
@@ -237,11 +235,11 @@ def _density(mass: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
 
 def _mode_reference(distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
     w = weights(distances.distance, win.scale)
-    position = candidates.list[: candidates.count]
+    position = candidates.positions[: candidates.size]
     grey = candidates.pixels[0][position].astype(np.int64)
-    choice = np.zeros(distances.count, np.int32)
-    values = np.zeros((1, distances.count), np.uint16)
-    for s in range(distances.count):
+    choice = np.zeros(distances.sites, np.int32)
+    values = np.zeros((1, distances.sites), np.uint16)
+    for s in range(distances.sites):
         mass = np.zeros(256, np.uint64)
         np.add.at(mass, grey, w[:, s])
         f = _density(mass, win)
@@ -254,15 +252,13 @@ def _mode_reference(distances: Distances, candidates: Candidates, win: Window) -
     return Relaxed(choice, values)
 
 
-def _mode_launch(
-    machine: OpenCL, distances: Distances, candidates: Candidates, win: Window
-) -> Relaxed:
+def _mode_launch(machine: OpenCL, distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
     out = _relaxed(machine, distances, candidates)
     machine.launch(
         _kernel(machine, "mode", candidates),
-        (distances.count,),
+        (distances.sites,),
         *_weighing(distances, win),
-        *(candidates.pixels, _plane(candidates), candidates.list),
+        *(candidates.pixels, _plane(candidates), candidates.positions),
         *(machine.constant(win.gauss), np.int32(win.radius), *out),
     )
     return out
@@ -273,10 +269,10 @@ mode = Operation("mode", _mode_reference, _mode_launch)
 
 def _mode_vector_reference(distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
     w = weights(distances.distance, win.scale)
-    position = candidates.list[: candidates.count]
+    position = candidates.positions[: candidates.size]
     y = candidates.pixels[:, position]
-    choice = np.zeros(distances.count, np.int32)
-    for s in range(distances.count):
+    choice = np.zeros(distances.sites, np.int32)
+    for s in range(distances.sites):
         heavy = np.flatnonzero(w[:, s])
         heaviest = heavy[np.argsort(~w[heavy, s], kind="stable")][:HEAVIEST]
         f = np.zeros(heaviest.size, np.float32)
@@ -292,15 +288,13 @@ def _mode_vector_reference(distances: Distances, candidates: Candidates, win: Wi
     return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
 
 
-def _mode_vector_launch(
-    machine: OpenCL, distances: Distances, candidates: Candidates, win: Window
-) -> Relaxed:
+def _mode_vector_launch(machine: OpenCL, distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
     out = _relaxed(machine, distances, candidates)
     machine.launch(
         _kernel(machine, "mode_vector", candidates),
-        (distances.count,),
+        (distances.sites,),
         *_weighing(distances, win),
-        *(candidates.pixels, _plane(candidates), candidates.list, *out),
+        *(candidates.pixels, _plane(candidates), candidates.positions, *out),
     )
     return out
 
@@ -311,13 +305,11 @@ mode_vector = Operation("mode_vector", _mode_vector_reference, _mode_vector_laun
 # -- the table of probabilities -------------------------------------------------------------------------------
 
 
-def _table_reference(
-    distances: Distances, candidates: Candidates, win: Window
-) -> NDArray[np.float32]:
+def _table_reference(distances: Distances, candidates: Candidates, win: Window) -> NDArray[np.float32]:
     w = weights(distances.distance, win.scale)
-    grey = candidates.pixels[0][candidates.list[: candidates.count]].astype(np.int64)
-    table = np.zeros((distances.count, win.top + 1), np.float32)
-    for s in range(distances.count):
+    grey = candidates.pixels[0][candidates.positions[: candidates.size]].astype(np.int64)
+    table = np.zeros((distances.sites, win.top + 1), np.float32)
+    for s in range(distances.sites):
         mass = np.zeros(win.top + 1, np.uint64)
         np.add.at(mass, grey, w[:, s])
         f = _density(mass, win)
@@ -325,16 +317,14 @@ def _table_reference(
     return table
 
 
-def _table_launch(
-    machine: OpenCL, distances: Distances, candidates: Candidates, win: Window
-) -> Array:
-    shape = (distances.count, win.top + 1)
+def _table_launch(machine: OpenCL, distances: Distances, candidates: Candidates, win: Window) -> Array:
+    shape = (distances.sites, win.top + 1)
     mass, table = machine.empty(shape, np.uint64), machine.empty(shape, np.float32)
     machine.launch(
         _kernel(machine, "table", candidates),
-        (distances.count,),
+        (distances.sites,),
         *_weighing(distances, win),
-        *(candidates.pixels, candidates.list, machine.constant(win.gauss)),
+        *(candidates.pixels, candidates.positions, machine.constant(win.gauss)),
         *(np.int32(win.radius), np.int32(win.top + 1), mass, table),
     )
     return table
@@ -365,13 +355,13 @@ def _plane(candidates: Candidates) -> np.int32:
 def _weighing(distances: Distances, win: Window | None) -> list[Any]:
     """The arguments that every kernel on distances begins with."""
     blocks, padded = distances.nearest.shape
-    sizes = [np.int32(blocks), np.int32(distances.count), np.int32(padded)]
+    sizes = [np.int32(blocks), np.int32(distances.sites), np.int32(padded)]
     return [distances.distance, distances.nearest, *sizes, *([win.scale] if win else [])]
 
 
 def _relaxed(machine: OpenCL, distances: Distances, candidates: Candidates) -> Relaxed:
     channels = candidates.pixels.shape[0]
     return Relaxed(
-        machine.empty((distances.count,), np.int32),
-        machine.empty((channels, distances.count), np.uint16),
+        machine.empty((distances.sites,), np.int32),
+        machine.empty((channels, distances.sites), np.uint16),
     )

@@ -28,16 +28,14 @@ class Field(NamedTuple):
 
 
 class Neighbourhoods(NamedTuple):
-    """``confidence`` (N, P) u = 1 - t_r; ``weighted`` (N, C, P) x_r u; ``count`` sites of the P columns."""
+    """``confidence`` (N, P) u = 1 - t_r; ``weighted`` (N, C, P) x_r u; ``sites`` S of the P columns."""
 
     confidence: Array
     weighted: Array
-    count: int
+    sites: int
 
 
-def _reference(
-    sites: NDArray[np.int32], field: Field, offsets: NDArray[np.int32], grid: Grid
-) -> Neighbourhoods:
+def _reference(sites: NDArray[np.int32], field: Field, offsets: NDArray[np.int32], grid: Grid) -> Neighbourhoods:
     r = grid.neighbours(sites, offsets)
     u = (1024 - field.temperature.ravel()[r].astype(np.float32)) / np.float32(1024)
     u = np.where(r < 0, np.float32(0), u)
@@ -45,9 +43,7 @@ def _reference(
     return Neighbourhoods(u, np.moveaxis(x * u, 0, 1), sites.size)
 
 
-def _launch(
-    machine: OpenCL, sites: Array, field: Field, offsets: Array, grid: Grid
-) -> Neighbourhoods:
+def _launch(machine: OpenCL, sites: Array, field: Field, offsets: Array, grid: Grid) -> Neighbourhoods:
     count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
     padded = -(-count // machine.vector) * machine.vector
     confidence = machine.empty((neighbours, padded), np.float32)

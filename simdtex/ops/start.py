@@ -17,9 +17,7 @@ if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
 
 
-def _reference(
-    pixels: NDArray[np.float32], positions: NDArray[np.int32], grid: Grid, seed: int
-) -> Field:
+def _reference(pixels: NDArray[np.float32], positions: NDArray[np.int32], grid: Grid, seed: int) -> Field:
     lo, hi, *_ = random.draw4(seed, 0, 0, np.arange(grid.plane), random.START)
     shape = (grid.height, grid.width)
     source = positions[random.below(lo, hi, positions.size)].reshape(shape)

@@ -22,12 +22,11 @@ def _reference(
     r = grid.neighbours(sites, offsets)
     t = np.where(r < 0, 0, field.temperature.ravel()[r].astype(np.int32))
     members = np.maximum(1, (r >= 0).sum(0))
-    return (np.maximum(0, xi + t.sum(0)) // members).astype(np.uint16)
+    cooled: NDArray[np.uint16] = (np.maximum(0, xi + t.sum(0)) // members).astype(np.uint16)
+    return cooled
 
 
-def _launch(
-    machine: OpenCL, sites: Array, field: Field, offsets: Array, grid: Grid, xi: int
-) -> Array:
+def _launch(machine: OpenCL, sites: Array, field: Field, offsets: Array, grid: Grid, xi: int) -> Array:
     cooled = machine.empty((sites.size,), np.uint16)
     machine.launch(
         machine.kernel("temperature", "temperature"),

@@ -81,9 +81,7 @@ def contact_sheet(
     font = PIL.ImageFont.load_default(TEXT)
     strip = TEXT + 6
     height = max(picture.shape[0] for _, picture in shown) + strip + GAP
-    width = GAP + max(
-        max(picture.shape[1], int(np.ceil(font.getlength(label)))) for label, picture in shown
-    )
+    width = GAP + max(max(picture.shape[1], int(np.ceil(font.getlength(label)))) for label, picture in shown)
     across = columns or max(1, round(float(np.sqrt(len(shown) * height / width))))
     across = min(across, len(shown))
     down = -(-len(shown) // across)
@@ -280,9 +278,7 @@ def source_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
         raise ValueError("the source map is not (rows, cols, 2): pass the one of the run")
     extent = np.maximum(np.asarray(sample_shape[:2]) - 1, 1)
     across = np.clip(positions / extent, 0.0, 1.0) - 0.5
-    colours = _srgb(
-        np.full(positions.shape[:2], 0.72), 0.19 * across[..., 0], 0.19 * across[..., 1]
-    )
+    colours = _srgb(np.full(positions.shape[:2], 0.72), 0.19 * across[..., 0], 0.19 * across[..., 1])
     colours[(positions < 0).any(axis=2)] = 0
     return colours
 

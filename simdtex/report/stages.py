@@ -83,9 +83,7 @@ class StageWriter:
     Holds at most 200 frames of at most 512 pixels a side for the animation, 160 MB in colour.
     """
 
-    def __init__(
-        self, folder: str | os.PathLike[str], *, limits: tuple[float, float] | None = None
-    ) -> None:
+    def __init__(self, folder: str | os.PathLike[str], *, limits: tuple[float, float] | None = None) -> None:
         self.folder = Path(folder)
         self._limits = limits
         self._earlier = _earlier_stages(self.folder)
@@ -142,9 +140,7 @@ class StageWriter:
             for path in self._earlier:
                 path.unlink(missing_ok=True)
         except OSError as error:
-            raise ValueError(
-                f"the folder {self.folder} cannot be written ({error.strerror}): choose another"
-            ) from None
+            raise ValueError(f"the folder {self.folder} cannot be written ({error.strerror}): choose another") from None
 
     def _keep(self, level: int, picture: Picture) -> None:
         small = fitted(picture, FRAME_SIDE)
@@ -168,14 +164,10 @@ def _earlier_stages(folder: Path) -> list[Path]:
         else:
             found = []
     except OSError as error:
-        raise ValueError(
-            f"{folder} cannot be used ({error.strerror}): give another folder"
-        ) from None
+        raise ValueError(f"{folder} cannot be used ({error.strerror}): give another folder") from None
     others = sorted(path.name for path in found if not _STAGE.fullmatch(path.name))
     if others:
-        raise ValueError(
-            f"the folder {folder} holds other files ({others[0]}): give an empty or a new one"
-        )
+        raise ValueError(f"the folder {folder} holds other files ({others[0]}): give an empty or a new one")
     if not os.access(folder if folder.is_dir() else folder.parent, os.W_OK | os.X_OK):
         raise ValueError(f"the folder {folder} is not writable: choose another folder")
     return found

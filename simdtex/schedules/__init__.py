@@ -2,8 +2,8 @@
 """Parallel schedules: which sites relax together.
 
 A schedule is a pair of pure functions. ``init`` takes the lattice of a level and gives a `State`; ``step`` takes a
-state and gives the next one and an `Info` with the sites to relax now. The counters in the state key every random choice, so
-a schedule never depends on the device.
+state and gives the next one and an `Info` with the sites to relax now. The counters in the state key every
+random choice, so a schedule never depends on the device.
 """
 
 from __future__ import annotations
@@ -36,9 +36,7 @@ class Schedule(Protocol):
     independent: bool
     """Whether every step's sites are i.i.d. in the sense of equation (14)."""
 
-    def init(
-        self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int
-    ) -> Any:
+    def init(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int) -> Any:
         """The state before the first sweep of a level."""
         ...
 

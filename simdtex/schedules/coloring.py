@@ -16,13 +16,13 @@ from simdtex.schedules import Info
 
 
 class State(NamedTuple):
-    """``members`` the grid sites sorted by colour; ``bounds`` where each colour begins; ``pixel`` site -> pixel index.
+    """What the schedule carries.
 
-    ``sweep`` sweeps begun so far; ``queue`` what is left of the present one.
+    ``members`` the grid sites of each colour; ``pixel`` site -> pixel index; ``sweep`` sweeps begun so far; ``queue``
+    what is left of the present one.
     """
 
-    members: NDArray[np.int32]
-    bounds: NDArray[np.int64]
+    members: tuple[NDArray[np.int32], ...]
     pixel: NDArray[np.int32]
     seed: int
     level: int
@@ -40,14 +40,11 @@ class Coloring:
     name = "coloring"
     independent = True
 
-    def init(
-        self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int
-    ) -> State:
-        """Colour the lattice; O(sites log sites) once a level."""
+    def init(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int) -> State:
+        """Colour the lattice; O(sites (|N| + colours)) once a level."""
         colors = coloring(machine, grid, offsets, order, seed).ravel()
-        members = np.argsort(colors, kind="stable").astype(np.int32)
-        bounds = np.concatenate([[0], np.cumsum(np.bincount(colors))])
-        return State(members, bounds, grid.sites(), seed, level, 0, ())
+        members = tuple(np.flatnonzero(colors == c).astype(np.int32) for c in range(colors.max() + 1))
+        return State(members, grid.sites(), seed, level, 0, ())
 
     def step(self, state: State, active: Callable[[], NDArray[np.bool_]]) -> tuple[State, Info]:
         """The next colour class with active sites; a site changes its activity only when it relaxes."""
@@ -58,15 +55,13 @@ class Coloring:
         return state, Info(sites, state.sweep, not rest)
 
     def _begin(self, state: State, active: NDArray[np.bool_]) -> State:
-        colors = np.arange(len(state.bounds) - 1)
+        colors = np.arange(len(state.members))
         sweep = state.sweep + 1
-        order = np.argsort(
-            random.draw4(state.seed, state.level, sweep, colors, random.SCHEDULE)[0], kind="stable"
-        )
+        order = np.argsort(random.draw4(state.seed, state.level, sweep, colors, random.SCHEDULE)[0], kind="stable")
         active = active.ravel()
         queue = []
         for color in order:
-            members = state.members[state.bounds[color] : state.bounds[color + 1]]
+            members = state.members[color]
             members = members[active[members]]
             if members.size:
                 queue.append(state.pixel[members])

@@ -1,0 +1,189 @@
+"""Small problems for the operations, the machines that run them, and the comparison of their bytes."""
+
+import functools
+from typing import NamedTuple
+
+import numpy as np
+from hypothesis import strategies as st
+
+from simdtex.lattice import Grid, neighbourhood_offsets
+from simdtex.machine.reference import Reference
+from simdtex.ops import lcpdf
+from simdtex.ops.coherence import coherence
+from simdtex.ops.neighbourhood import Field, neighbourhood
+from simdtex.sample import Sample
+
+REFERENCE = Reference()
+
+
+@functools.cache
+def opencl(info, **options):
+    """One OpenCL machine for each device and set of machine options, so that a program is built once."""
+    from simdtex.machine.opencl import OpenCL
+
+    return OpenCL(info, **options)
+
+
+def texture(shape, channels=None, dtype=np.uint8, seed=0):
+    """A striped picture with noise that uses most of a type's range; the same for the same arguments."""
+    rng = np.random.default_rng(seed)
+    row, col = np.indices(shape)
+    planes = [
+        0.5 + 0.3 * np.sin(row * (1.1 + 0.2 * c) + col * 0.7) + 0.2 * rng.uniform(-1, 1, shape)
+        for c in range(channels or 1)
+    ]
+    picture = np.stack(planes, -1) if channels else planes[0]
+    if dtype == np.bool_:
+        return picture > 0.5
+    if np.issubdtype(dtype, np.integer):
+        return np.rint(picture * np.iinfo(dtype).max).astype(dtype)
+    return (picture * 3 - 1).astype(dtype)
+
+
+class Problem(NamedTuple):
+    """A field half-way through a relaxation: everything in NumPy arrays."""
+
+    sample: Sample
+    order: int
+    grid: Grid
+    field: Field
+    sites: np.ndarray
+    edges: str
+    phases: str
+
+    @property
+    def offsets(self):
+        return neighbourhood_offsets(self.order)
+
+    def candidates(self, machine):
+        return self.sample.candidates(machine, self.offsets, self.grid.spacing, self.phases, self.edges)
+
+    def on(self, machine):
+        """Sites, field and offsets as arrays of a machine."""
+        field = Field(*(machine.put(a) for a in self.field))
+        return machine.put(self.sites), field, machine.put(self.offsets)
+
+    def distances(self, machine, strength=0.0):
+        """The distances of equation (12), divided for coherent candidates; and the candidates."""
+        sites, field, offsets = self.on(machine)
+        candidates = self.candidates(machine)
+        near = neighbourhood(machine, sites, field, offsets, self.grid)
+        found = lcpdf.distance(machine, near, candidates)
+        if strength:
+            favour = np.float32(1 / (1 + strength))
+            found = coherence(machine, found, candidates, sites, field, offsets, self.grid, favour)
+        return found, candidates
+
+    def window(self, bandwidth=1.0):
+        n = len(self.offsets)
+        count = self.candidates(REFERENCE).size
+        h = bandwidth * lcpdf.optimal_bandwidth(self.sample.variance, count, self.sample.channels * (n + 1))
+        return lcpdf.window(h, self.sample.top), h
+
+    # What the plain loops want, in (row, column) instead of pixel indices.
+
+    def image(self):
+        return list(self.field.values)
+
+    def temperature(self):
+        return self.field.temperature / 1024
+
+    def where(self):
+        return [divmod(int(site), self.grid.width) for site in self.sites]
+
+    def source(self):
+        """(row, column) in the padded sample of each site's source."""
+        return np.stack(np.divmod(self.field.source, self.sample.cols), -1)
+
+    def padded(self):
+        return [channel.reshape(self.sample.rows, self.sample.cols) for channel in self.sample.working]
+
+    def positions(self):
+        """(row, column) in the padded sample of each candidate."""
+        found = self.candidates(REFERENCE)
+        return [divmod(int(p), self.sample.cols) for p in found.positions[: found.size]]
+
+
+def problem(
+    seed=0,
+    *,
+    order=2,
+    channels=1,
+    sample_shape=(12, 11),
+    shape=(9, 8),
+    spacing=1,
+    torus=True,
+    dtype=np.uint8,
+    temperatures="mixed",
+    edges="whole",
+    phases="all",
+    count=None,
+):
+    """A problem from a seed. A third of its sites stand beside what their neighbours were taken from."""
+    rng = np.random.default_rng(seed)
+    offsets = neighbourhood_offsets(order)
+    pixels = texture(sample_shape, channels, dtype, seed)
+    margin = int(offsets.max()) * spacing if edges != "whole" else 0
+    sample = Sample(pixels, channels * len(offsets), margin)
+    grid = Grid(*shape, spacing, torus)
+    row, col = np.indices(shape)
+    scattered = rng.integers(0, sample_shape, (*shape, 2))
+    shifted = np.stack([row % sample_shape[0], col % sample_shape[1]], -1)
+    place = np.where(rng.random(shape)[..., None] < 0.4, shifted, scattered) + margin
+    source = (place[..., 0] * sample.cols + place[..., 1]).astype(np.int32)
+    values = sample.working[:, source]
+    t = {
+        "mixed": rng.choice([0, 1024, *rng.integers(0, 1025, 6)], shape),
+        "zero": np.zeros(shape, int),
+        "one": np.full(shape, 1024),
+    }[temperatures]
+    sites = grid.sites()
+    sites = rng.permutation(sites)[: count or sites.size].astype(np.int32)
+    field = Field(values, source, t.astype(np.uint16))
+    return Problem(sample, order, grid, field, sites, edges, phases)
+
+
+@st.composite
+def problems(draw, max_order=9, channels=st.sampled_from([1, 2, 3])):
+    """Problems of any small shape, order, spacing and boundary."""
+    order = draw(st.integers(1, max_order))
+    spacing = draw(st.sampled_from([1, 2, 4]))
+    reach = int(neighbourhood_offsets(order).max())
+    edges = draw(st.sampled_from(["whole", "reflect"]))
+    least = 2 * reach * spacing + 1 if edges == "whole" else 2
+    side = st.integers(least, least + 6)
+    return problem(
+        draw(st.integers(0, 2**16)),
+        order=order,
+        channels=draw(channels),
+        sample_shape=(draw(side), draw(side)),
+        shape=(draw(st.integers(1, 12)), draw(st.integers(1, 12))),
+        spacing=spacing,
+        torus=draw(st.booleans()),
+        dtype=draw(st.sampled_from([np.uint8, np.uint16, np.float32])),
+        temperatures=draw(st.sampled_from(["mixed", "zero", "one"])),
+        edges=edges,
+        phases="all",
+        count=draw(st.sampled_from([1, 7, 24, 37])),  # PoCL compiles anew for each
+    )
+
+
+def host(machine, arrays):
+    """NumPy arrays of what an operation returned."""
+    return [np.asarray(machine.get(a)) for a in arrays]
+
+
+def assert_same_bits(ours, theirs):
+    """Two arrays, or two sequences of them, have the same type, shape and bytes."""
+    if not isinstance(ours, np.ndarray):
+        assert len(ours) == len(theirs)
+        for a, b in zip(ours, theirs, strict=True):
+            assert_same_bits(a, b)
+        return
+    assert (ours.dtype, ours.shape) == (theirs.dtype, theirs.shape)
+    different = np.argwhere(ours != theirs)
+    assert not len(different), (
+        f"{len(different)} of {ours.size} differ, first at {different[0]}: "
+        f"{ours[tuple(different[0])]} and {theirs[tuple(different[0])]}"
+    )
+    assert ours.tobytes() == theirs.tobytes()

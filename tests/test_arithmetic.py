@@ -1,0 +1,163 @@
+"""fma() and exp(): the bits of the NumPy twins against exact arithmetic, and of devices against the twins."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import tolerances
+from cases import assert_same_bits
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simdtex.machine.opencl import kernel_folder
+from simdtex.ops.arithmetic import exp32, fma32
+
+SOURCE = """
+#pragma OPENCL FP_CONTRACT OFF
+#include "common/exp.h"
+__kernel void fmas(__global const float *a, __global const float *b, __global const float *c, __global float *out)
+{
+    const int i = get_global_id(0);
+    out[i] = fma(a[i], b[i], c[i]);
+}
+__kernel void exps(__global const float *x, __global float *out)
+{
+    const int i = get_global_id(0);
+    out[i] = exp32(x[i]);
+}
+"""
+
+finite = st.floats(width=32, allow_nan=False, allow_infinity=False)
+
+
+def to_float32(exact):
+    """The float32 nearest to a Fraction, ties to even, by whole-number arithmetic alone."""
+    if exact == 0:
+        return np.float32(0)
+    size, sign = abs(exact), -1 if exact < 0 else 1
+    exponent = size.numerator.bit_length() - size.denominator.bit_length()
+    if Fraction(2) ** exponent > size:
+        exponent -= 1
+    unit = Fraction(2) ** (max(exponent, -126) - 23)
+    mantissa = round(size / unit)  # Python rounds a Fraction's half to even
+    if mantissa * unit >= Fraction(2) ** 128:
+        return np.float32(sign * np.inf)
+    return np.float32(sign * float(mantissa * unit))
+
+
+def exact_fma(a, b, c):
+    return to_float32(Fraction(float(a)) * Fraction(float(b)) + Fraction(float(c)))
+
+
+def check(a, b, c):
+    a, b, c = (np.asarray(v, np.float32).ravel() for v in (a, b, c))
+    with np.errstate(over="ignore"):
+        ours = fma32(a, b, c)
+    exact = np.array([exact_fma(*abc) for abc in zip(a, b, c, strict=True)], np.float32)
+    np.testing.assert_array_equal(ours, exact)
+
+
+def triples(count, seed=0):
+    """Factors and summands in which the sum's roundings matter: far apart, close, and cancelling."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.standard_normal((2, count)).astype(np.float32)
+    scale = 2.0 ** rng.integers(-40, 41, count)
+    c = (rng.standard_normal(count) * scale).astype(np.float32)
+    cancelling = rng.random(count) < 0.3
+    return a, b, np.where(cancelling, -(a * b), c).astype(np.float32)
+
+
+def halfway_triples():
+    """a b + c that float64 rounds onto the middle between two float32: rounding twice goes wrong there."""
+    tiny = np.float32(2.0**-60)
+    found = []
+    for mantissa in (2**23, 2**23 + 1, 2**24 - 1):
+        for sign in (1, -1):
+            # (mantissa + 1/2) as a product of float32 factors is impossible in general, so the half is the product.
+            for nudge in (tiny, -tiny, np.float32(0)):
+                half = np.float32(0.5)
+                found.append((half, sign * (np.float32(1) + nudge), np.float32(sign * mantissa)))
+    # (1 + 2^-12)^2 = 1 + 2^-11 + 2^-24, half a unit in the last place; a summand far below decides.
+    base = np.float32(1 + 2.0**-12)
+    for below in (2.0**-80, -(2.0**-80), 2.0**-140, -(2.0**-149), 0.0):
+        found += [(base, base, np.float32(below)), (-base, base, np.float32(below))]
+    return found
+
+
+def test_fma32_is_rounded_once_where_rounding_twice_errs():
+    a, b, c = zip(*halfway_triples(), strict=True)
+    a, b, c = (np.array(v, np.float32) for v in (a, b, c))
+    check(a, b, c)
+    twice = (a.astype(np.float64) * b + c).astype(np.float32)
+    assert (twice != fma32(a, b, c)).any(), "these cases are meant to be hard"
+
+
+def test_fma32_is_exact_on_many_random_triples():
+    check(*triples(3000))
+
+
+@given(finite, finite, finite)
+def test_fma32_is_exact_for_any_floats(a, b, c):
+    check(a, b, c)
+
+
+@pytest.mark.parametrize("power", [-149, -148, -127, -126, -125])
+def test_fma32_is_exact_among_the_subnormal(power):
+    unit = np.float32(2.0**power)
+    factors = np.float32([1, 1.5, 0.5, 0.75, 2.5, -1.5])
+    a, c = np.meshgrid(factors, factors * unit)
+    check(a, np.full(a.shape, unit), c)
+
+
+def test_fma32_takes_any_shapes_that_broadcast():
+    assert fma32(np.ones((2, 1), np.float32), np.ones(3, np.float32), np.float32(1)).shape == (2, 3)
+    assert fma32(np.float32(2), np.float32(3), np.float32(1)).shape == ()
+
+
+def grid_of_exponents():
+    near = -np.logspace(-45, 0, 20_001)
+    return np.concatenate([np.linspace(-86.9, 0, 400_001), near]).astype(np.float32)
+
+
+def test_exp32_is_as_close_as_stated():
+    x = grid_of_exponents()
+    exact = np.exp(x.astype(np.float64))
+    assert (abs(exp32(x) - exact) / exact).max() < tolerances.EXP32
+
+
+def test_exp32_of_0_is_1_and_it_never_exceeds_1():
+    assert exp32(np.float32(0)) == 1
+    assert exp32(grid_of_exponents()).max() == 1
+
+
+@pytest.fixture(scope="module")
+def build(machine):
+    """The program above on a machine, as it builds its own."""
+    import pyopencl as cl
+
+    options = ["-I", str(kernel_folder())]
+    program = cl.Program(machine.context, SOURCE).build(options)
+
+    def run(name, *arrays):
+        out = machine.empty(arrays[0].shape, np.float32)
+        machine.launch(cl.Kernel(program, name), out.shape, *map(machine.put, arrays), out)
+        return machine.get(out)
+
+    return run
+
+
+@pytest.mark.parametrize("kind", ["random", "halfway"])
+def test_fma_of_a_device_has_the_twins_bits(build, kind):
+    a, b, c = triples(20_000, 1) if kind == "random" else zip(*halfway_triples(), strict=True)
+    a, b, c = (np.array(v, np.float32) for v in (a, b, c))
+    normal = abs(fma32(a, b, c)) >= 2.0**-126  # devices may flush the rest to 0; no kernel meets them
+    a, b, c = a[normal], b[normal], c[normal]
+    small = abs(c) < 2.0**-126
+    c = np.where(small, 0, c).astype(np.float32)
+    assert_same_bits(build("fmas", a, b, c), fma32(a, b, c))
+
+
+def test_exp32_of_a_device_has_the_twins_bits(build):
+    x = grid_of_exponents()
+    x = x[(x < -(2.0**-120)) | (x == 0)]
+    assert_same_bits(build("exps", x), exp32(x))

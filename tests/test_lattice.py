@@ -1,0 +1,128 @@
+"""Lattices, neighbourhoods and boundaries, equations (3), (10) and (11), against plain loops."""
+
+import numpy as np
+import plain
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from simdtex.lattice import Grid, Sublattice, check_order, coloring_sublattice, neighbourhood_offsets
+
+
+@pytest.mark.parametrize(("order", "count"), [(1, 4), (2, 8), (3, 8), (4, 12), (5, 20), (8, 24), (18, 60)])
+def test_the_size_of_a_neighbourhood(order, count):
+    assert neighbourhood_offsets(order).shape == (count, 2)
+
+
+@pytest.mark.parametrize("order", [*range(1, 33), 50, 100, 225])
+def test_offsets_are_those_of_equation_3_in_canonical_order(order):
+    offsets = neighbourhood_offsets(order)
+    assert offsets.dtype == np.int32
+    assert [tuple(o) for o in offsets.tolist()] == plain.offsets(order)
+
+
+@given(st.integers(1, 400))
+def test_a_neighbourhood_is_symmetric_and_without_its_centre(order):
+    offsets = {tuple(o) for o in neighbourhood_offsets(order).tolist()}
+    assert (0, 0) not in offsets
+    assert offsets == {(-i, -j) for i, j in offsets} == {(j, i) for i, j in offsets}
+
+
+@pytest.mark.parametrize("order", [0, -1, -18])
+def test_an_order_without_neighbours_is_an_error(order):
+    with pytest.raises(ValueError, match=f"order {order} has no neighbours; give 1"):
+        check_order(order)
+
+
+@pytest.mark.parametrize("order", [1.0, "8", None, True])
+def test_an_order_that_is_no_whole_number_is_an_error(order):
+    with pytest.raises(TypeError, match="order must be a whole number"):
+        neighbourhood_offsets(order)
+
+
+sizes = st.integers(1, 11)
+spacings = st.sampled_from([1, 2, 4, 8])
+
+
+@given(sizes, sizes, spacings)
+def test_the_sites_of_a_grid(height, width, spacing):
+    grid = Grid(height, width, spacing)
+    assert (grid.rows, grid.cols) == plain.grid_size((height, width), spacing)
+    rows, cols = range(0, height, spacing), range(0, width, spacing)
+    assert grid.sites().tolist() == [i * width + j for i in rows for j in cols]
+    assert grid.sites().dtype == np.int32
+    picture = np.arange(height * width).reshape(height, width)
+    assert np.array_equal(grid.view(picture).ravel(), grid.sites())
+    assert grid.view(np.stack([picture] * 3)).shape == (3, grid.rows, grid.cols)
+    assert grid.plane == picture.size
+
+
+@given(sizes, sizes, spacings, st.integers(1, 13), st.booleans())
+def test_the_neighbours_of_every_site(height, width, spacing, order, torus):
+    grid = Grid(height, width, spacing, torus)
+    ours = grid.neighbours(grid.sites(), neighbourhood_offsets(order))
+    assert ours.dtype == np.int32
+    for site, column in zip(grid.sites().tolist(), ours.T.tolist(), strict=True):
+        i, j = site // width // spacing, site % width // spacing
+        near = plain.neighbours(i, j, order, grid.rows, grid.cols, torus)
+        assert column == [-1 if r is None else (r[0] * width + r[1]) * spacing for r in near]
+
+
+@given(sizes, sizes, spacings, st.integers(1, 13), st.booleans())
+def test_being_neighbours_is_mutual(height, width, spacing, order, torus):
+    grid = Grid(height, width, spacing, torus)
+    near = grid.neighbours(grid.sites(), neighbourhood_offsets(order))
+    pairs = {(s, r) for s, column in zip(grid.sites().tolist(), near.T.tolist(), strict=True) for r in column if r >= 0}
+    assert pairs == {(r, s) for s, r in pairs}
+
+
+def test_the_arguments_of_a_kernel():
+    assert Grid(7, 9, 2, False).args == (4, 5, 2, 9, 0)
+    assert all(isinstance(n, np.int32) for n in Grid(7, 9).args)
+
+
+def vectors(pattern, reach=12):
+    """Of the sublattice, around the origin, by brute force."""
+    steps = range(-4 * reach, 4 * reach + 1)
+    found = ((n * pattern.a + m * pattern.b, m * pattern.c) for n in steps for m in steps)
+    return {v for v in found if max(map(abs, v)) <= reach and v != (0, 0)}
+
+
+@given(st.integers(1, 8), st.integers(0, 7), st.integers(1, 8))
+def test_the_shortest_vector_of_a_sublattice(a, b, c):
+    pattern = Sublattice(a, b % a, c)
+    assert pattern.index == a * c
+    assert pattern.shortest() == min(i * i + j * j for i, j in vectors(pattern))
+
+
+@given(st.integers(1, 6), st.integers(0, 5), st.integers(1, 6), st.integers(1, 30), st.integers(1, 30))
+def test_a_torus_fits_where_both_periods_are_vectors_of_the_sublattice(a, b, c, rows, cols):
+    pattern = Sublattice(a, b % a, c)
+    here = vectors(pattern, 30)
+    assert pattern.fits(rows, cols) == ((rows, 0) in here and (0, cols) in here)
+
+
+@pytest.mark.parametrize(("order", "index"), [(1, 2), (2, 4), (8, 9), (18, 20)])
+def test_the_fewest_colours_known(order, index):
+    assert coloring_sublattice(order).index == index
+
+
+@pytest.mark.parametrize("order", range(1, 33))
+def test_the_sublattice_of_an_order_is_long_and_none_with_fewer_cosets_is(order):
+    best = coloring_sublattice(order)
+    assert min(i * i + j * j for i, j in vectors(best)) > order
+    for index in range(1, best.index):
+        for c in (c for c in range(1, index + 1) if index % c == 0):
+            a = index // c
+            for b in range(a):
+                short = ((i, j) for i, j in plain.offsets(order) if j % c == 0 and (i - j // c * b) % a == 0)
+                assert next(short, None) is not None
+
+
+@given(st.integers(1, 20), st.integers(1, 40), st.integers(1, 40))
+def test_a_sublattice_for_a_torus_fits_it(order, rows, cols):
+    found = coloring_sublattice(order, rows, cols, limit=30)
+    if found is not None:
+        assert found.fits(rows, cols)
+        assert found.shortest() > order
+        assert found.index <= 30

@@ -1,0 +1,490 @@
+"""The LCPDF: distances, densities and draws against equations (6) to (8) and (12) in plain float64."""
+
+import numpy as np
+import plain
+import pytest
+from cases import REFERENCE, assert_same_bits, host, opencl, problem, problems, texture
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import chisquare
+from tolerances import LCPDF, NEAR_TIE, SIGNIFICANCE
+
+import simdtex
+from simdtex.ops import lcpdf
+
+VARIANTS = [
+    {"vector": 1},
+    {"vector": 4},
+    {"vector": 8},
+    {"step": 1},
+    {"step": 2},
+    {"step": 8},
+    {"work_group": 3},
+    {"work_group": 16},
+]
+ids = {"ids": lambda options: "-".join(f"{k}-{v}" for k, v in options.items())}
+
+
+# -- distances, equation (12) ---------------------------------------------------------------------------------
+
+
+def distances(machine, p):
+    found, candidates = p.distances(machine)
+    return np.asarray(machine.get(found.distance))[: candidates.size, : found.sites]
+
+
+def plain_distances(p):
+    x, t, y = p.image(), p.temperature(), p.padded()
+    return np.array(
+        [
+            [plain.distance(x, t, site, y, position, p.order, p.grid.spacing, p.grid.torus) for site in p.where()]
+            for position in p.positions()
+        ]
+    )
+
+
+@given(problems(max_order=5))
+@settings(max_examples=20)
+def test_the_distance_is_equation_12(p):
+    ours = distances(REFERENCE, p)
+    # float32 holds 24 bits; the rounding of each of at most 60 terms adds half a unit in the last place.
+    np.testing.assert_allclose(ours, plain_distances(p), rtol=60 * 2.0**-24, atol=0)
+
+
+def test_the_distance_of_cold_8_bit_pixels_is_exact():
+    p = problem(1, order=18, temperatures="zero", torus=False)
+    assert np.array_equal(distances(REFERENCE, p), plain_distances(p))
+
+
+@given(p=problems(max_order=18))
+@settings(max_examples=30)
+def test_distances_of_a_device_have_the_references_bits(machine, p):
+    assert_same_bits(distances(machine, p), distances(REFERENCE, p))
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_distances_at_large_orders_have_the_references_bits(machine, channels, dtype):
+    """The most neighbours times channels: the sums are longest and least exact here."""
+    p = problem(2, order=50, channels=channels, dtype=dtype, sample_shape=(20, 19), shape=(20, 17), count=40)
+    assert_same_bits(distances(machine, p), distances(REFERENCE, p))
+
+
+@pytest.mark.parametrize("options", VARIANTS, **ids)
+def test_the_shape_of_a_launch_changes_no_bit_of_a_distance(cl_device, options):
+    p = problem(3, order=8, sample_shape=(16, 15), count=37)
+    assert_same_bits(distances(opencl(cl_device, **options), p), distances(REFERENCE, p))
+
+
+# -- h_opt and the tables of the kernel, equations (7) and (8) ------------------------------------------------
+
+
+@given(st.integers(0, 100), st.sampled_from([1, 2, 8]), st.sampled_from([1, 3]))
+@settings(max_examples=20)
+def test_the_optimal_bandwidth_is_equation_8(seed, order, channels):
+    p = problem(seed, order=order, channels=channels)
+    _, h = p.window()
+    formula = plain.optimal_bandwidth(p.sample.levels, len(p.positions()), len(p.offsets))
+    assert h == pytest.approx(formula, rel=1e-12)
+
+
+@pytest.mark.parametrize("h", [0.05, 0.4, 1.0, 7.3, 60.0, 5000.0])
+def test_the_tables_of_a_bandwidth(h):
+    win = lcpdf.window(h, 255)
+    k = np.arange(win.radius + 1)
+    gauss = np.exp(-(k**2) / (2 * h * h))
+    np.testing.assert_allclose(win.gauss, gauss, rtol=2.0**-23, atol=2.0**-126)
+    assert win.scale == np.float32(1 / (2 * h * h))
+    assert win.radius == 255 or np.exp(-((win.radius + 1) ** 2) / (2 * h * h)) < 2.0**-33
+    steps = np.concatenate([gauss[:0:-1], gauss])
+    cumulative = np.cumsum(steps) / steps.sum()
+    np.testing.assert_allclose(win.noise / 2.0**32, cumulative, atol=2.0**-32 * win.noise.size)
+    assert (np.diff(win.noise.astype(np.int64)) >= 0).all()
+
+
+# -- simdtex.lcpdf, equations (6) to (8) and (12) -------------------------------------------------------------
+
+
+def formula(image, sample, sites, order, bandwidth=1.0, temperature=None, levels=256, boundary="torus"):
+    t = np.zeros(image.shape) if temperature is None else np.rint(temperature * 1024) / 1024
+    positions = plain.whole_positions(sample.shape, order)
+    h = bandwidth * plain.optimal_bandwidth([sample], len(positions), len(plain.offsets(order)))
+    rows = []
+    for site in sites:
+        d = [
+            plain.distance([image], t, site, [sample], p, order, 1, boundary == "torus") for p in positions
+        ]
+        rows.append(plain.mixture(d, [sample[p] for p in positions], h, levels))
+    return np.array(rows)
+
+
+def check_lcpdf(machine, image, sample, sites, **options):
+    ours = simdtex.lcpdf(image, sample, sites, device=machine, **options)
+    exact = formula(image, sample, sites, **options)
+    assert ours.dtype == np.float64
+    assert ours.shape == exact.shape
+    assert abs(ours - exact).max() < LCPDF
+    assert abs(ours.sum(1) - 1).max() < LCPDF
+    return ours
+
+
+@pytest.mark.parametrize("boundary", ["torus", "open"])
+@pytest.mark.parametrize("bandwidth", [0.15, 1.0, 3.0])
+@pytest.mark.parametrize("order", [1, 2, 8])
+def test_lcpdf_is_the_formula(order, bandwidth, boundary):
+    rng = np.random.default_rng(order)
+    image, sample = texture((7, 9), seed=1), texture((10, 11), seed=2)
+    sites = [(0, 0), (6, 8), (3, 4), (0, 4)]
+    for temperature in (None, rng.random(image.shape), np.ones(image.shape)):
+        check_lcpdf(
+            REFERENCE, image, sample, sites, order=order, bandwidth=bandwidth,
+            temperature=temperature, boundary=boundary,
+        )  # fmt: skip
+
+
+@given(
+    st.integers(1, 5),
+    st.tuples(st.integers(1, 6), st.integers(1, 6)),
+    st.tuples(st.integers(5, 9), st.integers(5, 9)),
+    st.sampled_from([2, 3, 16, 100]),
+    st.sampled_from(["torus", "open"]),
+    st.integers(0, 1000),
+)
+@settings(max_examples=25)
+def test_lcpdf_is_the_formula_for_any_shape_and_levels(order, shape, sample_shape, levels, boundary, seed):
+    rng = np.random.default_rng(seed)
+    image, sample = rng.integers(0, levels, shape), rng.integers(0, levels, sample_shape)
+    sample[0, :2] = 0, 1  # its variance is above 0
+    sites = rng.integers(0, shape, (3, 2))
+    check_lcpdf(
+        REFERENCE, image, sample, sites, order=order, levels=levels, boundary=boundary,
+        temperature=rng.random(shape),
+    )  # fmt: skip
+
+
+def test_lcpdf_of_a_device_has_the_references_bits_and_is_the_formula(machine):
+    rng = np.random.default_rng(4)
+    for levels, order, boundary in [(256, 2, "torus"), (17, 8, "open"), (4096, 1, "torus")]:
+        image, sample = rng.integers(0, levels, (8, 7)), rng.integers(0, levels, (9, 12))
+        sites, t = rng.integers(0, (8, 7), (11, 2)), rng.random((8, 7))
+        options = {"order": order, "levels": levels, "boundary": boundary, "temperature": t}
+        ours = check_lcpdf(machine, image, sample, sites[:2], **options)
+        ours = simdtex.lcpdf(image, sample, sites, device=machine, **options)
+        assert_same_bits(ours, simdtex.lcpdf(image, sample, sites, device=REFERENCE, **options))
+
+
+def test_lcpdf_of_more_sites_than_scratch_memory_holds(cl_device):
+    image, sample = texture((9, 8), seed=3), texture((12, 12), seed=4)
+    sites = np.argwhere(image >= 0)
+    whole = simdtex.lcpdf(image, sample, sites, order=2, device=REFERENCE)
+    for vector in (4, 16):
+        small = opencl(cl_device, scratch=2**13, vector=vector)
+        assert_same_bits(simdtex.lcpdf(image, sample, sites, order=2, device=small), whole)
+
+
+def test_lcpdf_of_a_constant_sample_and_of_no_site():
+    constant = np.full((5, 5), 7, np.uint8)
+    table = simdtex.lcpdf(constant, constant, [(0, 0)], order=1, device=REFERENCE)
+    assert table.argmax() == 7
+    assert table.sum() == pytest.approx(1, abs=LCPDF)
+    assert simdtex.lcpdf(constant, constant, [], order=1, device=REFERENCE).shape == (0, 256)
+
+
+GREY = np.arange(42, dtype=np.uint8).reshape(6, 7)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"order": 0}, ValueError, "order 0 has no neighbours; give 1"),
+        ({"order": 1.5}, TypeError, "order must be a whole number"),
+        ({"order": 16}, ValueError, "the largest order that fits is 8"),
+        ({"bandwidth": 0}, ValueError, "bandwidth is 0; give a number above 0"),
+        ({"bandwidth": float("nan")}, ValueError, "bandwidth"),
+        ({"bandwidth": "1"}, TypeError, "bandwidth must be a number"),
+        ({"levels": 1}, ValueError, "levels is 1; give 2 or more"),
+        ({"levels": 5000}, ValueError, "levels is 5000; give 4096 or fewer"),
+        ({"levels": 40}, ValueError, "holds 0 to 41, beyond 0 to 39"),
+        ({"estimator": "kernel"}, ValueError, "choose one of: parzen, histogram"),
+        ({"boundary": "mirror"}, ValueError, "choose one of: torus, open"),
+        ({"image": GREY.astype(float)}, TypeError, "image must hold whole numbers"),
+        ({"image": -GREY.astype(int)}, ValueError, "image holds -41 to 0"),
+        ({"image": GREY[0]}, ValueError, "image must be a"),
+        ({"sample": GREY[:0]}, ValueError, "sample must be a .* not empty"),
+        ({"sites": [(0, 0, 0)]}, ValueError, "sites must be an"),
+        ({"sites": [(0.5, 0)]}, ValueError, "sites must be an"),
+        ({"sites": [(6, 0)]}, ValueError, "outside the image of 6 rows x 7 columns"),
+        ({"sites": [(0, -1)]}, ValueError, "outside the image of 6 rows x 7 columns"),
+        ({"temperature": np.zeros((2, 2))}, ValueError, r"temperature has shape \(2, 2\)"),
+        ({"temperature": np.full(GREY.shape, 1.5)}, ValueError, "between 0 and 1"),
+        ({"temperature": np.full(GREY.shape, np.nan)}, ValueError, "between 0 and 1"),
+    ],
+)
+def test_bad_input_is_one_clear_sentence(change, error, words):
+    options = {"image": GREY, "sample": GREY, "sites": [(0, 0)], "order": 2, "device": "reference"} | change
+    with pytest.raises(error, match=words):
+        simdtex.lcpdf(**options)
+
+
+# -- the Gibbs sampler draws from the density -----------------------------------------------------------------
+
+DRAWS = 5_000
+SEEDS = (1, 2**33 + 7, 2**64 - 1)
+
+
+def draw_many(machine, p, win, noisy, strength=0.0):
+    """Draws at the problem's only site, each under another site's number and over several seeds."""
+    p = p._replace(sites=np.repeat(p.sites[:1], DRAWS))
+    found, candidates = p.distances(machine, strength)
+    numbers = machine.put(np.arange(DRAWS, dtype=np.int32))
+    drawn = [
+        host(machine, lcpdf.draw(machine, found, candidates, numbers, win, noisy, seed, 1, 3)) for seed in SEEDS
+    ]
+    choice, values = (np.concatenate(a, -1) for a in zip(*drawn, strict=True))
+    return choice, values
+
+
+def reweighted(p, strength):
+    """d_p at the problem's first site, divided by 1 + coherence where the candidate continues a neighbour."""
+    site, t = p.where()[0], p.field.temperature
+    continuing = plain.coherent(p.source(), t, site, p.order, p.grid.spacing, p.grid.torus) if strength else ()
+    x, y = p.image(), p.padded()
+    found = []
+    for position in p.positions():
+        d = plain.distance(x, p.temperature(), site, y, position, p.order, p.grid.spacing, p.grid.torus)
+        found.append(d / (1 + strength) if position in continuing else d)
+    return np.array(found)
+
+
+def check_chi_square(counts, probabilities):
+    """Pearson's test; outcomes expected less than 5 times are taken together."""
+    expected = probabilities / probabilities.sum() * counts.sum()
+    rare = expected < 5
+    if rare.any():
+        counts = np.append(counts[~rare], counts[rare].sum())
+        expected = np.append(expected[~rare], expected[rare].sum())
+        if expected[-1] < 5:  # all the rare ones are rare together
+            least = expected[:-1].argmin()
+            counts[least] += counts[-1]
+            expected[least] += expected[-1]
+            counts, expected = counts[:-1], expected[:-1]
+    assert expected.size >= 3, "there is something to draw from"
+    assert chisquare(counts, expected).pvalue > SIGNIFICANCE
+
+
+CASES = [
+    # order, bandwidth, temperatures, coherence, torus
+    (1, 1.0, "mixed", 0.0, True),
+    (2, 2.0, "zero", 0.0, False),
+    (2, 1.0, "one", 0.0, True),
+    (1, 1.0, "mixed", 1.0, True),
+    (2, 2.5, "zero", 2.0, True),
+    (4, 2.0, "mixed", 5.0, False),
+]
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_a_draw_of_a_grey_level_follows_the_density(case, seed):
+    order, bandwidth, temperatures, strength, torus = case
+    p = problem(seed, order=order, temperatures=temperatures, torus=torus, shape=(7, 8))
+    win, h = p.window(bandwidth)
+    _, values = draw_many(REFERENCE, p, win, True, strength)
+    density = plain.mixture(reweighted(p, strength), [p.padded()[0][q] for q in p.positions()], h, 256)
+    check_chi_square(np.bincount(values[0], minlength=256), density)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_a_draw_of_a_source_follows_the_weights(case, seed):
+    order, bandwidth, temperatures, strength, torus = case
+    p = problem(seed, order=order, channels=3, temperatures=temperatures, torus=torus, shape=(7, 8))
+    win, h = p.window(bandwidth)
+    choice, values = draw_many(REFERENCE, p, win, False, strength)
+    d = reweighted(p, strength)
+    weights = np.exp(-(d - d.min()) / (2 * h * h))
+    where = p.candidates(REFERENCE)
+    counts = np.bincount(where.index_of[choice], minlength=len(weights))
+    check_chi_square(counts, weights)
+    assert np.array_equal(values, p.sample.working[:, choice])
+
+
+def test_draws_on_a_device_follow_the_density_too(machine):
+    p = problem(5, order=2, shape=(7, 8))
+    win, h = p.window(1.5)
+    _, values = draw_many(machine, p, win, True, 1.0)
+    density = plain.mixture(reweighted(p, 1.0), [p.padded()[0][q] for q in p.positions()], h, 256)
+    check_chi_square(np.bincount(values[0], minlength=256), density)
+
+
+def test_a_wrong_density_is_noticed():
+    """The test above can fail: the same draws against a bandwidth off by a tenth, and without coherence."""
+    p = problem(2, order=2, temperatures="zero", shape=(7, 8))
+    win, h = p.window(2.5)
+    _, values = draw_many(REFERENCE, p, win, True, 1.0)
+    grey = [p.padded()[0][q] for q in p.positions()]
+    check_chi_square(np.bincount(values[0], minlength=256), plain.mixture(reweighted(p, 1.0), grey, h, 256))
+    counts = np.bincount(values[0], minlength=256)
+    for d, width in [(reweighted(p, 1.0), 1.1 * h), (reweighted(p, 0.0), h)]:
+        with pytest.raises(AssertionError):
+            check_chi_square(counts, plain.mixture(d, grey, width, 256))
+
+
+def test_the_draw_of_a_vector_follows_the_density_in_each_channel():
+    """P(x) of one channel is the mixture with one factor of the kernel; legal vectors only, so far from the ends."""
+    p = problem(6, order=1, channels=2, temperatures="zero", shape=(7, 8))
+    levels = (p.sample.levels // 4 + 100).astype(np.uint16)
+    p.sample._lay(levels, 0)
+    p = p._replace(field=p.field._replace(values=p.sample.working[:, p.field.source]))
+    win, h = p.window(1.0)
+    _, values = draw_many(REFERENCE, p, win, True)
+    for c in range(2):
+        density = plain.mixture(reweighted(p, 0), [p.padded()[c][q] for q in p.positions()], h, 256)
+        check_chi_square(np.bincount(values[c], minlength=256), density)
+
+
+def test_draws_are_legal_where_half_of_the_kernel_is_not():
+    black = np.zeros((6, 6), np.uint8)
+    black[0, 0] = 1
+    p = problem(1, order=1)
+    p.sample._lay(black[None].astype(np.uint16), 0)
+    p = p._replace(field=p.field._replace(source=np.zeros_like(p.field.source), values=p.field.values * 0))
+    for h in (0.5, 40.0, 1e6):
+        win = lcpdf.window(h, 255)
+        _, values = draw_many(REFERENCE, p, win, True)
+        steps = np.exp(-(np.arange(256) ** 2) / (2 * h * h))
+        if h > 0.5:
+            check_chi_square(np.bincount(values[0], minlength=256), steps)
+        assert values.max() <= 255
+
+
+# -- iterated conditional modes -------------------------------------------------------------------------------
+
+
+def relaxed(machine, p, name, bandwidth, strength, noisy=True):
+    found, candidates = p.distances(machine, strength)
+    win, _ = p.window(bandwidth)
+    if name == "draw":
+        arguments = (machine.put(p.sites), win, noisy, 2**63 + 11, 3, 2)
+    else:
+        arguments = () if name == "best" else (win,)
+    return host(machine, getattr(lcpdf, name)(machine, found, candidates, *arguments))
+
+
+bandwidths = st.sampled_from([0.15, 1.0, 3.0])
+strengths = st.sampled_from([0.0, 1.0])
+
+
+@given(problems(max_order=4, channels=st.just(1)), bandwidths, strengths)
+@settings(max_examples=15)
+def test_the_mode_is_the_highest_of_the_density(p, bandwidth, strength):
+    p = p._replace(sites=p.sites[:4])
+    if p.sample.top != 255:
+        return
+    choice, values = relaxed(REFERENCE, p, "mode", bandwidth, strength)
+    _, h = p.window(bandwidth)
+    h = h or 1.0
+    grey = np.array([p.padded()[0][q] for q in p.positions()], float)
+    index_of = p.candidates(REFERENCE).index_of
+    for s, site in enumerate(p.sites):
+        d = reweighted(p._replace(sites=np.array([site])), strength)
+        density = plain.mixture(d, grey, h, 256)
+        assert density[values[0, s]] >= density.max() * (1 - NEAR_TIE)
+        share = np.exp(-(d - d.min() + (grey - values[0, s]) ** 2) / (2 * h * h))
+        assert share[index_of[choice[s]]] >= share.max() * (1 - NEAR_TIE), "the source answers for most of it"
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_mode_of_a_texture(seed):
+    """As above, with densities of several humps, and no near-ties left out by chance."""
+    p = problem(seed, order=2, shape=(8, 8), count=12)
+    _, values = relaxed(REFERENCE, p, "mode", 1.0, 1.0)
+    _, h = p.window(1.0)
+    grey = [p.padded()[0][q] for q in p.positions()]
+    compared = 0
+    for s, site in enumerate(p.sites):
+        density = plain.mixture(reweighted(p._replace(sites=np.array([site])), 1.0), grey, h, 256)
+        second, first = np.sort(density)[-2:]
+        if second < first * (1 - NEAR_TIE):
+            assert values[0, s] == density.argmax()
+            compared += 1
+    assert compared >= 10
+
+
+@given(problems(max_order=5), strengths)
+@settings(max_examples=25)
+def test_the_best_is_the_nearest_candidate_the_first_of_several(p, strength):
+    choice, values = relaxed(REFERENCE, p, "best", 1.0, strength)
+    found, _ = p.distances(REFERENCE, strength)
+    for s in range(p.sites.size):
+        column = found.distance[:, s].tolist()
+        row, col = p.positions()[column.index(min(column))]
+        assert choice[s] == row * p.sample.cols + col
+        assert values[:, s].tolist() == [channel[row, col] for channel in p.padded()]
+
+
+def test_the_best_of_equals_is_the_first(machine):
+    p = problem(1, temperatures="one", sample_shape=(15, 15))
+    for m in (REFERENCE, machine):
+        choice, _ = relaxed(m, p, "best", 1.0, 0.0)
+        assert set(choice.tolist()) == {int(p.candidates(REFERENCE).positions[0])}
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_mode_of_a_vector_is_the_densest_of_the_heaviest(seed):
+    p = problem(seed, order=1, channels=3, shape=(7, 8), count=8)
+    choice, values = relaxed(REFERENCE, p, "mode_vector", 1.0, 1.0)
+    _, h = p.window(1.0)
+    y = np.array([[channel[q] for channel in p.padded()] for q in p.positions()])
+    index_of = p.candidates(REFERENCE).index_of
+    for s, site in enumerate(p.sites):
+        d = reweighted(p._replace(sites=np.array([site])), 1.0)
+        heaviest = np.argsort(d, kind="stable")[: lcpdf.HEAVIEST]
+        w = np.exp(-(d - d.min()) / (2 * h * h))
+        heaviest = [i for i in heaviest if w[i] >= 2.0**-40]
+        density = np.array([plain.vector_density(d, y, h, y[i]) for i in heaviest])
+        chosen = heaviest.index(index_of[choice[s]])
+        assert density[chosen] >= density.max() * (1 - NEAR_TIE)
+        assert values[:, s].tolist() == y[heaviest[chosen]].tolist()
+
+
+# -- a device has the reference's bits ------------------------------------------------------------------------
+
+
+@given(p=problems(channels=st.just(1)), bandwidth=bandwidths, strength=strengths)
+@settings(max_examples=15)
+def test_grey_relaxations_of_a_device_have_the_references_bits(machine, p, bandwidth, strength):
+    for name in ("draw", "best", "mode_vector", *(["mode"] if p.sample.top == 255 else [])):
+        theirs = relaxed(REFERENCE, p, name, bandwidth, strength)
+        assert_same_bits(relaxed(machine, p, name, bandwidth, strength), theirs)
+    theirs = relaxed(REFERENCE, p, "draw", bandwidth, strength, noisy=False)
+    assert_same_bits(relaxed(machine, p, "draw", bandwidth, strength, noisy=False), theirs)
+
+
+@given(p=problems(channels=st.sampled_from([2, 3])), bandwidth=bandwidths, strength=strengths)
+@settings(max_examples=15)
+def test_vector_relaxations_of_a_device_have_the_references_bits(machine, p, bandwidth, strength):
+    for name in ("draw", "best", "mode_vector"):
+        theirs = relaxed(REFERENCE, p, name, bandwidth, strength)
+        assert_same_bits(relaxed(machine, p, name, bandwidth, strength), theirs)
+
+
+@pytest.mark.parametrize("options", [{"vector": 1}, {"vector": 4}, {"work_group": 3}], **ids)
+def test_the_shape_of_a_launch_changes_no_bit(cl_device, options):
+    p = problem(7, order=5, shape=(9, 10), sample_shape=(17, 16), count=53)
+    for name in ("draw", "best", "mode", "mode_vector"):
+        theirs = relaxed(REFERENCE, p, name, 1.0, 1.0)
+        assert_same_bits(relaxed(opencl(cl_device, **options), p, name, 1.0, 1.0), theirs)
+
+
+def test_draws_that_are_often_illegal_have_the_references_bits(machine):
+    """Many attempts: a wide kernel around black and white pixels."""
+    p = problem(8, order=1, channels=3, shape=(9, 9))
+    extremes = np.where(p.sample.levels > 127, 255, 0).astype(np.uint16)
+    p.sample._lay(extremes, 0)
+    for m in (REFERENCE, machine):
+        found, candidates = p.distances(m)
+        win = lcpdf.window(90.0, 255)
+        ours = host(m, lcpdf.draw(m, found, candidates, m.put(p.sites), win, True, 5, 0, 1))
+        theirs = ours if m is REFERENCE else theirs
+        assert_same_bits(ours, theirs)

@@ -1,0 +1,63 @@
+"""The left half of equation (12): confidences and weighted grey levels of every neighbour."""
+
+import numpy as np
+import plain
+import pytest
+from cases import REFERENCE, assert_same_bits, host, opencl, problem, problems
+from hypothesis import given, settings
+
+from simdtex.ops.neighbourhood import neighbourhood
+
+
+def run(machine, p):
+    sites, field, offsets = p.on(machine)
+    confidence, weighted, count = neighbourhood(machine, sites, field, offsets, p.grid)
+    confidence, weighted = host(machine, (confidence, weighted))
+    assert count == p.sites.size
+    padding = confidence[:, count:], weighted[:, :, count:]
+    assert not any(a.any() for a in padding), "columns that are no sites have no weight"
+    return confidence[:, :count], weighted[:, :, :count]
+
+
+def check_formula(p):
+    confidence, weighted = run(REFERENCE, p)
+    t, x, spacing = p.temperature(), p.image(), p.grid.spacing
+    for s, (row, col) in enumerate(p.where()):
+        near = plain.neighbours(
+            row // spacing, col // spacing, p.order, p.grid.rows, p.grid.cols, p.grid.torus
+        )
+        for k, r in enumerate(near):
+            here = None if r is None else (r[0] * spacing, r[1] * spacing)
+            u = 0 if here is None else 1 - t[here]
+            assert confidence[k, s] == u, "1 - t is exact in float32"
+            for c, channel in enumerate(x):
+                assert weighted[k, c, s] == (0 if here is None else channel[here] * u)
+
+
+@given(problems())
+@settings(max_examples=40)
+def test_the_reference_is_the_formula(p):
+    check_formula(p)
+
+
+@pytest.mark.parametrize("torus", [True, False], ids=["torus", "open"])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 5), (2, 3)])
+def test_the_reference_is_the_formula_on_tiny_pictures(shape, torus):
+    check_formula(problem(1, order=5, shape=shape, torus=torus))
+
+
+@given(p=problems())
+@settings(max_examples=25)
+def test_a_device_has_the_references_bits(machine, p):
+    assert_same_bits(run(machine, p), run(REFERENCE, p))
+
+
+@pytest.mark.parametrize("options", [{"vector": 1}, {"vector": 4}, {"work_group": 3}], ids=str)
+def test_the_shape_of_a_launch_changes_no_bit(cl_device, options):
+    p = problem(2, order=8, channels=3, count=37)
+    assert_same_bits(run(opencl(cl_device, **options), p), run(REFERENCE, p))
+
+
+def test_a_hot_neighbour_and_one_outside_have_no_weight():
+    p = problem(3, order=1, shape=(3, 3), torus=False, temperatures="one")
+    assert not np.concatenate([a.ravel() for a in run(REFERENCE, p)]).any()

@@ -1,0 +1,65 @@
+"""The picture before the first level: pixels of the sample at random, all hot."""
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, host, opencl, texture
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import chisquare
+from tolerances import SIGNIFICANCE
+
+from simdtex import random
+from simdtex.lattice import Grid
+from simdtex.ops.start import start
+from simdtex.sample import Sample
+
+
+def run(machine, sample, positions, shape, seed):
+    planes = machine.put(sample.working.astype(np.float32))
+    return host(machine, start(machine, planes, machine.put(positions), Grid(*shape), seed))
+
+
+@st.composite
+def starts(draw):
+    side = st.integers(1, 9)
+    channels, margin = draw(st.integers(1, 3)), draw(st.integers(0, 3))
+    dtype = draw(st.sampled_from([np.uint8, np.uint16, np.float32]))
+    sample = Sample(texture((draw(side), draw(side)), channels, dtype, 1), 8, margin)
+    positions = sample.positions(np.zeros((1, 2), np.int32), 1)
+    return sample, positions, (draw(side), draw(side)), draw(st.integers(0, 2**64 - 1))
+
+
+@given(starts())
+def test_the_reference_is_the_rule(case):
+    sample, positions, shape, seed = case
+    values, source, temperature = run(REFERENCE, *case)
+    assert [a.dtype for a in (values, source, temperature)] == [np.uint16, np.int32, np.uint16]
+    assert source.shape == temperature.shape == values.shape[1:] == shape
+    assert (temperature == 1024).all()
+    for site, p in enumerate(source.ravel().tolist()):
+        lo, hi, *_ = random.draw4(seed, 0, 0, site, random.START)
+        assert p == positions[((int(hi) << 32 | int(lo)) * len(positions)) >> 64]
+        row, col = divmod(p, sample.cols)
+        inside = (row - sample.margin, col - sample.margin)
+        assert all(0 <= i < n for i, n in zip(inside, sample.levels.shape[1:], strict=True))
+        assert values.reshape(sample.channels, -1)[:, site].tolist() == sample.levels[:, *inside].tolist()
+
+
+@given(case=starts())
+@settings(max_examples=25)
+def test_a_device_has_the_references_bits(machine, case):
+    assert_same_bits(run(machine, *case), run(REFERENCE, *case))
+
+
+@pytest.mark.parametrize("work_group", [3, 16])
+def test_the_shape_of_a_launch_changes_no_bit(cl_device, work_group):
+    sample = Sample(texture((9, 7), 3), 8)
+    case = sample, sample.positions(np.zeros((1, 2), np.int32), 1), (10, 13), 5
+    assert_same_bits(run(opencl(cl_device, work_group=work_group), *case), run(REFERENCE, *case))
+
+
+def test_every_pixel_is_as_likely():
+    sample = Sample(texture((5, 4), 1), 8)
+    positions = sample.positions(np.zeros((1, 2), np.int32), 1)
+    _, source, _ = run(REFERENCE, sample, positions, (100, 100), 11)
+    assert chisquare(np.bincount(source.ravel(), minlength=20)).pvalue > SIGNIFICANCE

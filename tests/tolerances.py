@@ -1,0 +1,24 @@
+"""Every tolerance of the tests, in one place, each with its reason.
+
+What is not here is compared byte for byte.
+"""
+
+EXP32 = 2.5e-7
+"""Relative error of exp32 against float64: the bound that kernels/common/exp.h states. A polynomial of degree 6 on
+|r| <= log(2) / 2 (about 1.2e-7 with its coefficients and steps rounded to float32) after a reduction in two parts."""
+
+LCPDF = 1e-5
+"""Absolute error of a probability of `simdtex.lcpdf` against equations (6) to (8) and (12) in float64, as its docstring
+states. Distances and their product with 1 / 2h^2 are float32 (24 bits), so an exponent of up to 28 is off by up to
+28 * 2**-23 or so, and weights below 2**-40 of the largest are 0; sums over up to 4096 levels add little."""
+
+NEAR_TIE = 1e-5
+"""Relative gap between the two highest densities below which ICM may take either mode: its densities carry the float32
+rounding of LCPDF."""
+
+SIGNIFICANCE = 1e-4
+"""Of every chi-square test of a draw. Seeds are fixed, so a test that passes keeps passing; over all of them a correct
+sampler would have failed one in a few hundred choices of the seeds."""
+
+CONTRAST = 1e-12
+"""Relative error of plain float64 expressions of a few operations against each other."""
