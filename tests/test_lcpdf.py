@@ -228,7 +228,7 @@ def test_bad_input_is_one_clear_sentence(change, error, words):
 
 # -- the Gibbs sampler draws from the density -----------------------------------------------------------------
 
-DRAWS = 5_000
+DRAWS = 10_000
 SEEDS = (1, 2**33 + 7, 2**64 - 1)
 
 
@@ -275,11 +275,11 @@ def check_chi_square(counts, probabilities):
 CASES = [
     # order, bandwidth, temperatures, coherence, torus
     (1, 1.0, "mixed", 0.0, True),
-    (2, 2.0, "zero", 0.0, False),
+    (2, 1.0, "zero", 0.0, False),
     (2, 1.0, "one", 0.0, True),
     (1, 1.0, "mixed", 1.0, True),
-    (2, 2.5, "zero", 2.0, True),
-    (4, 2.0, "mixed", 5.0, False),
+    (2, 1.0, "zero", 2.0, True),
+    (4, 1.5, "mixed", 5.0, False),
 ]
 
 
@@ -319,8 +319,8 @@ def test_draws_on_a_device_follow_the_density_too(machine):
 
 def test_a_wrong_density_is_noticed():
     """The test above can fail: the same draws against a bandwidth off by a tenth, and without coherence."""
-    p = problem(2, order=2, temperatures="zero", shape=(7, 8))
-    win, h = p.window(2.5)
+    p = problem(1, order=4, temperatures="zero", shape=(7, 8))
+    win, h = p.window(1.0)
     _, values = draw_many(REFERENCE, p, win, True, 1.0)
     grey = [p.padded()[0][q] for q in p.positions()]
     check_chi_square(np.bincount(values[0], minlength=256), plain.mixture(reweighted(p, 1.0), grey, h, 256))

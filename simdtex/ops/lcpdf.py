@@ -76,9 +76,11 @@ def optimal_bandwidth(variance: float, candidates: int, dimensions: int) -> floa
 def window(bandwidth: float, top: int) -> Window:
     """The tables for a bandwidth h in working grey levels; h = 0 (a constant sample) stands for 1.
 
+    h below 10^-10 stands for that: any difference then weighs nothing already, and 1 / 2h^2 stays finite.
+
     math.exp is rounded to 2**-24 or coarser here, so the last bit of a platform's libm does not show.
     """
-    h = bandwidth or 1.0
+    h = max(bandwidth, 1e-10) if bandwidth else 1.0
     scale = np.float32(1 / (2 * h * h))
     radius = min(top, ceil(h * sqrt(2 * log(2.0**33))))
     gauss = [exp(-k * k / (2 * h * h)) for k in range(radius + 1)]

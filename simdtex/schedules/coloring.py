@@ -41,7 +41,7 @@ class Coloring:
     independent = True
 
     def init(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int) -> State:
-        """Colour the lattice; O(sites (|N| + colours)) once a level."""
+        """Colour the lattice; O(sites x (neighbours + colours)) once a level."""
         colors = coloring(machine, grid, offsets, order, seed).ravel()
         members = tuple(np.flatnonzero(colors == c).astype(np.int32) for c in range(colors.max() + 1))
         return State(members, grid.sites(), seed, level, 0, ())

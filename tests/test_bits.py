@@ -1,0 +1,308 @@
+"""Same seed, same bits: whole syntheses on every device, in every shape of launch, against the reference."""
+
+import functools
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, opencl, texture
+
+import simdtex
+
+ROOT = Path(__file__).resolve().parent.parent
+REQUIRED = bool(os.environ.get("SIMDTEX_REQUIRE_OPENCL"))
+
+# sample shape, channels, type, output shape, options
+RUNS = {
+    "defaults": ((13, 12), None, np.uint8, (11, 14), {"order": 8}),
+    "paper": ((14, 13), None, np.uint8, (9, 11), {"preset": "paper", "order": 2}),
+    "paper-icm": ((12, 13), None, np.uint8, (10, 9), {"preset": "paper", "order": 5, "relaxation": "icm"}),
+    "gibbs-source": ((12, 12), None, np.uint8, (15, 7), {"order": 5, "relaxation": "gibbs", "boundary": "open"}),
+    "gibbs-density": (
+        (12, 12),
+        None,
+        np.uint8,
+        (9, 9),
+        {"order": 2, "relaxation": "gibbs", "pixel": "density", "bandwidth": 0.5, "coherence": 0},
+    ),
+    "colour-icm": ((12, 11), 3, np.uint8, (10, 13), {"order": 2, "boundary": "open"}),
+    "colour-gibbs-density": (
+        (11, 12),
+        3,
+        np.uint8,
+        (8, 9),
+        {"order": 2, "relaxation": "gibbs", "pixel": "density", "coherence": 2.0},
+    ),
+    "colour-icm-density": ((11, 12), 3, np.uint8, (7, 10), {"order": 1, "pixel": "density", "bandwidth": 1.0}),
+    "16-bit-density": ((12, 12), None, np.uint16, (9, 8), {"order": 5, "pixel": "density", "bandwidth": 1.0}),
+    "16-bit-two-channels": ((12, 12), 2, np.uint16, (9, 8), {"order": 8, "relaxation": "gibbs"}),
+    "float32": ((12, 13), None, np.float32, (13, 7), {"order": 5}),
+    "float64-density": (
+        (12, 13),
+        None,
+        np.float64,
+        (7, 9),
+        {"order": 2, "relaxation": "gibbs", "pixel": "density", "bandwidth": 0.6},
+    ),
+    "bool": ((12, 12), None, np.bool_, (9, 9), {"order": 2}),
+    "smaller-than-the-sample": ((17, 19), None, np.uint8, (5, 3), {"order": 2}),
+    "larger-than-the-sample": ((9, 8), None, np.uint8, (23, 18), {"order": 2, "levels": 2}),
+    "a-row": ((9, 8), None, np.uint8, (1, 17), {"order": 2}),
+    "large-order": ((16, 16), None, np.uint8, (10, 12), {"order": 18, "levels": 1}),
+    "all-phases-reflected": (
+        (11, 12),
+        None,
+        np.uint8,
+        (13, 10),
+        {"order": 5, "phases": "all", "edges": "reflect", "levels": 3, "xi": -20.0},
+    ),
+}
+SOME = ("defaults", "colour-gibbs-density")
+
+# Forms of a launch: work-group size, vector width, candidates in registers, bytes of scratch memory.
+FORMS = [
+    *({"vector": vector} for vector in (1, 4, 8, 16)),
+    *({"work_group": size} for size in (1, 3, 16)),
+    *({"step": step} for step in (1, 2, 8)),
+    {"scratch": 1},
+    {"scratch": 5_000, "vector": 4},
+]
+MIXED = [
+    {"work_group": 3, "vector": 4, "step": 2, "scratch": 5_000},
+    {"work_group": 16, "vector": 1, "step": 8, "scratch": 40_000},
+]
+
+
+def synthesis(name, device):
+    """Everything that a run gives but its times: the image, source map, temperatures and stages."""
+    sample_shape, channels, dtype, shape, options = RUNS[name]
+    sample = texture(sample_shape, channels, dtype, 5)
+    axis = None if channels is None else -1
+    image, output = simdtex.synthesize(
+        sample, shape, channel_axis=axis, rng=2**40 + 3, device=device, full_output=True, **options
+    )
+    counts = [{k: v for k, v in level.items() if k != "seconds"} for level in output.statistics["levels"]]
+    return [image, output.source, output.temperature, *(stage.image for stage in output.stages)], counts
+
+
+@functools.cache
+def expected(name):
+    return synthesis(name, REFERENCE)
+
+
+def check(name, device):
+    arrays, counts = synthesis(name, device)
+    theirs, their_counts = expected(name)
+    assert_same_bits(arrays, theirs)
+    assert counts == their_counts
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_every_device_has_the_references_bits(cl_device, name):
+    # PoCL compiles a kernel anew for each work-group size it chooses by itself, so it chooses in a few runs only.
+    check(name, opencl(cl_device, work_group=16))
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in SOME else pytest.param(name, marks=pytest.mark.slow) for name in RUNS]
+)
+def test_the_runtimes_own_work_groups_change_no_bit(machine, name):
+    check(name, machine)
+
+
+def named(options):
+    return "-".join(f"{key}-{value}" for key, value in options.items())
+
+
+@pytest.mark.parametrize("options", FORMS, ids=named)
+def test_the_form_of_a_launch_changes_no_bit(cl_device, options):
+    check("defaults", opencl(cl_device, **({"work_group": 16} | options)))
+
+
+@pytest.mark.parametrize("options", MIXED, ids=named)
+def test_the_form_of_a_launch_changes_no_bit_of_a_colour(cl_device, options):
+    check("colour-gibbs-density", opencl(cl_device, **options))
+
+
+def test_small_scratch_memory_makes_many_pieces(cl_device):
+    """Else the test above would show nothing."""
+    small, large = opencl(cl_device, scratch=5_000, vector=4), opencl(cl_device)
+    assert small.chunk(150, 24) < 10 < large.chunk(150, 24)
+
+
+def test_the_references_pieces_change_no_bit():
+    from simdtex.machine.reference import Reference
+
+    for name in SOME:
+        check(name, Reference(20_000))
+    check("a-row", Reference(1))
+
+
+@pytest.mark.parametrize("name", SOME)
+def test_a_run_after_another_has_the_same_bits(any_device, name):
+    """No state is left in a machine, and none in its memory pool."""
+    machine = opencl(any_device, work_group=16)
+    for other in ("larger-than-the-sample", name, "smaller-than-the-sample"):
+        check(other, machine)
+    check(name, machine)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2**32 - 1, 2**32, 2**64 - 1])
+def test_any_seed_has_the_references_bits(cl_device, seed):
+    machine = opencl(cl_device, work_group=16)
+    sample = texture((9, 10))
+    options = {"order": 1, "rng": seed, "relaxation": "gibbs", "levels": 1}
+    ours = simdtex.synthesize(sample, (7, 8), device=machine, **options)
+    assert_same_bits(ours, simdtex.synthesize(sample, (7, 8), device=REFERENCE, **options))
+
+
+# -- in processes of their own --------------------------------------------------------------------------------
+
+CHILD = """
+import json, sys
+import test_bits
+from simdtex.machine import open_machine
+machine = open_machine(sys.argv[1])
+print(json.dumps({"units": machine.info.compute_units, "name": machine.name}), flush=True)
+for name in sys.argv[2:]:
+    test_bits.check(name, machine)
+    print("same bits:", name, flush=True)
+"""
+
+
+def child(code, *arguments, **variables):
+    """Run Python in a process of its own; give back its end and all that it printed."""
+    env = {key: value for key, value in os.environ.items() if not key.startswith("OCLGRIND")}
+    path = os.pathsep.join([str(ROOT), str(ROOT / "tests"), *filter(None, [os.environ.get("PYTHONPATH")])])
+    return subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        env=env | {"PYTHONPATH": path} | variables,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
+def missing(what):
+    (pytest.fail if REQUIRED else pytest.skip)(f"{what} is not here")
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_any_number_of_threads_has_the_references_bits(cl_device, threads):
+    if not (cl_device.platform.startswith("Portable Computing") and cl_device.compute_units > 1):
+        pytest.skip("not a PoCL device of several threads")
+    # PoCL before version 4 reads the first of the two variables, from 4 on the second.
+    limits = {"POCL_MAX_PTHREAD_COUNT": str(threads), "POCL_CPU_MAX_CU_COUNT": str(threads)}
+    kind = re.match(r"[a-z]+", cl_device.name)[0]
+    done = child(CHILD, kind, "defaults", POCL_DEVICES=kind, **limits)
+    assert done.returncode == 0, done.stdout
+    first, *rest = done.stdout.splitlines()
+    assert json.loads(first)["units"] == threads, "PoCL heeds the limit"
+    assert "same bits: defaults" in rest
+
+
+def vendors(folder, library):
+    """A folder that shows the loader one runtime alone."""
+    (folder / "only.icd").write_text(f"{library}\n")
+    return str(folder)
+
+
+def library(pattern):
+    found = sorted(Path("/usr/lib").glob(pattern))
+    return found[0] if found else None
+
+
+@pytest.mark.parametrize("name", ["a-row", *(pytest.param(name, marks=pytest.mark.slow) for name in SOME)])
+def test_rusticl_has_the_references_bits(tmp_path, name):
+    """Mesa's runtime on its software rasteriser: slow, and independent of all others."""
+    found = library("**/libRusticlOpenCL.so.1")
+    if found is None:
+        pytest.skip("rusticl is not here")
+    variables = {"OCL_ICD_VENDORS": vendors(tmp_path, found), "RUSTICL_ENABLE": "llvmpipe"}
+    done = child(CHILD, "llvmpipe", name, **variables)
+    if "No device matches" in done.stdout or "cannot be used" in done.stdout:
+        pytest.skip("rusticl has no usable device here")
+    assert done.returncode == 0, done.stdout
+    assert done.stdout.count("same bits") == 1
+
+
+# -- Oclgrind: races and accesses out of bounds ---------------------------------------------------------------
+
+TINY = """
+import sys
+import numpy as np
+import simdtex
+from cases import REFERENCE, assert_same_bits, texture
+from simdtex.device import find
+from simdtex.machine.opencl import OpenCL
+
+info = find("oclgrind")
+colour, grey = texture((6, 5), 3), texture((7, 6))
+few = (np.indices((5, 6)).sum(0) // 2 % 3).astype(np.uint8)
+runs = [
+    (grey, None, {"order": 1, "levels": 2}),
+    (grey, None, {"order": 2, "levels": 1, "relaxation": "gibbs", "pixel": "density", "boundary": "open"}),
+    (grey, None, {"order": 1, "levels": 1, "pixel": "density", "bandwidth": 1.0, "coarsest": "same"}),
+    (colour, -1, {"order": 1, "levels": 2, "edges": "reflect", "pixel": "density", "coarsest": "same"}),
+]
+machines = [OpenCL(info, work_group=group, vector=vector) for group, vector in ((None, 16), (3, 4), (4, 1))]
+for number, (sample, axis, options) in enumerate(runs):
+    for machine in machines[: 3 if number == 0 else 1]:
+        options |= {"rng": 1, "free_sweeps": 1, "channel_axis": axis}
+        ours = simdtex.synthesize(sample, (5, 7), device=machine, **options)
+        assert_same_bits(ours, simdtex.synthesize(sample, (5, 7), device=REFERENCE, **options))
+for options in ({"temperature": np.full((5, 6), 0.5)}, {"estimator": "histogram"}):
+    options |= {"order": 1, "levels": 3}
+    tables = [simdtex.lcpdf(few, few, [(2, 2), (2, 3), (1, 1)], device=m, **options) for m in (machines[0], REFERENCE)]
+    assert_same_bits(*tables)
+print("same bits throughout")
+"""
+
+PLANTED = """
+import numpy as np
+import pyopencl as cl
+from simdtex.device import find
+from simdtex.machine.opencl import OpenCL
+
+machine = OpenCL(find("oclgrind"))
+program = cl.Program(machine.context, '''
+__kernel void race(__global int *sum) { sum[0] = sum[0] + (int)get_global_id(0); }
+__kernel void outside(__global int *sum) { sum[get_global_id(0) + 1] = 1; }
+''').build()
+target = cl.Buffer(machine.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=np.zeros(4, np.int32))
+cl.Kernel(program, "PLANT")(machine.queue, (4,), (2,), target)
+machine.sync()
+"""
+
+REPORT = re.compile(r"data race|Invalid (read|write)|uninitialized|out of bounds|Oclgrind - Errors", re.IGNORECASE)
+
+
+def under_oclgrind(folder, code):
+    found = library("oclgrind/liboclgrind-rt-icd.so") or library("**/liboclgrind-rt-icd.so")
+    if found is None:
+        missing("Oclgrind")
+    variables = {"OCL_ICD_VENDORS": vendors(folder, found), "OCLGRIND_DATA_RACES": "1"}
+    return child(code, OCLGRIND_CHECK_API="1", PYOPENCL_NO_CACHE="1", **variables)
+
+
+def test_no_kernel_races_or_leaves_its_bounds(tmp_path):
+    done = under_oclgrind(tmp_path, TINY)
+    assert done.returncode == 0, done.stdout
+    assert "same bits throughout" in done.stdout
+    assert not REPORT.search(done.stdout), done.stdout
+
+
+@pytest.mark.parametrize(("plant", "words"), [("race", "data race"), ("outside", "Invalid write")])
+def test_a_planted_fault_is_reported(tmp_path, plant, words):
+    """So that the silence of the test above means something."""
+    done = under_oclgrind(tmp_path, PLANTED.replace("PLANT", plant))
+    assert done.returncode == 0, done.stdout
+    assert words in done.stdout, done.stdout
+    assert REPORT.search(done.stdout)

@@ -1,0 +1,196 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command line, end to end, as its user meets it."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from simdtex import image
+from simdtex.cli import main
+from simdtex.source_map import load_source_map
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with a small sample, a colour map of the same material, and nothing else."""
+    rng = np.random.default_rng(1)
+    image.write(tmp_path / "sample.png", rng.integers(0, 256, (24, 20), dtype=np.uint8))
+    image.write(tmp_path / "normal.png", rng.integers(0, 65536, (24, 20, 3), dtype=np.uint16))
+    return tmp_path
+
+
+def run(*args):
+    return CliRunner().invoke(main, [str(arg) for arg in args])
+
+
+def synth(folder, *args):
+    arguments = ["synth", folder / "sample.png", "-o", folder / "out.png", "--order", 2, "--seed", 5]
+    return run(*arguments, "--device", "reference", *args)
+
+
+def listing(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+
+def test_a_stranger_gets_more_texture(folder):
+    command = [sys.executable, "-m", "simdtex", "synth", "sample.png", "-o", "out.png", "--size", "31x27", "--order", "2"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert image.read(folder / "out.png").pixels.shape == (27, 31)
+    assert "31x27 from 20x24" in done.stdout and "seed" in done.stdout
+
+
+def test_everything_at_once(folder):
+    args = ["--size", "30x26", "--stages", folder / "st", "--source-map", folder / "s.npz"]
+    result = synth(folder, *args, "--also", f"{folder}/normal.png={folder}/normal-out.png")
+    assert result.exit_code == 0, result.output
+    source = load_source_map(folder / "s.npz")
+    sample, made = image.read(folder / "sample.png").pixels, image.read(folder / "out.png").pixels
+    normal, carried = image.read(folder / "normal.png").pixels, image.read(folder / "normal-out.png").pixels
+    assert np.array_equal(made, sample[source[..., 0], source[..., 1]])
+    assert np.array_equal(carried, normal[source[..., 0], source[..., 1]])
+    assert carried.dtype == np.uint16
+    stages = listing(folder / "st")
+    assert {"sheet.png", "animation.gif", "level0-sweep01.png", "temperature-level0-sweep01.png"} <= set(stages)
+
+
+def test_the_same_seed_gives_the_same_file(folder):
+    synth(folder, "-q")
+    first = (folder / "out.png").read_bytes()
+    synth(folder, "-q")
+    assert (folder / "out.png").read_bytes() == first
+
+
+def test_quiet_says_nothing(folder):
+    assert synth(folder, "-q").output == ""
+
+
+def test_default_size_is_twice_the_sample(folder):
+    synth(folder, "-q")
+    assert image.read(folder / "out.png").pixels.shape == (48, 40)
+
+
+BAD = {
+    "order 0": (["--order", 0], "order 0"),
+    "too large an order": (["--order", 400], "largest order that fits is"),
+    "size 0": (["--size", "0x20"], "size"),
+    "negative size": (["--size", "20x-3"], "size"),
+    "size in words": (["--size", "large"], "size"),
+    "beyond any device": (["--size", "60000x60000"], "smaller size"),
+    "method": (["--method", "mfr"], "choose one of: mrf"),
+    "preset": (["--preset", "papre"], "choose one of: default, paper"),
+    "relaxation": (["--relaxation", "icn"], "choose one of: icm, gibbs"),
+    "boundary": (["--boundary", "round"], "choose one of: torus, open"),
+    "schedule": (["--schedule", "luby?"], "choose one of: coloring"),
+    "xi": (["--xi", 0.5], "xi"),
+    "bandwidth": (["--bandwidth", 0], "bandwidth"),
+    "coherence": (["--coherence", -1], "coherence"),
+    "levels": (["--levels", 12], "give at most"),
+    "seed": (["--seed", -4], "seed"),
+    "device": (["--device", "no such device"], "no such device"),
+    "also without a file": (["--also", "normal.png"], "MAP=OUT"),
+    "also a missing map": (["--also", "nothing.png=there.png"], "nothing.png"),
+    "source map suffix": (["--source-map", "map.jpg"], ".npz"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_options_get_one_sentence_and_write_nothing(folder, case):
+    args, words = BAD[case]
+    before = listing(folder)
+    result = synth(folder, *args)
+    assert result.exit_code == 2, result.output
+    assert words in result.output
+    assert len(result.output.strip().splitlines()) == 1
+    assert listing(folder) == before
+
+
+def write_not_an_image(path):
+    path.write_text("this is a text")
+
+
+def write_nothing(path):
+    path.write_bytes(b"")
+
+
+def write_nan(path):
+    np.save(path, np.where(np.eye(20) > 0, np.nan, 1.0))
+
+
+def write_infinite(path):
+    np.save(path, np.where(np.eye(20) > 0, np.inf, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "make"),
+    [
+        ("missing.png", lambda path: None),
+        ("text.png", write_not_an_image),
+        ("empty.png", write_nothing),
+        ("nan.npy", write_nan),
+        ("infinite.npy", write_infinite),
+        ("folder.png", lambda path: path.mkdir()),
+    ],
+)
+def test_bad_samples(folder, name, make):
+    make(folder / name)
+    before = listing(folder)
+    result = run("synth", folder / name, "-o", folder / "out.npy", "--order", 2, "--device", "reference")
+    assert result.exit_code == 2, result.output
+    assert len(result.output.strip().splitlines()) == 1
+    assert listing(folder) == before
+
+
+@pytest.mark.parametrize("output", ["nowhere/out.png", "sample.png/out.png", "out.xyz", "."])
+def test_bad_outputs(folder, output):
+    before = listing(folder)
+    result = run("synth", folder / "sample.png", "-o", folder / output, "--order", 2)
+    assert result.exit_code == 2, result.output
+    assert len(result.output.strip().splitlines()) == 1
+    assert listing(folder) == before
+
+
+def test_two_outputs_never_share_a_file(folder):
+    result = synth(folder, "--also", f"{folder}/normal.png={folder}/out.png")
+    assert result.exit_code == 2 and "written twice" in result.output
+
+
+def test_a_map_of_another_size_is_refused_before_the_work(folder):
+    image.write(folder / "small.png", np.zeros((5, 5), np.uint8))
+    result = synth(folder, "--also", f"{folder}/small.png={folder}/small-out.png")
+    assert result.exit_code == 2 and "sample's size" in result.output
+
+
+def test_devices_lists_the_reference():
+    result = run("devices")
+    assert result.exit_code == 0 and "reference" in result.output
+
+
+def test_ctrl_c_leaves_no_file(folder):
+    image.write(folder / "big.png", np.random.default_rng(2).integers(0, 256, (96, 96), dtype=np.uint8))
+    command = [sys.executable, "-m", "simdtex", "synth", "big.png", "-o", "out.png", "--size", "1500x1500"]
+    running = subprocess.Popen(
+        [*command, "--stages", "st"], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 120
+    while not (folder / "st" / "level0-sweep01.png").exists() and not any((folder / "st").glob("level*")):
+        assert running.poll() is None and time.monotonic() < deadline, running.communicate()
+        time.sleep(0.1)
+    running.send_signal(signal.SIGINT)
+    _, errors = running.communicate(timeout=60)
+    assert running.returncode == 130, errors
+    assert "Traceback" not in errors and "stopped" in errors
+    assert not (folder / "out.png").exists()
+    assert not [path for path in folder.rglob("*") if path.name.startswith((".", "tmp"))]
+
+
+def test_the_demo(tmp_path, monkeypatch):
+    result = run("demo", "-o", tmp_path / "demo", "--size", "16x12")
+    assert result.exit_code == 0, result.output
+    assert listing(tmp_path / "demo") == ["brick.png", "grass.png", "gravel.png", "sheet.png"]
+    assert image.read(tmp_path / "demo" / "brick.png").pixels.shape == (12, 16)

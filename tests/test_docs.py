@@ -1,0 +1,210 @@
+"""README, documentation and examples: what they show runs, what they name exists."""
+
+import doctest
+import inspect
+import os
+import re
+import runpy
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+from skimage import data
+
+import simdtex
+from simdtex import cli
+from simdtex.image import write
+from simdtex.methods.mrf import PRESETS, Options
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = sorted(path for path in (ROOT / "docs").rglob("*.rst") if "_build" not in path.parts)
+EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+REFERENCE = (ROOT / "docs" / "reference" / "command-line.rst").read_text(encoding="utf-8")
+
+
+def page_id(path):
+    return str(path.relative_to(ROOT))
+
+
+def fenced(text, language):
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+
+
+def directive(text, language):
+    """Bodies of the code blocks of a page, their indentation removed."""
+    blocks = re.findall(rf"^\.\. code-block:: {language}\n\n((?:(?:   .*)?\n)+)", text, re.MULTILINE)
+    return [re.sub(r"^   ", "", block, flags=re.MULTILINE) for block in blocks]
+
+
+def commands(text):
+    """Lines that call simdtex, without the prompt."""
+    blocks = fenced(text, "console") + directive(text, "console")
+    lines = [line.removeprefix("$ ") for block in blocks for line in block.splitlines()]
+    return [line for line in lines if line.startswith("simdtex ")]
+
+
+def small(code):
+    """The same code or command at sizes that take a second."""
+    code = code.replace("[:128, :128]", "[:16, :16]").replace("[128:256, 128:256]", "[16:32, 16:32]")
+    code = code.replace("[266:362, 486:582]", "[266:282, 486:502]").replace("(10, 20), (64, 64)", "(5, 7), (6, 6)")
+    return code.replace("(256, 256)", "(40, 40)").replace("(192, 192)", "(40, 40)").replace("256x256", "40x40")
+
+
+@pytest.fixture
+def material(tmp_path, monkeypatch):
+    """A folder with the files that the texts speak of."""
+    sample = data.brick()[:16, :16]
+    write(tmp_path / "brick.png", sample)
+    write(tmp_path / "brick-height.png", sample.astype(np.uint16) * 257)
+    write(tmp_path / "brick-normal.png", np.stack([sample] * 3, axis=-1))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+# ---------------------------------------------------------------- what is shown runs
+
+
+PYTHON = {code: page_id(page) for page in PAGES for code in directive(page.read_text("utf-8"), "python")}
+PYTHON |= {code: "README.md" for code in fenced(README, "python")}  # the pages repeat some of these
+
+
+@pytest.mark.parametrize(
+    ("code", "page"), PYTHON.items(), ids=[f"{page}-{i}" for i, page in enumerate(PYTHON.values())]
+)
+def test_python_runs(any_device, code, page):
+    assert small(code) != code, "the sizes of this block are not known to the test"
+    exec(compile(small(code), page, "exec"), {"__name__": page})
+
+
+@pytest.mark.parametrize("line", commands(README))
+def test_readme_command_runs(any_device, material, line):
+    words = shlex.split(small(line))
+    words += ["--order", "8"] if "synth" in words else []  # quicker
+    environment = os.environ | {"SIMDTEX_DEVICE": str(any_device.index)}
+    done = subprocess.run(
+        [sys.executable, "-m", *words], env=environment, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    if "synth" in words:
+        outputs = [words[i + 1] for i, word in enumerate(words) if word == "-o"]
+        outputs += [word.partition("=")[2] for word in words if "=" in word]
+        assert outputs and all((material / name).is_file() for name in outputs)
+    if "--stages" in words:
+        assert (material / "stages" / "sheet.png").is_file()
+    assert simdtex.__file__.startswith(str(ROOT))
+
+
+@pytest.mark.parametrize(
+    ("page", "line"), [(page_id(page), line) for page in PAGES for line in commands(page.read_text("utf-8"))]
+)
+def test_documented_command_parses(page, line):
+    _, command, *words = shlex.split(line)
+    context = cli.main.commands[command].make_context(command, words)
+    valid = {name: value for name, value in context.params.items() if value is not None and hasattr(Options, name)}
+    Options(**valid)
+    assert context.params.get("preset") in (None, *PRESETS)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_id)
+def test_doctests_of_page(page):
+    result = doctest.testfile(str(page), module_relative=False, encoding="utf-8")
+    assert result.failed == 0
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_example_runs(any_device, example, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", [example.name, str(tmp_path / "out"), "--size", "40"])
+    runpy.run_path(str(example), run_name="__main__")
+    assert list((tmp_path / "out").rglob("*.png"))
+    assert str(tmp_path / "out") in capsys.readouterr().out
+
+
+# ---------------------------------------------------------------- what is named exists
+
+
+def test_links_of_readme_exist():
+    links = re.findall(r"\]\(([^)]+)\)", README)
+    inside = [link for link in links if "://" not in link and not link.startswith("#")]
+    assert inside
+    for link in inside:
+        assert (ROOT / link.partition("#")[0]).exists(), link
+
+
+def test_make_targets_of_readme_exist():
+    targets = re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    named = re.findall(r"\bmake (demo|test|docs|[a-z]+$)", README, re.MULTILINE)
+    assert {"demo", "test", "docs"} <= set(named)
+    assert set(named) <= set(targets)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_id)
+def test_files_named_on_page_exist(page):
+    text = page.read_text(encoding="utf-8")
+    for name in re.findall(r"``((?:simdtex|kernels|tests|examples|benchmarks)/[\w/.]+)``", text):
+        assert (ROOT / name).exists(), name
+
+
+def test_every_kernel_and_operation_is_in_the_table():
+    table = (ROOT / "docs" / "concepts" / "index.rst").read_text(encoding="utf-8")
+    for kernel in (ROOT / "kernels").glob("*.cl"):
+        for name in (f"kernels/{kernel.name}", f"simdtex/ops/{kernel.stem}.py", f"tests/test_{kernel.stem}.py"):
+            assert f"``{name}``" in table, name
+
+
+# ---------------------------------------------------------------- the reference is complete
+
+
+def documented(program):
+    """Option names under ``.. program:: simdtex PROGRAM``."""
+    sections = re.split(r"^\.\. program:: simdtex ?", REFERENCE, flags=re.MULTILINE)
+    text = next(section for section in sections[1:] if section.splitlines()[0] == program)
+    signatures = re.findall(r"^\.\. option:: (.*)$", text, re.MULTILINE)
+    return {part.split()[0] for signature in signatures for part in signature.split(", ")}
+
+
+@pytest.mark.parametrize("name", sorted(cli.main.commands))
+def test_every_option_of_the_command_line_is_documented(name):
+    command = cli.main.commands[name]
+    options = {o for p in command.params if isinstance(p, click.Option) for o in (*p.opts, *p.secondary_opts)}
+    assert f"simdtex {name}\n" in REFERENCE
+    if options:
+        assert documented(name) == options
+
+
+def test_every_option_of_mrf_is_on_the_command_line_and_in_the_docstrings():
+    names = set(Options.__dataclass_fields__)
+    options = {p.name for p in cli.main.commands["synth"].params}
+    assert names <= options
+    described = set(re.findall(r"^    (\w+) : ", Options.__doc__, re.MULTILINE))
+    assert described == names
+    assert names | {"preset"} <= set(re.findall(r"``(\w+)``", simdtex.synthesize.__doc__))
+
+
+def test_every_option_of_mrf_has_its_page():
+    page = (ROOT / "docs" / "reference" / "options.rst").read_text(encoding="utf-8")
+    assert set(Options.__dataclass_fields__) <= set(re.findall(r"``(\w+)``", page))
+
+
+def test_paper_preset_is_described():
+    page = (ROOT / "docs" / "decisions.rst").read_text(encoding="utf-8")
+    for name, value in PRESETS["paper"].items():
+        shown = f'"{value}"' if isinstance(value, str) else value
+        assert f"``{name}={shown}``" in page
+
+
+def test_signature_of_synthesize_is_the_documented_one():
+    page = (ROOT / "docs" / "reference" / "functions.rst").read_text(encoding="utf-8")
+    shown = re.search(r"autofunction:: synthesize\((.*)\)", page).group(1)
+    real = [str(p.replace(annotation=p.empty)) for p in inspect.signature(simdtex.synthesize).parameters.values()]
+    assert shown.replace("*, ", "").replace('"', "'") == ", ".join(real)
+
+
+def test_public_names_are_in_the_reference():
+    page = (ROOT / "docs" / "reference" / "index.rst").read_text(encoding="utf-8")
+    for name in simdtex.__all__:
+        assert f"`simdtex.{name}`" in page, name
