@@ -93,7 +93,7 @@ def step(machine, order):
     field = Field(*(machine.put(a) for a in (sample.working[:, source], source, warm)))
     device_offsets = machine.put(offsets)
     sites = np.arange(0, 256 * 256, 20, dtype=np.int32)  # 3277, as many as a colour of order 18 has
-    size = machine.chunk(candidates.size, len(offsets))
+    size = machine.chunk(candidates.size, len(offsets), 1)
     pieces = [machine.put(sites[i : i + size]) for i in range(0, len(sites), size)]
     near = [neighbourhood(machine, piece, field, device_offsets, grid) for piece in pieces]
 
@@ -131,7 +131,10 @@ def main():
         command = [sys.executable, "-c", JOB, sys.path[0], name, str(options.order), options.device or ""]
         done = subprocess.run(command, capture_output=True, text=True, check=True)
         seconds, first, memory = json.loads(done.stdout)
-        print(f"{name:8} 128x128 -> 256x256, order {options.order}: {seconds:5.1f} s, first progress after {first:.1f} s, ", end="")
+        print(
+            f"{name:8} 128x128 -> 256x256, order {options.order}: {seconds:5.1f} s, first progress after {first:.1f} s, ",
+            end="",
+        )
         print(f"peak memory {memory:.0f} MiB")
 
 

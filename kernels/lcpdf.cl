@@ -97,8 +97,30 @@ inline float smallest_of(__global const float *nearest, const int blocks, const 
         if ((nearest[b_ * P + s] - smallest) * scale < NO_WEIGHT)                                                      \
             for (int p = b_ * BLOCK; p < (b_ + 1) * BLOCK; ++p)
 
-// The Gibbs sampler: a candidate drawn with probability W_p / sum W, and its grey level plus a step of the
-// kernel, redrawn together until the grey level is legal. Exact for the mixture over the legal levels.
+// The kernel of equation (7) around grey level y, cut off at the legal levels 0..top: `noise` holds cumulative
+// probabilities of the steps -radius..radius, so the legal steps span noise values low .. low + mass.
+inline uint legal_low(__global const uint *noise, const int radius, const int y)
+{
+    return radius > y ? noise[radius - y - 1] : 0u;
+}
+
+inline uint legal_mass(__global const uint *noise, const int radius, const int y, const int top)
+{
+    return noise[min(2 * radius, radius + top - y)] - legal_low(noise, radius, y);
+}
+
+// W_p times the share of the kernel around y_p that is legal: the mass of candidate p in the mixture over legal levels.
+inline ulong mass_of(const float d, const float smallest, const float scale, __global const float *sample,
+                     const int plane, const int from, __global const uint *noise, const int radius, const int top)
+{
+    ulong w = weight(d, smallest, scale);
+    for (int c = 0; c < C && w && radius >= 0; ++c)
+        w = mul_hi(w, (ulong)legal_mass(noise, radius, (int)sample[c * plane + from], top) << 32);
+    return w;
+}
+
+// The Gibbs sampler: a candidate drawn with probability proportional to its mass, then each channel's grey level
+// from the kernel around the candidate's, cut off at the legal levels.
 //
 // noise    (2 * radius + 1,)  cumulative probabilities of the steps -radius..radius in 2^-32; radius < 0: no step,
 //                             the pixel is the sample's own
@@ -116,44 +138,40 @@ __kernel void lcpdf_draw(__global const float *restrict distance, __global const
     if (s >= S)
         return;
     const float smallest = smallest_of(nearest, blocks, P, s);
+#define MASS(p) mass_of(DISTANCE(p), smallest, scale, sample, plane, candidates[p], noise, radius, top)
     ulong total = 0;
-    FOR_CANDIDATES(p) total += weight(DISTANCE(p), smallest, scale);
+    FOR_CANDIDATES(p) total += MASS(p);
 
-    for (uint attempt = 0; attempt < 64; ++attempt) {
-        const uint4 bits = draw4(seed, level, sweep, sites[s], PURPOSE_DRAW, attempt * (1 + C));
-        const ulong target = below(bits.x, bits.y, total);
-        ulong sum = 0;
-        int chosen = -1;
-        for (int b = 0; b < blocks && chosen < 0; ++b) {
-            if ((nearest[b * P + s] - smallest) * scale >= NO_WEIGHT)
-                continue;
-            for (int p = b * BLOCK; p < (b + 1) * BLOCK && chosen < 0; ++p) {
-                sum += weight(DISTANCE(p), smallest, scale);
-                chosen = sum > target ? p : -1;
-            }
+    const uint4 bits = draw4(seed, level, sweep, sites[s], PURPOSE_DRAW, 0);
+    const ulong target = below(bits.x, bits.y, total);
+    ulong sum = 0;
+    int chosen = -1;
+    for (int b = 0; b < blocks && chosen < 0; ++b) {
+        if ((nearest[b * P + s] - smallest) * scale >= NO_WEIGHT)
+            continue;
+        for (int p = b * BLOCK; p < (b + 1) * BLOCK && chosen < 0; ++p) {
+            sum += MASS(p);
+            chosen = sum > target ? p : -1;
         }
-        const int from = candidates[chosen];
-        bool legal = true;
-        for (int c = 0; c < C; ++c) {
-            int x = (int)sample[c * plane + from];
-            if (radius >= 0) {
-                const uint u = draw4(seed, level, sweep, sites[s], PURPOSE_DRAW, attempt * (1 + C) + 1 + c).x;
-                int lo = 0, hi = 2 * radius; // the first step whose cumulative probability exceeds u
-                while (lo < hi) {
-                    const int mid = (lo + hi) / 2;
-                    if (noise[mid] > u)
-                        hi = mid;
-                    else
-                        lo = mid + 1;
-                }
-                x += lo - radius;
+    }
+    const int from = candidates[chosen];
+    choice[s] = from;
+    for (int c = 0; c < C; ++c) {
+        int x = (int)sample[c * plane + from];
+        if (radius >= 0) {
+            const uint random = draw4(seed, level, sweep, sites[s], PURPOSE_DRAW, 1 + c).x;
+            const uint u = legal_low(noise, radius, x) + mul_hi(random, legal_mass(noise, radius, x, top));
+            int lo = 0, hi = 2 * radius; // the first step whose cumulative probability exceeds u
+            while (lo < hi) {
+                const int mid = (lo + hi) / 2;
+                if (noise[mid] > u)
+                    hi = mid;
+                else
+                    lo = mid + 1;
             }
-            legal = legal && x >= 0 && x <= top;
-            values[c * S + s] = (ushort)clamp(x, 0, top);
+            x += lo - radius;
         }
-        choice[s] = from;
-        if (legal)
-            return;
+        values[c * S + s] = (ushort)x;
     }
 }
 

@@ -16,6 +16,9 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from simdtex import __version__
+from simdtex.methods.mrf import Options
+
+DEFAULTS = Options()
 
 
 def plainly(command: Callable[..., None]) -> Callable[..., None]:
@@ -29,7 +32,7 @@ def plainly(command: Callable[..., None]) -> Callable[..., None]:
             click.echo(f"simdtex: {error}", err=True)
             sys.exit(2)
         except KeyboardInterrupt:
-            click.echo("simdtex: stopped; no output was written", err=True)
+            click.echo("simdtex: stopped; nothing but stages may have been written", err=True)
             sys.exit(130)
 
     return wrapped
@@ -55,19 +58,23 @@ DEVICE = click.option(
 @click.option("--size", metavar="WIDTHxHEIGHT", help="Of the output, in pixels. Default: twice the sample.")
 @click.option("--method", default="mrf", show_default=True, help="mrf: Paget and Longstaff 1998.")
 @click.option("--preset", help="default, or paper: the 1998 rules to the letter.")
-@click.option("--order", type=int, help="Neighbours within sqrt(order): 8 has 24, 18 has 60.  [18]")
+@click.option("--order", type=int, help=f"Neighbours within sqrt(order): 8 has 24, 18 has 60.  [{DEFAULTS.order}]")
 @click.option("--levels", type=int, help="Of the multigrid.  [as many as the sample feeds]")
-@click.option("--relaxation", help="icm (the mode) or gibbs (a draw).  [icm]")
-@click.option("--bandwidth", type=float, help="Of the Parzen kernel, in units of h_opt.  [0.15]")
-@click.option("--coherence", type=float, help="Preference for continuing a neighbour's source.  [1]")
-@click.option("--xi", type=float, help="Cooling, below 0; further down is faster.  [-1]")
-@click.option("--free-sweeps", type=int, help="Sweeps over all sites after a level's equilibrium.  [2]")
-@click.option("--pixel", help="source (pixels of the sample) or density (grey levels).  [source]")
-@click.option("--phases", help="decimated or all: candidates at coarse levels.  [decimated]")
-@click.option("--edges", help="auto, reflect or whole: candidates at the sample's edge.  [auto]")
-@click.option("--coarsest", help="gibbs or same: how the coarsest level relaxes.  [gibbs]")
-@click.option("--schedule", help="Which sites relax together: coloring.  [coloring]")
-@click.option("--boundary", help="torus (the result tiles) or open.  [torus]")
+@click.option("--relaxation", help=f"icm (the mode) or gibbs (a draw).  [{DEFAULTS.relaxation}]")
+@click.option("--bandwidth", type=float, help=f"Of the Parzen kernel, in units of h_opt.  [{DEFAULTS.bandwidth}]")
+@click.option(
+    "--coherence", type=float, help=f"Preference for continuing a neighbour's source.  [{DEFAULTS.coherence}]"
+)
+@click.option("--xi", type=float, help=f"Cooling, below 0; further down is faster.  [{DEFAULTS.xi}]")
+@click.option(
+    "--free-sweeps", type=int, help=f"Sweeps over all sites after a level's equilibrium.  [{DEFAULTS.free_sweeps}]"
+)
+@click.option("--pixel", help=f"source (pixels of the sample) or density (grey levels).  [{DEFAULTS.pixel}]")
+@click.option("--phases", help=f"decimated or all: candidates at coarse levels.  [{DEFAULTS.phases}]")
+@click.option("--edges", help=f"auto, reflect or whole: candidates at the sample's edge.  [{DEFAULTS.edges}]")
+@click.option("--coarsest", help=f"gibbs or same: how the coarsest level relaxes.  [{DEFAULTS.coarsest}]")
+@click.option("--schedule", help=f"Which sites relax together: coloring.  [{DEFAULTS.schedule}]")
+@click.option("--boundary", help=f"torus (the result tiles) or open.  [{DEFAULTS.boundary}]")
 @click.option("--seed", type=int, help="Same seed, same picture on every device.  [a fresh one, printed]")
 @DEVICE
 @click.option("--stages", type=click.Path(path_type=Path), metavar="DIR", help="Write every level and sweep.")
@@ -108,7 +115,8 @@ def synth(
     if source_map:
         image.check_writable(source_map, suffixes=maps.SOURCE_SUFFIXES)
     others = [_other_map(text, (height, width)) for text in also]
-    _check_distinct([output, *([source_map] if source_map else []), *(path for _, path in others)], sample)
+    outputs = [output, *([source_map] if source_map else []), *(path for _, path in others)]
+    _check_distinct(outputs, [sample, *(Path(text.partition("=")[0]) for text in also)])
     writer = StageWriter(stages, limits=(float(pixels.min()), float(pixels.max()))) if stages else None
 
     began = time.perf_counter()
@@ -211,12 +219,14 @@ def _other_map(text: str, sample: tuple[int, int]) -> tuple[Any, Path]:
     return pixels, Path(out)
 
 
-def _check_distinct(outputs: list[Path], sample: Path) -> None:
-    """Raise where two outputs would overwrite each other."""
+def _check_distinct(outputs: list[Path], inputs: list[Path]) -> None:
+    """Raise where an output would overwrite another or an input."""
     resolved = [path.resolve() for path in outputs]
     for path in outputs:
         if resolved.count(path.resolve()) > 1:
             raise ValueError(f"{path} would be written twice; give each output a file of its own")
+        if path.resolve() in [other.resolve() for other in inputs]:
+            raise ValueError(f"{path} is an input and would be overwritten; give the output another name")
 
 
 @contextmanager

@@ -69,7 +69,7 @@ def synthesize(
         Return the source map, temperatures, stages and statistics too.
     **options
         Of the method: ``preset``, ``order``, ``levels``, ``relaxation``, ``bandwidth``, ``coherence``, ``xi``,
-        ``free_sweeps``, ``pixel``, ``phases``, ``coarsest``, ``schedule``, ``boundary``; see
+        ``free_sweeps``, ``pixel``, ``phases``, ``edges``, ``coarsest``, ``schedule``, ``boundary``; see
         `simdtex.methods.mrf.Options`.
 
     Returns
@@ -86,8 +86,8 @@ def synthesize(
 
     Notes
     -----
-    Cost: output pixels x sample pixels x neighbours x channels x about 14 fma at the finest level and a third
-    of that at all others together. Memory grows with output pixels plus sample pixels, never with their product.
+    Cost: about 14 fma for every output pixel, sample pixel, neighbour and channel; nearly all of it at the finest
+    level, since each coarser one has a quarter of the sites and of the candidates. Memory grows with output pixels plus sample pixels, never with their product.
 
     Examples
     --------
@@ -190,7 +190,7 @@ def lcpdf(
     window = parzen.window(h, levels - 1)
     device_offsets = machine.put(offsets)
     rows = [np.zeros((0, levels))]
-    step = min(machine.chunk(candidates.size, len(offsets)), 4096)
+    step = min(machine.chunk(candidates.size, len(offsets), 1), 4096)
     for first in range(0, len(where), step):
         here = machine.put(where[first : first + step])
         near = neighbourhood(machine, here, field, device_offsets, grid)

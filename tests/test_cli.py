@@ -38,7 +38,19 @@ def listing(folder):
 
 
 def test_a_stranger_gets_more_texture(folder):
-    command = [sys.executable, "-m", "simdtex", "synth", "sample.png", "-o", "out.png", "--size", "31x27", "--order", "2"]
+    command = [
+        sys.executable,
+        "-m",
+        "simdtex",
+        "synth",
+        "sample.png",
+        "-o",
+        "out.png",
+        "--size",
+        "31x27",
+        "--order",
+        "2",
+    ]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     assert image.read(folder / "out.png").pixels.shape == (27, 31)
@@ -158,6 +170,11 @@ def test_bad_outputs(folder, output):
 def test_two_outputs_never_share_a_file(folder):
     result = synth(folder, "--also", f"{folder}/normal.png={folder}/out.png")
     assert result.exit_code == 2 and "written twice" in result.output
+
+
+def test_no_input_is_overwritten(folder):
+    result = run("synth", folder / "sample.png", "-o", folder / "sample.png", "--order", 2)
+    assert result.exit_code == 2 and "overwritten" in result.output
 
 
 def test_a_map_of_another_size_is_refused_before_the_work(folder):

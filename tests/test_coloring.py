@@ -104,7 +104,9 @@ def test_a_torus_that_fits_has_the_best_patterns_number_of_colours(order):
             assert colors.max() + 1 == best.index
 
 
-@pytest.mark.parametrize(("order", "sides"), [(1, (8, 64, 256)), (2, (8, 64, 256)), (8, (9, 48, 255)), (18, (20, 80, 240))])
+@pytest.mark.parametrize(
+    ("order", "sides"), [(1, (8, 64, 256)), (2, (8, 64, 256)), (8, (9, 48, 255)), (18, (20, 80, 240))]
+)
 def test_usual_sizes_need_no_more_than_the_best_pattern(order, sides):
     for side in sides:
         assert colour(order, side, side, True).max() + 1 == coloring_sublattice(order).index

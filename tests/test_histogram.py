@@ -34,9 +34,7 @@ def counted(p):
     y = p.padded()
     for s, site in enumerate(p.where()):
         for position in plain.whole_positions(y[0].shape, p.order, p.grid.spacing):
-            d = plain.distance(
-                p.image(), p.temperature(), site, y, position, p.order, p.grid.spacing, p.grid.torus
-            )
+            d = plain.distance(p.image(), p.temperature(), site, y, position, p.order, p.grid.spacing, p.grid.torus)
             counts[s, y[0][position]] += d == 0
     return counts
 

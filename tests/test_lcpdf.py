@@ -111,9 +111,7 @@ def formula(image, sample, sites, order, bandwidth=1.0, temperature=None, levels
     h = bandwidth * plain.optimal_bandwidth([sample], len(positions), len(plain.offsets(order)))
     rows = []
     for site in sites:
-        d = [
-            plain.distance([image], t, site, [sample], p, order, 1, boundary == "torus") for p in positions
-        ]
+        d = [plain.distance([image], t, site, [sample], p, order, 1, boundary == "torus") for p in positions]
         rows.append(plain.mixture(d, [sample[p] for p in positions], h, levels))
     return np.array(rows)
 
@@ -237,9 +235,7 @@ def draw_many(machine, p, win, noisy, strength=0.0):
     p = p._replace(sites=np.repeat(p.sites[:1], DRAWS))
     found, candidates = p.distances(machine, strength)
     numbers = machine.put(np.arange(DRAWS, dtype=np.int32))
-    drawn = [
-        host(machine, lcpdf.draw(machine, found, candidates, numbers, win, noisy, seed, 1, 3)) for seed in SEEDS
-    ]
+    drawn = [host(machine, lcpdf.draw(machine, found, candidates, numbers, win, noisy, seed, 1, 3)) for seed in SEEDS]
     choice, values = (np.concatenate(a, -1) for a in zip(*drawn, strict=True))
     return choice, values
 

@@ -23,9 +23,7 @@ def check_formula(p):
     confidence, weighted = run(REFERENCE, p)
     t, x, spacing = p.temperature(), p.image(), p.grid.spacing
     for s, (row, col) in enumerate(p.where()):
-        near = plain.neighbours(
-            row // spacing, col // spacing, p.order, p.grid.rows, p.grid.cols, p.grid.torus
-        )
+        near = plain.neighbours(row // spacing, col // spacing, p.order, p.grid.rows, p.grid.cols, p.grid.torus)
         for k, r in enumerate(near):
             here = None if r is None else (r[0] * spacing, r[1] * spacing)
             u = 0 if here is None else 1 - t[here]

@@ -17,10 +17,7 @@ def run(machine, p, xi):
 
 
 def check_formula(p, xi):
-    formula = [
-        plain.cooled(p.field.temperature, site, p.order, p.grid.spacing, p.grid.torus, xi)
-        for site in p.where()
-    ]
+    formula = [plain.cooled(p.field.temperature, site, p.order, p.grid.spacing, p.grid.torus, xi) for site in p.where()]
     ours = run(REFERENCE, p, xi)
     assert ours.dtype == p.field.temperature.dtype
     assert ours.tolist() == formula

@@ -33,8 +33,8 @@ class Machine(Protocol):
         """Raise DeviceError where this many bytes are more than there is."""
         ...
 
-    def chunk(self, candidates: int, values: int) -> int:
-        """How many sites to relax in one go, given candidates and values per neighbourhood."""
+    def chunk(self, candidates: int, neighbours: int, channels: int) -> int:
+        """How many sites to relax in one go, for a neighbourhood of so many neighbours and channels."""
         ...
 
 

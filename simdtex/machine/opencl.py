@@ -17,6 +17,7 @@ import pyopencl.tools as cl_tools
 
 from simdtex.device import DeviceError, DeviceInfo
 from simdtex.ops.operation import Array, Operation, P, R
+from simdtex.sample import BLOCK
 
 OUT_OF_MEMORY = (
     cl.status_code.MEM_OBJECT_ALLOCATION_FAILURE,
@@ -133,9 +134,11 @@ class OpenCL:
                 f"{self.name} ran out of memory; give a smaller size or sample, or another --device"
             ) from error
 
-    def chunk(self, candidates: int, values: int) -> int:
+    def chunk(self, candidates: int, neighbours: int, channels: int) -> int:
         """Whole vectors of sites: bounded by scratch memory, and by 4e9 fma so that no launch is long."""
-        fit = min(self.scratch // (4 * candidates), int(4e9) // (2 * candidates * values))
+        padded = -(-candidates // BLOCK) * BLOCK
+        per_site = 4 * (padded + padded // BLOCK + neighbours * (1 + channels))
+        fit = min(self.scratch // per_site, int(4e9) // (2 * padded * neighbours * channels))
         return max(1, fit // self.vector) * self.vector
 
     def kernel(self, file: str, name: str, **defines: int) -> Any:

@@ -42,6 +42,6 @@ class Reference:
     def require(self, size: int) -> None:
         """Nothing is known of the memory here."""
 
-    def chunk(self, candidates: int, values: int) -> int:
-        """Sites whose distances fit the scratch memory."""
-        return max(1, self.scratch // (8 * candidates))
+    def chunk(self, candidates: int, neighbours: int, channels: int) -> int:
+        """Sites whose distances and neighbourhoods fit the scratch memory."""
+        return max(1, self.scratch // (8 * (candidates + neighbours * (1 + channels))))

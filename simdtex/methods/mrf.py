@@ -58,7 +58,8 @@ class Options:
     order : int
         o of equation (3): neighbours within the distance sqrt(o).
     levels : int, optional
-        M of Algorithm 1. None: the most levels at which the sample still has 64 candidates.
+        M of Algorithm 1. None: the most levels at which the sample still has 64 candidates, and the output's
+        lattice a whole neighbourhood.
     relaxation : {"icm", "gibbs"}
         Take the LCPDF's mode, or draw from it.
     bandwidth : float
@@ -187,9 +188,9 @@ def synthesize(
 
     Notes
     -----
-    Cost: sweeps x sites x candidates x |N| x channels x 2 fma, about 7 sweeps a level. Memory on the device: 12 + 2
-    channels bytes per output pixel, 4 channels + 8 bytes per sample pixel, and the machine's scratch memory or,
-    if that is more, 64 bytes per sample pixel.
+    Cost: sweeps x sites x candidates x |N| x channels x 2 fma, about 7 sweeps a level. Memory on the device, in bytes:
+    14 + 2 channels per output pixel, 8 channels + 8 per pixel of the sample with its margin, and the machine's
+    scratch memory or, if that is more, 65 per candidate. On the host: about 40 per output pixel.
     """
     offsets = neighbourhood_offsets(options.order)
     levels = _number_of_levels(pixels.shape[:2], offsets, shape, options)  # 1
@@ -253,14 +254,14 @@ def _sweep(
     machine, schedule = run.machine, run.schedule
     active = temperatures > 0 if phase == "relax" else np.ones(temperatures.shape, bool)
     left = float(temperatures.mean()) / 1024
-    values = run.sample.channels * len(run.offsets)
-    size = machine.chunk(level.candidates.size, values)
+    neighbours, channels = len(run.offsets), run.sample.channels
+    size = machine.chunk(level.candidates.size, neighbours, channels)
     while True:
         state, info = schedule.step(state, partial(np.copy, active))  # 6.2.1
         for first in range(0, len(info.sites), size):  # 6.2.2, as many sites at a time as scratch memory holds
             sites = info.sites[first : first + size]
             field = _relax(run, level, field, sites, info.sweep)
-            work = 2 * level.candidates.size * values * len(sites)
+            work = 2 * level.candidates.size * neighbours * channels * len(sites)
             machine.sync(work)
             meter.add(len(sites), work)
             if run.callback:
@@ -343,7 +344,8 @@ def _number_of_levels(
         most -= 1
     if options.levels is None:
         levels = 1
-        while levels < most and candidates(levels + 1) >= ENOUGH:
+        reach = 2 * int(offsets.max()) * 2  # of a neighbourhood at the next level
+        while levels < most and candidates(levels + 1) >= ENOUGH and min(shape) > reach * 2 ** (levels - 1):
             levels += 1
         return levels
     if options.levels > most:
@@ -369,4 +371,4 @@ def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int]) -> N
         raise ValueError(
             f"an output of {shape[0]} rows x {shape[1]} columns is beyond 2**31 values; give a smaller size"
         )
-    machine.require(pixels * (8 + 2 * sample.channels + 4) + sample.rows * sample.cols * (4 * sample.channels + 8 + 64))
+    machine.require(pixels * (14 + 2 * sample.channels) + sample.rows * sample.cols * (8 * sample.channels + 73))

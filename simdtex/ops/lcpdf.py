@@ -150,30 +150,35 @@ def _draw_reference(
     level: int,
     sweep: int,
 ) -> Relaxed:
-    cumulative = np.cumsum(weights(distances.distance, win.scale), 0, dtype=np.uint64)
+    w = weights(distances.distance, win.scale)
+    positions = candidates.positions[: candidates.size]
     channels = len(candidates.pixels)
-    choice = np.zeros(sites.size, np.int32)
-    values = np.zeros((channels, sites.size), np.uint16)
-    left = np.arange(sites.size)
-    for attempt in range(64):
-        base = attempt * (1 + channels)
-        bits = random.draw4(seed, level, sweep, sites[left], random.DRAW, base)
-        target = random.below(bits[0], bits[1], cumulative[-1, left])
-        chosen = (cumulative[:, left] > target).argmax(0)
-        choice[left] = candidates.positions[chosen]
-        legal = np.ones(left.size, bool)
+    if noisy:
         for c in range(channels):
-            x = candidates.pixels[c][choice[left]].astype(np.int64)
-            if noisy:
-                u = random.draw4(seed, level, sweep, sites[left], random.DRAW, base + 1 + c)[0]
-                step = np.searchsorted(win.noise, u, side="right")
-                x = x + np.minimum(step, 2 * win.radius) - win.radius
-            legal &= (x >= 0) & (x <= win.top)
-            values[c, left] = np.clip(x, 0, win.top)
-        left = left[~legal]
-        if not left.size:
-            break
+            _, mass = _legal(candidates.pixels[c][positions], win)
+            w = random.below(np.zeros_like(mass), mass, w.T).T
+    cumulative = np.cumsum(w, 0, dtype=np.uint64)
+    lo, hi, *_ = random.draw4(seed, level, sweep, sites, random.DRAW, 0)
+    target = random.below(lo, hi, cumulative[-1])
+    choice = positions[(cumulative > target).argmax(0)]
+    values = np.zeros((channels, sites.size), np.uint16)
+    for c in range(channels):
+        x = candidates.pixels[c][choice].astype(np.int64)
+        if noisy:
+            low, mass = _legal(x, win)
+            bits = random.draw4(seed, level, sweep, sites, random.DRAW, 1 + c)[0].astype(np.uint64)
+            u = low + ((bits * mass) >> np.uint64(32)).astype(np.uint32)
+            x = x + np.searchsorted(win.noise, u, side="right") - win.radius
+        values[c] = x
     return Relaxed(choice, values)
+
+
+def _legal(y: NDArray[Any], win: Window) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+    """Where the legal steps from grey level y begin among the cumulative probabilities, and their mass."""
+    y = y.astype(np.int64)
+    cumulative = np.concatenate([[0], win.noise]).astype(np.uint32)
+    low = cumulative[np.maximum(0, win.radius - y)]
+    return low, cumulative[np.minimum(2 * win.radius, win.radius + win.top - y) + 1] - low
 
 
 def _draw_launch(

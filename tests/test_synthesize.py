@@ -1,0 +1,478 @@
+"""`simdtex.synthesize`: what it takes, what it gives, what it says along the way, and what it refuses."""
+
+import math
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, opencl, texture
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import simdtex
+from simdtex.methods import mrf
+
+QUICK = {"order": 2, "levels": 1, "device": REFERENCE}
+TYPES = [np.bool_, np.uint8, np.int8, np.uint16, np.int32, np.int64, np.float16, np.float32, np.float64]
+
+
+def quick(sample, shape, **options):
+    return simdtex.synthesize(sample, shape, **({"rng": 1} | QUICK | options))
+
+
+# -- what it gives --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", TYPES)
+def test_the_type_is_the_samples_and_every_pixel_is_one_of_its_own(dtype):
+    sample = texture((9, 10), dtype=dtype)
+    image = quick(sample, (7, 8))
+    assert (image.dtype, image.shape) == (sample.dtype, (7, 8))
+    assert np.isin(image, sample).all()
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32, np.bool_])
+def test_levels_drawn_from_the_density_stay_in_the_range_of_the_type(dtype):
+    sample = texture((9, 10), dtype=dtype)
+    image = quick(sample, (9, 8), pixel="density", relaxation="gibbs", bandwidth=2.0)
+    assert image.dtype == sample.dtype
+    if dtype not in (np.bool_, np.uint8):  # whose levels are all there are
+        assert sample.min() <= image.min() <= image.max() <= sample.max()
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2, -1, -2, -3])
+def test_the_channel_axis_is_kept(axis):
+    last = texture((9, 10), 3)
+    image = quick(np.moveaxis(last, -1, axis), (6, 7), channel_axis=axis)
+    assert image.shape[axis] == 3
+    expected = quick(last, (6, 7), channel_axis=-1)
+    assert_same_bits(np.ascontiguousarray(np.moveaxis(image, axis, -1)), expected)
+
+
+def test_one_channel_is_as_good_as_none():
+    sample = texture((9, 10))
+    assert_same_bits(quick(sample[..., None], (6, 7), channel_axis=-1)[..., 0], quick(sample, (6, 7)))
+
+
+def test_any_memory_layout_and_byte_order_gives_the_same():
+    sample = texture((9, 10), dtype=np.uint16)
+    plain = quick(sample, (6, 7))
+    for other in (np.asfortranarray(sample), sample.astype(">u2"), sample[::-1][::-1], sample.tolist()):
+        assert np.array_equal(quick(other, (6, 7)), plain)
+
+
+def test_the_sample_is_not_changed():
+    sample = texture((9, 10))
+    before = sample.copy()
+    sample.flags.writeable = False
+    image = quick(sample, (6, 7))
+    assert_same_bits(sample, before)
+    assert image.flags.writeable
+    assert not np.shares_memory(image, sample)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (9, 1), (2, 3), (5, 17), (17, 5), (23, 22), (np.int64(4), 4)])
+@pytest.mark.parametrize("boundary", ["torus", "open"])
+def test_any_size(shape, boundary):
+    sample = texture((9, 8))
+    image = simdtex.synthesize(sample, shape, order=2, boundary=boundary, rng=1, device=REFERENCE)
+    assert image.shape == shape
+    assert np.isin(image, sample).all()
+
+
+@given(
+    st.tuples(st.integers(3, 12), st.integers(3, 12)),
+    st.tuples(st.integers(1, 12), st.integers(1, 12)),
+    st.sampled_from([1, 2, 4, 8]),
+    st.sampled_from([None, 1, 3]),
+    st.sampled_from(["torus", "open"]),
+    st.sampled_from(["icm", "gibbs"]),
+)
+@settings(max_examples=25)
+def test_any_sample_that_fits_any_size_and_any_order(sample_shape, shape, order, channels, boundary, relaxation):
+    if min(sample_shape) <= 2 * math.isqrt(order):
+        return
+    image, output = simdtex.synthesize(
+        texture(sample_shape, channels), shape, order=order, boundary=boundary, relaxation=relaxation,
+        channel_axis=None if channels is None else -1, rng=1, device=REFERENCE, full_output=True,
+    )  # fmt: skip
+    assert image.shape == shape + (() if channels is None else (channels,))
+    assert not output.temperature.any()
+
+
+def test_a_sample_that_barely_fits_has_one_candidate():
+    sample = texture((5, 5))
+    image = quick(sample, (4, 4), order=8, edges="whole")
+    assert (image == sample[2, 2]).all()
+
+
+def test_a_constant_sample_gives_a_constant():
+    for dtype in (np.uint8, np.uint16, np.float64):
+        for pixel in ("source", "density"):
+            image = quick(np.full((6, 7), 3, dtype), (5, 6), pixel=pixel)
+            if pixel == "source" or dtype != np.uint8:
+                assert (image == 3).all()
+
+
+# -- randomness -----------------------------------------------------------------------------------------------
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_others():
+    sample = texture((10, 10))
+    first, again, other = (quick(sample, (9, 9), rng=seed) for seed in (5, 5, 6))
+    assert_same_bits(first, again)
+    assert (first != other).any()
+
+
+def test_a_generator_is_asked_for_a_seed():
+    sample = texture((10, 10))
+    one, two = (quick(sample, (9, 9), rng=np.random.default_rng(3)) for _ in range(2))
+    assert_same_bits(one, two)
+    generator = np.random.default_rng(3)
+    assert_same_bits(quick(sample, (9, 9), rng=generator), one)
+    assert (quick(sample, (9, 9), rng=generator) != one).any()
+
+
+def test_no_seed_is_a_fresh_seed_that_the_statistics_tell():
+    sample = texture((10, 10))
+    image, output = quick(sample, (9, 9), rng=None, full_output=True)
+    seed = output.statistics["seed"]
+    assert_same_bits(quick(sample, (9, 9), rng=seed), image)
+    assert (quick(sample, (9, 9), rng=None) != quick(sample, (9, 9), rng=None)).any()
+
+
+def test_the_whole_seed_counts():
+    sample = texture((10, 10))
+    images = [quick(sample, (9, 9), rng=seed).tobytes() for seed in (1, 1 + 2**32, 1 + 2**63)]
+    assert len(set(images)) == 3
+
+
+def test_adding_a_constant_to_the_levels_changes_no_arrangement():
+    dark = texture((12, 11)) // 2
+    for options in ({}, {"relaxation": "gibbs"}, {"pixel": "density", "relaxation": "icm", "coarsest": "same"}):
+        plain, output = quick(dark, (10, 9), full_output=True, **options)
+        bright, other = quick(dark + 100, (10, 9), full_output=True, **options)
+        assert np.array_equal(output.source, other.source)
+        assert np.array_equal(plain.astype(int) + 100, bright)
+
+
+def test_scaling_float_pixels_changes_no_arrangement():
+    sample = texture((12, 11), dtype=np.float64)
+    _, output = quick(sample, (10, 9), full_output=True)
+    _, other = quick(sample * 2.0**20, (10, 9), full_output=True)
+    assert np.array_equal(output.source, other.source)
+
+
+# -- full output ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("edges", ["whole", "reflect"])
+@pytest.mark.parametrize("axis", [None, -1, 0])
+def test_the_source_map_names_where_every_pixel_was_taken_from(axis, edges):
+    sample = texture((13, 12), None if axis is None else 3)
+    given = sample if axis is None else np.moveaxis(sample, -1, axis)
+    image, output = simdtex.synthesize(
+        given, (11, 9), order=2, levels=2, channel_axis=axis, rng=1, device=REFERENCE, full_output=True,
+        pixel="source", edges=edges,
+    )  # fmt: skip
+    row, col = np.moveaxis(output.source, -1, 0)
+    assert output.source.shape == (11, 9, 2)
+    assert np.issubdtype(output.source.dtype, np.integer)
+    taken = sample[row, col]
+    assert np.array_equal(image, taken if axis is None else np.moveaxis(taken, -1, axis))
+    assert 0 <= output.source.min() and row.max() < 13 and col.max() < 12
+
+
+@pytest.mark.parametrize("options", [{}, {"relaxation": "gibbs"}, {"boundary": "open"}, {"xi": -30.0}], ids=str)
+def test_nothing_is_hot_in_the_end(options):
+    _, output = quick(texture((10, 10)), (9, 11), full_output=True, **options)
+    assert output.temperature.shape == (9, 11)
+    assert not output.temperature.any()
+
+
+@pytest.mark.parametrize("axis", [None, 0])
+def test_the_stages_are_the_levels_coarsest_first(axis):
+    sample = texture((17, 18), None if axis is None else 2)
+    given = sample if axis is None else np.moveaxis(sample, -1, axis)
+    image, output = simdtex.synthesize(
+        given, (13, 10), order=1, levels=3, channel_axis=axis, rng=2, device=REFERENCE, full_output=True
+    )
+    assert [stage.level for stage in output.stages] == [2, 1, 0]
+    sizes = [stage.image.shape for stage in output.stages]
+    channels = () if axis is None else (2,)
+    assert sizes == [(*channels, *size) for size in [(4, 3), (7, 5), (13, 10)]]
+    assert all(stage.image.dtype == sample.dtype for stage in output.stages)
+    assert_same_bits(output.stages[-1].image, image)
+
+
+def test_the_statistics_count_what_was_done():
+    _, output = simdtex.synthesize(
+        texture((15, 14)), (9, 12), order=2, levels=2, free_sweeps=1, rng=7, device=REFERENCE, full_output=True
+    )
+    told = output.statistics
+    assert told["device"] == REFERENCE.name
+    assert told["seed"] == 7
+    assert {option.name for option in fields(mrf.Options)} == set(told["options"])
+    assert told["options"]["order"] == 2
+    assert [level["level"] for level in told["levels"]] == [1, 0]
+    assert [(level["rows"], level["cols"]) for level in told["levels"]] == [(5, 6), (9, 12)]
+    for level in told["levels"]:
+        sites = level["rows"] * level["cols"]
+        assert level["fma"] == level["relaxations"] * level["candidates"] * 8 * 2
+        assert sites < level["relaxations"] <= sites * level["sweeps"]
+        assert level["seconds"] >= 0
+        assert level["steps"] >= level["sweeps"]
+    assert told["seconds"] >= sum(level["seconds"] for level in told["levels"])
+
+
+def test_a_torus_has_no_seam_and_an_open_lattice_has_one():
+    row, col = np.indices((24, 24))
+    sample = np.rint(127 + 100 * np.sin(row / 3) * np.cos(col / 3)).astype(np.uint8)
+    step = {}
+    for boundary in ("torus", "open"):
+        images = [
+            simdtex.synthesize(sample, (17, 15), order=4, boundary=boundary, rng=seed, device=REFERENCE).astype(int)
+            for seed in range(3)
+        ]
+        step[boundary] = np.mean([abs(image[:, 0] - image[:, -1]) for image in images])
+        step[boundary, "inside"] = np.mean([abs(np.diff(image, axis=1)) for image in images])
+    assert step["torus"] < 1.5 * step["torus", "inside"]
+    assert step["open"] > 1.5 * step["open", "inside"]
+
+
+def test_held_sites_are_kept_from_level_to_level_without_free_sweeps():
+    _, output = simdtex.synthesize(
+        texture((17, 18)), (13, 10), order=1, levels=3, free_sweeps=0, rng=2, device=REFERENCE, full_output=True
+    )
+    coarse, middle, fine = (stage.image for stage in output.stages)
+    assert np.array_equal(middle[::2, ::2], coarse)
+    assert np.array_equal(fine[::2, ::2], middle)
+
+
+@pytest.mark.parametrize("preset", mrf.PRESETS)
+def test_presets_are_options_that_others_override(preset):
+    options = mrf.make_options(preset)
+    for name, value in mrf.PRESETS[preset].items():
+        assert getattr(options, name) == value
+    assert mrf.make_options(preset, order=3, coherence=0.25).coherence == 0.25
+    image = simdtex.synthesize(texture((9, 9)), (5, 6), preset=preset, order=1, levels=1, rng=1, device=REFERENCE)
+    assert image.shape == (5, 6)
+
+
+def test_the_preset_paper_has_no_rule_of_ours():
+    paper = mrf.make_options("paper")
+    assert (paper.coherence, paper.bandwidth, paper.free_sweeps, paper.edges) == (0, 1, 0, "whole")
+
+
+# -- callbacks ------------------------------------------------------------------------------------------------
+
+
+def record(sample, shape, **options):
+    seen = []
+    image = simdtex.synthesize(sample, shape, callback=seen.append, rng=1, device=REFERENCE, **options)
+    return image, seen
+
+
+def test_progress_goes_from_0_to_1():
+    for options in ({"order": 2, "levels": 2}, {"order": 1, "levels": 1, "free_sweeps": 0}, {"order": 8}):
+        _, seen = record(texture((16, 16)), (12, 13), **options)
+        fractions = [progress.fraction for progress in seen]
+        assert fractions == sorted(fractions)
+        assert 0 < fractions[0] < 0.5
+        assert 0.9 < fractions[-1] <= 1
+
+
+def test_progress_tells_level_sweep_and_phase():
+    _, seen = record(texture((16, 16)), (12, 13), order=2, levels=2, free_sweeps=2)
+    assert {progress.levels for progress in seen} == {2}
+    assert [progress.level for progress in seen] == sorted((p.level for p in seen), reverse=True)
+    for level in (1, 0):
+        here = [progress for progress in seen if progress.level == level]
+        sweeps = [progress.sweep for progress in here]
+        assert sweeps == sorted(sweeps)
+        assert set(sweeps) == set(range(1, max(sweeps) + 1))
+        assert [p.sweep for p in here if p.end_of_sweep] == list(range(1, max(sweeps) + 1)), "one end for each"
+        phases = [progress.phase for progress in here if progress.end_of_sweep]
+        assert phases == ["relax"] * (len(phases) - 2) + ["free"] * 2
+        assert 0 < here[0].temperature_left <= 1
+        assert all(progress.temperature_left == 0 for progress in here if progress.phase == "free")
+        assert here[-1].end_of_sweep
+
+
+@pytest.mark.parametrize("axis", [None, 0])
+def test_progress_shows_the_picture_and_its_temperature(axis):
+    sample = texture((12, 12), None if axis is None else 2)
+    given = sample if axis is None else np.moveaxis(sample, -1, axis)
+    pictures = []
+
+    def look(progress):
+        if progress.end_of_sweep:
+            pictures.append((progress.level, progress.image(), progress.temperature()))
+
+    image = simdtex.synthesize(
+        given, (7, 10), order=1, levels=2, channel_axis=axis, rng=1, device=REFERENCE, callback=look
+    )
+    sizes = {0: (7, 10), 1: (4, 5)}
+    for level, picture, temperature in pictures:
+        assert picture.shape == ((2,) if axis == 0 else ()) + sizes[level]
+        assert temperature.shape == sizes[level]
+        assert 0 <= temperature.min() <= temperature.max() <= 1
+    assert_same_bits(pictures[-1][1], image)
+    assert not pictures[-1][2].any()
+
+
+def test_a_callback_changes_nothing():
+    sample = texture((12, 12))
+    image, _ = record(sample, (7, 10), **{k: v for k, v in QUICK.items() if k != "device"})
+    assert_same_bits(quick(sample, (7, 10)), image)
+
+
+def test_an_interrupt_gets_through_and_the_next_run_works(any_device):
+    sample, machine = texture((12, 12)), opencl(any_device)
+    options = {"order": 2, "rng": 1, "device": machine}
+    before = simdtex.synthesize(sample, (9, 9), **options)
+    calls = []
+
+    def interrupt(progress):
+        calls.append(progress)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        simdtex.synthesize(sample, (9, 9), callback=interrupt, **options)
+    assert len(calls) == 3
+    assert_same_bits(simdtex.synthesize(sample, (9, 9), **options), before)
+
+
+# -- what it refuses ------------------------------------------------------------------------------------------
+
+
+SAMPLE = texture((9, 10))
+FLOAT = texture((9, 10), dtype=np.float64)
+
+
+def with_value(value):
+    sample = FLOAT.copy()
+    sample[4, 5] = value
+    return sample
+
+
+BAD = [
+    # the sample
+    ({"sample": with_value(np.nan)}, ValueError, "NaN|not finite"),
+    ({"sample": with_value(np.inf)}, ValueError, "infinite|not finite"),
+    ({"sample": with_value(-np.inf)}, ValueError, "infinite|not finite"),
+    ({"sample": np.zeros((0, 5), np.uint8)}, ValueError, "empty"),
+    ({"sample": np.zeros((5, 0), np.uint8)}, ValueError, "empty"),
+    ({"sample": SAMPLE.astype(complex)}, TypeError, "real"),
+    ({"sample": SAMPLE.astype(str)}, TypeError, "convert it"),
+    ({"sample": None}, TypeError, "convert it"),
+    ({"sample": [[1, 2], [3]]}, ValueError, "ragged: give rows of equal length"),
+    ({"sample": SAMPLE[0]}, ValueError, r"give \(rows, cols\)"),
+    ({"sample": texture((9, 9), 3)}, ValueError, "or channel_axis=-1 if its last axis holds the channels"),
+    ({"channel_axis": -1}, ValueError, "give three axes"),
+    ({"sample": texture((9, 9), 3), "channel_axis": 3}, ValueError, "give one of -3 to 2"),
+    ({"sample": texture((9, 9), 3), "channel_axis": "last"}, TypeError, "give None or an integer"),
+    ({"sample": texture((4, 30)), "order": 8}, ValueError, "the largest order that fits is 3"),
+    ({"sample": texture((2, 30)), "order": 1}, ValueError, "give at least 3x3 pixels"),
+    ({"sample": texture((1, 1)), "order": 1}, ValueError, "give at least 3x3 pixels"),
+    # the size
+    ({"shape": (0, 5)}, ValueError, "rows of the output is 0; give 1 or more"),
+    ({"shape": (5, -1)}, ValueError, "columns of the output is -1; give 1 or more"),
+    ({"shape": (5.0, 5)}, TypeError, "rows of the output must be a whole number"),
+    ({"shape": (True, 5)}, TypeError, "rows of the output must be a whole number"),
+    ({"shape": 5}, ValueError, "shape must be two whole numbers"),
+    ({"shape": (5, 5, 3)}, ValueError, "shape must be two whole numbers"),
+    ({"shape": "12"}, TypeError, "must be a whole number"),
+    ({"shape": (2**16, 2**16)}, ValueError, "give a smaller size"),
+    # the options
+    ({"order": 0}, ValueError, "order 0 has no neighbours; give 1"),
+    ({"order": -8}, ValueError, "order -8 has no neighbours; give 1"),
+    ({"order": 8.0}, TypeError, "order must be a whole number"),
+    ({"levels": 0}, ValueError, "levels is 0; give 1 or more"),
+    ({"levels": 20}, ValueError, "levels=20 is too many .* give at most"),
+    ({"levels": 1.5}, TypeError, "levels must be a whole number"),
+    ({"relaxation": "annealing"}, ValueError, "choose one of: icm, gibbs"),
+    ({"relaxation": 3}, ValueError, "choose one of: icm, gibbs"),
+    ({"bandwidth": 0}, ValueError, "bandwidth is 0; give a number above 0"),
+    ({"bandwidth": -1.0}, ValueError, "give a number above 0"),
+    ({"bandwidth": math.inf}, ValueError, "bandwidth is inf"),
+    ({"bandwidth": "1"}, TypeError, "bandwidth must be a number"),
+    ({"coherence": -0.5}, ValueError, "coherence is -0.5; give a number of at least 0"),
+    ({"coherence": math.nan}, ValueError, "coherence is nan"),
+    ({"coherence": None}, TypeError, "coherence must be a number"),
+    ({"xi": 0}, ValueError, "xi"),
+    ({"xi": 0.5}, ValueError, "xi"),
+    ({"xi": math.nan}, ValueError, "xi"),
+    ({"xi": "cold"}, TypeError, "xi must be a number"),
+    ({"free_sweeps": -1}, ValueError, "free_sweeps is -1; give 0 or more"),
+    ({"free_sweeps": 1.5}, TypeError, "free_sweeps must be a whole number"),
+    ({"pixel": "median"}, ValueError, "choose one of: source, density"),
+    ({"schedule": "raster"}, ValueError, "choose one of: coloring"),
+    ({"boundary": "mirror"}, ValueError, "choose one of: torus, open"),
+    ({"preset": "best"}, ValueError, "choose one of: default, paper"),
+    ({"temperature": 1}, TypeError, "unknown option 'temperature' .* choose from: preset, order, levels"),
+    ({"method": "magic"}, ValueError, "unknown method 'magic'; choose one of: mrf"),
+    # the seed and the device
+    ({"rng": -1}, ValueError, r"give a whole number from 0 to 2\*\*64 - 1"),
+    ({"rng": 2**64}, ValueError, r"give a whole number from 0 to 2\*\*64 - 1"),
+    ({"rng": 0.5}, TypeError, "a whole number or a numpy.random.Generator"),
+    ({"device": "no such device"}, simdtex.DeviceError, "choose one of: .*reference"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "error", "words"), BAD, ids=lambda v: None)
+def test_bad_input_is_refused_with_a_remedy(change, error, words):
+    arguments = {"sample": SAMPLE, "shape": (6, 7), "order": 2, "rng": 1, "device": "reference"} | change
+    with pytest.raises(error, match=words) as caught:
+        simdtex.synthesize(arguments.pop("sample"), arguments.pop("shape"), **arguments)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 500
+
+
+def test_a_device_error_is_a_value_error():
+    assert issubclass(simdtex.DeviceError, ValueError)
+
+
+@pytest.mark.parametrize("side", range(3, 10))
+def test_the_largest_order_that_is_named_works_and_the_next_does_not(side):
+    sample = texture((side, 14))
+    with pytest.raises(ValueError, match="the largest order that fits is") as caught:
+        quick(sample, (4, 4), order=100)
+    largest = int(str(caught.value).rpartition(" ")[2])
+    assert quick(sample, (4, 4), order=largest).shape == (4, 4)
+    with pytest.raises(ValueError, match=f"the largest order that fits is {largest}"):
+        quick(sample, (4, 4), order=largest + 1)
+
+
+@pytest.mark.parametrize("edges", ["whole", "reflect"])
+def test_the_most_levels_that_are_named_work_and_one_more_does_not(edges):
+    for sample, shape in [((9, 10), (20, 20)), ((30, 31), (5, 9)), ((17, 40), (40, 17))]:
+        options = {"order": 2, "edges": edges, "device": REFERENCE, "rng": 1}
+        with pytest.raises(ValueError, match="give at most") as caught:
+            simdtex.synthesize(texture(sample), shape, levels=30, **options)
+        most = int(str(caught.value).rpartition(" ")[2])
+        image = simdtex.synthesize(texture(sample), shape, levels=most, **options)
+        assert image.shape == shape
+        with pytest.raises(ValueError, match="give at most"):
+            simdtex.synthesize(texture(sample), shape, levels=most + 1, **options)
+
+
+@pytest.mark.parametrize("scale", [1e-320, 1e-300, 1.0, 1e300, 8e307])
+def test_float_pixels_of_any_magnitude(scale):
+    sample = texture((9, 10), dtype=np.float64) * scale
+    image = quick(sample, (5, 6))
+    assert np.isin(image, sample).all()
+    image = quick(sample, (5, 6), pixel="density", relaxation="gibbs")
+    assert np.isfinite(image).all()
+
+
+@pytest.mark.parametrize("dtype", [np.int64, np.uint64, np.int8])
+def test_integer_pixels_of_any_magnitude(dtype):
+    bounds = np.iinfo(dtype)
+    sample = texture((9, 10), dtype=np.int8).astype(dtype)
+    sample[4, 4:6] = bounds.min, bounds.max
+    image = quick(sample, (5, 6))
+    assert np.isin(image, sample).all()
+    image = quick(sample, (5, 6), pixel="density", relaxation="gibbs")
+    assert image.dtype == dtype
