@@ -5,7 +5,8 @@
 
 Prints the device's fma peak (independent chains of vector fma), the rate of the LCPDF step on a state from the middle
 of a run, and, from a process of its own, the whole job 128x128 -> 256x256: seconds, seconds to the first piece of
-progress from the start of the process (kernels compiled before), and peak memory.
+progress from the start of the process (kernels compiled before), and peak memory. Last, the growth of memory with the
+output, from two outputs of a tiny sample.
 """
 
 import argparse
@@ -58,6 +59,20 @@ simdtex.synthesize(samples.grey()[sys.argv[2]], (256, 256), rng=1, order=int(sys
                    callback=callback)
 print(json.dumps([time.time() - start, first[0], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
 """
+
+MEMORY = """
+import resource, sys
+import numpy, simdtex
+sample = numpy.arange(64, dtype=numpy.uint8).reshape(8, 8)
+side = int(sys.argv[1])
+simdtex.synthesize(sample, (side, side), order=1, levels=1, xi=-100.0, free_sweeps=0, rng=1, device=sys.argv[2] or None)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+def output_of(*arguments):
+    """What a Python process of its own prints."""
+    return subprocess.run([sys.executable, "-c", *arguments], capture_output=True, text=True, check=True).stdout
 
 
 def best_of(function, machine, repeats=7):
@@ -128,14 +143,12 @@ def main():
     print(f"distances     {alone / 1e9:8.0f} GFMA/s  {alone / most:.2f} of the peak")
     print(f"LCPDF step    {whole / 1e9:8.0f} GFMA/s  {whole / most:.2f} of the peak")
     for name in samples.grey():
-        command = [sys.executable, "-c", JOB, sys.path[0], name, str(options.order), options.device or ""]
-        done = subprocess.run(command, capture_output=True, text=True, check=True)
-        seconds, first, memory = json.loads(done.stdout)
-        print(
-            f"{name:8} 128x128 -> 256x256, order {options.order}: {seconds:5.1f} s, first progress after {first:.1f} s, ",
-            end="",
-        )
-        print(f"peak memory {memory:.0f} MiB")
+        printed = output_of(JOB, sys.path[0], name, str(options.order), options.device or "")
+        seconds, first, memory = json.loads(printed)
+        job = f"{name:8} 128x128 -> 256x256, order {options.order}"
+        print(f"{job}: {seconds:5.1f} s, first progress after {first:.1f} s, peak memory {memory:.0f} MiB")
+    small, large = (int(output_of(MEMORY, str(side), options.device or "")) for side in (1024, 3072))
+    print(f"memory of the process per output pixel: {(large - small) / (3072**2 - 1024**2):.0f} bytes")
 
 
 if __name__ == "__main__":

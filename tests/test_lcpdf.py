@@ -88,12 +88,13 @@ def test_the_optimal_bandwidth_is_equation_8(seed, order, channels):
     assert h == pytest.approx(formula, rel=1e-12)
 
 
-@pytest.mark.parametrize("h", [0.05, 0.4, 1.0, 7.3, 60.0, 5000.0])
+@pytest.mark.parametrize("h", [0.05, 0.075, 0.4, 1.0, 7.3, 60.0, 5000.0])
 def test_the_tables_of_a_bandwidth(h):
     win = lcpdf.window(h, 255)
     k = np.arange(win.radius + 1)
     gauss = np.exp(-(k**2) / (2 * h * h))
-    np.testing.assert_allclose(win.gauss, gauss, rtol=2.0**-23, atol=2.0**-126)
+    np.testing.assert_allclose(win.gauss, gauss, rtol=2.0**-23)
+    assert win.gauss.min() >= 2.0**-126, "no subnormal, which a device may take for 0"
     assert win.scale == np.float32(1 / (2 * h * h))
     assert win.radius == 255 or np.exp(-((win.radius + 1) ** 2) / (2 * h * h)) < 2.0**-33
     steps = np.concatenate([gauss[:0:-1], gauss])
@@ -371,7 +372,7 @@ bandwidths = st.sampled_from([0.15, 1.0, 3.0])
 strengths = st.sampled_from([0.0, 1.0])
 
 
-@given(problems(max_order=4, channels=st.just(1)), bandwidths, strengths)
+@given(problems(max_order=4, channels=(1,)), bandwidths, strengths)
 @settings(max_examples=15)
 def test_the_mode_is_the_highest_of_the_density(p, bandwidth, strength):
     p = p._replace(sites=p.sites[:4])
@@ -447,7 +448,7 @@ def test_the_mode_of_a_vector_is_the_densest_of_the_heaviest(seed):
 # -- a device has the reference's bits ------------------------------------------------------------------------
 
 
-@given(p=problems(channels=st.just(1)), bandwidth=bandwidths, strength=strengths)
+@given(p=problems(channels=(1,)), bandwidth=bandwidths, strength=strengths)
 @settings(max_examples=15)
 def test_grey_relaxations_of_a_device_have_the_references_bits(machine, p, bandwidth, strength):
     for name in ("draw", "best", "mode_vector", *(["mode"] if p.sample.top == 255 else [])):
@@ -457,7 +458,7 @@ def test_grey_relaxations_of_a_device_have_the_references_bits(machine, p, bandw
     assert_same_bits(relaxed(machine, p, "draw", bandwidth, strength, noisy=False), theirs)
 
 
-@given(p=problems(channels=st.sampled_from([2, 3])), bandwidth=bandwidths, strength=strengths)
+@given(p=problems(channels=(2, 3)), bandwidth=bandwidths, strength=strengths)
 @settings(max_examples=15)
 def test_vector_relaxations_of_a_device_have_the_references_bits(machine, p, bandwidth, strength):
     for name in ("draw", "best", "mode_vector"):
@@ -473,14 +474,15 @@ def test_the_shape_of_a_launch_changes_no_bit(cl_device, options):
         assert_same_bits(relaxed(opencl(cl_device, **options), p, name, 1.0, 1.0), theirs)
 
 
-def test_draws_that_are_often_illegal_have_the_references_bits(machine):
-    """Many attempts: a wide kernel around black and white pixels."""
+def test_draws_near_the_ends_of_the_levels_have_the_references_bits(machine):
+    """A wide kernel around black and white pixels."""
     p = problem(8, order=1, channels=3, shape=(9, 9))
     extremes = np.where(p.sample.levels > 127, 255, 0).astype(np.uint16)
     p.sample._lay(extremes, 0)
-    for m in (REFERENCE, machine):
+    win = lcpdf.window(90.0, 255)
+
+    def run(m):
         found, candidates = p.distances(m)
-        win = lcpdf.window(90.0, 255)
-        ours = host(m, lcpdf.draw(m, found, candidates, m.put(p.sites), win, True, 5, 0, 1))
-        theirs = ours if m is REFERENCE else theirs
-        assert_same_bits(ours, theirs)
+        return host(m, lcpdf.draw(m, found, candidates, m.put(p.sites), win, True, 5, 0, 1))
+
+    assert_same_bits(run(machine), run(REFERENCE))

@@ -7,7 +7,7 @@ relaxation and users take from it. The kernels are in ``kernels/lcpdf.cl``.
 
 from __future__ import annotations
 
-from math import ceil, exp, log, pow, sqrt
+from math import exp, log, pow, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -74,15 +74,16 @@ def optimal_bandwidth(variance: float, candidates: int, dimensions: int) -> floa
 
 
 def window(bandwidth: float, top: int) -> Window:
-    """The tables for a bandwidth h in working grey levels; h = 0 (a constant sample) stands for 1.
+    """The tables for a bandwidth h in working grey levels.
 
-    h below 10^-10 stands for that: any difference then weighs nothing already, and 1 / 2h^2 stays finite.
+    h below 10^-10, or 0 for a constant sample, stands for that: any difference then weighs nothing already, and
+    1 / 2h^2 stays finite. The tables end before the Gaussian falls below 2**-33, so they hold no subnormal number.
 
     math.exp is rounded to 2**-24 or coarser here, so the last bit of a platform's libm does not show.
     """
-    h = max(bandwidth, 1e-10) if bandwidth else 1.0
+    h = max(bandwidth, 1e-10)
     scale = np.float32(1 / (2 * h * h))
-    radius = min(top, ceil(h * sqrt(2 * log(2.0**33))))
+    radius = min(top, int(h * sqrt(2 * log(2.0**33))))
     gauss = [exp(-k * k / (2 * h * h)) for k in range(radius + 1)]
     steps = gauss[:0:-1] + gauss
     total, running, noise = sum(steps), 0.0, []
