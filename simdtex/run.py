@@ -6,6 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import sqrt
 from typing import Any
 
 from numpy.typing import NDArray
@@ -89,34 +90,50 @@ class Meter:
     Parameters
     ----------
     expected : dict
-        Level -> expected relaxations times candidates.
+        Level -> expected work of its cooling and of its free sweeps, in relaxations times candidates.
     """
 
-    def __init__(self, expected: dict[int, float]) -> None:
+    def __init__(self, expected: dict[int, tuple[float, float]]) -> None:
         self.reports: list[dict[str, Any]] = []
         self._expected = expected
-        self._ended = 0.0
+        self._ended = self._fraction = self._cooled = 0.0
+        self._sweep_share = self._first_left = 0.0
+        self._free = 0
         self._began = self._level_began = time.perf_counter()
 
     def begin(self, level: int, grid: Grid, candidates: int) -> None:
         """Begin a level."""
         self._level_began = time.perf_counter()
+        self._cooled = self._sweep_share = self._first_left = 0.0
+        self._free = 0
         sizes = {"level": level, "rows": grid.rows, "cols": grid.cols, "candidates": candidates}
         self.reports.append(sizes | {"sweeps": 0, "relaxations": 0, "fma": 0, "seconds": 0.0})
 
-    def add(self, relaxations: int, fma: int) -> None:
-        """Count sites that were relaxed."""
-        self.reports[-1]["relaxations"] += relaxations
-        self.reports[-1]["fma"] += fma
+    def sweep(self, left: float) -> None:
+        """Begin a sweep with this mean temperature: the share of the sweeps done is about 1 - sqrt(t / t_0)."""
+        self.reports[-1]["sweeps"] += 1
+        self._first_left = self._first_left or left
+        cooled = 1 - sqrt(left / self._first_left) if left else 1.0
+        like_the_last = cooled - self._cooled or 0.1
+        self._sweep_share, self._cooled = min(like_the_last, 1 - cooled), cooled
 
-    def sweeps(self, number: int) -> None:
-        """Note how many sweeps the level has had."""
-        self.reports[-1]["sweeps"] = number
+    def add(self, relaxations: int, fma: int, share: float) -> None:
+        """Count sites that were relaxed, `share` of the sweep being done with them."""
+        report = self.reports[-1]
+        report["relaxations"] += relaxations
+        report["fma"] += fma
+        cooling, free = self._expected[report["level"]]
+        done = (self._cooled + self._sweep_share * share) * cooling
+        if self._cooled == 1:
+            self._free += relaxations * report["candidates"]
+            done = cooling + min(self._free, free)
+        total = sum(sum(work) for work in self._expected.values())
+        self._fraction = max(self._fraction, min(1.0, (self._ended + done) / total))
 
     def end(self) -> None:
         """End the level."""
         self.reports[-1]["seconds"] = time.perf_counter() - self._level_began
-        self._ended += self._expected[self.reports[-1]["level"]]
+        self._ended += sum(self._expected[self.reports[-1]["level"]])
 
     @property
     def seconds(self) -> float:
@@ -126,7 +143,4 @@ class Meter:
     @property
     def fraction(self) -> float:
         """Share of the expected work that is done, 0 to 1; never falls."""
-        report = self.reports[-1]
-        expected = self._expected[report["level"]]
-        here = min(float(expected), float(report["relaxations"] * report["candidates"]))
-        return min(1.0, (self._ended + here) / sum(self._expected.values()))
+        return self._fraction

@@ -69,10 +69,10 @@ class Sample:
             levels = planes.astype(np.uint16)
         else:
             self.top = 2 ** min(12, int((33 - log2(values)) / 2)) - 1
-            wide = planes.astype(np.float64)
-            extent = float(wide.max()) - float(wide.min())
-            self.unit = extent / self.top if extent > 0 else 1.0
-            levels = np.rint((wide - wide.min()) / self.unit).astype(np.uint16)
+            half = planes.astype(np.float64) / 2  # so that no difference overflows
+            half_unit = float(half.max() - half.min()) / self.top or 0.5
+            self.unit = 2 * half_unit
+            levels = np.rint((half - half.min()) / half_unit).astype(np.uint16)
         self._lay(levels, margin)
 
     @classmethod
@@ -189,6 +189,10 @@ class Sample:
             return np.ascontiguousarray(moved > 0.5)
         if np.issubdtype(self.pixels.dtype, np.integer):
             bounds = np.iinfo(self.pixels.dtype)
-            moved = np.clip(np.rint(moved), bounds.min, bounds.max)
-        result: NDArray[Any] = np.where(step == 0, own, moved.astype(self.pixels.dtype))
-        return result
+            most = float(bounds.max)  # which may be one more than the type holds
+            most = most if int(most) <= bounds.max else float(np.nextafter(most, 0))
+            moved = np.clip(np.rint(moved), bounds.min, most)
+        taken: NDArray[Any] = np.where(step == 0, own, moved.astype(self.pixels.dtype))
+        if self.pixels.dtype != np.uint8:  # whose legal levels are 0 to 255
+            taken = np.clip(taken, self.pixels.min(), self.pixels.max())
+        return taken

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isqrt
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -87,7 +88,8 @@ def synthesize(
     Notes
     -----
     Cost: about 14 fma for every output pixel, sample pixel, neighbour and channel; nearly all of it at the finest
-    level, since each coarser one has a quarter of the sites and of the candidates. Memory grows with output pixels plus sample pixels, never with their product.
+    level, since each coarser one has a quarter of the sites and of the candidates. Memory grows with output pixels
+    plus sample pixels, never with their product.
 
     Examples
     --------
@@ -175,6 +177,9 @@ def lcpdf(
     y = _check_grey("sample", sample, levels)
     where = _check_sites(sites, x.shape)
     offsets = neighbourhood_offsets(order)
+    if len(offsets) * (levels - 1) ** 2 > 2**33:  # beyond which (12) is not exact: see Sample
+        most = 1 + isqrt(2**33 // len(offsets))
+        raise ValueError(f"levels is {levels}; give at most {most} for order {order}")
     grey = Sample.of_levels(y, levels)
     mrf.check_fit(y.shape, int(offsets.max()), order)
 

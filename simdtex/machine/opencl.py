@@ -64,11 +64,14 @@ class OpenCL:
         self.name = f"{info.name.strip()} ({info.platform})"
         self.context = cl.Context([info.handle])  # type: ignore[list-item]
         self.queue = cl.CommandQueue(self.context)
-        self.work_group = work_group
         on_gpu = info.kind == "gpu"
+        self.forced = work_group is not None
+        self.group = work_group or (64 if on_gpu else 16)  # a fixed size: PoCL compiles once per size
         self.scratch = scratch or (2**28 if on_gpu else 2**24)
         self.vector = vector or (1 if on_gpu else 16)
         self.step = step or 4
+        if BLOCK % self.step:
+            raise ValueError(f"step is {self.step}; give a divisor of {BLOCK}")
         self.tile = (64, 1) if on_gpu else (1, 8)
         self._pool = cl_tools.MemoryPool(cl_tools.ImmediateAllocator(self.queue))
         self._pending, self._burst, self._synced = 0, 1e8, time.perf_counter()
@@ -159,10 +162,9 @@ class OpenCL:
             return cl.Program(self.context, source).build([*options.split(), "-I", str(folder)])
 
     def launch(self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None) -> None:
-        """Enqueue a kernel over a range of work-items, rounded up to whole work-groups where one is given."""
-        if self.work_group:
-            local = (self.work_group,) + (1,) * (len(size) - 1)
-        if local:
-            size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
+        """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels guard."""
+        one_dimensional = (self.group,) + (1,) * (len(size) - 1)
+        local = local if local and not self.forced else one_dimensional
+        size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
         data = [a.data if isinstance(a, cl_array.Array) else a for a in args]
         kernel(self.queue, size, local, *data)

@@ -253,7 +253,9 @@ def _sweep(
     """Relax every site with t > 0 once, or, in the phase ``"free"``, every site."""
     machine, schedule = run.machine, run.schedule
     active = temperatures > 0 if phase == "relax" else np.ones(temperatures.shape, bool)
-    left = float(temperatures.mean()) / 1024
+    left = float(temperatures.mean()) / 1024 if phase == "relax" else 0.0
+    meter.sweep(left)
+    wanted, relaxed = int(active.sum()), 0
     neighbours, channels = len(run.offsets), run.sample.channels
     size = machine.chunk(level.candidates.size, neighbours, channels)
     while True:
@@ -263,7 +265,8 @@ def _sweep(
             field = _relax(run, level, field, sites, info.sweep)
             work = 2 * level.candidates.size * neighbours * channels * len(sites)
             machine.sync(work)
-            meter.add(len(sites), work)
+            relaxed += len(sites)
+            meter.add(len(sites), work, relaxed / wanted)
             if run.callback:
                 last = info.last and first + size >= len(info.sites)
                 image = partial(_picture, run, level, field)
@@ -272,7 +275,6 @@ def _sweep(
                     Progress(level.number, run.levels, info.sweep, phase, left, last, meter.fraction, image, warmth)
                 )
         if info.last:
-            meter.sweeps(info.sweep)
             return field, state
 
 
@@ -314,16 +316,19 @@ def _picture(run: _Run, level: _Level, field: Field) -> NDArray[Any]:
     return run.sample.picture(level.grid.view(values), level.grid.view(source))
 
 
-def _expected_work(run: _Run) -> dict[int, float]:
-    """Relaxations times candidates that each level should take: 7 sweeps, the coarsest |N| / -xi."""
+def _expected_work(run: _Run) -> dict[int, tuple[float, float]]:
+    """Relaxations times candidates that cooling and free sweeps of each level should take, as measured at xi = -1.
+
+    The coarsest level takes about 0.6 |N| sweeps, the others relax each of their new sites about 6 times.
+    """
     work = {}
     for number in range(run.levels):
-        grid = Grid(*run.shape, 2**number)
-        options = run.options
+        grid, options = Grid(*run.shape, 2**number), run.options
         coarsest = number == run.levels - 1
-        sweeps = min(1024, len(run.offsets) / -options.xi) if coarsest else 7 * 0.75
+        sweeps = min(1024, 1 - 0.6 * len(run.offsets) / options.xi) if coarsest else 6 * 0.75
         candidates = run.sample.positions(run.offsets, grid.spacing, options.phases, options.edges).size
-        work[number] = grid.rows * grid.cols * (sweeps + options.free_sweeps) * candidates
+        sites = grid.rows * grid.cols * candidates
+        work[number] = (sites * sweeps, float(sites * options.free_sweeps))
     return work
 
 
