@@ -123,7 +123,7 @@ def step(machine, order):
             d = coherence(machine, d, candidates, piece, field, device_offsets, grid, np.float32(0.5))
             relaxed = lcpdf.best(machine, d, candidates)
             cooled = temperature(machine, piece, field, device_offsets, grid, -1024)
-            commit(machine, piece, field, relaxed, cooled)
+            commit(machine, field, piece, relaxed, cooled)
 
     fma = 2 * len(sites) * candidates.size * len(offsets)
     return fma / best_of(distances, machine), fma / best_of(whole, machine)

@@ -121,7 +121,7 @@ class Sample:
             The pixels of the decimated sample, equation (10), or every pixel.
         edges : {"whole", "reflect", "auto"}
             Those whose neighbourhood lies in the sample, equation (4); all, where the margin is wide enough; or
-            the former where they are half of all or more, else the latter.
+            the former where they are three quarters of all or more, else the latter.
         """
         (top, left), (bottom, right) = offsets.min(0) * spacing, offsets.max(0) * spacing
         step = 1 if phases == "all" else spacing

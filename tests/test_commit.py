@@ -21,7 +21,7 @@ def outcome(p):
 def run(machine, p):
     sites, field, _ = p.on(machine)
     choice, values, cooled = (machine.put(a) for a in outcome(p))
-    return host(machine, commit(machine, sites, field, Relaxed(choice, values), cooled))
+    return host(machine, commit(machine, field, sites, Relaxed(choice, values), cooled))
 
 
 def check_formula(p):

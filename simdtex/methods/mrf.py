@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
-from math import log2, prod
+from math import inf, log2, prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -78,7 +78,7 @@ class Options:
     edges : {"auto", "reflect", "whole"}
         Candidates are those sample positions whose whole neighbourhood lies in the sample, equation (4)
         (``whole``), or all, those near the edge with a neighbourhood completed by reflection (``reflect``);
-        ``auto`` reflects at the levels at which fewer than half of the positions have a whole neighbourhood.
+        ``auto`` reflects at the levels at which fewer than three quarters of them have a whole neighbourhood.
     coarsest : {"gibbs", "same"}
         How the coarsest level relaxes: by draws, or as the other levels. Its mode says nothing while all is unknown.
     schedule : {"coloring"}
@@ -109,7 +109,9 @@ class Options:
         one_of("relaxation", self.relaxation, ("icm", "gibbs"))
         real("bandwidth", self.bandwidth, 0, above=True)
         real("coherence", self.coherence, 0)
-        real("-xi", -self.xi if isinstance(self.xi, (int, float)) else self.xi, 0, above=True)
+        real("xi", self.xi, -inf)
+        if self.xi >= 0:
+            raise ValueError(f"xi is {self.xi}; give a number below 0")
         whole("free_sweeps", self.free_sweeps, 0)
         one_of("pixel", self.pixel, ("source", "density"))
         one_of("phases", self.phases, ("all", "decimated"))
@@ -260,15 +262,20 @@ def _sweep(
     size = machine.chunk(level.candidates.size, neighbours, channels)
     while True:
         state, info = schedule.step(state, partial(np.copy, active))  # 6.2.1
-        for first in range(0, len(info.sites), size):  # 6.2.2, as many sites at a time as scratch memory holds
-            sites = info.sites[first : first + size]
-            field = _relax(run, level, field, sites, info.sweep)
+        pieces = [info.sites[i : i + size] for i in range(0, len(info.sites), size)]  # what scratch memory holds
+        outcomes = []
+        for sites in pieces:  # 6.2.2
+            outcomes.append(_relax(run, level, field, sites, info.sweep))
             work = 2 * level.candidates.size * neighbours * channels * len(sites)
             machine.sync(work)
             relaxed += len(sites)
             meter.add(len(sites), work, relaxed / wanted)
+            complete = sites is pieces[-1]
+            if complete:
+                for outcome in outcomes:  # no site sees another of its step
+                    field = commit(machine, field, *outcome)
             if run.callback:
-                last = info.last and first + size >= len(info.sites)
+                last = info.last and complete
                 image = partial(_picture, run, level, field)
                 warmth = partial(_warmth, run, level, field)
                 run.callback(
@@ -278,8 +285,10 @@ def _sweep(
             return field, state
 
 
-def _relax(run: _Run, level: _Level, field: Field, sites: NDArray[np.int32], sweep: int) -> Field:
-    """Steps 6.2.2.1 to 6.2.2.3 for sites that relax together."""
+def _relax(
+    run: _Run, level: _Level, field: Field, sites: NDArray[np.int32], sweep: int
+) -> tuple[Array, lcpdf.Relaxed, Array]:
+    """Steps 6.2.2.1 to 6.2.2.3 for sites that relax together: the sites, what they take, and how warm they are."""
     machine, options = run.machine, run.options
     number, grid, offsets, candidates, window, relaxation = level
     here = machine.put(sites)
@@ -299,7 +308,7 @@ def _relax(run: _Run, level: _Level, field: Field, sites: NDArray[np.int32], swe
         relaxed = lcpdf.mode_vector(machine, distances, candidates, window)
     xi = min(-1, round(options.xi * 1024))
     cooled = temperature(machine, here, field, offsets, grid, xi)  # 6.2.2.3
-    return commit(machine, here, field, relaxed, cooled)
+    return here, relaxed, cooled
 
 
 def _temperatures(run: _Run, level: _Level, field: Field) -> NDArray[np.uint16]:

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
 
 
-def _reference(sites: NDArray[np.int32], field: Field, relaxed: Relaxed, cooled: NDArray[np.uint16]) -> Field:
+def _reference(field: Field, sites: NDArray[np.int32], relaxed: Relaxed, cooled: NDArray[np.uint16]) -> Field:
     field.values.reshape(len(field.values), -1)[:, sites] = relaxed.values
     field.source.ravel()[sites] = relaxed.choice
     field.temperature.ravel()[sites] = cooled
     return field
 
 
-def _launch(machine: OpenCL, sites: Array, field: Field, relaxed: Relaxed, cooled: Array) -> Field:
+def _launch(machine: OpenCL, field: Field, sites: Array, relaxed: Relaxed, cooled: Array) -> Field:
     channels, height, width = field.values.shape
     machine.launch(
         machine.kernel("commit", "commit"),
