@@ -231,17 +231,18 @@ def _check_distinct(outputs: list[Path], inputs: list[Path]) -> None:
 
 @contextmanager
 def _progress(quiet: bool) -> Iterator[Callable[[Any], None]]:
-    """A progress bar with level, sweep, temperature left and time left."""
+    """A progress bar, where there is a terminal, with level, sweep, temperature left and time left."""
     if quiet:
         yield lambda progress: None
         return
+    console = Console(stderr=True)
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         TaskProgressColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("starting", total=1.0)
 
         def show(progress: Any) -> None:

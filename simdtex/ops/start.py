@@ -30,13 +30,13 @@ def _launch(machine: OpenCL, pixels: Array, positions: Array, grid: Grid, seed: 
     field = Field(
         machine.empty((channels, *shape), np.uint16),
         machine.empty(shape, np.int32),
-        machine.empty(shape, np.uint16).fill(1024),
+        machine.empty(shape, np.uint16),
     )
     machine.launch(
         machine.kernel("start", "start"),
         (grid.plane,),
         *(np.uint64(seed), pixels, np.int32(plane), np.int32(channels), positions),
-        *(np.int32(positions.size), np.int32(grid.plane), field.values, field.source),
+        *(np.int32(positions.size), np.int32(grid.plane), *field),
     )
     return field
 
