@@ -109,13 +109,14 @@ inline uint legal_mass(__global const uint *noise, const int radius, const int y
     return noise[min(2 * radius, radius + top - y)] - legal_low(noise, radius, y);
 }
 
-// W_p times the share of the kernel around y_p that is legal: the mass of candidate p in the mixture over legal levels.
+// W_p times the share of the kernel around y_p that is legal: the mass of candidate p in the mixture over legal
+// levels. Dozens of saturated channels do not make it 0.
 inline ulong mass_of(const float d, const float smallest, const float scale, __global const float *sample,
                      const int plane, const int from, __global const uint *noise, const int radius, const int top)
 {
     ulong w = weight(d, smallest, scale);
     for (int c = 0; c < C && w && radius >= 0; ++c)
-        w = mul_hi(w, (ulong)legal_mass(noise, radius, (int)sample[c * plane + from], top) << 32);
+        w = max(mul_hi(w, (ulong)legal_mass(noise, radius, (int)sample[c * plane + from], top) << 32), 1ul);
     return w;
 }
 
@@ -321,11 +322,12 @@ __kernel void lcpdf_mode_vector(__global const float *restrict distance, __globa
         values[c * S + s] = (ushort)sample[c * plane + at[mode]];
 }
 
-// The whole table of probabilities of one channel, (S, levels).
+// The whole density of one channel, (S, levels), up to a factor: the host divides each row by its sum, since OpenCL lets
+// devices round a division as they like.
 //
 // window  (radius + 1,)   exp(-k^2 / 2h^2)
 // mass    (S, levels)     scratch: sum of the weights per grey level
-// table   (S, levels)     out: P(x), adds up to 1 over each row to float32's precision
+// table   (S, levels)     out: f(x)
 __kernel void lcpdf_table(__global const float *restrict distance, __global const float *restrict nearest,
                           const int blocks, const int S, const int P, const float scale,
                           __global const float *restrict sample, __global const int *restrict candidates,
@@ -346,14 +348,10 @@ __kernel void lcpdf_table(__global const float *restrict distance, __global cons
         if (w)
             m[(int)sample[candidates[p]]] += w;
     }
-    float total = 0.0f;
     for (int x = 0; x < levels; ++x) {
         float here = 0.0f;
         for (int v = max(0, x - radius); v <= min(levels - 1, x + radius); ++v)
             here = m[v] ? fma((float)m[v], window[abs(x - v)], here) : here;
         f[x] = here;
-        total += here;
     }
-    for (int x = 0; x < levels; ++x)
-        f[x] /= total;
 }

@@ -201,8 +201,8 @@ def lcpdf(
         near = neighbourhood(machine, here, field, device_offsets, grid)
         distances = parzen.distance(machine, near, candidates)
         if estimator == "parzen":
-            table = machine.get(parzen.table(machine, distances, candidates, window))
-            rows.append(table.astype(np.float64))
+            density = machine.get(parzen.table(machine, distances, candidates, window)).astype(np.float64)
+            rows.append(density / np.cumsum(density, 1)[:, -1:])
         else:
             counts = machine.get(histogram(machine, distances, candidates, levels))
             rows.append(_shares(counts, where[first : first + step], grid))

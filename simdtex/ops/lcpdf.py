@@ -157,7 +157,7 @@ def _draw_reference(
     if noisy:
         for c in range(channels):
             _, mass = _legal(candidates.pixels[c][positions], win)
-            w = random.below(np.zeros_like(mass), mass, w.T).T
+            w = np.where(w > 0, np.maximum(random.below(np.zeros_like(mass), mass, w.T).T, 1), 0)
     cumulative = np.cumsum(w, 0, dtype=np.uint64)
     lo, hi, *_ = random.draw4(seed, level, sweep, sites, random.DRAW, 0)
     target = random.below(lo, hi, cumulative[-1])
@@ -193,16 +193,9 @@ def _draw_launch(
     level: int,
     sweep: int,
 ) -> Relaxed:
-    out = _relaxed(machine, distances, candidates)
-    machine.launch(
-        _kernel(machine, "draw", candidates),
-        (distances.sites,),
-        *_weighing(distances, win),
-        *(candidates.pixels, _plane(candidates), candidates.positions, sites),
-        *(np.uint64(seed), np.uint32(level), np.uint32(sweep), machine.constant(win.noise)),
-        *(np.int32(win.radius if noisy else -1), np.int32(win.top), *out),
-    )
-    return out
+    counters = (np.uint64(seed), np.uint32(level), np.uint32(sweep))
+    kernel = (machine.constant(win.noise), np.int32(win.radius if noisy else -1), np.int32(win.top))
+    return _take(machine, "draw", distances, candidates, win, sites, *counters, *kernel)
 
 
 draw = Operation("draw", _draw_reference, _draw_launch)
@@ -217,14 +210,7 @@ def _best_reference(distances: Distances, candidates: Candidates) -> Relaxed:
 
 
 def _best_launch(machine: OpenCL, distances: Distances, candidates: Candidates) -> Relaxed:
-    out = _relaxed(machine, distances, candidates)
-    machine.launch(
-        _kernel(machine, "best", candidates),
-        (distances.sites,),
-        *_weighing(distances, None),
-        *(candidates.pixels, _plane(candidates), candidates.positions, *out),
-    )
-    return out
+    return _take(machine, "best", distances, candidates, None)
 
 
 best = Operation("best", _best_reference, _best_launch)
@@ -261,15 +247,8 @@ def _mode_reference(distances: Distances, candidates: Candidates, win: Window) -
 
 
 def _mode_launch(machine: OpenCL, distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
-    out = _relaxed(machine, distances, candidates)
-    machine.launch(
-        _kernel(machine, "mode", candidates),
-        (distances.sites,),
-        *_weighing(distances, win),
-        *(candidates.pixels, _plane(candidates), candidates.positions),
-        *(machine.constant(win.gauss), np.int32(win.radius), *out),
-    )
-    return out
+    gauss = (machine.constant(win.gauss), np.int32(win.radius))
+    return _take(machine, "mode", distances, candidates, win, *gauss)
 
 
 mode = Operation("mode", _mode_reference, _mode_launch)
@@ -297,20 +276,13 @@ def _mode_vector_reference(distances: Distances, candidates: Candidates, win: Wi
 
 
 def _mode_vector_launch(machine: OpenCL, distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
-    out = _relaxed(machine, distances, candidates)
-    machine.launch(
-        _kernel(machine, "mode_vector", candidates),
-        (distances.sites,),
-        *_weighing(distances, win),
-        *(candidates.pixels, _plane(candidates), candidates.positions, *out),
-    )
-    return out
+    return _take(machine, "mode_vector", distances, candidates, win)
 
 
 mode_vector = Operation("mode_vector", _mode_vector_reference, _mode_vector_launch)
 
 
-# -- the table of probabilities -------------------------------------------------------------------------------
+# -- the whole density -------------------------------------------------------------------------------
 
 
 def _table_reference(distances: Distances, candidates: Candidates, win: Window) -> NDArray[np.float32]:
@@ -320,8 +292,7 @@ def _table_reference(distances: Distances, candidates: Candidates, win: Window) 
     for s in range(distances.sites):
         mass = np.zeros(win.top + 1, np.uint64)
         np.add.at(mass, grey, w[:, s])
-        f = _density(mass, win)
-        table[s] = f / np.cumsum(f, dtype=np.float32)[-1]
+        table[s] = _density(mass, win)
     return table
 
 
@@ -367,9 +338,22 @@ def _weighing(distances: Distances, win: Window | None) -> list[Any]:
     return [distances.distance, distances.nearest, *sizes, *([win.scale] if win else [])]
 
 
-def _relaxed(machine: OpenCL, distances: Distances, candidates: Candidates) -> Relaxed:
+def _take(
+    machine: OpenCL,
+    name: str,
+    distances: Distances,
+    candidates: Candidates,
+    win: Window | None,
+    *arguments: Any,
+) -> Relaxed:
+    """Launch a kernel that gives each site a source and a value."""
     channels = candidates.pixels.shape[0]
-    return Relaxed(
-        machine.empty((distances.sites,), np.int32),
-        machine.empty((channels, distances.sites), np.uint16),
+    out = Relaxed(machine.empty((distances.sites,), np.int32), machine.empty((channels, distances.sites), np.uint16))
+    machine.launch(
+        _kernel(machine, name, candidates),
+        (distances.sites,),
+        *_weighing(distances, win),
+        *(candidates.pixels, _plane(candidates), candidates.positions),
+        *(*arguments, *out),
     )
+    return out
