@@ -25,7 +25,7 @@ numpydoc_show_class_members = False
 
 # The page of the study shows the table and all the pictures that benchmarks/study.py has written.
 table = (HERE / "study" / "table.csv").read_text(encoding="utf-8").splitlines()
-results = [".. csv-table::\n   :file: /study/table.csv\n   :header-rows: 1\n"] if len(table) > 1 else []
+results = [".. csv-table::\n   :file: ../study/table.csv\n   :header-rows: 1\n"] if len(table) > 1 else []
 results += [
     f".. figure:: /study/{picture.name}\n   :alt: {picture.stem}\n\n   {picture.stem.replace('-', ' ')}\n"
     for picture in sorted((HERE / "study").glob("*.png"))
