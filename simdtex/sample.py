@@ -136,6 +136,10 @@ class Sample:
         positions: NDArray[np.int32] = (row[:, None] * np.int32(self.cols) + col[None, :]).ravel()
         return positions
 
+    def planes(self, machine: Any) -> Array:
+        """The working levels as an array (C, rows * cols) of a machine, float32."""
+        return machine.put(self.working.astype(np.float32))
+
     def candidates(
         self,
         machine: Any,
@@ -143,15 +147,16 @@ class Sample:
         spacing: int,
         phases: str = "decimated",
         edges: str = "whole",
+        planes: Array | None = None,
     ) -> Candidates:
-        """The candidates of a level (see `positions`) as arrays of a machine."""
+        """The candidates of a level (see `positions`) as arrays of a machine, which may have the planes already."""
         positions = self.positions(offsets, spacing, phases, edges)
         index_of = np.full(self.rows * self.cols, -1, np.int32)
         index_of[positions] = np.arange(positions.size, dtype=np.int32)
         padding = np.full(-positions.size % BLOCK, positions[0], np.int32)
         reach = (offsets[:, 0] * np.int32(self.cols) + offsets[:, 1]) * np.int32(spacing)
         return Candidates(
-            machine.put(self.working.astype(np.float32)),
+            self.planes(machine) if planes is None else planes,
             machine.put(np.concatenate([positions, padding])),
             positions.size,
             machine.put(reach.astype(np.int32)),

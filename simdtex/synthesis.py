@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import isqrt
 from typing import Any, Literal, overload
 
@@ -105,12 +106,12 @@ def synthesize(
     size = _check_shape(shape)
     chosen = mrf.make_options(**options)
     seed = as_seed(rng)
-    image, output = mrf.synthesize(open_machine(device), pixels, size, chosen, seed, _squeezed(callback, channel_axis))
-    stages = [s.__class__(s.level, _restored(s.image, channel_axis)) for s in output.stages]
+    image, output = mrf.synthesize(open_machine(device), pixels, size, chosen, seed, _seeing(callback, channel_axis))
     image = _restored(image, channel_axis)
-    if full_output:
-        return image, Output(output.source, output.temperature, stages, output.statistics)
-    return image
+    if not full_output:
+        return image
+    stages = [replace(stage, image=_restored(stage.image, channel_axis)) for stage in output.stages]
+    return image, replace(output, stages=stages)
 
 
 def lcpdf(
@@ -221,11 +222,10 @@ def _shares(counts: NDArray[np.uint32], sites: NDArray[np.int32], grid: Grid) ->
     return shares
 
 
-def _squeezed(callback: Callback | None, channel_axis: int | None) -> Callback | None:
+def _seeing(callback: Callback | None, channel_axis: int | None) -> Callback | None:
     """The callback, which sees pictures with the sample's own axes."""
     if callback is None:
         return None
-    from dataclasses import replace
 
     def seen(progress: Any) -> Any:
         read: Callable[[], NDArray[Any]] = progress.image

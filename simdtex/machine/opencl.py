@@ -91,7 +91,8 @@ class OpenCL:
 
     def get(self, array: Array) -> Any:
         """Copy from the device."""
-        return array.get(self.queue)
+        with self._memory_errors():
+            return array.get(self.queue)
 
     def empty(self, shape: Any, dtype: Any) -> Array:
         """An array whose contents do not matter yet, from a pool."""

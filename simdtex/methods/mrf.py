@@ -137,6 +137,7 @@ class _Run:
 
     machine: Machine
     sample: Sample
+    planes: Array
     shape: tuple[int, int]
     offsets: NDArray[np.int32]
     options: Options
@@ -200,12 +201,12 @@ def synthesize(
     sample = Sample(pixels, pixels.shape[-1] * len(offsets), margin)
     _check_memory(machine, sample, shape)
     schedule = schedules.get(options.schedule)
-    run = _Run(machine, sample, shape, offsets, options, schedule, seed, levels, callback)
+    planes = sample.planes(machine)
+    run = _Run(machine, sample, planes, shape, offsets, options, schedule, seed, levels, callback)
     meter = Meter(_expected_work(run))
     stages = []
 
     everywhere = machine.put(sample.positions(np.zeros((1, 2), np.int32), 1))
-    planes = machine.put(sample.working.astype(np.float32))
     field = start(machine, planes, everywhere, Grid(*shape), seed)  # 2, 5
     for number in reversed(range(levels)):  # 6
         level = _level(run, number)  # 3, 4, 6.1
@@ -234,7 +235,7 @@ def _level(run: _Run, number: int) -> _Level:
     """Define the lattice, the candidates and the bandwidth of a level."""
     options, sample, offsets = run.options, run.sample, run.offsets
     grid = Grid(*run.shape, 2**number, options.boundary == "torus")
-    candidates = sample.candidates(run.machine, offsets, grid.spacing, options.phases, options.edges)
+    candidates = sample.candidates(run.machine, offsets, grid.spacing, options.phases, options.edges, run.planes)
     dimensions = sample.channels * (len(offsets) + 1)
     h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, candidates.size, dimensions)
     by_draw = number == run.levels - 1 and options.coarsest == "gibbs"
@@ -255,13 +256,17 @@ def _sweep(
     """Relax every site with t > 0 once, or, in the phase ``"free"``, every site."""
     machine, schedule = run.machine, run.schedule
     active = temperatures > 0 if phase == "relax" else np.ones(temperatures.shape, bool)
+
+    def wanting() -> NDArray[np.bool_]:
+        return active
+
     left = float(temperatures.mean()) / 1024 if phase == "relax" else 0.0
     meter.sweep(left)
     wanted, relaxed = int(active.sum()), 0
     neighbours, channels = len(run.offsets), run.sample.channels
     size = machine.chunk(level.candidates.size, neighbours, channels)
     while True:
-        state, info = schedule.step(state, partial(np.copy, active))  # 6.2.1
+        state, info = schedule.step(state, wanting)  # 6.2.1
         pieces = [info.sites[i : i + size] for i in range(0, len(info.sites), size)]  # what scratch memory holds
         outcomes = []
         for sites in pieces:  # 6.2.2
