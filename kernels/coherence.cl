@@ -28,7 +28,7 @@ __kernel void coherence(__global const int *restrict sites, const int S, const i
     const int i = ROW_OF(sites[s]), j = COL_OF(sites[s]);
     for (int k = 0; k < N; ++k) {
         const int2 o = offsets[k];
-        const int r = neighbour(i, j, o.x, o.y, rows, cols, spacing, width, torus);
+        const int r = neighbour(i, j, o.x, o.y, HERE);
         if (r < 0 || temperature[r] >= 1024)
             continue;
         const int row = source[r] / sample_cols - o.x * spacing;

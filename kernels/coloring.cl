@@ -22,7 +22,7 @@ __kernel void coloring_lattice(GRID, __global const int2 *restrict offsets, cons
     const int own = COSET(i, j);
     bool clash = false;
     for (int k = 0; k < N; ++k) {
-        const int r = neighbour(i, j, offsets[k].x, offsets[k].y, rows, cols, 1, cols, torus);
+        const int r = neighbour(i, j, offsets[k].x, offsets[k].y, FLAT);
         clash = clash || (r >= 0 && r < site && COSET(r / cols, r % cols) == own);
     }
     color[site] = clash ? UNCOLORED : own;
@@ -44,7 +44,7 @@ __kernel void coloring_greedy(GRID, __global const int2 *restrict offsets, const
     const int i = site / cols, j = site % cols;
     const uint own = draw4(seed, 0, 0, site, PURPOSE_COLOR, 0).x;
     for (int k = 0; k < N; ++k) {
-        const int r = neighbour(i, j, offsets[k].x, offsets[k].y, rows, cols, 1, cols, torus);
+        const int r = neighbour(i, j, offsets[k].x, offsets[k].y, FLAT);
         if (r < 0 || color[r] != UNCOLORED)
             continue;
         const uint other = draw4(seed, 0, 0, r, PURPOSE_COLOR, 0).x;
@@ -54,7 +54,7 @@ __kernel void coloring_greedy(GRID, __global const int2 *restrict offsets, const
     for (int base = 0;; base += 32) { // 32 colours at a time
         uint taken = 0;
         for (int k = 0; k < N; ++k) {
-            const int r = neighbour(i, j, offsets[k].x, offsets[k].y, rows, cols, 1, cols, torus);
+            const int r = neighbour(i, j, offsets[k].x, offsets[k].y, FLAT);
             const int other = r < 0 ? UNCOLORED : color[r];
             if (other >= base && other < base + 32)
                 taken |= 1u << (other - base);

@@ -26,7 +26,7 @@ __kernel void neighbourhood(__global const int *restrict sites, const int S, con
     if (s < S) {
         const int i = ROW_OF(sites[s]), j = COL_OF(sites[s]);
         const int2 o = offsets[k];
-        r = neighbour(i, j, o.x, o.y, rows, cols, spacing, width, torus);
+        r = neighbour(i, j, o.x, o.y, HERE);
     }
     const float u = r < 0 ? 0.0f : (float)(1024 - temperature[r]) * 0x1p-10f;
     confidence[k * P + s] = u;

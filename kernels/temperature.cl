@@ -17,7 +17,7 @@ __kernel void temperature(__global const int *restrict sites, const int S,
     const int i = ROW_OF(sites[s]), j = COL_OF(sites[s]);
     int sum = xi, members = 0;
     for (int k = 0; k < N; ++k) {
-        const int r = neighbour(i, j, offsets[k].x, offsets[k].y, rows, cols, spacing, width, torus);
+        const int r = neighbour(i, j, offsets[k].x, offsets[k].y, HERE);
         if (r < 0)
             continue;
         sum += temperature[r];

@@ -55,12 +55,16 @@ class Grid:
         2**level.
     torus : bool
         Whether rows and columns wrap around.
+    tile : (int, int), optional
+        Rows and columns of tiles, in sites of the grid. Neighbours in another tile are then read from an older
+        picture that stands `plane` pixels on (`simdtex.ops.snapshot`).
     """
 
     height: int
     width: int
     spacing: int = 1
     torus: bool = True
+    tile: tuple[int, int] | None = None
 
     @property
     def rows(self) -> int:
@@ -80,8 +84,13 @@ class Grid:
     @property
     def args(self) -> tuple[np.int32, ...]:
         """The GRID arguments of a kernel (kernels/common/lattice.h)."""
-        numbers = (self.rows, self.cols, self.spacing, self.width, self.torus)
+        numbers = (self.rows, self.cols, self.spacing, self.width, self.torus, *(self.tile or (0, 0)), self.plane)
         return tuple(np.int32(n) for n in numbers)
+
+    @property
+    def flat(self) -> Grid:
+        """The same sites as a lattice of their own, numbered 0 .. rows * cols - 1."""
+        return Grid(self.rows, self.cols, 1, self.torus)
 
     def sites(self) -> NDArray[np.int32]:
         """Pixel index of every site, (rows * cols,), row by row."""
@@ -91,11 +100,14 @@ class Grid:
         return sites
 
     def view(self, picture: NDArray[Any]) -> NDArray[Any]:
-        """The sites of this grid as a view of a picture (..., H, W)."""
-        return picture[..., :: self.spacing, :: self.spacing]
+        """The sites of this grid as a view of a picture (..., H, W); older pictures below it do not show."""
+        return picture[..., : self.height : self.spacing, :: self.spacing]
 
     def neighbours(self, sites: NDArray[np.int32], offsets: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Pixel index of each neighbour, (N, S); -1 outside an open lattice and for the site itself."""
+        """Pixel index of each neighbour, (N, S); -1 outside an open lattice and for the site itself.
+
+        Where there are tiles, `plane` is added to that of a neighbour in another tile.
+        """
         row = sites // self.width // self.spacing
         col = sites % self.width // self.spacing
         k = row[None, :] + offsets[:, 0, None]
@@ -104,7 +116,12 @@ class Grid:
             k, m = k % self.rows, m % self.cols
         inside = (k >= 0) & (k < self.rows) & (m >= 0) & (m < self.cols)
         itself = (k == row) & (m == col)
-        return np.where(inside & ~itself, (k * self.width + m) * self.spacing, -1).astype(np.int32)
+        pixel = (k * self.width + m) * self.spacing
+        if self.tile:
+            high, wide = self.tile
+            apart = (k // high != row // high) | (m // wide != col // wide)
+            pixel = pixel + apart * self.plane
+        return np.where(inside & ~itself, pixel, -1).astype(np.int32)
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,8 @@ class Progress:
         The present level (0 is the finest, and the last) and their number.
     sweep : int
         The present sweep of the level, from 1.
+    step : int
+        The present step of the level, from 1: sites that relax together.
     phase : str
         ``"relax"`` while some temperature is above 0, then ``"free"``.
     temperature_left : float
@@ -41,6 +43,7 @@ class Progress:
     level: int
     levels: int
     sweep: int
+    step: int
     phase: str
     temperature_left: float
     end_of_sweep: bool
@@ -74,8 +77,9 @@ class Output:
         Each level's picture at its end, the coarsest first.
     statistics : dict
         ``device``, ``seed``, ``options``, ``seconds``, and ``levels``: one dict per level with
-        ``level``, ``rows``, ``cols``, ``candidates``, ``sweeps``, ``relaxations``, ``fma`` (of equation (12)) and
-        ``seconds``.
+        ``level``, ``rows``, ``cols``, ``candidates``, ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation
+        (12)), ``seconds``, and ``equilibrium``: the ``sweeps``, ``steps`` and ``relaxations`` until no temperature
+        was left, free sweeps not counted.
     """
 
     source: NDArray[Any]
@@ -99,6 +103,7 @@ class Meter:
         self._ended = self._fraction = self._cooled = 0.0
         self._sweep_share = self._first_left = 0.0
         self._free = 0
+        self._cooling = True
         self._began = self._level_began = time.perf_counter()
 
     def begin(self, level: int, grid: Grid, candidates: int) -> None:
@@ -107,20 +112,31 @@ class Meter:
         self._cooled = self._sweep_share = self._first_left = 0.0
         self._free = 0
         sizes = {"level": level, "rows": grid.rows, "cols": grid.cols, "candidates": candidates}
-        self.reports.append(sizes | {"sweeps": 0, "relaxations": 0, "fma": 0, "seconds": 0.0})
+        counts = {"sweeps": 0, "steps": 0, "relaxations": 0}
+        self.reports.append({**sizes, **counts, "equilibrium": dict(counts), "fma": 0, "seconds": 0.0})
 
-    def sweep(self, left: float) -> None:
-        """Begin a sweep with this mean temperature: the share of the sweeps done is about 1 - sqrt(t / t_0)."""
-        self.reports[-1]["sweeps"] += 1
+    def sweep(self, phase: str, left: float) -> int:
+        """Begin a sweep with this mean temperature: the share of the sweeps done is about 1 - sqrt(t / t_0).
+
+        Returns the number of the sweep within the level, from 1.
+        """
+        self._cooling = phase == "relax"
+        self._count("sweeps", 1)
         self._first_left = self._first_left or left
         cooled = 1 - sqrt(left / self._first_left) if left else 1.0
         like_the_last = cooled - self._cooled or 0.1
         self._sweep_share, self._cooled = min(like_the_last, 1 - cooled), cooled
+        return int(self.reports[-1]["sweeps"])
+
+    def step(self) -> int:
+        """Begin a step, and return its number within the level, from 1."""
+        self._count("steps", 1)
+        return int(self.reports[-1]["steps"])
 
     def add(self, relaxations: int, fma: int, share: float) -> None:
         """Count sites that were relaxed, `share` of the sweep being done with them."""
         report = self.reports[-1]
-        report["relaxations"] += relaxations
+        self._count("relaxations", relaxations)
         report["fma"] += fma
         cooling, free = self._expected[report["level"]]
         done = (self._cooled + self._sweep_share * share) * cooling
@@ -134,6 +150,12 @@ class Meter:
         """End the level."""
         self.reports[-1]["seconds"] = time.perf_counter() - self._level_began
         self._ended += sum(self._expected[self.reports[-1]["level"]])
+
+    def _count(self, what: str, number: int) -> None:
+        report = self.reports[-1]
+        report[what] += number
+        if self._cooling:
+            report["equilibrium"][what] += number
 
     @property
     def seconds(self) -> float:

@@ -71,8 +71,8 @@ def synthesize(
         Return the source map, temperatures, stages and statistics too.
     **options
         Of the method: ``preset``, ``order``, ``levels``, ``relaxation``, ``bandwidth``, ``coherence``, ``xi``,
-        ``free_sweeps``, ``pixel``, ``phases``, ``edges``, ``coarsest``, ``schedule``, ``boundary``; see
-        `simdtex.methods.mrf.Options`.
+        ``free_sweeps``, ``pixel``, ``phases``, ``edges``, ``coarsest``, ``schedule``, ``check_schedule``,
+        ``boundary``; see `simdtex.methods.mrf.Options`.
 
     Returns
     -------

@@ -77,7 +77,7 @@ def test_being_neighbours_is_mutual(height, width, spacing, order, torus):
 
 
 def test_the_arguments_of_a_kernel():
-    assert Grid(7, 9, 2, False).args == (4, 5, 2, 9, 0)
+    assert Grid(7, 9, 2, False).args == (4, 5, 2, 9, 0, 0, 0, 63)
     assert all(isinstance(n, np.int32) for n in Grid(7, 9).args)
 
 

@@ -413,7 +413,7 @@ BAD = [
     ({"free_sweeps": -1}, ValueError, "free_sweeps is -1; give 0 or more"),
     ({"free_sweeps": 1.5}, TypeError, "free_sweeps must be a whole number"),
     ({"pixel": "median"}, ValueError, "choose one of: source, density"),
-    ({"schedule": "raster"}, ValueError, "choose one of: coloring"),
+    ({"schedule": "rows"}, ValueError, "choose one of: coloring"),
     ({"boundary": "mirror"}, ValueError, "choose one of: torus, open"),
     ({"preset": "best"}, ValueError, "choose one of: default, paper"),
     ({"temperature": 1}, TypeError, "unknown option 'temperature' .* choose from: preset, order, levels"),

@@ -4,8 +4,13 @@
 #ifndef SIMDTEX_LATTICE_H
 #define SIMDTEX_LATTICE_H
 
-// The five numbers every lattice kernel takes, in this order.
-#define GRID const int rows, const int cols, const int spacing, const int width, const int torus
+// The numbers every lattice kernel takes, in this order. Where tile_rows > 0, the lattice is cut into tiles, and what lies
+// in another tile is read `elsewhere` pixels on, where an older picture stands; commit writes here only.
+#define GRID                                                                                                           \
+    const int rows, const int cols, const int spacing, const int width, const int torus, const int tile_rows,          \
+        const int tile_cols, const int elsewhere
+#define HERE rows, cols, spacing, width, torus, tile_rows, tile_cols, elsewhere
+#define FLAT rows, cols, 1, cols, torus, 0, 0, 0 // the level's grid as a lattice of its own
 
 // Pixel index of grid site (i, j).
 #define SITE(i, j) (((i) * width + (j)) * spacing)
@@ -28,7 +33,10 @@ inline int neighbour(const int i, const int j, const int di, const int dj, GRID)
         l = wrap(l, cols);
     } else if (k < 0 || k >= rows || l < 0 || l >= cols)
         return -1;
-    return k == i && l == j ? -1 : SITE(k, l);
+    if (k == i && l == j)
+        return -1;
+    const bool apart = tile_rows > 0 && (i / tile_rows != k / tile_rows || j / tile_cols != l / tile_cols);
+    return apart ? SITE(k, l) + elsewhere : SITE(k, l);
 }
 
 #endif

@@ -20,6 +20,7 @@ inline uint4 philox(uint4 counter, uint2 key)
 #define PURPOSE_START 1u
 #define PURPOSE_DRAW 2u
 #define PURPOSE_COLOR 3u
+#define PURPOSE_SCHEDULE 4u
 
 inline uint4 draw4(const ulong seed, const uint level, const uint sweep, const uint site, const uint purpose,
                    const uint attempt)

@@ -145,7 +145,7 @@ class OpenCL:
         fit = min(self.scratch // per_site, int(4e9) // (2 * padded * neighbours * channels))
         return max(1, fit // self.vector) * self.vector
 
-    def kernel(self, file: str, name: str, **defines: int) -> Any:
+    def kernel(self, file: str, name: str, **defines: int | str) -> Any:
         """A kernel of ``kernels/FILE.cl``, compiled once for these -D constants."""
         options = " ".join(f"-D {key}={value}" for key, value in sorted(defines.items()))
         key = (file, name, options)

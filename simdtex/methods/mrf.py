@@ -7,7 +7,7 @@ the comments are the algorithm's own.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from math import inf, log2, prod
 from typing import Any, NamedTuple
@@ -23,6 +23,7 @@ from simdtex.ops.coherence import coherence
 from simdtex.ops.commit import commit
 from simdtex.ops.neighbourhood import Field, neighbourhood
 from simdtex.ops.operation import Array
+from simdtex.ops.snapshot import snapshot
 from simdtex.ops.start import start
 from simdtex.ops.temperature import temperature
 from simdtex.options import one_of, real, whole
@@ -81,8 +82,11 @@ class Options:
         ``auto`` reflects at the levels at which fewer than three quarters of them have a whole neighbourhood.
     coarsest : {"gibbs", "same"}
         How the coarsest level relaxes: by draws, or as the other levels. Its mode says nothing while all is unknown.
-    schedule : {"coloring"}
-        Which sites relax together.
+    schedule : str or simdtex.schedules.Schedule
+        Which sites relax together: ``"coloring"``, ``"coloring-fixed"``, ``"luby"``, ``"checkerboard"``,
+        ``"synchronous"``, ``"random-subset"``, ``"raster"``, ``"random-scan"``, ``"block"``, or one of your own.
+    check_schedule : bool
+        Check at every step that a schedule which claims independent sites keeps equation (14).
     boundary : {"torus", "open"}
         Whether the output wraps around.
     """
@@ -98,7 +102,8 @@ class Options:
     phases: str = "decimated"
     edges: str = "auto"
     coarsest: str = "gibbs"
-    schedule: str = "coloring"
+    schedule: str | schedules.Schedule = "coloring"
+    check_schedule: bool = False
     boundary: str = "torus"
 
     def __post_init__(self) -> None:
@@ -119,6 +124,8 @@ class Options:
         one_of("coarsest", self.coarsest, ("gibbs", "same"))
         one_of("boundary", self.boundary, ("torus", "open"))
         schedules.get(self.schedule)
+        if not isinstance(self.check_schedule, (bool, np.bool_)):
+            raise TypeError(f"check_schedule must be True or False, not {self.check_schedule!r}")
 
 
 def make_options(preset: str = "default", **given: Any) -> Options:
@@ -201,6 +208,8 @@ def synthesize(
     sample = Sample(pixels, pixels.shape[-1] * len(offsets), margin)
     _check_memory(machine, sample, shape)
     schedule = schedules.get(options.schedule)
+    if options.check_schedule:
+        schedule = schedules.Checked(schedule)
     planes = sample.planes(machine)
     run = _Run(machine, sample, planes, shape, offsets, options, schedule, seed, levels, callback)
     meter = Meter(_expected_work(run))
@@ -219,16 +228,17 @@ def synthesize(
         stages.append(Stage(number, _picture(run, level, field)))
         meter.end()
 
-    source = machine.get(field.source)
-    image = sample.picture(machine.get(field.values), source)
+    values, source, temperatures = (Grid(*shape).view(machine.get(plane)) for plane in field)
+    image = sample.picture(values, source)
     statistics = {
         "device": machine.name,
         "seed": seed,
-        "options": asdict(options) | {"levels": levels},
+        "options": {f.name: getattr(options, f.name) for f in fields(Options)}
+        | {"levels": levels, "schedule": schedule.name},
         "seconds": meter.seconds,
         "levels": meter.reports,
     }
-    return image, Output(sample.place(source), machine.get(field.temperature) / 1024, stages, statistics)
+    return image, Output(sample.place(source), temperatures / 1024, stages, statistics)
 
 
 def _level(run: _Run, number: int) -> _Level:
@@ -253,28 +263,33 @@ def _sweep(
     phase: str,
     meter: Meter,
 ) -> tuple[Field, Any]:
-    """Relax every site with t > 0 once, or, in the phase ``"free"``, every site."""
+    """Relax about as many sites as have t > 0, or, in the phase ``"free"``, as there are: a sweep of the schedule."""
     machine, schedule = run.machine, run.schedule
-    active = temperatures > 0 if phase == "relax" else np.ones(temperatures.shape, bool)
+    everywhere = np.ones(temperatures.shape, bool)
 
-    def wanting() -> NDArray[np.bool_]:
-        return active
+    def active() -> NDArray[np.bool_]:
+        return _temperatures(run, level, field) > 0 if phase == "relax" else everywhere
 
     left = float(temperatures.mean()) / 1024 if phase == "relax" else 0.0
-    meter.sweep(left)
-    wanted, relaxed = int(active.sum()), 0
+    sweep = meter.sweep(phase, left)
+    wanted, relaxed = int((temperatures > 0).sum()) if phase == "relax" else everywhere.size, 0
     neighbours, channels = len(run.offsets), run.sample.channels
     size = machine.chunk(level.candidates.size, neighbours, channels)
+    old = False
     while True:
-        state, info = schedule.step(state, wanting)  # 6.2.1
+        state, info = schedule.step(state, active)  # 6.2.1
+        grid = replace(level.grid, tile=info.tile)
+        if info.tile and not old:  # what tiles see of one another until the sweep ends
+            field, old = Field(*(snapshot(machine, plane, grid.height) for plane in field)), True
         pieces = [info.sites[i : i + size] for i in range(0, len(info.sites), size)]  # what scratch memory holds
         outcomes = []
+        step = meter.step()
         for sites in pieces:  # 6.2.2
-            outcomes.append(_relax(run, level, field, sites, info.sweep))
+            outcomes.append(_relax(run, level, grid, field, sites, info.key))
             work = 2 * level.candidates.size * neighbours * channels * len(sites)
             machine.sync(work)
             relaxed += len(sites)
-            meter.add(len(sites), work, relaxed / wanted)
+            meter.add(len(sites), work, min(1.0, relaxed / wanted))
             complete = sites is pieces[-1]
             if complete:
                 for outcome in outcomes:  # no site sees another of its step
@@ -283,19 +298,18 @@ def _sweep(
                 last = info.last and complete
                 image = partial(_picture, run, level, field)
                 warmth = partial(_warmth, run, level, field)
-                run.callback(
-                    Progress(level.number, run.levels, info.sweep, phase, left, last, meter.fraction, image, warmth)
-                )
+                where = (level.number, run.levels, sweep, step, phase, left)
+                run.callback(Progress(*where, last, meter.fraction, image, warmth))
         if info.last:
             return field, state
 
 
 def _relax(
-    run: _Run, level: _Level, field: Field, sites: NDArray[np.int32], sweep: int
+    run: _Run, level: _Level, grid: Grid, field: Field, sites: NDArray[np.int32], key: int
 ) -> tuple[Array, lcpdf.Relaxed, Array]:
     """Steps 6.2.2.1 to 6.2.2.3 for sites that relax together: the sites, what they take, and how warm they are."""
     machine, options = run.machine, run.options
-    number, grid, offsets, candidates, window, relaxation = level
+    number, _, offsets, candidates, window, relaxation = level
     here = machine.put(sites)
     near = neighbourhood(machine, here, field, offsets, grid)  # 6.2.2.1
     distances = lcpdf.distance(machine, near, candidates)
@@ -304,7 +318,7 @@ def _relax(
         distances = coherence(machine, distances, candidates, here, field, offsets, grid, favour)
     density = options.pixel == "density"
     if relaxation == "gibbs":  # 6.2.2.2
-        relaxed = lcpdf.draw(machine, distances, candidates, here, window, density, run.seed, number, sweep)
+        relaxed = lcpdf.draw(machine, distances, candidates, here, window, density, run.seed, number, key)
     elif not density:
         relaxed = lcpdf.best(machine, distances, candidates)
     elif run.sample.channels == 1 and window.top == 255:

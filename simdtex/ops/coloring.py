@@ -18,16 +18,11 @@ if TYPE_CHECKING:
 UNCOLORED = -1
 
 
-def _flat(grid: Grid) -> Grid:
-    """The level's grid as a lattice of its own."""
-    return Grid(grid.rows, grid.cols, 1, grid.torus)
-
-
 def _lattice_reference(grid: Grid, offsets: NDArray[np.int32], pattern: Sublattice) -> NDArray[np.int32]:
     site = np.arange(grid.rows * grid.cols, dtype=np.int32)
     row, col = np.divmod(site, grid.cols)
     own = (row - col // pattern.c * pattern.b) % pattern.a * pattern.c + col % pattern.c
-    r = _flat(grid).neighbours(site, offsets)
+    r = grid.flat.neighbours(site, offsets)
     clash = ((r >= 0) & (r < site) & (own[r] == own)).any(0)
     colors: NDArray[np.int32] = np.where(clash, UNCOLORED, own).astype(np.int32)
     return colors.reshape(grid.rows, grid.cols)
@@ -52,7 +47,7 @@ def _greedy_reference(
 ) -> NDArray[np.int32]:
     flat = colors.ravel()
     bare = np.flatnonzero(flat == UNCOLORED).astype(np.int32)
-    r = _flat(grid).neighbours(bare, offsets)
+    r = grid.flat.neighbours(bare, offsets)
     priority = random.draw4(seed, 0, 0, np.arange(flat.size), random.COLOR)[0].astype(np.int64)
     own, other = priority[bare], priority[r]
     rival = (r >= 0) & (flat[r] == UNCOLORED) & ((other > own) | ((other == own) & (r > bare)))

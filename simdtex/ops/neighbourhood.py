@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from math import prod
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -52,7 +53,7 @@ def _launch(machine: OpenCL, sites: Array, field: Field, offsets: Array, grid: G
         machine.kernel("neighbourhood", "neighbourhood"),
         (padded, neighbours),
         *(sites, np.int32(count), np.int32(padded), field.values, field.temperature),
-        *(np.int32(channels), np.int32(grid.plane), offsets, *grid.args, confidence, weighted),
+        *(np.int32(channels), np.int32(prod(field.values.shape[1:])), offsets, *grid.args, confidence, weighted),
     )
     return Neighbourhoods(confidence, weighted, count)
 

@@ -1,55 +1,102 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parallel schedules: which sites relax together.
 
-A schedule is a pair of pure functions. ``init`` takes the lattice of a level and gives a `State`; ``step`` takes a
+A schedule is a pair of pure functions. ``init`` takes the lattice of a level and gives a state; ``step`` takes a
 state and gives the next one and an `Info` with the sites to relax now. The counters in the state key every
 random choice, so a schedule never depends on the device.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from importlib.metadata import entry_points
 
-import numpy as np
-from numpy.typing import NDArray
+from simdtex.schedules.partition import Block, Checkerboard, Coloring, FixedColoring, Partition, Raster, Synchronous
+from simdtex.schedules.scattered import Luby, RandomScan, RandomSubset, Scattered
+from simdtex.schedules.schedule import Active, Checked, Info, Schedule, neighbours_in
 
-from simdtex.lattice import Grid
+__all__ = [
+    "SCHEDULES",
+    "Active",
+    "Block",
+    "Checked",
+    "Checkerboard",
+    "Coloring",
+    "FixedColoring",
+    "Info",
+    "Luby",
+    "Partition",
+    "RandomScan",
+    "RandomSubset",
+    "Raster",
+    "Scattered",
+    "Schedule",
+    "Synchronous",
+    "get",
+    "neighbours_in",
+]
+
+SCHEDULES: dict[str, Callable[[], Schedule]] = {
+    "coloring": Coloring,
+    "coloring-fixed": FixedColoring,
+    "luby": Luby,
+    "checkerboard": Checkerboard,
+    "synchronous": Synchronous,
+    "random-subset": RandomSubset,
+    "raster": Raster,
+    "random-scan": RandomScan,
+    "block": Block,
+}
+"""The schedules by name."""
+
+GROUP = "simdtex.schedules"
+"""Entry points of this group are schedules too: packages can bring their own."""
 
 
-class Info(NamedTuple):
-    """What a step decided.
+def get(schedule: str | Schedule) -> Schedule:
+    """The schedule of a name.
 
-    ``sites`` (S,) int32 pixel indices that relax together; ``sweep`` the sweep this step belongs to;
-    ``last`` whether the sweep ends with it.
+    Parameters
+    ----------
+    schedule : str or Schedule
+        A key of `SCHEDULES`; ``"random-subset:P"`` or ``"block:ROWSxCOLS"``; the name of an entry point of the group
+        ``simdtex.schedules``; or a schedule, which is returned as it is.
+
+    Raises
+    ------
+    ValueError
+        There is no such schedule; the sentence lists the valid names.
     """
-
-    sites: NDArray[np.int32]
-    sweep: int
-    last: bool
-
-
-class Schedule(Protocol):
-    """A parallel schedule."""
-
-    name: str
-    independent: bool
-    """Whether every step's sites are i.i.d. in the sense of equation (14)."""
-
-    def init(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int) -> Any:
-        """The state before the first sweep of a level."""
-        ...
-
-    def step(self, state: Any, active: Callable[[], NDArray[np.bool_]]) -> tuple[Any, Info]:
-        """The next step. ``active()`` tells, per site of the grid, whether it still wants relaxing."""
-        ...
+    if not isinstance(schedule, str):
+        if not all(callable(getattr(schedule, part, None)) for part in ("init", "step", "independent")):
+            raise TypeError(
+                f"a schedule must be a name, or an object with init, step and independent, not {schedule!r}"
+            )
+        return schedule
+    name, colon, parameter = schedule.partition(":")
+    if colon and name in _WITH_PARAMETER:
+        return _WITH_PARAMETER[name](parameter)
+    if schedule in SCHEDULES:
+        return SCHEDULES[schedule]()
+    brought = {entry.name: entry for entry in entry_points(group=GROUP)}
+    if schedule in brought:
+        return get(brought[schedule].load()())
+    raise ValueError(f"unknown schedule {schedule!r}; choose one of: {', '.join([*SCHEDULES, *brought])}")
 
 
-def get(name: str) -> Schedule:
-    """The schedule of a name; ValueError with the valid ones where there is none."""
-    from simdtex.schedules.coloring import Coloring
+def _random_subset(text: str) -> Schedule:
+    try:
+        return RandomSubset(float(text))
+    except ValueError:
+        raise ValueError(f"{text!r} is no share of sites; give one above 0 and up to 1: random-subset:0.5") from None
 
-    schedules: dict[str, Schedule] = {"coloring": Coloring()}
-    if name not in schedules:
-        raise ValueError(f"unknown schedule {name!r}; choose one of: {', '.join(schedules)}")
-    return schedules[name]
+
+def _block(text: str) -> Schedule:
+    sides = re.fullmatch(r"([1-9]\d{0,8})x([1-9]\d{0,8})", text)
+    if not sides:
+        raise ValueError(f"{text!r} is no size of a tile; give rows x columns from 1x1 up: block:16x16")
+    return Block(int(sides[1]), int(sides[2]))
+
+
+_WITH_PARAMETER = {"random-subset": _random_subset, "block": _block}

@@ -1,58 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command line: ``simdtex synth``, ``simdtex devices``, ``simdtex demo``."""
+"""``simdtex synth``: more of a texture."""
 
 from __future__ import annotations
 
-import functools
-import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from simdtex import __version__
+from simdtex.cli.common import DEVICE, check_distinct, plainly, progress_bar
 from simdtex.methods.mrf import Options
 
 DEFAULTS = Options()
 
 
-def plainly(command: Callable[..., None]) -> Callable[..., None]:
-    """Turn bad input into one sentence and exit code 2, and Ctrl-C into exit code 130."""
-
-    @functools.wraps(command)
-    def wrapped(*args: Any, **kwargs: Any) -> None:
-        try:
-            command(*args, **kwargs)
-        except (ValueError, TypeError, OSError) as error:
-            click.echo(f"simdtex: {error}", err=True)
-            sys.exit(2)
-        except KeyboardInterrupt:
-            click.echo("simdtex: stopped; nothing but stages may have been written", err=True)
-            sys.exit(130)
-
-    return wrapped
-
-
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
-@click.version_option(__version__, prog_name="simdtex")
-def main() -> None:
-    """More of a texture from a sample of it, by parallel relaxation on any OpenCL device."""
-
-
-DEVICE = click.option(
-    "--device",
-    metavar="TEXT",
-    help="Part of a device's name or platform, an index of `simdtex devices`, or `reference`. "
-    "Default: SIMDTEX_DEVICE, else a GPU, else a CPU.",
-)
-
-
-@main.command()
+@click.command()
 @click.argument("sample", type=click.Path(path_type=Path))
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Picture to write.")
 @click.option("--size", metavar="WIDTHxHEIGHT", help="Of the output, in pixels. Default: twice the sample.")
@@ -73,7 +36,12 @@ DEVICE = click.option(
 @click.option("--phases", help=f"decimated or all: candidates at coarse levels.  [{DEFAULTS.phases}]")
 @click.option("--edges", help=f"auto, reflect or whole: candidates at the sample's edge.  [{DEFAULTS.edges}]")
 @click.option("--coarsest", help=f"gibbs or same: how the coarsest level relaxes.  [{DEFAULTS.coarsest}]")
-@click.option("--schedule", help=f"Which sites relax together: coloring.  [{DEFAULTS.schedule}]")
+@click.option(
+    "--schedule",
+    help="Which sites relax together: coloring, coloring-fixed, luby, checkerboard, synchronous, random-subset[:P], "
+    f"raster, random-scan or block[:ROWSxCOLS].  [{DEFAULTS.schedule}]",
+)
+@click.option("--check-schedule", is_flag=True, default=None, help="Check equation (14) at every step.")
 @click.option("--boundary", help=f"torus (the result tiles) or open.  [{DEFAULTS.boundary}]")
 @click.option("--seed", type=int, help="Same seed, same picture on every device.  [a fresh one, printed]")
 @DEVICE
@@ -116,12 +84,12 @@ def synth(
         image.check_writable(source_map, suffixes=maps.SOURCE_SUFFIXES)
     others = [_other_map(text, (height, width)) for text in also]
     outputs = [output, *([source_map] if source_map else []), *(path for _, path in others)]
-    _check_distinct(outputs, [sample, *(Path(text.partition("=")[0]) for text in also)])
+    check_distinct(outputs, [sample, *(Path(text.partition("=")[0]) for text in also)])
     writer = StageWriter(stages, limits=(float(pixels.min()), float(pixels.max()))) if stages else None
 
     began = time.perf_counter()
     try:
-        with _progress(quiet) as show:
+        with progress_bar(quiet) as show:
 
             def callback(progress: Any) -> None:
                 show(progress)
@@ -155,52 +123,6 @@ def synth(
         )
 
 
-@main.command()
-@plainly
-def devices() -> None:
-    """List every OpenCL device, whether it works, and which one would be chosen."""
-    from simdtex.device import render
-
-    render(Console(width=None if sys.stdout.isatty() else 200))
-
-
-@main.command()
-@click.option(
-    "-o", "--output", default="demo", show_default=True, type=click.Path(path_type=Path), help="Folder to write."
-)
-@click.option("--size", default="256x256", show_default=True, metavar="WIDTHxHEIGHT", help="Of each output.")
-@click.option("--seed", type=int, default=1, show_default=True)
-@DEVICE
-@plainly
-def demo(output: Path, size: str, seed: int, device: str | None) -> None:
-    """Synthesise brick, grass and gravel from scikit-image's own pictures."""
-    from skimage import data
-
-    from simdtex import image
-    from simdtex.machine import open_machine
-    from simdtex.report.sheet import contact_sheet
-    from simdtex.synthesis import synthesize
-
-    shape = image.parse_size(size)
-    if output.exists() and not output.is_dir():
-        raise ValueError(f"{output} is a file; give --output a folder")
-    machine = open_machine(device)
-    click.echo(f"device: {machine.name}")
-    output.mkdir(parents=True, exist_ok=True)
-    pictures = []
-    for name in ("brick", "grass", "gravel"):
-        sample = getattr(data, name)()[:128, :128]
-        began = time.perf_counter()
-        with _progress(quiet=False) as show:
-            made = synthesize(sample, shape, rng=seed, device=machine, callback=show)
-        seconds = time.perf_counter() - began
-        image.write(output / f"{name}.png", made)
-        pictures += [(f"{name}, the sample", sample), (f"{name}, {seconds:.1f} s", made)]
-        click.echo(f"{output / name}.png: {shape[1]}x{shape[0]} from 128x128 in {seconds:.1f} s")
-    contact_sheet(pictures, output / "sheet.png", columns=2)
-    click.echo(f"all of them: {output / 'sheet.png'}")
-
-
 def _other_map(text: str, sample: tuple[int, int]) -> tuple[Any, Path]:
     """Read the map of ``--also MAP=OUT`` and check that it can be carried over and written."""
     from simdtex import image
@@ -217,40 +139,3 @@ def _other_map(text: str, sample: tuple[int, int]) -> tuple[Any, Path]:
         )
     image.check_writable(out, pixels.dtype, 1 if other.channel_axis is None else pixels.shape[-1])
     return pixels, Path(out)
-
-
-def _check_distinct(outputs: list[Path], inputs: list[Path]) -> None:
-    """Raise where an output would overwrite another or an input."""
-    resolved = [path.resolve() for path in outputs]
-    for path in outputs:
-        if resolved.count(path.resolve()) > 1:
-            raise ValueError(f"{path} would be written twice; give each output a file of its own")
-        if path.resolve() in [other.resolve() for other in inputs]:
-            raise ValueError(f"{path} is an input and would be overwritten; give the output another name")
-
-
-@contextmanager
-def _progress(quiet: bool) -> Iterator[Callable[[Any], None]]:
-    """A progress bar, where there is a terminal, with level, sweep, temperature left and time left."""
-    if quiet:
-        yield lambda progress: None
-        return
-    console = Console(stderr=True)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("starting", total=1.0)
-
-        def show(progress: Any) -> None:
-            bar.update(
-                task,
-                completed=progress.fraction,
-                description=f"level {progress.level}, sweep {progress.sweep}, "
-                f"temperature {progress.temperature_left:.3f}",
-            )
-
-        yield show

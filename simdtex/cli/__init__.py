@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The command line: ``simdtex synth``, ``simdtex devices``, ``simdtex demo``."""
+
+from __future__ import annotations
+
+import click
+
+from simdtex import __version__
+from simdtex.cli.demo import demo
+from simdtex.cli.devices import devices
+from simdtex.cli.synth import synth
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="simdtex")
+def main() -> None:
+    """More of a texture from a sample of it, by parallel relaxation on any OpenCL device."""
+
+
+for command in (synth, devices, demo):
+    main.add_command(command)

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex demo``: the first thing to run."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import click
+
+from simdtex.cli.common import DEVICE, plainly, progress_bar
+
+
+@click.command()
+@click.option(
+    "-o", "--output", default="demo", show_default=True, type=click.Path(path_type=Path), help="Folder to write."
+)
+@click.option("--size", default="256x256", show_default=True, metavar="WIDTHxHEIGHT", help="Of each output.")
+@click.option("--seed", type=int, default=1, show_default=True)
+@DEVICE
+@plainly
+def demo(output: Path, size: str, seed: int, device: str | None) -> None:
+    """Synthesise brick, grass and gravel from scikit-image's own pictures."""
+    from skimage import data
+
+    from simdtex import image
+    from simdtex.machine import open_machine
+    from simdtex.report.sheet import contact_sheet
+    from simdtex.synthesis import synthesize
+
+    shape = image.parse_size(size)
+    if output.exists() and not output.is_dir():
+        raise ValueError(f"{output} is a file; give --output a folder")
+    machine = open_machine(device)
+    click.echo(f"device: {machine.name}")
+    output.mkdir(parents=True, exist_ok=True)
+    pictures = []
+    for name in ("brick", "grass", "gravel"):
+        sample = getattr(data, name)()[:128, :128]
+        began = time.perf_counter()
+        with progress_bar(quiet=False) as show:
+            made = synthesize(sample, shape, rng=seed, device=machine, callback=show)
+        seconds = time.perf_counter() - began
+        image.write(output / f"{name}.png", made)
+        pictures += [(f"{name}, the sample", sample), (f"{name}, {seconds:.1f} s", made)]
+        click.echo(f"{output / name}.png: {shape[1]}x{shape[0]} from 128x128 in {seconds:.1f} s")
+    contact_sheet(pictures, output / "sheet.png", columns=2)
+    click.echo(f"all of them: {output / 'sheet.png'}")

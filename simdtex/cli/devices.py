@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex devices``: what there is to compute on."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+from rich.console import Console
+
+from simdtex.cli.common import plainly
+
+
+@click.command()
+@plainly
+def devices() -> None:
+    """List every OpenCL device, whether it works, and which one would be chosen."""
+    from simdtex.device import render
+
+    render(Console(width=None if sys.stdout.isatty() else 200))

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A random maximal set of sites without neighbours, equation (14), by the rounds of Luby (1986)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex import random
+from simdtex.lattice import Grid
+from simdtex.ops.operation import Array, Operation
+
+if TYPE_CHECKING:
+    from simdtex.machine.opencl import OpenCL
+
+UNDECIDED, IN, OUT = 0, 1, 2
+
+
+def _reference(
+    grid: Grid, offsets: NDArray[np.int32], active: NDArray[np.uint8], seed: int, level: int, count: int
+) -> NDArray[np.uint8]:
+    priority = random.draw4(seed, level, count, np.arange(active.size), random.SCHEDULE)[0].astype(np.int64)
+    state = np.where(active.ravel(), UNDECIDED, OUT).astype(np.uint8)
+    while (undecided := np.flatnonzero(state == UNDECIDED).astype(np.int32)).size:
+        r = grid.flat.neighbours(undecided, offsets)
+        there = r >= 0
+        beaten = there & (state[r] == IN)
+        above = (priority[r] > priority[undecided]) | ((priority[r] == priority[undecided]) & (r > undecided))
+        rival = there & (state[r] == UNDECIDED) & above
+        state[undecided] = np.where(beaten.any(0), OUT, np.where(rival.any(0), UNDECIDED, IN))
+    chosen: NDArray[np.uint8] = (state == IN).astype(np.uint8)
+    return chosen.reshape(active.shape)
+
+
+def _launch(
+    machine: OpenCL, grid: Grid, offsets: Array, active: Array, seed: int, level: int, count: int
+) -> NDArray[np.uint8]:
+    sites = grid.rows * grid.cols
+    priority = machine.empty((sites,), np.uint32)
+    state, following = (machine.empty((grid.rows, grid.cols), np.uint8) for _ in range(2))
+    machine.launch(
+        machine.kernel("luby", "luby_priority"),
+        (sites,),
+        *(np.int32(sites), np.uint64(seed), np.uint32(level), np.uint32(count), active, priority, state),
+    )
+    while True:
+        host = machine.get(state)
+        if not (host == UNDECIDED).any():
+            chosen: NDArray[np.uint8] = (host == IN).astype(np.uint8)
+            return chosen
+        machine.launch(
+            machine.kernel("luby", "luby_round"),
+            (sites,),
+            *(*grid.args, offsets, np.int32(offsets.shape[0]), priority, state, following),
+        )
+        state, following = following, state
+
+
+luby = Operation("luby", _reference, _launch)
+"""``luby(machine, grid, offsets, active, seed, level, count)``.
+
+``active`` (rows, cols) uint8 says which sites may be members. Returns such an array of the members, on the host: a
+schedule wants them there. The set is that of the greedy choice in the order of priorities, so it does not depend on
+the rounds. Cost: O(rows cols N) a round, some 5 to 10 rounds.
+"""
