@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma OPENCL FP_CONTRACT OFF
+#include "common/lanes.h"
 #include "common/lattice.h"
 
 #ifndef BLOCK
@@ -20,10 +21,10 @@ __kernel void coherence(__global const int *restrict sites, const int S, const i
                         __global const int *restrict source, __global const ushort *restrict temperature,
                         __global const int2 *restrict offsets, const int N, GRID, __global const int *restrict index_of,
                         const int sample_rows, const int sample_cols, const float favour,
-                        __global float *restrict distance, __global float *restrict nearest)
+                        __global float *restrict distance, __global float *restrict nearest LANES_ARG)
 {
-    const int s = get_global_id(0);
-    if (s >= S)
+    const int s = LANE;
+    if (IDLE(s))
         return;
     const int i = ROW_OF(sites[s]), j = COL_OF(sites[s]);
     for (int k = 0; k < N; ++k) {

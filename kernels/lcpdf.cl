@@ -8,6 +8,7 @@
 // no work-group size, chunking or reduction can change a draw. A weight below 2^-40 of the largest is zero by this definition.
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/exp.h"
+#include "common/lanes.h"
 #include "common/philox.h"
 #include "common/vector.h"
 
@@ -34,42 +35,44 @@ __kernel void lcpdf_distance(__global const float *restrict confidence, __global
                              const int N, const int P, __global const float *restrict sample, const int plane,
                              __global const int *restrict candidates, const int count,
                              __global const int *restrict reach, const int blocks,
-                             __global float *restrict distance, __global float *restrict nearest)
+                             __global float *restrict distance, __global float *restrict nearest LANES_ARG)
 {
-    const int s = get_global_id(0) * V;
-    const int block = get_global_id(1);
-    if (s >= P || block >= blocks)
+    const int s = LANE * V;
+    if (s < 0 || s >= P)
         return;
-    vec least = INFINITY;
-    for (int p = block * BLOCK; p < (block + 1) * BLOCK; p += STEP) {
-        __global const float *y[STEP];
-        vec d[STEP];
+    ALONG(block, blocks)
+    {
+        vec least = INFINITY;
+        for (int p = block * BLOCK; p < (block + 1) * BLOCK; p += STEP) {
+            __global const float *y[STEP];
+            vec d[STEP];
 #pragma unroll
-        for (int q = 0; q < STEP; ++q) {
-            y[q] = sample + candidates[p + q];
-            d[q] = 0.0f;
-        }
-        for (int k = 0; k < N; ++k) {
-            const int o = reach[k];
-            const vec u = LOAD(confidence + k * P + s);
+            for (int q = 0; q < STEP; ++q) {
+                y[q] = sample + candidates[p + q];
+                d[q] = 0.0f;
+            }
+            for (int k = 0; k < N; ++k) {
+                const int o = reach[k];
+                const vec u = LOAD(confidence + k * P + s);
 #pragma unroll
-            for (int c = 0; c < C; ++c) {
-                const vec xu = LOAD(weighted + (k * C + c) * P + s);
+                for (int c = 0; c < C; ++c) {
+                    const vec xu = LOAD(weighted + (k * C + c) * P + s);
 #pragma unroll
-                for (int q = 0; q < STEP; ++q) {
-                    const vec e = fma((vec)(-y[q][c * plane + o]), u, xu);
-                    d[q] = fma(e, e, d[q]);
+                    for (int q = 0; q < STEP; ++q) {
+                        const vec e = fma((vec)(-y[q][c * plane + o]), u, xu);
+                        d[q] = fma(e, e, d[q]);
+                    }
                 }
             }
-        }
 #pragma unroll
-        for (int q = 0; q < STEP; ++q) {
-            const vec dq = p + q < count ? d[q] : (vec)INFINITY;
-            STORE(dq, distance + (p + q) * P + s);
-            least = fmin(least, dq);
+            for (int q = 0; q < STEP; ++q) {
+                const vec dq = p + q < count ? d[q] : (vec)INFINITY;
+                STORE(dq, distance + (p + q) * P + s);
+                least = fmin(least, dq);
+            }
         }
+        STORE(least, nearest + block * P + s);
     }
-    STORE(least, nearest + block * P + s);
 }
 
 // Distances that coherence has divided carry the sign bit as a mark.
@@ -133,10 +136,10 @@ __kernel void lcpdf_draw(__global const float *restrict distance, __global const
                          __global const int *restrict candidates, __global const int *restrict sites,
                          const ulong seed, const uint level, const uint sweep, __global const uint *restrict noise,
                          const int radius, const int top, __global int *restrict choice,
-                         __global ushort *restrict values)
+                         __global ushort *restrict values LANES_ARG)
 {
-    const int s = get_global_id(0);
-    if (s >= S)
+    const int s = LANE;
+    if (IDLE(s))
         return;
     const float smallest = smallest_of(nearest, blocks, P, s);
 #define MASS(p) mass_of(DISTANCE(p), smallest, scale, sample, plane, candidates[p], noise, radius, top)
@@ -180,10 +183,10 @@ __kernel void lcpdf_draw(__global const float *restrict distance, __global const
 __kernel void lcpdf_best(__global const float *restrict distance, __global const float *restrict nearest,
                          const int blocks, const int S, const int P, __global const float *restrict sample,
                          const int plane, __global const int *restrict candidates, __global int *restrict choice,
-                         __global ushort *restrict values)
+                         __global ushort *restrict values LANES_ARG)
 {
-    const int s = get_global_id(0);
-    if (s >= S)
+    const int s = LANE;
+    if (IDLE(s))
         return;
     const float smallest = smallest_of(nearest, blocks, P, s);
     int p = 0;
@@ -218,10 +221,10 @@ __kernel void lcpdf_mode(__global const float *restrict distance, __global const
                          const int blocks, const int S, const int P, const float scale,
                          __global const float *restrict sample, const int plane,
                          __global const int *restrict candidates, __global const float *restrict window,
-                         const int radius, __global int *restrict choice, __global ushort *restrict values)
+                         const int radius, __global int *restrict choice, __global ushort *restrict values LANES_ARG)
 {
-    const int s = get_global_id(0);
-    if (s >= S)
+    const int s = LANE;
+    if (IDLE(s))
         return;
     const float smallest = smallest_of(nearest, blocks, P, s);
     ulong weights[LEVELS];
@@ -274,10 +277,10 @@ __kernel void lcpdf_mode_vector(__global const float *restrict distance, __globa
                                 const int blocks, const int S, const int P, const float scale,
                                 __global const float *restrict sample, const int plane,
                                 __global const int *restrict candidates, __global int *restrict choice,
-                                __global ushort *restrict values)
+                                __global ushort *restrict values LANES_ARG)
 {
-    const int s = get_global_id(0);
-    if (s >= S)
+    const int s = LANE;
+    if (IDLE(s))
         return;
     const float smallest = smallest_of(nearest, blocks, P, s);
     ulong heaviest[HEAVIEST];
@@ -332,10 +335,10 @@ __kernel void lcpdf_table(__global const float *restrict distance, __global cons
                           const int blocks, const int S, const int P, const float scale,
                           __global const float *restrict sample, __global const int *restrict candidates,
                           __global const float *restrict window, const int radius, const int levels,
-                          __global ulong *restrict mass, __global float *restrict table)
+                          __global ulong *restrict mass, __global float *restrict table LANES_ARG)
 {
-    const int s = get_global_id(0);
-    if (s >= S)
+    const int s = LANE;
+    if (IDLE(s))
         return;
     const float smallest = smallest_of(nearest, blocks, P, s);
     __global ulong *m = mass + (size_t)s * levels;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma OPENCL FP_CONTRACT OFF
+#include "common/lanes.h"
 #include "common/lattice.h"
 
 // The neighbourhoods of the sites to relax, ready for the distance of equation (12).
@@ -16,20 +17,20 @@
 // One work-item per (site, neighbour).
 __kernel void neighbourhood(__global const int *restrict sites, const int S, const int P,
                             __global const ushort *restrict values, __global const ushort *restrict temperature,
-                            const int channels, const int plane, __global const int2 *restrict offsets, GRID,
-                            __global float *restrict confidence, __global float *restrict weighted)
+                            const int channels, const int plane, __global const int2 *restrict offsets, const int N, GRID,
+                            __global float *restrict confidence, __global float *restrict weighted LANES_ARG)
 {
-    const int s = get_global_id(0), k = get_global_id(1);
-    if (s >= P)
+    const int s = LANE;
+    if (s < 0 || s >= P)
         return;
-    int r = -1;
-    if (s < S) {
-        const int i = ROW_OF(sites[s]), j = COL_OF(sites[s]);
+    const int site = s < S ? sites[s] : 0, i = ROW_OF(site), j = COL_OF(site);
+    ALONG(k, N)
+    {
         const int2 o = offsets[k];
-        r = neighbour(i, j, o.x, o.y, HERE);
+        const int r = s < S ? neighbour(i, j, o.x, o.y, HERE) : -1;
+        const float u = r < 0 ? 0.0f : (float)(1024 - temperature[r]) * 0x1p-10f;
+        confidence[k * P + s] = u;
+        for (int c = 0; c < channels; ++c)
+            weighted[(k * channels + c) * P + s] = r < 0 ? 0.0f : (float)values[c * plane + r] * u;
     }
-    const float u = r < 0 ? 0.0f : (float)(1024 - temperature[r]) * 0x1p-10f;
-    confidence[k * P + s] = u;
-    for (int c = 0; c < channels; ++c)
-        weighted[(k * channels + c) * P + s] = r < 0 ? 0.0f : (float)values[c * plane + r] * u;
 }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "common/lanes.h"
 #include "common/lattice.h"
 
 // Equation (13): t_s = max(0, (xi + sum of t_r over r in N_s) / |N_s|), in whole 1/1024, rounded down.
@@ -9,10 +10,10 @@
 // One work-item per site.
 __kernel void temperature(__global const int *restrict sites, const int S,
                           __global const ushort *restrict temperature, __global const int2 *restrict offsets,
-                          const int N, GRID, const int xi, __global ushort *restrict cooled)
+                          const int N, GRID, const int xi, __global ushort *restrict cooled LANES_ARG)
 {
-    const int s = get_global_id(0);
-    if (s >= S)
+    const int s = LANE;
+    if (IDLE(s))
         return;
     const int i = ROW_OF(sites[s]), j = COL_OF(sites[s]);
     int sum = xi, members = 0;

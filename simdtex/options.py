@@ -16,6 +16,12 @@ def one_of(name: str, value: Any, valid: Iterable[str]) -> None:
         raise ValueError(f"unknown {name} {value!r}; choose one of: {', '.join(valid)}")
 
 
+def true_or_false(name: str, value: Any) -> None:
+    """Raise TypeError unless the value is True or False."""
+    if not isinstance(value, bool):
+        raise TypeError(f"{name} must be True or False, not {value!r}")
+
+
 def whole(name: str, value: Any, least: int) -> None:
     """Raise unless the value is a whole number of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, Integral):

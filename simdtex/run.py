@@ -76,10 +76,18 @@ class Output:
     stages : list of Stage
         Each level's picture at its end, the coarsest first.
     statistics : dict
-        ``device``, ``seed``, ``options``, ``seconds``, and ``levels``: one dict per level with
+        ``device``, ``seed``, ``options``, ``seconds``, ``device_seconds`` (of kernels; None unless the machine was
+        opened with ``profile=True``), ``accounting``, and ``levels``: one dict per level with
         ``level``, ``rows``, ``cols``, ``candidates``, ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation
         (12)), ``seconds``, and ``equilibrium``: the ``sweeps``, ``steps`` and ``relaxations`` until no temperature
-        was left, free sweeps not counted.
+        was left, free sweeps not counted. ``accounting`` is what the run costs on a processor array, or, where none
+        was given, packed on a full MP-1: ``array``, ``mapping``, ``emulated``; ``layers``, virtual layers; ``shifts``,
+        X-Net shifts of a word that bring every pixel of the finest level all its neighbours, for either mapping;
+        ``steps``; ``passes``, SIMD passes: one for each virtual layer of a step that has an active site; ``active``, the
+        mean number of active PEs per pass; ``utilisation``, that over all PEs; ``sites``, relaxations; ``moved``, words
+        that each PE shifted; ``routed``, words through the router; ``flop``, 32-bit operations in the distances;
+        ``model_seconds``, the time of a MasPar MP-1 by the model of `simdtex.machine.accounting.Account`; and
+        ``launches``, kernels enqueued on the device.
     """
 
     source: NDArray[Any]

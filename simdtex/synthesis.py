@@ -72,7 +72,7 @@ def synthesize(
     **options
         Of the method: ``preset``, ``order``, ``levels``, ``relaxation``, ``bandwidth``, ``coherence``, ``xi``,
         ``free_sweeps``, ``pixel``, ``phases``, ``edges``, ``coarsest``, ``schedule``, ``check_schedule``,
-        ``boundary``; see `simdtex.methods.mrf.Options`.
+        ``boundary``, ``array``, ``mapping``, ``emulate``; see `simdtex.methods.mrf.Options`.
 
     Returns
     -------

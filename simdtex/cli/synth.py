@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from rich.console import Console
 
 from simdtex.cli.common import DEVICE, check_distinct, plainly, progress_bar
 from simdtex.methods.mrf import Options
@@ -43,6 +44,14 @@ DEFAULTS = Options()
 )
 @click.option("--check-schedule", is_flag=True, default=None, help="Check equation (14) at every step.")
 @click.option("--boundary", help=f"torus (the result tiles) or open.  [{DEFAULTS.boundary}]")
+@click.option(
+    "--array", metavar="ROWSxCOLS", help="Run on a processor array, or maspar-mp1-1k to -16k.  [sites are packed]"
+)
+@click.option("--mapping", help=f"cut-and-stack or hierarchical: how pixels lie on the array.  [{DEFAULTS.mapping}]")
+@click.option(
+    "--emulate/--no-emulate", default=None, help="Launch one work-item per PE, or only account for the array."
+)
+@click.option("--accounting", is_flag=True, help="Print what the run costs on the array, or on a full MP-1.")
 @click.option("--seed", type=int, help="Same seed, same picture on every device.  [a fresh one, printed]")
 @DEVICE
 @click.option("--stages", type=click.Path(path_type=Path), metavar="DIR", help="Write every level and sweep.")
@@ -65,12 +74,14 @@ def synth(
     stages: Path | None,
     source_map: Path | None,
     also: tuple[str, ...],
+    accounting: bool,
     quiet: bool,
     **options: Any,
 ) -> None:
     """Make more of the texture SAMPLE."""
     from simdtex import image
     from simdtex import source_map as maps
+    from simdtex.report.accounting import render
     from simdtex.report.stages import StageWriter
     from simdtex.synthesis import synthesize
 
@@ -121,6 +132,8 @@ def synth(
             f"{output}: {shape[1]}x{shape[0]} from {width}x{height} in {time.perf_counter() - began:.1f} s "
             f"on {run.statistics['device']}, seed {run.statistics['seed']}"
         )
+    if accounting:
+        render(run.statistics["accounting"], Console())
 
 
 def _other_map(text: str, sample: tuple[int, int]) -> tuple[Any, Path]:

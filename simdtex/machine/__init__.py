@@ -3,8 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.lattice import Grid
+from simdtex.machine.array import ProcessorArray
 from simdtex.ops.operation import Array, Operation, P, R
 
 
@@ -12,6 +18,16 @@ class Machine(Protocol):
     """What a method may ask of a machine. A method says nothing about OpenCL."""
 
     name: str
+
+    @property
+    def launches(self) -> int:
+        """Kernels enqueued so far; on the reference, operations."""
+        ...
+
+    @property
+    def seconds(self) -> float | None:
+        """Seconds the device has worked so far; None where that is not measured."""
+        ...
 
     def run(self, operation: Operation[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Run one operation on arrays of this machine."""
@@ -23,6 +39,14 @@ class Machine(Protocol):
 
     def get(self, array: Array) -> Any:
         """A NumPy array with the contents of an array of this machine; waits for them."""
+        ...
+
+    def emulate(self, array: ProcessorArray) -> Machine:
+        """The same machine as a processor array."""
+        ...
+
+    def pieces(self, sites: NDArray[np.int32], grid: Grid, most: int) -> Iterator[tuple[Machine, NDArray[np.int32]]]:
+        """The sites of a step in pieces of `most` or fewer, each with the machine that is to relax it."""
         ...
 
     def sync(self, work: int = 0) -> None:
@@ -38,7 +62,7 @@ class Machine(Protocol):
         ...
 
 
-def open_machine(device: str | Machine | None = None) -> Machine:
+def open_machine(device: str | Machine | None = None, *, profile: bool = False) -> Machine:
     """The machine for a device text.
 
     Parameters
@@ -46,6 +70,8 @@ def open_machine(device: str | Machine | None = None) -> Machine:
     device : str, Machine or None
         Part of a name or platform, an index of ``simdtex devices``, or ``"reference"``; None takes
         SIMDTEX_DEVICE, else a GPU, else a CPU. A machine is returned as it is.
+    profile : bool
+        Whether an OpenCL machine measures how long its device works.
 
     Raises
     ------
@@ -63,4 +89,4 @@ def open_machine(device: str | Machine | None = None) -> Machine:
         return Reference()
     from simdtex.machine.opencl import OpenCL
 
-    return OpenCL(info)
+    return OpenCL(info, profile=profile)

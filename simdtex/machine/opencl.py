@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from copy import copy
+from math import gcd, prod
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +16,12 @@ import numpy as np
 import pyopencl as cl
 import pyopencl.array as cl_array
 import pyopencl.tools as cl_tools
+from numpy.typing import NDArray
 
 from simdtex.device import DeviceError, DeviceInfo
+from simdtex.lattice import Grid
+from simdtex.machine.array import ProcessorArray
+from simdtex.machine.log import Log
 from simdtex.ops.operation import Array, Operation, P, R
 from simdtex.sample import BLOCK
 
@@ -49,6 +55,8 @@ class OpenCL:
         Sites side by side in a work-item (1, 4, 8 or 16); changes no bit of any result.
     step : int, optional
         Candidates kept in registers together, a divisor of 64; changes no bit of any result.
+    profile : bool
+        Whether to measure how long the device works.
     """
 
     def __init__(
@@ -59,11 +67,14 @@ class OpenCL:
         scratch: int | None = None,
         vector: int | None = None,
         step: int | None = None,
+        profile: bool = False,
     ) -> None:
         self.info = info
         self.name = f"{info.name.strip()} ({info.platform})"
         self.context = cl.Context([info.handle])  # type: ignore[list-item]
-        self.queue = cl.CommandQueue(self.context)
+        timed: dict[str, Any] = {"properties": cl.command_queue_properties.PROFILING_ENABLE} if profile else {}
+        self.queue = cl.CommandQueue(self.context, **timed)
+        self.log = Log(profile)
         on_gpu = info.kind == "gpu"
         self.forced = work_group is not None
         self.group = work_group or (64 if on_gpu else 16)  # a fixed size: PoCL compiles once per size
@@ -73,6 +84,8 @@ class OpenCL:
         if BLOCK % self.step:
             raise ValueError(f"step is {self.step}; give a divisor of {BLOCK}")
         self.tile = (64, 1) if on_gpu else (1, 8)
+        self.array: ProcessorArray | None = None
+        self._lane: Array | None = None
         self._pool = cl_tools.MemoryPool(cl_tools.ImmediateAllocator(self.queue))
         self._pending, self._burst, self._synced = 0, 1e8, time.perf_counter()
         self._constants: dict[tuple[str, bytes], Array] = {}
@@ -112,11 +125,47 @@ class OpenCL:
             return
         with self._memory_errors():
             self.queue.finish()
+        self.log.settle()
         seconds = time.perf_counter() - self._synced
         if work:
             rate = self._pending / max(seconds, 1e-6)
             self._burst = min(max(rate * 0.1, self._burst / 2), self._burst * 2)
         self._pending, self._synced = 0, time.perf_counter()
+
+    @property
+    def launches(self) -> int:
+        """Kernels enqueued so far."""
+        return self.log.launches
+
+    @property
+    def seconds(self) -> float | None:
+        """Seconds the device has worked, None without ``profile``."""
+        self.sync()
+        return self.log.seconds
+
+    def emulate(self, array: ProcessorArray) -> OpenCL:
+        """The same device as a processor array: every launch has one work-item per PE."""
+        emulated = copy(self)
+        emulated.array, emulated.vector = array, 1
+        return emulated
+
+    def pieces(self, sites: NDArray[np.int32], grid: Grid, most: int) -> Iterator[tuple[OpenCL, NDArray[np.int32]]]:
+        """The sites of a step in pieces that scratch memory holds, each with the machine that relaxes it.
+
+        On an array one virtual layer after another: the machine then masks the PEs without a site.
+        """
+        if not self.array:
+            yield from ((self, sites[i : i + most]) for i in range(0, len(sites), most))
+            return
+        layer, pe = self.array.place(sites, grid)
+        for number in np.unique(layer):
+            here, at = sites[layer == number], pe[layer == number]
+            for i in range(0, len(here), most):
+                lane = np.full(self.array.size, -1, np.int32)
+                lane[at[i : i + most]] = np.arange(len(here[i : i + most]), dtype=np.int32)
+                masked = copy(self)
+                masked._lane = self.put(lane)
+                yield masked, here[i : i + most]
 
     def require(self, size: int) -> None:
         """Raise DeviceError where this many bytes are more than the device has."""
@@ -145,14 +194,14 @@ class OpenCL:
         fit = min(self.scratch // per_site, int(4e9) // (2 * padded * neighbours * channels))
         return max(1, fit // self.vector) * self.vector
 
-    def kernel(self, file: str, name: str, **defines: int | str) -> Any:
+    def kernel(self, file: str, function: str, /, **defines: int | str) -> Any:
         """A kernel of ``kernels/FILE.cl``, compiled once for these -D constants."""
         options = " ".join(f"-D {key}={value}" for key, value in sorted(defines.items()))
-        key = (file, name, options)
+        key = (file, function, options)
         if key not in self._kernels:
             if key[::2] not in self._programs:
                 self._programs[key[::2]] = self._build(file, options)
-            self._kernels[key] = cl.Kernel(self._programs[key[::2]], name)
+            self._kernels[key] = cl.Kernel(self._programs[key[::2]], function)
         return self._kernels[key]
 
     def _build(self, file: str, options: str) -> Any:
@@ -162,10 +211,39 @@ class OpenCL:
             warnings.simplefilter("ignore", cl.CompilerWarning)
             return cl.Program(self.context, source).build([*options.split(), "-I", str(folder)])
 
+    def launch_sites(
+        self,
+        kernel: tuple[str, str],
+        size: tuple[int, ...],
+        *args: Any,
+        local: tuple[int, ...] | None = None,
+        defines: Mapping[str, int] | None = None,
+    ) -> None:
+        """Enqueue a kernel, given as (file, name), over sites that relax together: common/lanes.h."""
+        defines = defines or {}
+        if self._lane is None:
+            self.launch(self.kernel(*kernel, **defines), size, *args, local=local)
+        else:
+            self._enqueue(self.kernel(*kernel, LANES=1, **defines), self._lane.shape, *args, self._lane)
+
     def launch(self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None) -> None:
-        """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels guard."""
+        """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels guard.
+
+        On an array, as many times as it takes with one work-item per PE.
+        """
+        if self.array:
+            for begin in range(0, size[0], self.array.size):
+                self._enqueue(kernel, (self.array.size,), *args, begin=begin)
+            return
         one_dimensional = (self.group,) + (1,) * (len(size) - 1)
         local = local if local and not self.forced else one_dimensional
         size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
+        self._enqueue(kernel, size, *args, local=local)
+
+    def _enqueue(
+        self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None, begin: int = 0
+    ) -> None:
         data = [a.data if isinstance(a, cl_array.Array) else a for a in args]
-        kernel(self.queue, size, local, *data)
+        offset = (begin,) if begin else None
+        event = kernel(self.queue, size, local or (gcd(size[0], self.group),), *data, global_offset=offset)
+        self.log.add(prod(size), event)

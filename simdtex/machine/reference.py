@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from simdtex.lattice import Grid
+from simdtex.machine.array import ProcessorArray
 from simdtex.ops.operation import Array, Operation, P, R
 
 
@@ -23,9 +27,12 @@ class Reference:
 
     def __init__(self, scratch: int = 2**24) -> None:
         self.scratch = scratch
+        self.launches = 0
+        self.seconds = None
 
     def run(self, operation: Operation[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Run the twin."""
+        self.launches += 1
         return operation.reference(*args, **kwargs)
 
     def put(self, array: Any) -> Array:
@@ -35,6 +42,14 @@ class Reference:
     def get(self, array: Array) -> Any:
         """A copy."""
         return np.array(array)
+
+    def emulate(self, array: ProcessorArray) -> Reference:
+        """Nothing changes: there are no work-items here."""
+        return self
+
+    def pieces(self, sites: NDArray[np.int32], grid: Grid, most: int) -> Iterator[tuple[Reference, NDArray[np.int32]]]:
+        """The sites of a step in pieces that scratch memory holds."""
+        yield from ((self, sites[i : i + most]) for i in range(0, len(sites), most))
 
     def sync(self, work: int = 0) -> None:
         """Nothing runs behind one's back here."""

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from simdtex import schedules
 from simdtex.lattice import Grid, check_order, neighbourhood_offsets
 from simdtex.machine import Machine
+from simdtex.machine.accounting import Account
+from simdtex.machine.array import parse_array
 from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
 from simdtex.ops.commit import commit
@@ -26,7 +28,7 @@ from simdtex.ops.operation import Array
 from simdtex.ops.snapshot import snapshot
 from simdtex.ops.start import start
 from simdtex.ops.temperature import temperature
-from simdtex.options import one_of, real, whole
+from simdtex.options import one_of, real, true_or_false, whole
 from simdtex.run import Callback, Meter, Output, Progress, Stage
 from simdtex.sample import Candidates, Sample
 
@@ -89,6 +91,14 @@ class Options:
         Check at every step that a schedule which claims independent sites keeps equation (14).
     boundary : {"torus", "open"}
         Whether the output wraps around.
+    array : str, optional
+        A processor array to run on: ``"ROWSxCOLS"`` or ``"maspar-mp1-1k"`` to ``"maspar-mp1-16k"``. None packs the
+        active sites instead.
+    mapping : {"cut-and-stack", "hierarchical"}
+        How a picture larger than the array lies on it.
+    emulate : bool
+        Whether every launch is to have one work-item per PE of the array. False packs all the same, and only
+        accounts for the array.
     """
 
     order: int = 18
@@ -105,6 +115,9 @@ class Options:
     schedule: str | schedules.Schedule = "coloring"
     check_schedule: bool = False
     boundary: str = "torus"
+    array: str | None = None
+    mapping: str = "cut-and-stack"
+    emulate: bool = True
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -124,8 +137,9 @@ class Options:
         one_of("coarsest", self.coarsest, ("gibbs", "same"))
         one_of("boundary", self.boundary, ("torus", "open"))
         schedules.get(self.schedule)
-        if not isinstance(self.check_schedule, (bool, np.bool_)):
-            raise TypeError(f"check_schedule must be True or False, not {self.check_schedule!r}")
+        true_or_false("check_schedule", self.check_schedule)
+        parse_array(self.array or "1x1", self.mapping)
+        true_or_false("emulate", self.emulate)
 
 
 def make_options(preset: str = "default", **given: Any) -> Options:
@@ -151,6 +165,7 @@ class _Run:
     schedule: schedules.Schedule
     seed: int
     levels: int
+    account: Account
     callback: Callback | None
 
 
@@ -211,7 +226,12 @@ def synthesize(
     if options.check_schedule:
         schedule = schedules.Checked(schedule)
     planes = sample.planes(machine)
-    run = _Run(machine, sample, planes, shape, offsets, options, schedule, seed, levels, callback)
+    array = parse_array(options.array or "maspar-mp1-16k", options.mapping)
+    emulated = bool(options.array) and options.emulate
+    machine = machine.emulate(array) if emulated else machine
+    account = Account(array, packed=options.array is None)
+    launches, worked = machine.launches, machine.seconds
+    run = _Run(machine, sample, planes, shape, offsets, options, schedule, seed, levels, account, callback)
     meter = Meter(_expected_work(run))
     stages = []
 
@@ -220,6 +240,8 @@ def synthesize(
     for number in reversed(range(levels)):  # 6
         level = _level(run, number)  # 3, 4, 6.1
         meter.begin(number, level.grid, level.candidates.size)
+        words = sample.channels + 1 + bool(options.coherence)  # of a neighbour: pixel, temperature, source
+        account.begin(level.grid, offsets, level.candidates.size, sample.channels, words)
         state = schedule.init(machine, level.grid, offsets, options.order, seed, number)
         while (temperatures := _temperatures(run, level, field)).any():  # 6.2
             field, state = _sweep(run, level, field, state, temperatures, "relax", meter)
@@ -236,6 +258,8 @@ def synthesize(
         "options": {f.name: getattr(options, f.name) for f in fields(Options)}
         | {"levels": levels, "schedule": schedule.name},
         "seconds": meter.seconds,
+        "device_seconds": None if worked is None else (machine.seconds or 0.0) - worked,
+        "accounting": account.report() | {"emulated": emulated, "launches": machine.launches - launches},
         "levels": meter.reports,
     }
     return image, Output(sample.place(source), temperatures / 1024, stages, statistics)
@@ -281,34 +305,29 @@ def _sweep(
         grid = replace(level.grid, tile=info.tile)
         if info.tile and not old:  # what tiles see of one another until the sweep ends
             field, old = Field(*(snapshot(machine, plane, grid.height) for plane in field)), True
-        pieces = [info.sites[i : i + size] for i in range(0, len(info.sites), size)]  # what scratch memory holds
-        outcomes = []
-        step = meter.step()
-        for sites in pieces:  # 6.2.2
-            outcomes.append(_relax(run, level, grid, field, sites, info.key))
+        where = {"level": level.number, "sweep": sweep, "step": meter.step(), "phase": phase, "temperature_left": left}
+        run.account.step(info.sites)
+        outcomes: list[Any] = []
+        for part, sites in machine.pieces(info.sites, grid, size):  # 6.2.2
+            if outcomes:
+                _tell(run, level, field, meter, where, False)
+            outcomes.append((part, _relax(run, part, level, grid, field, sites, info.key)))
             work = 2 * level.candidates.size * neighbours * channels * len(sites)
             machine.sync(work)
             relaxed += len(sites)
             meter.add(len(sites), work, min(1.0, relaxed / wanted))
-            complete = sites is pieces[-1]
-            if complete:
-                for outcome in outcomes:  # no site sees another of its step
-                    field = commit(machine, field, *outcome)
-            if run.callback:
-                last = info.last and complete
-                image = partial(_picture, run, level, field)
-                warmth = partial(_warmth, run, level, field)
-                where = (level.number, run.levels, sweep, step, phase, left)
-                run.callback(Progress(*where, last, meter.fraction, image, warmth))
+        for part, outcome in outcomes:  # no site sees another of its step
+            field = commit(part, field, *outcome)
+        _tell(run, level, field, meter, where, info.last)
         if info.last:
             return field, state
 
 
 def _relax(
-    run: _Run, level: _Level, grid: Grid, field: Field, sites: NDArray[np.int32], key: int
+    run: _Run, machine: Machine, level: _Level, grid: Grid, field: Field, sites: NDArray[np.int32], key: int
 ) -> tuple[Array, lcpdf.Relaxed, Array]:
     """Steps 6.2.2.1 to 6.2.2.3 for sites that relax together: the sites, what they take, and how warm they are."""
-    machine, options = run.machine, run.options
+    options = run.options
     number, _, offsets, candidates, window, relaxation = level
     here = machine.put(sites)
     near = neighbourhood(machine, here, field, offsets, grid)  # 6.2.2.1
@@ -328,6 +347,13 @@ def _relax(
     xi = min(-1, round(options.xi * 1024))
     cooled = temperature(machine, here, field, offsets, grid, xi)  # 6.2.2.3
     return here, relaxed, cooled
+
+
+def _tell(run: _Run, level: _Level, field: Field, meter: Meter, where: dict[str, Any], last: bool) -> None:
+    if run.callback:
+        image, warmth = partial(_picture, run, level, field), partial(_warmth, run, level, field)
+        now: dict[str, Any] = {"end_of_sweep": last, "fraction": meter.fraction, "image": image, "temperature": warmth}
+        run.callback(Progress(levels=run.levels, **where, **now))
 
 
 def _temperatures(run: _Run, level: _Level, field: Field) -> NDArray[np.uint16]:

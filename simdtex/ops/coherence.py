@@ -51,13 +51,14 @@ def _launch(
     grid: Grid,
     favour: np.float32,
 ) -> Distances:
-    machine.launch(
-        machine.kernel("coherence", "coherence", BLOCK=BLOCK),
+    machine.launch_sites(
+        ("coherence", "coherence"),
         (sites.size,),
         *(sites, np.int32(sites.size), np.int32(distances.distance.shape[1])),
         *(field.source, field.temperature, offsets, np.int32(offsets.shape[0]), *grid.args),
         *(candidates.index_of, np.int32(candidates.rows), np.int32(candidates.cols), favour),
         *(distances.distance, distances.nearest),
+        defines={"BLOCK": BLOCK},
     )
     return distances
 

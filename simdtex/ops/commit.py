@@ -25,8 +25,8 @@ def _reference(field: Field, sites: NDArray[np.int32], relaxed: Relaxed, cooled:
 
 def _launch(machine: OpenCL, field: Field, sites: Array, relaxed: Relaxed, cooled: Array) -> Field:
     channels, height, width = field.values.shape
-    machine.launch(
-        machine.kernel("commit", "commit"),
+    machine.launch_sites(
+        ("commit", "commit"),
         (sites.size,),
         *(sites, np.int32(sites.size), np.int32(channels), np.int32(height * width)),
         *(relaxed.values, relaxed.choice, cooled, *field),

@@ -114,13 +114,14 @@ def _distance_launch(machine: OpenCL, near: Neighbourhoods, candidates: Candidat
     blocks = candidates.positions.size // BLOCK
     distance = machine.empty((blocks * BLOCK, padded), np.float32)
     nearest = machine.empty((blocks, padded), np.float32)
-    machine.launch(
-        _kernel(machine, "distance", candidates),
+    machine.launch_sites(
+        ("lcpdf", "lcpdf_distance"),
         (padded // machine.vector, blocks),
         *(near.confidence, near.weighted, np.int32(neighbours), np.int32(padded)),
         *(candidates.pixels, _plane(candidates), candidates.positions, np.int32(candidates.size)),
         *(candidates.reach, np.int32(blocks), distance, nearest),
         local=machine.tile,
+        defines=_defines(machine, candidates),
     )
     return Distances(distance, nearest, near.sites)
 
@@ -299,12 +300,13 @@ def _table_reference(distances: Distances, candidates: Candidates, win: Window) 
 def _table_launch(machine: OpenCL, distances: Distances, candidates: Candidates, win: Window) -> Array:
     shape = (distances.sites, win.top + 1)
     mass, table = machine.empty(shape, np.uint64), machine.empty(shape, np.float32)
-    machine.launch(
-        _kernel(machine, "table", candidates),
+    machine.launch_sites(
+        ("lcpdf", "lcpdf_table"),
         (distances.sites,),
         *_weighing(distances, win),
         *(candidates.pixels, candidates.positions, machine.constant(win.gauss)),
         *(np.int32(win.radius), np.int32(win.top + 1), mass, table),
+        defines=_defines(machine, candidates),
     )
     return table
 
@@ -315,16 +317,9 @@ table = Operation("table", _table_reference, _table_launch)
 # -- what the launchers share ---------------------------------------------------------------------------------
 
 
-def _kernel(machine: OpenCL, name: str, candidates: Candidates) -> Any:
-    return machine.kernel(
-        "lcpdf",
-        f"lcpdf_{name}",
-        V=machine.vector,
-        C=candidates.pixels.shape[0],
-        BLOCK=BLOCK,
-        STEP=machine.step,
-        HEAVIEST=HEAVIEST,
-    )
+def _defines(machine: OpenCL, candidates: Candidates) -> dict[str, int]:
+    channels = candidates.pixels.shape[0]
+    return {"V": machine.vector, "C": channels, "BLOCK": BLOCK, "STEP": machine.step, "HEAVIEST": HEAVIEST}
 
 
 def _plane(candidates: Candidates) -> np.int32:
@@ -349,11 +344,12 @@ def _take(
     """Launch a kernel that gives each site a source and a value."""
     channels = candidates.pixels.shape[0]
     out = Relaxed(machine.empty((distances.sites,), np.int32), machine.empty((channels, distances.sites), np.uint16))
-    machine.launch(
-        _kernel(machine, name, candidates),
+    machine.launch_sites(
+        ("lcpdf", f"lcpdf_{name}"),
         (distances.sites,),
         *_weighing(distances, win),
         *(candidates.pixels, _plane(candidates), candidates.positions),
         *(*arguments, *out),
+        defines=_defines(machine, candidates),
     )
     return out

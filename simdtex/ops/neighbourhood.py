@@ -49,11 +49,12 @@ def _launch(machine: OpenCL, sites: Array, field: Field, offsets: Array, grid: G
     padded = -(-count // machine.vector) * machine.vector
     confidence = machine.empty((neighbours, padded), np.float32)
     weighted = machine.empty((neighbours, channels, padded), np.float32)
-    machine.launch(
-        machine.kernel("neighbourhood", "neighbourhood"),
+    machine.launch_sites(
+        ("neighbourhood", "neighbourhood"),
         (padded, neighbours),
         *(sites, np.int32(count), np.int32(padded), field.values, field.temperature),
-        *(np.int32(channels), np.int32(prod(field.values.shape[1:])), offsets, *grid.args, confidence, weighted),
+        *(np.int32(channels), np.int32(prod(field.values.shape[1:])), offsets, np.int32(neighbours), *grid.args),
+        *(confidence, weighted),
     )
     return Neighbourhoods(confidence, weighted, count)
 

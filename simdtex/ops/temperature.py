@@ -28,8 +28,8 @@ def _reference(
 
 def _launch(machine: OpenCL, sites: Array, field: Field, offsets: Array, grid: Grid, xi: int) -> Array:
     cooled = machine.empty((sites.size,), np.uint16)
-    machine.launch(
-        machine.kernel("temperature", "temperature"),
+    machine.launch_sites(
+        ("temperature", "temperature"),
         (sites.size,),
         *(sites, np.int32(sites.size), field.temperature, offsets, np.int32(offsets.shape[0])),
         *(*grid.args, np.int32(xi), cooled),

@@ -69,9 +69,11 @@ def get(schedule: str | Schedule) -> Schedule:
         There is no such schedule; the sentence lists the valid names.
     """
     if not isinstance(schedule, str):
-        if not all(callable(getattr(schedule, part, None)) for part in ("init", "step", "independent")):
+        whole = all(callable(getattr(schedule, part, None)) for part in ("init", "step", "independent"))
+        if isinstance(schedule, type) or not whole or not isinstance(getattr(schedule, "name", None), str):
             raise TypeError(
-                f"a schedule must be a name, or an object with init, step and independent, not {schedule!r}"
+                "a schedule must be a name, or an object with a name, init, step and independent "
+                f"(not its class), not {schedule!r}"
             )
         return schedule
     name, colon, parameter = schedule.partition(":")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from simdtex import random
 from simdtex.lattice import Grid
 from simdtex.ops.coloring import coloring
+from simdtex.options import whole
 from simdtex.schedules.schedule import Active, Info
 
 
@@ -47,9 +48,9 @@ class Partition:
 
     def init(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int) -> State:
         """Lay out the groups, once a level."""
-        group = np.asarray(self.groups(machine, grid, offsets, order, seed)).ravel().astype(np.int64)
+        numbers, group = np.unique(np.ravel(self.groups(machine, grid, offsets, order, seed)), return_inverse=True)
         nothing = np.zeros(0, np.int32)
-        return State(grid.sites(), group, int(group.max()) + 1, seed, level, 0, nothing, np.zeros(0, np.int64), 0)
+        return State(grid.sites(), group, numbers.size, seed, level, 0, nothing, np.zeros(0, np.int64), 0)
 
     def step(self, state: State, active: Active) -> tuple[State, Info]:
         """The next group that has active sites; a sweep goes by what was active when it began."""
@@ -175,9 +176,9 @@ class Block(Partition):
     """
 
     def __init__(self, rows: int = 16, cols: int = 16) -> None:
-        if rows < 1 or cols < 1:
-            raise ValueError(f"a tile of {rows}x{cols} sites is empty; give 1x1 or more, say block:16x16")
-        self.tile = rows, cols
+        whole("rows of a tile", rows, 1)
+        whole("columns of a tile", cols, 1)
+        self.tile = int(rows), int(cols)
         self.name = "block" if self.tile == (16, 16) else f"block:{rows}x{cols}"
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:

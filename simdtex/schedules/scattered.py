@@ -95,7 +95,7 @@ class RandomSubset(Scattered):
         if not 0 < p <= 1:
             raise ValueError(f"{p} is no share of sites; give one above 0 and up to 1: random-subset:0.5")
         self.p = p
-        self.name = "random-subset" if p == 0.5 else f"random-subset:{p:g}"
+        self.name = "random-subset" if p == 0.5 else f"random-subset:{float(p)!r}".removesuffix(".0")
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Only on a lattice without neighbours."""

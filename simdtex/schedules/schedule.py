@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from simdtex.lattice import Grid
 
 Active = Callable[[], NDArray[np.bool_]]
-"""``active()`` tells, per site of the grid (rows, cols), whether it wants relaxing now."""
+"""``active()`` tells, per site of the grid (rows, cols), whether it wants relaxing now; its array never changes."""
 
 
 class Info(NamedTuple):

@@ -1,0 +1,258 @@
+"""The processor array: where pixels live, how neighbours get there, what is counted, and the same bits."""
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, opencl, texture
+from hypothesis import given
+from hypothesis import strategies as st
+
+import simdtex
+from simdtex.lattice import Grid, neighbourhood_offsets
+from simdtex.machine.accounting import FLOPS, ROUTER, XNET, Account
+from simdtex.machine.array import ARRAYS, MAPPINGS, ProcessorArray, parse_array
+
+SCHEDULES = ["coloring", "luby", "synchronous", "random-subset:0.3", "block:4x4"]
+
+# -- geometry -------------------------------------------------------------------------------------------------
+
+
+def test_cut_and_stack_by_hand():
+    """5 x 6 pixels on 2 x 4 PEs: three layers down, two across."""
+    array, grid = ProcessorArray(2, 4), Grid(5, 6)
+    assert array.layers(grid) == (3, 2)
+    layer, pe = array.place(np.array([0, 3, 4, 5, 6, 12, 29], np.int32), grid)
+    assert layer.tolist() == [0, 0, 1, 1, 0, 2, 5]
+    assert pe.tolist() == [0, 3, 0, 1, 4, 0, 1]
+
+
+def test_hierarchical_by_hand():
+    """5 x 6 pixels on 2 x 4 PEs: blocks of 3 x 2, the last column of PEs empty."""
+    array, grid = ProcessorArray(2, 4, "hierarchical"), Grid(5, 6)
+    assert array.layers(grid) == (3, 2)
+    layer, pe = array.place(np.array([0, 1, 2, 5, 6, 18, 29], np.int32), grid)
+    assert layer.tolist() == [0, 1, 0, 1, 2, 0, 3]
+    assert pe.tolist() == [0, 0, 1, 2, 0, 4, 6]
+
+
+@given(
+    st.tuples(st.integers(1, 9), st.integers(1, 9)),
+    st.tuples(st.integers(1, 20), st.integers(1, 20)),
+    st.sampled_from(MAPPINGS),
+)
+def test_every_pixel_has_a_place_of_its_own(pes, shape, mapping):
+    array, grid = ProcessorArray(*pes, mapping), Grid(*shape)
+    layer, pe = array.place(grid.sites(), grid)
+    high, wide = array.layers(grid)
+    assert pe.min() >= 0 and pe.max() < array.size
+    assert layer.min() >= 0 and layer.max() < high * wide
+    assert len(set(zip(layer.tolist(), pe.tolist(), strict=True))) == grid.plane
+
+
+@pytest.mark.parametrize("mapping", MAPPINGS)
+@pytest.mark.parametrize(("order", "shifts"), [(1, 4), (2, 8), (4, 8 + 4 * 2), (8, 8 + 16 * 2)])
+def test_shifts_of_a_picture_of_the_arrays_size(order, shifts, mapping):
+    """8 neighbours are one shift away, diagonals too; the 16 around them two."""
+    offsets = neighbourhood_offsets(order)
+    assert ProcessorArray(8, 8, mapping).shifts(Grid(8, 8), offsets).tolist() == [shifts]
+    assert ProcessorArray(8, 8, mapping).shifts(Grid(8, 8, 1, False), offsets).tolist() == [shifts]
+
+
+def test_neighbours_of_a_coarser_level_are_farther():
+    array, offsets = ProcessorArray(16, 16), neighbourhood_offsets(1)
+    assert [int(array.shifts(Grid(16, 16, 2**n), offsets)[0]) for n in range(4)] == [4, 8, 16, 32]
+
+
+def test_the_way_around_the_array_is_taken_where_it_is_shorter():
+    """Three columns to the right on an array of four is one to the left."""
+    offsets = np.array([[0, 3]], np.int32)
+    assert ProcessorArray(4, 4).shifts(Grid(4, 4), offsets).tolist() == [1]
+
+
+def test_shifts_of_blocks():
+    """Four pixels to a PE: of the two horizontal neighbours one is on the PE, the other on the next."""
+    array = ProcessorArray(4, 4, "hierarchical")
+    offsets = np.array([[0, -1], [0, 1]], np.int32)
+    assert array.shifts(Grid(8, 8), offsets).tolist() == [1, 1, 1, 1]
+    assert ProcessorArray(4, 4).shifts(Grid(8, 8), offsets).tolist() == [2, 2, 2, 2]
+
+
+def test_a_seam_costs_a_second_way():
+    """6 columns on 8 PEs: the right neighbour of column 5 is column 0, five back or three on."""
+    offsets = np.array([[0, 1]], np.int32)
+    assert ProcessorArray(8, 8).shifts(Grid(8, 6), offsets).tolist() == [1 + 3]
+    assert ProcessorArray(8, 8).shifts(Grid(8, 6, 1, False), offsets).tolist() == [1]
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_the_mp1s(name):
+    array = parse_array(name)
+    assert array.size == int(name.split("-")[-1].removesuffix("k")) * 1024
+    assert array.cols in (array.rows, 2 * array.rows)
+
+
+@pytest.mark.parametrize("text", ["", "128", "0x4", "4x0", "4x4x4", "-4x4", "4.0x4", "maspar", "x", "128X128", " 4x4"])
+def test_texts_that_name_no_array(text):
+    with pytest.raises(ValueError, match="give rows x columns such as 128x128, or one of: maspar-mp1-1k"):
+        parse_array(text)
+
+
+def test_an_unknown_mapping():
+    with pytest.raises(ValueError, match="choose one of: cut-and-stack, hierarchical"):
+        parse_array("4x4", "round-robin")
+
+
+# -- accounting -----------------------------------------------------------------------------------------------
+
+
+def account(array, packed, grid, steps, order=1, candidates=10, channels=1, words=2):
+    counted = Account(array, packed)
+    counted.begin(grid, neighbourhood_offsets(order), candidates, channels, words)
+    for sites in steps:
+        counted.step(np.array(sites, np.int32))
+    return counted.report()
+
+
+def test_utilisation_by_hand():
+    """A checkerboard of 4 x 4 pixels on 4 x 4 PEs: two steps of eight."""
+    row, col = np.indices((4, 4))
+    colors = [np.flatnonzero((row + col) % 2 == c) for c in (0, 1)]
+    told = account(ProcessorArray(4, 4), False, Grid(4, 4), colors)
+    assert (told["steps"], told["passes"], told["layers"], told["sites"]) == (2, 2, 1, 16)
+    assert (told["active"], told["utilisation"]) == (8, 0.5)
+    assert told["moved"] == 2 * 4 * 2  # passes, shifts, words
+    assert told["routed"] == 0
+    assert told["flop"] == 16 * 10 * 4 * 4  # sites, candidates, neighbours, operations
+    expected = 2 * 10 * 4 * 4 / FLOPS + 2 * 4 * 2 * 4 / XNET
+    assert told["model_seconds"] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_layer_without_an_active_site_costs_nothing():
+    """8 x 8 pixels on 4 x 4 PEs: a step in one quarter is one pass cut and stacked, four in blocks."""
+    quarter = (np.arange(4)[:, None] * 8 + np.arange(4)).ravel()
+    for mapping, passes, utilisation in [("cut-and-stack", 1, 1.0), ("hierarchical", 4, 0.25)]:
+        told = account(ProcessorArray(4, 4, mapping), False, Grid(8, 8), [quarter])
+        assert (told["layers"], told["passes"], told["utilisation"]) == (4, passes, utilisation)
+
+
+def test_packed_sites_fill_the_array_and_use_the_router():
+    told = account(ProcessorArray(4, 4), True, Grid(8, 8), [np.arange(20), np.arange(3), []])
+    assert (told["mapping"], told["steps"], told["passes"], told["layers"]) == ("packed", 3, 3, 4)
+    assert told["active"] == pytest.approx(23 / 3)
+    assert told["routed"] == 23 * 4 * 2
+    assert told["model_seconds"] == pytest.approx(3 * 10 * 4 * 4 / FLOPS + 23 * 4 * 2 * 4 / ROUTER, rel=1e-12)
+
+
+def test_the_published_figures():
+    assert pytest.approx(1.2e9) == FLOPS * 16384
+    assert pytest.approx(23e9) == XNET * 16384
+    assert ROUTER == 1.28e9
+
+
+# -- runs -----------------------------------------------------------------------------------------------------
+
+
+def run(device, **options):
+    given = {"order": 2, "levels": 2, "rng": 3, "full_output": True} | options
+    return simdtex.synthesize(texture((14, 13)), (11, 12), device=device, **given)
+
+
+@pytest.mark.parametrize("schedule", SCHEDULES)
+@pytest.mark.parametrize(
+    ("array", "mapping"), [("4x4", "cut-and-stack"), ("4x8", "hierarchical"), ("16x16", "hierarchical")]
+)
+def test_the_array_has_the_bits_of_packed_sites(any_device, array, mapping, schedule):
+    packed, _ = run(REFERENCE, schedule=schedule)
+    image, _ = run(opencl(any_device), schedule=schedule, array=array, mapping=mapping)
+    assert_same_bits(image, packed)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"relaxation": "gibbs", "pixel": "density"},
+        {"pixel": "density"},
+        {"coherence": 0.0, "boundary": "open"},
+    ],
+    ids=str,
+)
+def test_every_way_of_relaxing_runs_on_the_array(machine, options):
+    packed, _ = run(REFERENCE, **options)
+    image, _ = run(machine, array="8x4", **options)
+    assert_same_bits(image, packed)
+
+
+def test_pixel_vectors_on_the_array(any_device):
+    sample = texture((12, 13), 3)
+    made = [
+        simdtex.synthesize(
+            sample, (9, 7), order=1, levels=1, channel_axis=-1, rng=1, pixel="density", device=d, array="4x4"
+        )
+        for d in (REFERENCE, opencl(any_device))
+    ]
+    assert_same_bits(made[1], made[0])
+
+
+@pytest.mark.parametrize(("array", "size"), [("4x4", 16), ("5x7", 35), ("16x16", 256)])
+def test_every_launch_has_one_work_item_per_pe(any_device, array, size):
+    machine = opencl(any_device, step=2)  # a log of its own
+    machine.log.shapes.clear()
+    _, output = run(machine, array=array, schedule="luby")
+    assert list(machine.log.shapes) == [size]
+    assert output.statistics["accounting"]["launches"] == machine.log.shapes[size]
+
+
+def test_small_scratch_memory_masks_some_more(any_device):
+    packed, _ = run(REFERENCE, schedule="synchronous")
+    image, output = run(opencl(any_device, scratch=2**14), schedule="synchronous", array="16x16")
+    assert_same_bits(image, packed)
+    counted = output.statistics["accounting"]
+    assert counted["passes"] == counted["steps"], "pieces are no SIMD steps"
+
+
+def test_accounting_does_not_depend_on_how_the_run_is_made(any_device):
+    seen = []
+    for device in (REFERENCE, opencl(any_device)):
+        for emulate in (True, False):
+            _, output = run(device, array="4x8", mapping="hierarchical", emulate=emulate)
+            counted = output.statistics["accounting"]
+            assert counted.pop("emulated") == emulate
+            counted.pop("launches")
+            seen.append(counted)
+    assert all(counted == seen[0] for counted in seen)
+    assert seen[0]["array"] == "4x8" and seen[0]["mapping"] == "hierarchical"
+    levels = output.statistics["levels"]
+    assert seen[0]["steps"] == sum(level["steps"] for level in levels)
+    assert seen[0]["sites"] == sum(level["relaxations"] for level in levels)
+    assert seen[0]["flop"] == 2 * sum(level["fma"] for level in levels)
+
+
+def test_without_an_array_a_full_mp1_is_accounted_for():
+    _, output = run(REFERENCE)
+    counted = output.statistics["accounting"]
+    assert (counted["array"], counted["mapping"], counted["emulated"]) == ("128x128", "packed", False)
+
+
+def test_device_seconds_are_measured_on_request(any_device):
+    _, output = run(opencl(any_device))
+    assert output.statistics["device_seconds"] is None
+    _, output = run(opencl(any_device, profile=True))
+    assert 0 < output.statistics["device_seconds"] < output.statistics["seconds"] * any_device.compute_units
+    _, output = run(REFERENCE)
+    assert output.statistics["device_seconds"] is None
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"array": "128"}, ValueError, "give rows x columns such as 128x128"),
+        ({"array": 128}, ValueError, "give rows x columns such as 128x128"),
+        ({"array": "4x4", "mapping": "blocks"}, ValueError, "choose one of: cut-and-stack, hierarchical"),
+        ({"mapping": "blocks"}, ValueError, "choose one of: cut-and-stack, hierarchical"),
+        ({"array": "4x4", "emulate": 1}, TypeError, "emulate must be True or False"),
+        ({"check_schedule": "yes"}, TypeError, "check_schedule must be True or False"),
+    ],
+    ids=str,
+)
+def test_bad_input(options, error, words):
+    with pytest.raises(error, match=words):
+        run(REFERENCE, **options)
