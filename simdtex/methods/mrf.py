@@ -214,15 +214,15 @@ def synthesize(
     Notes
     -----
     Cost: sweeps x sites x candidates x |N| x channels x 2 fma, about 7 sweeps a level. Memory on the device, in bytes:
-    14 + 2 channels per output pixel, 8 channels + 8 per pixel of the sample with its margin, and the machine's
-    scratch memory or, if that is more, 65 per candidate. On the host: about 40 per output pixel.
+    14 + 2 channels per output pixel (20 + 4 channels with the schedule ``block``), 8 channels + 8 per pixel of the
+    sample with its margin, and the machine's scratch memory or, if that is more, 65 per candidate. On the host: about 40 per output pixel.
     """
     offsets = neighbourhood_offsets(options.order)
     levels = _number_of_levels(pixels.shape[:2], offsets, shape, options)  # 1
     margin = int(offsets.max()) * 2 ** (levels - 1) if options.edges != "whole" else 0
     sample = Sample(pixels, pixels.shape[-1] * len(offsets), margin)
-    _check_memory(machine, sample, shape)
     schedule = schedules.get(options.schedule)
+    _check_memory(machine, sample, shape, copies=2 if getattr(schedule, "tile", None) else 1)
     if options.check_schedule:
         schedule = schedules.Checked(schedule)
     planes = sample.planes(machine)
@@ -424,10 +424,11 @@ def check_fit(sample: tuple[int, ...], radius: int, order: int) -> None:
     )
 
 
-def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int]) -> None:
-    pixels = shape[0] * shape[1]
-    if pixels * sample.channels >= 2**31:
+def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], copies: int) -> None:
+    pixels, channels = shape[0] * shape[1], sample.channels
+    if pixels * channels * copies >= 2**31:
         raise ValueError(
             f"an output of {shape[0]} rows x {shape[1]} columns is beyond 2**31 values; give a smaller size"
         )
-    machine.require(pixels * (14 + 2 * sample.channels) + sample.rows * sample.cols * (8 * sample.channels + 73))
+    field = copies * (6 + 2 * channels)
+    machine.require(pixels * (8 + field) + sample.rows * sample.cols * (8 * channels + 73))
