@@ -83,11 +83,11 @@ class Output:
         was left, free sweeps not counted. ``accounting`` is what the run costs on a processor array, or, where none
         was given, packed on a full MP-1: ``array``, ``mapping``, ``emulated``; ``layers``, virtual layers; ``shifts``,
         X-Net shifts of a word that bring every pixel of the finest level all its neighbours, for either mapping;
-        ``steps``; ``passes``, SIMD passes: one for each virtual layer of a step that has an active site; ``active``, the
-        mean number of active PEs per pass; ``utilisation``, that over all PEs; ``sites``, relaxations; ``moved``, words
-        that each PE shifted; ``routed``, words through the router; ``flop``, 32-bit operations in the distances;
-        ``model_seconds``, the time of a MasPar MP-1 by the model of `simdtex.machine.accounting.Account`; and
-        ``launches``, kernels enqueued on the device.
+        ``steps``; ``passes``, SIMD steps: one for each virtual layer of a step that has an active site; ``active``,
+        the mean number of active PEs per pass; ``utilisation``, that over all PEs; ``sites``, relaxations; ``moved``,
+        words that each PE shifted; ``routed``, words through the router; ``flop``, 32-bit operations in the
+        distances; ``model_seconds``, the time of a MasPar MP-1 by the model of
+        `simdtex.machine.accounting.Account`; and ``launches``, kernels enqueued on the device.
     """
 
     source: NDArray[Any]
