@@ -93,7 +93,7 @@ def _model(offsets: Array, grid: Grid, chances: Array, seed: int) -> tuple[Any, 
 def _launch_relax(
     machine: OpenCL, spins: Array, sites: Array, offsets: Array, grid: Grid, chances: Array, seed: int, key: int
 ) -> Array:
-    chains, temperatures = spins.shape[0], chances.shape[0]
+    chains, temperatures = int(spins.shape[0]), int(chances.shape[0])
     relaxed = machine.empty((chains, sites.size), np.uint8)
     seeds = chains // temperatures
     machine.launch(
@@ -106,11 +106,11 @@ def _launch_relax(
 
 
 def _launch_commit(machine: OpenCL, spins: Array, sites: Array, relaxed: Array) -> Array:
-    chains = np.int32(spins.shape[0])  # the temperatures do not matter here
+    chains = int(spins.shape[0])  # which temperature is whose does not matter here
     machine.launch(
         machine.kernel("ising", "ising_commit"),
         (sites.size, chains, 1),
-        *(sites, np.int32(sites.size), relaxed, np.int32(prod(spins.shape[1:])), chains, spins),
+        *(sites, np.int32(sites.size), relaxed, np.int32(prod(spins.shape[1:])), np.int32(chains), spins),
     )
     return spins
 

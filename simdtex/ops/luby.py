@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 UNDECIDED, IN, OUT = 0, 1, 2
 
+ROUNDS = 4
+"""Rounds between two looks at what is left; further rounds change nothing."""
+
 
 def _reference(
     grid: Grid, offsets: NDArray[np.int32], active: NDArray[np.uint8], seed: int, level: int, count: int
@@ -46,16 +49,17 @@ def _launch(
         *(np.int32(sites), np.uint64(seed), np.uint32(level), np.uint32(count), active, priority, state),
     )
     while True:
+        for _ in range(ROUNDS):
+            machine.launch(
+                machine.kernel("luby", "luby_round"),
+                (sites,),
+                *(*grid.args, offsets, np.int32(offsets.shape[0]), priority, state, following),
+            )
+            state, following = following, state
         host = machine.get(state)
         if not (host == UNDECIDED).any():
             chosen: NDArray[np.uint8] = (host == IN).astype(np.uint8)
             return chosen
-        machine.launch(
-            machine.kernel("luby", "luby_round"),
-            (sites,),
-            *(*grid.args, offsets, np.int32(offsets.shape[0]), priority, state, following),
-        )
-        state, following = following, state
 
 
 luby = Operation("luby", _reference, _launch)

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex schedules``: the same job under several parallel schedules."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+from click.core import ParameterSource
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+from simdtex.cli.common import DEVICE, plainly
+from simdtex.methods.mrf import Options
+
+DEFAULTS = Options()
+SCHEDULES = "coloring,coloring-fixed,luby,checkerboard,synchronous,random-subset,block"
+
+
+@click.command()
+@click.argument("sample", required=False, type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    default="schedules-report",
+    show_default=True,
+    type=click.Path(path_type=Path),
+    help="Folder for the report.",
+)
+@click.option(
+    "--schedules", "names", default=SCHEDULES, metavar="A,B,...", help="Which to compare.  [those of many sites a step]"
+)
+@click.option("--seeds", default=3, show_default=True, help="Runs of each schedule, with seeds one after another.")
+@click.option("--seed", default=1, show_default=True, help="The first of them.")
+@click.option("--size", default="96x96", show_default=True, metavar="WIDTHxHEIGHT", help="Of each output.")
+@click.option("--preset", help="default, or paper: the 1998 rules to the letter.")
+@click.option("--order", type=int, help=f"Neighbours within sqrt(order).  [{DEFAULTS.order}]")
+@click.option("--levels", type=int, help="Of the multigrid.  [as many as the sample feeds]")
+@click.option("--relaxation", help=f"icm (the mode) or gibbs (a draw).  [{DEFAULTS.relaxation}]")
+@click.option("--bandwidth", type=float, help=f"Of the Parzen kernel, in units of h_opt.  [{DEFAULTS.bandwidth}]")
+@click.option(
+    "--coherence", type=float, help=f"Preference for continuing a neighbour's source.  [{DEFAULTS.coherence}]"
+)
+@click.option("--xi", type=float, help=f"Cooling, below 0; further down is faster.  [{DEFAULTS.xi}]")
+@click.option(
+    "--free-sweeps",
+    type=int,
+    help=f"Sweeps over all sites after a level's equilibrium; 6 or more show oscillation.  [{DEFAULTS.free_sweeps}]",
+)
+@click.option("--boundary", help=f"torus or open.  [{DEFAULTS.boundary}]")
+@click.option("--array", default="maspar-mp1-16k", show_default=True, help="Processor array to count on, or ROWSxCOLS.")
+@click.option("--mapping", default=DEFAULTS.mapping, show_default=True, help="Or hierarchical: pixels onto the array.")
+@click.option("--emulate", is_flag=True, help="Run as on the array too, which takes longer.")
+@DEVICE
+@click.option("-q", "--quiet", is_flag=True, help="No progress and no table.")
+@plainly
+def schedules(
+    sample: Path | None,
+    output: Path,
+    names: str,
+    seeds: int,
+    seed: int,
+    size: str,
+    device: str | None,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Run the same job under several schedules and compare them in a report.
+
+    Without SAMPLE it is 128x128 pixels of the brick of scikit-image.
+    """
+    from simdtex import image
+    from simdtex import schedules as known
+    from simdtex.comparison import compare
+    from simdtex.options import whole
+    from simdtex.report.page import check_folder
+    from simdtex.report.schedules import terminal_tables, write_comparison
+
+    check_folder(output)
+    shape = image.parse_size(size)
+    chosen = [known.get(name.strip()) for name in names.split(",")]
+    whole("--seeds", seeds, 1)
+    pixels, channel_axis = _sample(sample)
+    began = time.perf_counter()
+    with _progress(quiet) as show:
+        found = compare(
+            pixels,
+            shape,
+            chosen,
+            seeds=range(seed, seed + seeds),
+            channel_axis=channel_axis,
+            device=device,
+            callback=show,
+            **{name: value for name, value in options.items() if value is not None},
+        )
+    write_comparison(output, found, _command_line(click.get_current_context()))
+    if quiet:
+        return
+    console = Console(width=None if sys.stdout.isatty() else 200)
+    for table in terminal_tables(found, console.width):
+        console.print(table)
+    click.echo(
+        f"{output / 'index.html'}: {len(chosen)} schedules, {seeds} {'seed' if seeds == 1 else 'seeds'}, "
+        f"{time.perf_counter() - began:.0f} s on {found.device}"
+    )
+
+
+def _command_line(context: click.Context) -> str:
+    """What was given, so that a reader can give it again."""
+    words = ["simdtex", "schedules"]
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        if context.get_parameter_source(name) is not ParameterSource.COMMANDLINE:
+            continue
+        value = str(context.params[name])
+        if isinstance(parameter, click.Option):
+            words += [parameter.opts[-1]] if parameter.is_flag else [parameter.opts[-1], value]
+        else:
+            words.append(value)
+    return shlex.join(words)
+
+
+def _sample(path: Path | None) -> tuple[Any, int | None]:
+    from simdtex import image
+
+    if path is None:
+        from skimage import data
+
+        brick: Any = data.brick
+        return brick()[:128, :128], None
+    picture = image.read(path)
+    return picture.pixels, picture.channel_axis
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Callable[[Any], None] | None]:
+    """A bar over all runs where there is a terminal, else a line for each."""
+    if quiet:
+        yield None
+        return
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("starting", total=1.0)
+        told = 0
+
+        def show(now: Any) -> None:
+            nonlocal told
+            what = f"{now.schedule}, seed {now.seed}"
+            level = f"level {now.progress.level}, sweep {now.progress.sweep}"
+            bar.update(task, completed=now.fraction, description=f"run {now.run} of {now.runs}: {what}, {level}")
+            if told < now.run and not console.is_terminal:
+                click.echo(f"run {now.run} of {now.runs}: {what}", err=True)
+            told = now.run
+
+        yield show

@@ -1,0 +1,245 @@
+"""A comparison of schedules: what is recorded of a run, who keeps equation (14), and that seeds decide everything."""
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from cases import texture
+
+from simdtex.comparison import Entry, Recorder, Spread, compare
+from simdtex.report.page import Figure
+from simdtex.report.schedules import mark, reading, sections, terminal_tables
+from simdtex.schedules import Checkerboard, Coloring
+
+
+def feed(recorder, pictures, level=0, phase="free", **more):
+    """Let a recorder see a level whose sweeps end with these pictures."""
+    for number, picture in enumerate(pictures, 1):
+        picture = np.asarray(picture)
+        said = {
+            "level": level,
+            "sweep": number,
+            "phase": phase,
+            "step": 3 * number,
+            "temperature_left": 1 / number,
+            "end_of_sweep": True,
+            "image": lambda picture=picture: picture,
+            "temperature": lambda: np.full((2, 2), 0.25),
+        }
+        recorder(SimpleNamespace(**{**said, **more}))
+
+
+def test_a_flip_flop_oscillates_wholly():
+    recorder = Recorder()
+    black, white = np.zeros((2, 2), np.uint8), np.ones((2, 2), np.uint8)
+    feed(recorder, [black, white, black, white])
+    assert [sweep.changed for sweep in recorder.sweeps] == [None, 1, 1, 1]
+    assert [sweep.returned for sweep in recorder.sweeps] == [None, None, 1, 1]
+
+
+def test_shares_of_a_sequence_by_hand():
+    recorder = Recorder()
+    feed(recorder, [[[0, 0], [0, 0]], [[1, 0], [2, 0]], [[1, 5], [0, 0]], [[1, 0], [3, 0]], [[1, 0], [3, 0]]])
+    assert [sweep.changed for sweep in recorder.sweeps] == [None, 0.5, 0.5, 0.5, 0]
+    assert [sweep.returned for sweep in recorder.sweeps] == [None, None, 0.25, 0.25, 0]
+    assert [(s.sweep, s.steps, s.before, s.left) for s in recorder.sweeps[:2]] == [(1, 3, 1, 0.25), (2, 6, 0.5, 0.25)]
+
+
+@pytest.mark.parametrize("axis", [-1, 0, 1])
+def test_a_pixel_changes_where_any_channel_does(axis):
+    first = np.zeros((2, 2, 2))
+    second = first.copy()
+    second[0, 1, 1] = second[1, 0, 0] = second[1, 0, 1] = 1
+    recorder = Recorder(axis)
+    feed(recorder, [np.moveaxis(picture, -1, axis) for picture in (first, second, first)])
+    assert [sweep.changed for sweep in recorder.sweeps] == [None, 0.5, 0.5]
+    assert recorder.sweeps[-1].returned == 0.5
+
+
+def test_levels_are_not_compared_with_one_another():
+    recorder = Recorder()
+    feed(recorder, [np.zeros((1, 1)), np.ones((1, 1))], level=1)
+    feed(recorder, [np.zeros((2, 2)), np.zeros((2, 2))], level=0)
+    assert [sweep.changed for sweep in recorder.sweeps] == [None, 1, None, 0]
+
+
+def test_only_ends_of_sweeps_are_recorded_and_all_progress_is_passed_on():
+    seen = []
+    recorder = Recorder(then=seen.append)
+    feed(recorder, [np.zeros((2, 2))] * 3, end_of_sweep=False)
+    assert len(seen) == 3 and recorder.sweeps == []
+
+
+# ---------------------------------------------------------------- runs
+
+
+SAMPLE = texture((18, 16))
+JOB = {"order": 2, "device": "reference", "levels": 2}
+
+
+def without_times(results):
+    if isinstance(results, dict):
+        return {k: without_times(v) for k, v in results.items() if k not in ("seconds", "device_seconds")}
+    return [without_times(item) for item in results] if isinstance(results, list) else results
+
+
+@pytest.fixture(scope="module")
+def found():
+    return compare(SAMPLE, (12, 14), ["coloring", "synchronous", "block:4x4"], seeds=(3, 5), **JOB)
+
+
+def test_seeds_decide_everything_but_times(found):
+    again = compare(SAMPLE, (12, 14), ["coloring", "synchronous", "block:4x4"], seeds=(3, 5), **JOB)
+    assert without_times(found.results()) == without_times(again.results())
+    for one, other in zip(found.entries, again.entries, strict=True):
+        assert all(np.array_equal(a.image, b.image) for a, b in zip(one.runs, other.runs, strict=True))
+    json.dumps(found.results(), allow_nan=False)
+
+
+def test_a_device_gives_what_the_reference_gives(found, any_device):
+    on_device = compare(
+        SAMPLE, (12, 14), ["coloring", "synchronous", "block:4x4"], seeds=(3, 5), **{**JOB, "device": any_device.index}
+    )
+    for one, other in zip(found.entries, on_device.entries, strict=True):
+        for a, b in zip(one.runs, other.runs, strict=True):
+            assert np.array_equal(a.image, b.image) and a.sweeps == b.sweeps
+    assert all(run.device_seconds > 0 for entry in on_device.entries for run in entry.runs)
+
+
+def test_runs_are_what_the_statistics_say(found):
+    for entry in found.entries:
+        assert [run.seed for run in entry.runs] == [3, 5]
+        for run in entry.runs:
+            finest = run.levels[-1]
+            assert len(run.finest) == finest["sweeps"] and run.finest[-1].steps == finest["steps"]
+            cooling = [sweep for sweep in run.finest if sweep.phase == "relax"]
+            assert run.figure("steps") == cooling[-1].steps == finest["equilibrium"]["steps"]
+            assert run.figure("sweeps") == len(cooling)
+            assert cooling[0].before == 0.75 and cooling[-1].left == 0
+            assert run.image.shape == (12, 14) and run.seconds > 0
+            assert 0 < run.figure("utilisation") <= 1
+    synchronous = found.entries[1].runs[0]
+    assert synchronous.figure("steps") == synchronous.figure("sweeps")
+
+
+def test_figures_over_seeds(found):
+    for entry in found.entries:
+        spread = entry.figure("plausibility")
+        values = [run.quality.plausibility for run in entry.runs]
+        assert spread == Spread(pytest.approx(np.mean(values)), pytest.approx(np.std(values, ddof=1)), tuple(values))
+    one = Entry("one", (True,), found.entries[0].runs[:1])
+    assert one.figure("copying").deviation is None
+    assert one.figure("oscillation_free") is not None
+
+
+def test_no_free_sweep_no_figure_of_one():
+    found = compare(SAMPLE, (12, 12), ["coloring"], seeds=[1], free_sweeps=1, **JOB)
+    assert found.entries[0].figure("changed_free") is not None
+    assert found.entries[0].figure("oscillation_free") is None
+
+
+def test_who_keeps_equation_14(found):
+    assert [entry.independent for entry in found.entries] == [True, False, False]
+    assert [mark(entry) for entry in found.entries] == ["keeps (14)", "breaks (14)", "breaks (14)"]
+    order_1 = compare(SAMPLE, (12, 12), ["checkerboard"], seeds=[1], **{**JOB, "order": 1})
+    assert order_1.entries[0].independent
+    odd = compare(SAMPLE, (11, 12), ["checkerboard"], seeds=[1], **{**JOB, "order": 1})  # the torus has a seam
+    assert not odd.entries[0].independent
+
+
+def test_a_level_at_which_it_breaks_is_enough():
+    tiles = compare(SAMPLE, (12, 12), ["block:6x6"], seeds=[1], **JOB)
+    assert tiles.entries[0].claims == (True, False) and not tiles.entries[0].independent
+    (section,) = (section for section in sections(tiles) if section.title == "Until equilibrium")
+    assert "At level 1 block:6x6 keeps equation (14)" in section.parts[0].note
+
+
+class Liar(Checkerboard):
+    """Claims what it does not keep."""
+
+    name = "liar"
+
+    def independent(self, grid, offsets):
+        return True
+
+
+def test_a_false_claim_is_caught_and_told():
+    found = compare(SAMPLE, (12, 12), [Liar(), "luby"], seeds=[1], **JOB)
+    liar, luby = found.entries
+    assert liar.caught and not liar.independent and all(liar.claims)
+    assert luby.independent and not luby.caught
+    assert mark(liar) == "breaks (14), against its claim"
+    assert "liar breaks it" in reading(found)
+
+
+def test_every_table_says_who_breaks_it(found):
+    tables = [
+        part for section in sections(found) for part in section.parts if getattr(part, "header", [""])[0] == "Schedule"
+    ]
+    assert len(tables) == 4
+    for table in tables:
+        assert [row[:2] for row in table.rows] == [
+            ["coloring", "keeps (14)"],
+            ["synchronous", "breaks (14)"],
+            ["block:4x4", "breaks (14)"],
+        ]
+    for width in (60, 100, 300):
+        for table in terminal_tables(found, width):
+            assert list(table.columns[1].cells) == ["yes", "NO", "NO"]
+    assert len(terminal_tables(found, 300)) == 1 < len(terminal_tables(found, 60))
+
+
+def test_figures_of_the_page(found):
+    figures = [part for section in sections(found) for part in section.parts if isinstance(part, Figure)]
+    assert [figure.file for figure in figures] == [
+        *("pictures.png", "seeds.png", "temperature.png", "costs.png", "changed.png", "oscillation.png", "quality.png")
+    ]
+    assert [f.png for f in figures] == [p.png for s in sections(found) for p in s.parts if isinstance(p, Figure)]
+
+
+@pytest.mark.parametrize("axis", [-1, 0])
+def test_colour_and_channels_on_any_axis(axis):
+    sample = np.moveaxis(texture((16, 16), channels=3), -1, axis)
+    found = compare(sample, (10, 12), ["coloring"], seeds=[1], channel_axis=axis, **JOB)
+    assert found.entries[0].runs[0].image.shape == ((10, 12, 3) if axis == -1 else (3, 10, 12))
+    assert sections(found)
+
+
+def test_progress_runs_from_0_to_1():
+    seen = []
+    compare(SAMPLE, (12, 12), ["coloring", Coloring.name + "-fixed"], seeds=(1, 2), callback=seen.append, **JOB)
+    fractions = [now.fraction for now in seen]
+    assert fractions == sorted(fractions) and fractions[-1] == pytest.approx(1) and fractions[0] == 0
+    turns = list(dict.fromkeys((now.run, now.schedule, now.seed, now.runs) for now in seen))
+    names = ("coloring", "coloring-fixed")
+    assert turns == [(1 + 2 * s + n, names[n], s + 1, 4) for s in range(2) for n in range(2)]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"schedules": []}, "no schedules"),
+        ({"schedules": ["luby", "luby"]}, "given twice"),
+        ({"schedules": ["lubi"]}, "choose one of"),
+        ({"seeds": []}, "no seeds"),
+        ({"seeds": [1, 1]}, "given twice"),
+        ({"seeds": [-1]}, "seed"),
+        ({"shape": (8, 20)}, "give 9 or more"),
+        ({"shape": 3}, "two whole numbers"),
+        ({"sample": np.zeros((8, 20))}, "too small"),
+        ({"order": 400}, "largest order that fits"),
+        ({"array": "round"}, "array"),
+        ({"mapping": "flat"}, "choose one of"),
+        ({"xi": 1.0}, "xi"),
+    ],
+)
+def test_bad_input(change, words):
+    good = {"sample": SAMPLE, "shape": (12, 12), "schedules": ["coloring"], **JOB}
+    with pytest.raises(ValueError, match=words):
+        compare(**{**good, **change})
+
+
+def test_the_schedule_is_no_option():
+    with pytest.raises(TypeError, match="schedules"):
+        compare(SAMPLE, (12, 12), schedule="luby", **JOB)

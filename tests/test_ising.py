@@ -1,0 +1,392 @@
+"""Heat-bath Ising: the operations bit for bit, and which schedules sample the Ising distribution."""
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, opencl
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from simdtex import random
+from simdtex.estimates import estimate, findings
+from simdtex.exact import CRITICAL
+from simdtex.lattice import Grid, neighbourhood_offsets
+from simdtex.methods.ising import Chains, ising
+from simdtex.ops.ising import heat_bath_chances, ising_commit, ising_relax, ising_sequence
+from simdtex.schedules import Info, Luby
+
+OFFSETS = neighbourhood_offsets(1)
+EXACT = ["coloring", "coloring-fixed", "luby", "checkerboard", "raster", "random-scan"]
+
+
+# ---------------------------------------------------------------- operations
+
+
+def problem(seed=0, shape=(6, 5), torus=True, tile=None, temperatures=(1.5, 3.0), seeds=3, count=None):
+    """Spins of chains, some sites of the lattice, and the chances."""
+    rng = np.random.default_rng(seed)
+    grid = Grid(*shape, torus=torus, tile=tile)
+    rows = 2 * shape[0] if tile else shape[0]
+    spins = rng.integers(0, 2, (len(temperatures) * seeds, rows, shape[1]), dtype=np.uint8)
+    sites = rng.permutation(grid.sites())[:count].astype(np.int32)
+    return grid, spins, sites, heat_bath_chances(temperatures, len(OFFSETS))
+
+
+def relaxed(machine, grid, spins, sites, chances, seed=7, key=3):
+    """The step's draws, and the spins after the commit."""
+    put = [machine.put(a) for a in (spins, sites, OFFSETS)]
+    drawn = ising_relax(machine, *put, grid, machine.put(chances), seed, key)
+    return machine.get(drawn), machine.get(ising_commit(machine, put[0], put[1], drawn))
+
+
+def sequenced(machine, grid, spins, queue, chances, seed=7):
+    put = [machine.put(a) for a in (spins, queue, OFFSETS)]
+    return machine.get(ising_sequence(machine, *put, grid, machine.put(chances), seed))
+
+
+problems = st.builds(
+    problem,
+    seed=st.integers(0, 2**16),
+    shape=st.tuples(st.integers(1, 7), st.integers(1, 7)),
+    torus=st.booleans(),
+    tile=st.sampled_from([None, (2, 3), (4, 4)]),
+    temperatures=st.sampled_from([(2.0,), (0.5, 2.3, 40.0)]),
+    seeds=st.sampled_from([1, 3, 17]),
+    count=st.sampled_from([1, 5, None]),
+)
+
+
+def check_formula(p, seed=7, key=3):
+    """Against a loop over chains, sites and neighbours, and floating-point probabilities."""
+    grid, spins, sites, chances = p
+    drawn, after = relaxed(REFERENCE, *p)
+    expected, (h, w) = spins.copy(), (grid.height, grid.width)
+    for chain in range(len(spins)):
+        temperature = {1: (2.0,), 2: (1.5, 3.0), 3: (0.5, 2.3, 40.0)}[len(chances)][chain * len(chances) // len(spins)]
+        for s, site in enumerate(sites):
+            i, j = divmod(int(site), w)
+            field = 0
+            for di, dj in ((-1, 0), (0, -1), (0, 1), (1, 0)):
+                k, m = i + di, j + dj
+                if grid.torus:
+                    k, m = k % h, m % w
+                if not (0 <= k < h and 0 <= m < w) or (k, m) == (i, j):
+                    continue
+                elsewhere = grid.tile and (k // grid.tile[0], m // grid.tile[1]) != (
+                    i // grid.tile[0],
+                    j // grid.tile[1],
+                )
+                field += 2 * int(spins[chain, k + (h if elsewhere else 0), m]) - 1
+            attempt = chain % (len(spins) // len(chances))
+            bits = int(random.draw4(seed, 0, key, np.array([site]), random.DRAW, attempt)[0][0])
+            chance = 1 / (1 + np.exp(-2 * field / temperature))
+            assert abs(bits - chance * 2**32) > 1  # no case so close that rounding decides
+            expected[chain, i, j] = drawn[chain, s]
+            assert drawn[chain, s] == (bits < chance * 2**32)
+    assert_same_bits(after, expected)
+
+
+@given(problems)
+@settings(max_examples=30)
+def test_the_reference_is_the_formula(p):
+    check_formula(p)
+
+
+@given(p=problems)
+@settings(max_examples=25)
+def test_a_device_has_the_references_bits(machine, p):
+    assert_same_bits(relaxed(machine, *p), relaxed(REFERENCE, *p))
+
+
+@given(p=problems)
+@settings(max_examples=15)
+def test_a_sequence_is_its_single_steps(machine, p):
+    grid, spins, sites, chances = p
+    queue = np.stack([sites, np.arange(len(sites)) % 4], 1).astype(np.int32)
+    one_by_one = spins
+    for site, key in queue:
+        one_by_one = relaxed(REFERENCE, grid, one_by_one, site[None], chances, key=int(key))[1]
+    assert_same_bits(sequenced(REFERENCE, grid, spins, queue, chances), one_by_one)
+    assert_same_bits(sequenced(machine, grid, spins, queue, chances), one_by_one)
+
+
+@pytest.mark.parametrize("work_group", [3, 16])
+def test_the_shape_of_a_launch_changes_no_bit(cl_device, work_group):
+    p = problem(2, count=7)
+    machine = opencl(cl_device, work_group=work_group)
+    assert_same_bits(relaxed(machine, *p), relaxed(REFERENCE, *p))
+    queue = np.stack([p[2], np.arange(7)], 1).astype(np.int32)
+    args = (p[0], p[1], queue, p[3])
+    assert_same_bits(sequenced(machine, *args), sequenced(REFERENCE, *args))
+
+
+def test_the_chances():
+    chances = heat_bath_chances([2.0, 1e-9, 1e9], 4)
+    assert chances.shape == (3, 5, 5) and chances.dtype == np.uint32
+    up, members = 3, 4
+    assert chances[0, members, up] == round(2**32 / (1 + np.exp(-2.0)))
+    assert list(chances[1, 4]) == [0, 0, 2**31, 2**32 - 1, 2**32 - 1]  # ice: the majority
+    assert (abs(chances[2, 4].astype(float) - 2**31) < 100).all()  # and next to no correlation
+    for n in range(5):  # turning all spins over exchanges up and down
+        both = chances[0, n, : n + 1].astype(float) + chances[0, n, n::-1]
+        assert (abs(both - 2.0**32) <= 1).all()
+
+
+# ---------------------------------------------------------------- the method
+
+
+@pytest.mark.parametrize("schedule", [*EXACT, "synchronous", "random-subset", "block:2x3", "block"])
+@pytest.mark.parametrize("boundary", ["torus", "open"])
+def test_a_run_is_the_same_on_a_device_and_the_reference(machine, schedule, boundary):
+    options = {"seeds": 3, "sweeps": 3, "burn_in": 1, "boundary": boundary, "start": "random"}
+    ours, theirs = (ising(m, (4, 6), [1.8, 2.5], schedule, **options) for m in (machine, REFERENCE))
+    for name in ("energy", "lagged", "even", "odd", "spins"):
+        assert_same_bits(getattr(ours, name), getattr(theirs, name))
+    assert (ours.steps, ours.relaxations) == (theirs.steps, theirs.relaxations)
+
+
+def test_what_is_measured_is_what_it_says():
+    for boundary in ("torus", "open"):
+        run = ising(REFERENCE, (3, 5), [2.5], "luby", seeds=4, sweeps=2, burn_in=3, boundary=boundary)
+        s = 2.0 * run.spins[0] - 1
+        bonds = [(s * np.roll(s, -1, axis)) for axis in (1, 2)]
+        if boundary == "open":
+            bonds = [bonds[0][:, :-1], bonds[1][:, :, :-1]]
+        assert run.energy[0, :, -1] == pytest.approx(-sum(b.sum((1, 2)) for b in bonds) / 15)
+        assert run.magnetisation[0, :, -1] == pytest.approx(s.mean((1, 2)))
+        parity = np.indices((3, 5)).sum(0) % 2
+        assert run.odd[0, :, -1] == pytest.approx(s[:, parity == 1].mean(1))
+        longer = ising(REFERENCE, (3, 5), [2.5], "luby", seeds=4, sweeps=3, burn_in=2, boundary=boundary)
+        assert_same_bits(longer.energy[..., 1:].copy(), run.energy)  # burn-in is but not looking
+        assert (run.lagged[0, :, 0] != run.energy[0, :, 0]).any()
+
+
+def test_a_temperature_knows_nothing_of_the_others(any_device):
+    machine = opencl(any_device)
+    alone = ising(machine, (4, 4), [2.5], "coloring", seeds=3, sweeps=5, burn_in=0)
+    beside = ising(machine, (4, 4), [1.0, 2.5], "coloring", seeds=3, sweeps=5, burn_in=0)
+    assert_same_bits(alone.energy[0].copy(), beside.energy[1].copy())
+
+
+def test_steps_of_one_site_share_a_launch(any_device):
+    machine = opencl(any_device)
+    run = ising(machine, (6, 6), [2.0], "raster", seeds=2, sweeps=3, burn_in=2)
+    assert (run.steps, run.relaxations, run.launches) == (5 * 36, 5 * 36, 5)
+
+
+class Turns:
+    """A step of one site, then all others at once with tiles, then one site again."""
+
+    name = "turns"
+
+    def independent(self, grid, offsets):
+        return False
+
+    def init(self, machine, grid, offsets, order, seed, level):
+        return grid.sites(), 0
+
+    def step(self, state, active):
+        sites, count = state
+        part = (sites[:1], sites[1:-1], sites[-1:])[count % 3]
+        info = Info(part, count, count % 3 == 2, (2, 2) if count % 3 == 1 else None)
+        return (sites, count + 1), info
+
+
+def test_single_sites_and_steps_of_many_keep_their_order(machine):
+    for m in (machine, REFERENCE):
+        run = ising(m, (4, 4), [2.0], Turns(), seeds=2, sweeps=4, burn_in=0, start="random")
+        spins = ising(m, (4, 4), [2.0], Turns(), seeds=2, sweeps=1, burn_in=0, start="random").spins[0]
+        grid, chances = Grid(4, 4), heat_bath_chances([2.0], 4)
+        bits = random.draw4(1, 0, 0, np.arange(16), random.START, np.arange(2)[:, None])[0]
+        expected = (bits >> 31).astype(np.uint8).reshape(2, 4, 4)
+        for key, part in enumerate((slice(0, 1), slice(1, -1), slice(-1, None))):
+            tile = replace(grid, tile=(2, 2)) if key == 1 else grid
+            stacked = np.concatenate([expected, expected], 1) if key == 1 else expected
+            after = relaxed(REFERENCE, tile, stacked, grid.sites()[part], chances, seed=1, key=key)[1]
+            expected = after[:, :4].copy()
+        assert_same_bits(spins, expected)
+        assert run.energy.shape == (1, 2, 4)
+
+
+@pytest.mark.parametrize(
+    ("bad", "sentence"),
+    [
+        ({"size": (1, 4)}, "a side of the lattice is 1; give 2 or more"),
+        ({"temperatures": []}, "there is no temperature"),
+        ({"temperatures": [0.0]}, "temperature is 0.0; give a number above 0"),
+        ({"seeds": 0}, "seeds is 0; give 1 or more"),
+        ({"sweeps": 0}, "sweeps is 0"),
+        ({"burn_in": -1}, "burn_in is -1"),
+        ({"boundary": "klein"}, "unknown boundary 'klein'; choose one of: torus, open"),
+        ({"start": "down"}, "unknown start 'down'; choose one of: up, random"),
+        ({"size": (30000, 30000)}, "give a smaller size or fewer seeds"),
+        ({"schedule": "chess"}, "unknown schedule 'chess'"),
+    ],
+)
+def test_bad_values_are_refused_in_a_sentence(bad, sentence):
+    values = {"size": (4, 4), "temperatures": [2.0], "schedule": "coloring", **bad}
+    with pytest.raises((ValueError, TypeError), match=sentence):
+        ising(REFERENCE, **values)
+
+
+# ---------------------------------------------------------------- estimates
+
+
+def autoregressive(rho, chains, length, seed=0):
+    noise = np.random.default_rng(seed).normal(size=(chains, length + 200)) * np.sqrt(1 - rho**2)
+    x = np.zeros_like(noise)
+    for t in range(1, noise.shape[1]):
+        x[:, t] = rho * x[:, t - 1] + noise[:, t]
+    return x[:, 200:]
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.9])
+def test_the_autocorrelation_time_of_a_known_process(rho):
+    found = estimate(autoregressive(rho, 20, 4000))
+    tau = (1 + rho) / (1 - rho)
+    assert found.tau == pytest.approx(tau, rel=0.1)
+    assert found.effective == pytest.approx(80000 / found.tau)
+    assert found.within == pytest.approx(np.sqrt(tau / 80000), rel=0.1)
+    assert found.between == pytest.approx(found.within, rel=0.6)
+    assert found.error == max(found.between, found.within) and abs(found.mean) < 5 * found.error
+
+
+def test_a_series_without_change_has_a_time_of_one_and_the_least_error():
+    found = estimate(np.full((3, 10), 2.5), 0.25)
+    assert (found.mean, found.error, found.tau, found.effective) == (2.5, 0.25, 1.0, 30.0)
+    mixed = np.concatenate([np.zeros((1, 500)), autoregressive(0.5, 1, 500)])
+    assert np.isfinite(estimate(mixed).error)
+
+
+# ---------------------------------------------------------------- which schedules are right
+
+
+@pytest.fixture(scope="module")
+def found(any_device):
+    """Findings of all schedules on a small lattice: below, near and above T_c."""
+    names = [*EXACT, "synchronous", "random-subset", "block:4x4"]
+    options = {"seeds": 32, "sweeps": 200, "burn_in": 100, "seed": 5}
+    runs = [ising(opencl(any_device), (8, 8), [1.8, CRITICAL, 2.8], name, **options) for name in names]
+    return {(one.schedule, one.temperature): one for one in findings(runs)}
+
+
+@pytest.mark.parametrize("schedule", EXACT)
+def test_schedules_that_keep_equation_14_have_the_exact_energy(found, schedule):
+    for (name, _), one in found.items():
+        if name == schedule:
+            assert one.independent and not one.differs, one
+            assert one.energy.error < 0.025  # not for want of precision
+
+
+def test_the_synchronous_schedule_has_another_energy_and_two_lattices(found):
+    for (name, _), one in found.items():
+        if name == "synchronous":
+            assert not one.independent and one.differs == "energy" and one.energy_sigmas > 4.5, one
+            assert abs(one.neighbours) < 0.004  # neighbours know nothing of one another
+            assert abs(one.lagged.mean - one.exact_energy) < 4 * one.lagged.error  # but those of the step before
+        elif name in EXACT:
+            assert one.neighbours > 0.008, one
+
+
+def test_the_synchronous_schedule_is_far_off_above_the_critical_point(found):
+    one = found["synchronous", 2.8]
+    assert one.energy_sigmas > 20 and abs(one.energy.mean) < 5 * one.energy.error  # no energy at all is left
+
+
+def test_random_subsets_and_blocks_differ_too(found):
+    for schedule in ("random-subset", "block:4x4"):
+        ones = [one for (name, _), one in found.items() if name == schedule]
+        assert any(one.differs for one in ones) and not any(one.independent for one in ones)
+
+
+@functools.cache
+def states():
+    """All states of a 4x4 torus."""
+    bits = np.arange(2**16)[:, None] >> np.arange(16) & 1
+    return (2 * bits - 1).reshape(-1, 4, 4)
+
+
+def energies():
+    return -sum((states() * np.roll(states(), 1, axis)).sum((1, 2)) for axis in (1, 2))
+
+
+def tabulated(weight):
+    """Probability of every (energy, |magnetisation|) of a 4x4 torus, both as whole numbers."""
+    table = {}
+    for e, m, w in zip(energies(), np.abs(states().sum((1, 2))), weight / weight.sum(), strict=True):
+        table[int(e), int(m)] = table.get((int(e), int(m)), 0.0) + w
+    return table
+
+
+@functools.cache
+def distribution(temperature):
+    return tabulated(np.exp(-energies() / temperature))
+
+
+def synchronous_distribution(temperature):
+    """The same of what the synchronous schedule is to sample: the product over sites of cosh(field / T)."""
+    s = states()
+    field = sum(np.roll(s, by, axis) for axis in (1, 2) for by in (1, -1))
+    return tabulated(np.cosh(field / temperature).prod((1, 2)))
+
+
+def tallied(run: Chains, thin):
+    """How often each (energy, |magnetisation|) was met, thinned until samples are as good as independent."""
+    e = np.rint(16 * run.energy[0, :, thin - 1 :: thin]).astype(int).ravel()
+    m = np.rint(16 * np.abs(run.magnetisation[0, :, thin - 1 :: thin])).astype(int).ravel()
+    return list(zip(e.tolist(), m.tolist(), strict=True))
+
+
+def binned(table, samples, least=8):
+    """Counts and expected counts, states too rare for chi-square thrown together."""
+    common = {key for key, p in table.items() if p * len(samples) >= least}
+    order = sorted(common)
+    counts = [samples.count(key) for key in order]
+    expected = [table[key] * len(samples) for key in order]
+    return np.array([*counts, len(samples) - sum(counts)]), np.array([*expected, len(samples) - sum(expected)])
+
+
+@pytest.fixture(scope="module")
+def tallies(any_device):
+    thin, made = 12, {}
+    for name in [*EXACT, "synchronous", "random-subset"]:
+        options = {"seeds": 200, "sweeps": 10 * thin, "burn_in": 60, "seed": 11}
+        made[name] = tallied(ising(opencl(any_device), (4, 4), [2.6], name, **options), thin)
+    return made
+
+
+@pytest.mark.parametrize("schedule", EXACT)
+def test_the_whole_distribution_of_a_small_lattice(tallies, schedule):
+    counts, expected = binned(distribution(2.6), tallies[schedule])
+    assert len(counts) > 12
+    assert stats.chisquare(counts, expected).pvalue > 1e-3
+
+
+@pytest.mark.parametrize("schedule", [name for name in EXACT if name != "raster"])
+def test_the_same_distribution_as_raster(tallies, schedule):
+    table = distribution(2.6)
+    ours, theirs = (binned(table, tallies[name])[0] for name in (schedule, "raster"))
+    assert stats.chi2_contingency([ours, theirs]).pvalue > 1e-3
+
+
+@pytest.mark.parametrize("schedule", ["synchronous", "random-subset"])
+def test_another_distribution_than_rasters(tallies, schedule):
+    table = distribution(2.6)
+    counts, expected = binned(table, tallies[schedule])
+    assert stats.chisquare(counts, expected).pvalue < 1e-12
+    assert stats.chi2_contingency([counts, binned(table, tallies["raster"])[0]]).pvalue < 1e-12
+
+
+def test_what_the_synchronous_schedule_samples_is_known_too(tallies):
+    counts, expected = binned(synchronous_distribution(2.6), tallies["synchronous"][::2])  # it takes twice the sweeps
+    assert len(counts) > 12
+    assert stats.chisquare(counts, expected).pvalue > 1e-3
+
+
+def test_schedules_made_by_hand_are_as_good_as_names(any_device):
+    run = ising(opencl(any_device), (4, 4), [2.0], Luby(), seeds=2, sweeps=2, burn_in=0)
+    named = ising(opencl(any_device), (4, 4), [2.0], "luby", seeds=2, sweeps=2, burn_in=0)
+    assert_same_bits(run.energy, named.energy)
