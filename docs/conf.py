@@ -52,7 +52,7 @@ COLUMNS = {
 
 
 def cell(row, name):
-    heading, form, factor, spread = COLUMNS[name]
+    _, form, factor, spread = COLUMNS[name]
     if name in ("schedule", "keeps (14)"):
         return row[name]
     text = form.format(float(row[name]) * factor)

@@ -51,27 +51,28 @@ def check_distinct(outputs: list[Path], inputs: list[Path]) -> None:
 
 
 @contextmanager
-def progress_bar(quiet: bool) -> Iterator[Callable[[Any], None]]:
-    """A progress bar, where there is a terminal, with level, sweep, temperature left and time left."""
-    if quiet:
-        yield lambda progress: None
-        return
-    console = Console(stderr=True)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("starting", total=1.0)
+def progress_bar(quiet: bool) -> Iterator[Callable[[float, str, str], None]]:
+    """A progress bar on a terminal; elsewhere a line whenever another job begins.
 
-        def show(progress: Any) -> None:
-            bar.update(
-                task,
-                completed=progress.fraction,
-                description=f"level {progress.level}, sweep {progress.sweep}, "
-                f"temperature {progress.temperature_left:.3f}",
-            )
+    Yields ``show(fraction, doing, job)``: the share of the whole that is done, what is being done now, and the job that
+    this is part of, empty where there is only one.
+    """
+    console = Console(stderr=True, quiet=quiet)
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bar:
+        task = bar.add_task("starting", total=1.0)
+        last = ""
+
+        def show(fraction: float, doing: str, job: str = "") -> None:
+            nonlocal last
+            bar.update(task, completed=fraction, description=", ".join(part for part in (job, doing) if part))
+            if job != last and not quiet and not console.is_terminal:
+                click.echo(job, err=True)
+            last = job
 
         yield show
+
+
+def standing(progress: Any) -> str:
+    """Where a run stands, for the progress bar."""
+    return f"level {progress.level}, sweep {progress.sweep}, temperature {progress.temperature_left:.3f}"

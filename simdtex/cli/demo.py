@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from simdtex.cli.common import DEVICE, plainly, progress_bar
+from simdtex.cli.common import DEVICE, plainly, progress_bar, standing
 
 
 @click.command()
@@ -39,7 +39,9 @@ def demo(output: Path, size: str, seed: int, device: str | None) -> None:
         sample = getattr(data, name)()[:128, :128]
         began = time.perf_counter()
         with progress_bar(quiet=False) as show:
-            made = synthesize(sample, shape, rng=seed, device=machine, callback=show)
+            made = synthesize(
+                sample, shape, rng=seed, device=machine, callback=lambda p: show(p.fraction, standing(p), "")
+            )
         seconds = time.perf_counter() - began
         image.write(output / f"{name}.png", made)
         pictures += [(f"{name}, the sample", sample), (f"{name}, {seconds:.1f} s", made)]

@@ -6,16 +6,13 @@ from __future__ import annotations
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from simdtex.cli.common import DEVICE, plainly
+from simdtex.cli.common import DEVICE, plainly, progress_bar
 
 SCHEDULES = (
     "coloring,coloring-fixed,luby,checkerboard,raster,random-scan,"
@@ -85,9 +82,13 @@ def ising(
 
     began = time.perf_counter()
     runs, pictures = [], []
-    with _progress(quiet, len(chosen)) as show:
+    with progress_bar(quiet) as show:
         for place, schedule in enumerate(chosen):
-            told = show(place, schedule.name)
+            job = f"schedule {place + 1} of {len(chosen)}: {schedule.name}"
+
+            def told(share: float, place: int = place, job: str = job) -> None:
+                show((place + share) / len(chosen), "", job)
+
             runs.append(ising(machine, shape, temperatures, schedule, seed=seed, callback=told, **options))
             if output:
                 lowest = [min(temperatures)]
@@ -113,23 +114,3 @@ def ising(
 def _distinct(chosen: list[Any]) -> list[Any]:
     """The schedules, each once."""
     return list({schedule.name: schedule for schedule in chosen}.values())
-
-
-@contextmanager
-def _progress(quiet: bool, count: int) -> Iterator[Callable[[int, str], Callable[[float], None] | None]]:
-    """A bar over all schedules where there is a terminal, else a line for each."""
-    if quiet:
-        yield lambda place, name: None
-        return
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("starting", total=1.0)
-
-        def show(place: int, name: str) -> Callable[[float], None]:
-            what = f"schedule {place + 1} of {count}: {name}"
-            if not console.is_terminal:
-                click.echo(what, err=True)
-            return lambda share: bar.update(task, completed=(place + share) / count, description=what)
-
-        yield show

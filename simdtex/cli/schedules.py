@@ -6,17 +6,14 @@ from __future__ import annotations
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
 from click.core import ParameterSource
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from simdtex.cli.common import DEVICE, plainly
+from simdtex.cli.common import DEVICE, plainly, progress_bar, standing
 from simdtex.methods.mrf import Options
 
 DEFAULTS = Options()
@@ -88,7 +85,12 @@ def schedules(
     whole("--seeds", seeds, 1)
     pixels, channel_axis = _sample(sample)
     began = time.perf_counter()
-    with _progress(quiet) as show:
+    with progress_bar(quiet) as show:
+
+        def tell(now: Any) -> None:
+            job = f"run {now.run} of {now.runs}: {now.schedule}, seed {now.seed}"
+            show(now.fraction, standing(now.progress), job)
+
         found = compare(
             pixels,
             shape,
@@ -96,7 +98,7 @@ def schedules(
             seeds=range(seed, seed + seeds),
             channel_axis=channel_axis,
             device=device,
-            callback=show,
+            callback=tell,
             **{name: value for name, value in options.items() if value is not None},
         )
     write_comparison(output, found, _command_line(click.get_current_context()))
@@ -136,27 +138,3 @@ def _sample(path: Path | None) -> tuple[Any, int | None]:
         return brick()[:128, :128], None
     picture = image.read(path)
     return picture.pixels, picture.channel_axis
-
-
-@contextmanager
-def _progress(quiet: bool) -> Iterator[Callable[[Any], None] | None]:
-    """A bar over all runs where there is a terminal, else a line for each."""
-    if quiet:
-        yield None
-        return
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("starting", total=1.0)
-        told = 0
-
-        def show(now: Any) -> None:
-            nonlocal told
-            what = f"{now.schedule}, seed {now.seed}"
-            level = f"level {now.progress.level}, sweep {now.progress.sweep}"
-            bar.update(task, completed=now.fraction, description=f"run {now.run} of {now.runs}: {what}, {level}")
-            if told < now.run and not console.is_terminal:
-                click.echo(f"run {now.run} of {now.runs}: {what}", err=True)
-            told = now.run
-
-        yield show

@@ -10,7 +10,7 @@ from typing import Any
 import click
 from rich.console import Console
 
-from simdtex.cli.common import DEVICE, check_distinct, plainly, progress_bar
+from simdtex.cli.common import DEVICE, check_distinct, plainly, progress_bar, standing
 from simdtex.methods.mrf import Options
 
 DEFAULTS = Options()
@@ -103,7 +103,7 @@ def synth(
         with progress_bar(quiet) as show:
 
             def callback(progress: Any) -> None:
-                show(progress)
+                show(progress.fraction, standing(progress), "")
                 if writer:
                     writer(progress)
 

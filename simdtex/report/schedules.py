@@ -61,7 +61,7 @@ EQUILIBRIUM = (
 TIMES = (
     Column("seconds", "Wall time, s", "wall s"),
     Column("device_seconds", "Device time, s", "device s"),
-    Column("passes", "SIMD passes", "passes"),
+    Column("passes", "SIMD steps", "passes"),
     Column("utilisation", "Utilisation", "utilis.", PERCENT),
     Column("model_seconds", "MP-1 by the model, s", "MP-1 s"),
 )
@@ -83,7 +83,7 @@ QUALITY = (
 ABOUT_EQUILIBRIUM = "A sweep relaxes as many sites as were still warm when it began. Free sweeps are not counted."
 ABOUT_TIMES = (
     "Wall time is without what watching the run took; device time is that spent in kernels. Utilisation is the mean "
-    "share of PEs with a site to relax, over the SIMD passes. The model counts the arithmetic of the distances and the "
+    "share of PEs with a site to relax, over the SIMD steps. The model counts the arithmetic of the distances and the "
     "fetching of neighbourhoods only."
 )
 ABOUT_MOVES = (
