@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every parallel schedule on brick, grass and gravel: what it costs, how it moves, what comes of it.
 
-    python benchmarks/schedules.py [--out docs/schedules] [--seeds 3] [--size 96] [--free-sweeps 8] [--only brick]
+    python benchmarks/schedules.py [--out docs/schedules] [--seeds 3] [--size 128] [--free-sweeps 8] [--only brick]
                                    [--device TEXT]
 
 Writes docs/study/schedules.csv (mean and standard deviation over the seeds) and, into docs/schedules, pictures and
@@ -30,7 +30,7 @@ def main():
     parser.add_argument("--out", type=Path, default=DOCS / "schedules")
     parser.add_argument("--table", type=Path, default=DOCS / "study" / "schedules.csv")
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--size", type=int, default=96)
+    parser.add_argument("--size", type=int, default=128)
     parser.add_argument("--free-sweeps", type=int, default=8)
     parser.add_argument("--only", default="")
     parser.add_argument("--device")

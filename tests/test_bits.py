@@ -239,6 +239,7 @@ import simdtex
 from cases import REFERENCE, assert_same_bits, texture
 from simdtex.device import find
 from simdtex.machine.opencl import OpenCL
+from simdtex.methods.ising import ising
 
 info = find("oclgrind")
 colour, grey = texture((6, 5), 3), texture((7, 6))
@@ -248,6 +249,8 @@ runs = [
     (grey, None, {"order": 2, "levels": 1, "relaxation": "gibbs", "pixel": "density", "boundary": "open"}),
     (grey, None, {"order": 1, "levels": 1, "pixel": "density", "bandwidth": 1.0, "coarsest": "same"}),
     (colour, -1, {"order": 1, "levels": 2, "edges": "reflect", "pixel": "density", "coarsest": "same"}),
+    (grey, None, {"order": 1, "levels": 1, "schedule": "luby"}),
+    (grey, None, {"order": 1, "levels": 1, "schedule": "block:2x3", "array": "2x2"}),
 ]
 machines = [OpenCL(info, work_group=group, vector=vector) for group, vector in ((None, 16), (3, 4), (4, 1))]
 for number, (sample, axis, options) in enumerate(runs):
@@ -259,6 +262,10 @@ for options in ({"temperature": np.full((5, 6), 0.5)}, {"estimator": "histogram"
     options |= {"order": 1, "levels": 3}
     tables = [simdtex.lcpdf(few, few, [(2, 2), (2, 3), (1, 1)], device=m, **options) for m in (machines[0], REFERENCE)]
     assert_same_bits(*tables)
+for schedule in ("block:2x2", "raster", "synchronous"):
+    options = {"seeds": 3, "sweeps": 2, "burn_in": 1}
+    chains = [ising(m, (4, 5), [2.0, 3.0], schedule, **options) for m in (machines[0], REFERENCE)]
+    assert_same_bits(*(one.spins for one in chains))
 print("same bits throughout")
 """
 

@@ -182,15 +182,17 @@ def test_the_schedule_of_the_page_works(machine):
     code = re.search(r"For example, .*::\n\n((?:(?:   .*)?\n)+)", PAGE.read_text(encoding="utf-8"))[1]
     names = {}
     exec(textwrap.dedent(code), names)
-    rows = names["Rows"]()
-    ours = run(rows, "gibbs", (6, 7), machine, check_schedule=True)
-    assert_same_bits(ours, run(rows, "gibbs", (6, 7)))
-    even, odd = np.arange(0, 48, 16), np.arange(8, 48, 16)
-    state, taken = rows.init(REFERENCE, Grid(6, 8), neighbourhood_offsets(2), 2, 1, 0), []
-    for _ in range(2):
-        state, info = rows.step(state, lambda: np.ones((6, 8), bool))
-        taken.append(sorted({site // 8 * 8 for site in info.sites.tolist()}))
-    assert taken == [even.tolist(), odd.tolist()]
+    wavefront = names["Wavefront"]()
+    for relaxation in ("icm", "gibbs"):
+        ours = run(wavefront, relaxation, (9, 11), machine, check_schedule=True, boundary="open")
+        assert_same_bits(ours, run("raster", relaxation, (9, 11), boundary="open"))
+    offsets = neighbourhood_offsets(2)
+    state, steps = wavefront.init(REFERENCE, Grid(6, 8, 1, False), offsets, 2, 1, 0), 0
+    last = False
+    while not last:
+        state, info = wavefront.step(state, lambda: np.ones((6, 8), bool))
+        steps, last = steps + 1, info.last
+    assert steps == 5 * 2 + 8
 
 
 # -- what is counted ------------------------------------------------------------------------------------------

@@ -14,6 +14,8 @@ import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from simdtex.methods.mrf import Options
+
 
 def plainly(command: Callable[..., None]) -> Callable[..., None]:
     """Turn bad input into one sentence and exit code 2, and Ctrl-C into exit code 130."""
@@ -32,12 +34,42 @@ def plainly(command: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
+DEFAULTS = Options()
+
 DEVICE = click.option(
     "--device",
     metavar="TEXT",
     help="Part of a device's name or platform, an index of `simdtex devices`, or `reference`. "
     "Default: SIMDTEX_DEVICE, else a GPU, else a CPU.",
 )
+
+
+_MRF_OPTIONS = (
+    click.option("--preset", help="default, or paper: the 1998 rules to the letter."),
+    click.option("--order", type=int, help=f"Neighbours within sqrt(order): 8 has 24, 18 has 60.  [{DEFAULTS.order}]"),
+    click.option("--levels", type=int, help="Of the multigrid.  [as many as the sample feeds]"),
+    click.option("--relaxation", help=f"icm (the mode) or gibbs (a draw).  [{DEFAULTS.relaxation}]"),
+    click.option("--bandwidth", type=float, help=f"Of the Parzen kernel, in units of h_opt.  [{DEFAULTS.bandwidth}]"),
+    click.option(
+        "--coherence", type=float, help=f"Preference for continuing a neighbour's source.  [{DEFAULTS.coherence}]"
+    ),
+    click.option("--xi", type=float, help=f"Cooling, below 0; further down is faster.  [{DEFAULTS.xi}]"),
+    click.option(
+        "--free-sweeps", type=int, help=f"Sweeps over all sites after a level's equilibrium.  [{DEFAULTS.free_sweeps}]"
+    ),
+    click.option("--pixel", help=f"source (pixels of the sample) or density (grey levels).  [{DEFAULTS.pixel}]"),
+    click.option("--phases", help=f"decimated or all: candidates at coarse levels.  [{DEFAULTS.phases}]"),
+    click.option("--edges", help=f"auto, reflect or whole: candidates at the sample's edge.  [{DEFAULTS.edges}]"),
+    click.option("--coarsest", help=f"gibbs or same: how the coarsest level relaxes.  [{DEFAULTS.coarsest}]"),
+    click.option("--boundary", help=f"torus (the result tiles) or open.  [{DEFAULTS.boundary}]"),
+)
+
+
+def mrf_options(command: Callable[..., None]) -> Callable[..., None]:
+    """The options of the method ``mrf`` that any command takes which runs it."""
+    for option in reversed(_MRF_OPTIONS):
+        command = option(command)
+    return command
 
 
 def check_distinct(outputs: list[Path], inputs: list[Path]) -> None:

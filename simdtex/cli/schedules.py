@@ -13,10 +13,8 @@ import click
 from click.core import ParameterSource
 from rich.console import Console
 
-from simdtex.cli.common import DEVICE, plainly, progress_bar, standing
-from simdtex.methods.mrf import Options
+from simdtex.cli.common import DEFAULTS, DEVICE, mrf_options, plainly, progress_bar, standing
 
-DEFAULTS = Options()
 SCHEDULES = "coloring,coloring-fixed,luby,checkerboard,synchronous,random-subset,block"
 
 
@@ -36,21 +34,7 @@ SCHEDULES = "coloring,coloring-fixed,luby,checkerboard,synchronous,random-subset
 @click.option("--seeds", default=3, show_default=True, help="Runs of each schedule, with seeds one after another.")
 @click.option("--seed", default=1, show_default=True, help="The first of them.")
 @click.option("--size", default="96x96", show_default=True, metavar="WIDTHxHEIGHT", help="Of each output.")
-@click.option("--preset", help="default, or paper: the 1998 rules to the letter.")
-@click.option("--order", type=int, help=f"Neighbours within sqrt(order).  [{DEFAULTS.order}]")
-@click.option("--levels", type=int, help="Of the multigrid.  [as many as the sample feeds]")
-@click.option("--relaxation", help=f"icm (the mode) or gibbs (a draw).  [{DEFAULTS.relaxation}]")
-@click.option("--bandwidth", type=float, help=f"Of the Parzen kernel, in units of h_opt.  [{DEFAULTS.bandwidth}]")
-@click.option(
-    "--coherence", type=float, help=f"Preference for continuing a neighbour's source.  [{DEFAULTS.coherence}]"
-)
-@click.option("--xi", type=float, help=f"Cooling, below 0; further down is faster.  [{DEFAULTS.xi}]")
-@click.option(
-    "--free-sweeps",
-    type=int,
-    help=f"Sweeps over all sites after a level's equilibrium; 6 or more show oscillation.  [{DEFAULTS.free_sweeps}]",
-)
-@click.option("--boundary", help=f"torus or open.  [{DEFAULTS.boundary}]")
+@mrf_options
 @click.option("--array", default="maspar-mp1-16k", show_default=True, help="Processor array to count on, or ROWSxCOLS.")
 @click.option("--mapping", default=DEFAULTS.mapping, show_default=True, help="Or hierarchical: pixels onto the array.")
 @click.option("--emulate", is_flag=True, help="Run as on the array too, which takes longer.")

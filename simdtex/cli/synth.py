@@ -10,10 +10,7 @@ from typing import Any
 import click
 from rich.console import Console
 
-from simdtex.cli.common import DEVICE, check_distinct, plainly, progress_bar, standing
-from simdtex.methods.mrf import Options
-
-DEFAULTS = Options()
+from simdtex.cli.common import DEFAULTS, DEVICE, check_distinct, mrf_options, plainly, progress_bar, standing
 
 
 @click.command()
@@ -21,29 +18,13 @@ DEFAULTS = Options()
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Picture to write.")
 @click.option("--size", metavar="WIDTHxHEIGHT", help="Of the output, in pixels. Default: twice the sample.")
 @click.option("--method", default="mrf", show_default=True, help="mrf: Paget and Longstaff 1998.")
-@click.option("--preset", help="default, or paper: the 1998 rules to the letter.")
-@click.option("--order", type=int, help=f"Neighbours within sqrt(order): 8 has 24, 18 has 60.  [{DEFAULTS.order}]")
-@click.option("--levels", type=int, help="Of the multigrid.  [as many as the sample feeds]")
-@click.option("--relaxation", help=f"icm (the mode) or gibbs (a draw).  [{DEFAULTS.relaxation}]")
-@click.option("--bandwidth", type=float, help=f"Of the Parzen kernel, in units of h_opt.  [{DEFAULTS.bandwidth}]")
-@click.option(
-    "--coherence", type=float, help=f"Preference for continuing a neighbour's source.  [{DEFAULTS.coherence}]"
-)
-@click.option("--xi", type=float, help=f"Cooling, below 0; further down is faster.  [{DEFAULTS.xi}]")
-@click.option(
-    "--free-sweeps", type=int, help=f"Sweeps over all sites after a level's equilibrium.  [{DEFAULTS.free_sweeps}]"
-)
-@click.option("--pixel", help=f"source (pixels of the sample) or density (grey levels).  [{DEFAULTS.pixel}]")
-@click.option("--phases", help=f"decimated or all: candidates at coarse levels.  [{DEFAULTS.phases}]")
-@click.option("--edges", help=f"auto, reflect or whole: candidates at the sample's edge.  [{DEFAULTS.edges}]")
-@click.option("--coarsest", help=f"gibbs or same: how the coarsest level relaxes.  [{DEFAULTS.coarsest}]")
+@mrf_options
 @click.option(
     "--schedule",
     help="Which sites relax together: coloring, coloring-fixed, luby, checkerboard, synchronous, random-subset[:P], "
     f"raster, random-scan or block[:ROWSxCOLS].  [{DEFAULTS.schedule}]",
 )
 @click.option("--check-schedule", is_flag=True, default=None, help="Check equation (14) at every step.")
-@click.option("--boundary", help=f"torus (the result tiles) or open.  [{DEFAULTS.boundary}]")
 @click.option(
     "--array", metavar="ROWSxCOLS", help="Run on a processor array, or maspar-mp1-1k to -16k.  [sites are packed]"
 )

@@ -21,6 +21,7 @@ import numpy as np
 
 from simdtex import __version__
 from simdtex.image import atomic_path
+from simdtex.report.folder import earlier_files
 
 __all__ = ["Figure", "Section", "Table", "Text", "check_folder", "write_report"]
 
@@ -150,24 +151,7 @@ def _folder(folder: Path) -> Iterator[None]:
 
 def _earlier(folder: Path) -> list[Path]:
     """Files of the report that is there already; raises where others are."""
-    try:
-        if folder.is_dir():
-            found = sorted(folder.iterdir())
-        elif folder.exists() or folder.is_symlink():
-            raise ValueError(f"{folder} is a file: give a folder for the report")
-        elif not folder.parent.is_dir():
-            raise ValueError(f"the folder {folder.parent} does not exist: create it first")
-        else:
-            found = []
-    except OSError as error:
-        raise ValueError(f"{folder} cannot be used ({error.strerror}): give another folder") from None
-    listed = _listed(folder / RESULTS) if found else []
-    others = [path.name for path in found if path.name not in listed or not path.is_file()]
-    if others:
-        raise ValueError(f"the folder {folder} holds other files ({others[0]}): give an empty or a new one")
-    if not os.access(folder if folder.is_dir() else folder.parent, os.W_OK | os.X_OK):
-        raise ValueError(f"the folder {folder} is not writable: choose another folder")
-    return found
+    return earlier_files(folder, "the report", lambda folder: _listed(folder / RESULTS))
 
 
 def _listed(results: Path) -> list[str]:

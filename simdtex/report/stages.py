@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.image import to_display, write
+from simdtex.report.folder import earlier_files
 from simdtex.report.sheet import (
     FRAME_SIDE,
     FRAMES,
@@ -86,7 +87,7 @@ class StageWriter:
     def __init__(self, folder: str | os.PathLike[str], *, limits: tuple[float, float] | None = None) -> None:
         self.folder = Path(folder)
         self._limits = limits
-        self._earlier = _earlier_stages(self.folder)
+        self._earlier = earlier_files(self.folder, "the stages", _stages_in)
         self._started = False
         self._frames: list[tuple[int, Picture]] = []
         self._every = 1
@@ -153,24 +154,8 @@ class StageWriter:
         self._seen += 1
 
 
-def _earlier_stages(folder: Path) -> list[Path]:
-    try:
-        if folder.is_dir():
-            found = list(folder.iterdir())
-        elif folder.exists():
-            raise ValueError(f"{folder} is a file: give a folder for the stages")
-        elif not folder.parent.is_dir():
-            raise ValueError(f"the folder {folder.parent} does not exist: create it first")
-        else:
-            found = []
-    except OSError as error:
-        raise ValueError(f"{folder} cannot be used ({error.strerror}): give another folder") from None
-    others = sorted(path.name for path in found if not _STAGE.fullmatch(path.name))
-    if others:
-        raise ValueError(f"the folder {folder} holds other files ({others[0]}): give an empty or a new one")
-    if not os.access(folder if folder.is_dir() else folder.parent, os.W_OK | os.X_OK):
-        raise ValueError(f"the folder {folder} is not writable: choose another folder")
-    return found
+def _stages_in(folder: Path) -> list[str]:
+    return [path.name for path in folder.iterdir() if _STAGE.fullmatch(path.name)]
 
 
 def _savable(picture: Picture) -> Picture:
