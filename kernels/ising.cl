@@ -12,7 +12,7 @@
 
 // What a site becomes.
 inline uchar heat_bath(__global const uchar *spins, const int site, __global const int2 *restrict offsets, const int N,
-                       GRID, __global const uint *restrict chances, const ulong seed, const uint key, const uint chain)
+                       GRID, __global const uint *restrict chances, const ulong seed, const uint turn, const uint chain)
 {
     const int i = ROW_OF(site), j = COL_OF(site);
     int members = 0, up = 0;
@@ -23,14 +23,14 @@ inline uchar heat_bath(__global const uchar *spins, const int site, __global con
         ++members;
         up += spins[r];
     }
-    return draw4(seed, 0, key, site, PURPOSE_DRAW, chain).x < chances[members * (N + 1) + up];
+    return draw4(seed, 0, turn, site, PURPOSE_DRAW, chain).x < chances[members * (N + 1) + up];
 }
 
 // One step: what its sites become, old values read.
 // sites (S,); relaxed (chains, S)  out. One work-item per (site, seed, temperature).
 __kernel void ising_relax(__global const int *restrict sites, const int S, __global const uchar *restrict spins,
                           const int stride, const int seeds, __global const int2 *restrict offsets, const int N, GRID,
-                          __global const uint *restrict chances, const ulong seed, const uint key,
+                          __global const uint *restrict chances, const ulong seed, const uint turn,
                           __global uchar *restrict relaxed)
 {
     const int s = get_global_id(0), c = get_global_id(1), t = get_global_id(2);
@@ -38,7 +38,7 @@ __kernel void ising_relax(__global const int *restrict sites, const int S, __glo
         return;
     const int chain = t * seeds + c;
     relaxed[chain * S + s] = heat_bath(spins + chain * stride, sites[s], offsets, N, HERE,
-                                       chances + t * (N + 1) * (N + 1), seed, key, c);
+                                       chances + t * (N + 1) * (N + 1), seed, turn, c);
 }
 
 // The end of a step: what its sites have become goes into the spins, all at once.
@@ -54,7 +54,7 @@ __kernel void ising_commit(__global const int *restrict sites, const int S, __gl
 }
 
 // A run of steps of one site each, one after another; each sees what the one before it has made.
-// queue (Q, 2) the site and the key of every step. One work-item per (seed, temperature).
+// queue (Q, 2) the site and the turn of every step. One work-item per (seed, temperature).
 __kernel void ising_sequence(__global const int2 *restrict queue, const int Q, __global uchar *spins, const int stride,
                              const int seeds, __global const int2 *restrict offsets, const int N, GRID,
                              __global const uint *restrict chances, const ulong seed)

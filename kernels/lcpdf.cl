@@ -134,7 +134,7 @@ __kernel void lcpdf_draw(__global const float *restrict distance, __global const
                          const int blocks, const int S, const int P, const float scale,
                          __global const float *restrict sample, const int plane,
                          __global const int *restrict candidates, __global const int *restrict sites,
-                         const ulong seed, const uint level, const uint sweep, __global const uint *restrict noise,
+                         const ulong seed, const uint level, const uint turn, __global const uint *restrict noise,
                          const int radius, const int top, __global int *restrict choice,
                          __global ushort *restrict values LANES_ARG)
 {
@@ -146,7 +146,7 @@ __kernel void lcpdf_draw(__global const float *restrict distance, __global const
     ulong total = 0;
     FOR_CANDIDATES(p) total += MASS(p);
 
-    const uint4 bits = draw4(seed, level, sweep, sites[s], PURPOSE_DRAW, 0);
+    const uint4 bits = draw4(seed, level, turn, sites[s], PURPOSE_DRAW, 0);
     const ulong target = below(bits.x, bits.y, total);
     ulong sum = 0;
     int chosen = -1;
@@ -163,7 +163,7 @@ __kernel void lcpdf_draw(__global const float *restrict distance, __global const
     for (int c = 0; c < C; ++c) {
         int x = (int)sample[c * plane + from];
         if (radius >= 0) {
-            const uint random = draw4(seed, level, sweep, sites[s], PURPOSE_DRAW, 1 + c).x;
+            const uint random = draw4(seed, level, turn, sites[s], PURPOSE_DRAW, 1 + c).x;
             const uint u = legal_low(noise, radius, x) + mul_hi(random, legal_mass(noise, radius, x, top));
             int lo = 0, hi = 2 * radius; // the first step whose cumulative probability exceeds u
             while (lo < hi) {

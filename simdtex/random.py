@@ -46,12 +46,12 @@ def philox(counter: list[NDArray[np.uint32]], key: tuple[int, int]) -> list[NDAr
     return [c.astype(np.uint32) for c in (c0, c1, c2, c3)]
 
 
-def draw4(seed: int, level: int, sweep: Any, site: Any, purpose: int, attempt: Any = 0) -> list[NDArray[np.uint32]]:
-    """Four random 32-bit numbers per site, the counter being (site, sweep or key, level and purpose, attempt)."""
+def draw4(seed: int, level: int, turn: Any, site: Any, purpose: int, attempt: Any = 0) -> list[NDArray[np.uint32]]:
+    """Four random 32-bit numbers per site, the counter being (site, turn, level and purpose, attempt)."""
     site, attempt = np.broadcast_arrays(np.asarray(site), np.asarray(attempt))
     counter = [
         site,
-        np.full(site.shape, sweep),
+        np.full(site.shape, turn),
         np.full(site.shape, level << 8 | purpose),
         attempt,
     ]

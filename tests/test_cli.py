@@ -78,6 +78,18 @@ def test_the_same_seed_gives_the_same_file(folder):
     assert (folder / "out.png").read_bytes() == first
 
 
+def test_an_array_makes_the_same_file_and_an_account(folder):
+    packed = synth(folder, "--size", "9x8", "--seed", 3, "--schedule", "luby", "--check-schedule")
+    assert packed.exit_code == 0 and "PEs" not in packed.output
+    made = (folder / "out.png").read_bytes()
+    for options in (["--array", "4x4"], ["--array", "4x4", "--mapping", "hierarchical", "--no-emulate"]):
+        result = synth(folder, "--size", "9x8", "--seed", 3, "--schedule", "luby", "--accounting", *options)
+        assert result.exit_code == 0, result.output
+        assert "4x4 PEs" in result.output and "utilisation" in result.output and "X-Net" in result.output
+        assert ("not emulated" in result.output) == ("--no-emulate" in options)
+        assert (folder / "out.png").read_bytes() == made
+
+
 def test_quiet_says_nothing(folder):
     assert synth(folder, "-q").output == ""
 
@@ -99,6 +111,10 @@ BAD = {
     "relaxation": (["--relaxation", "icn"], "choose one of: icm, gibbs"),
     "boundary": (["--boundary", "round"], "choose one of: torus, open"),
     "schedule": (["--schedule", "luby?"], "choose one of: coloring"),
+    "share of a random subset": (["--schedule", "random-subset:2"], "random-subset:0.5"),
+    "tile": (["--schedule", "block:16"], "block:16x16"),
+    "array": (["--array", "128"], "rows x columns such as 128x128"),
+    "mapping": (["--mapping", "snake"], "choose one of: cut-and-stack, hierarchical"),
     "xi": (["--xi", 0.5], "xi"),
     "bandwidth": (["--bandwidth", 0], "bandwidth"),
     "coherence": (["--coherence", -1], "coherence"),

@@ -73,7 +73,7 @@ def test_these_are_not_the_same(form):
 
 
 class Apart:
-    """Another schedule's steps, each cut into its sites, the last of them first, one a step under the same key."""
+    """Another schedule's steps, each cut into its sites, the last of them first, one a step under the same turn."""
 
     def __init__(self, schedule):
         self.schedule, self.name = schedule, f"apart {schedule.name}"

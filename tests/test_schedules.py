@@ -96,7 +96,7 @@ def walk(schedule, grid, sweeps=1, *, order=2, seed=1, level=0, mask=None, machi
 
 def plainly(told):
     """The same in numbers that can be compared."""
-    return [[(info.sites.tolist(), info.key, info.last, info.tile) for info in infos] for infos in told]
+    return [[(info.sites.tolist(), info.turn, info.last, info.tile) for info in infos] for infos in told]
 
 
 def frozen(value):
@@ -154,11 +154,11 @@ def test_sites_and_keys_are_in_order(name):
             assert [info.last for info in infos] == [False] * (len(infos) - 1) + [True]
             for info in infos:
                 assert (info.sites.dtype, info.sites.ndim) == (np.int32, 1)
-                assert isinstance(info.key, int) and 0 <= info.key < 2**32
+                assert isinstance(info.turn, int) and 0 <= info.turn < 2**32
                 assert np.isin(info.sites, grid.sites()[mask.ravel()]).all(), "active sites of the lattice alone"
-                pairs = {(site, info.key) for site in info.sites.tolist()}
+                pairs = {(site, info.turn) for site in info.sites.tolist()}
                 assert len(pairs) == len(info.sites), "no site twice in a step"
-                assert not pairs & met, "no site twice under a key"
+                assert not pairs & met, "no site twice under a turn"
                 met |= pairs
 
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Philox4x32-10 (Salmon et al., SC 2011): 128 random bits as a pure function of a counter and a key.
-// Key: the 64-bit seed. Counter: (site, sweep, level and purpose, attempt), so that no schedule, tile or
-// device changes a draw.
+// Key: the 64-bit seed. Counter: (site, turn, level and purpose, attempt), so that no tile or
+// device changes a draw. The turn counts sweeps, or steps where a sweep may take a site twice.
 #ifndef SIMDTEX_PHILOX_H
 #define SIMDTEX_PHILOX_H
 
@@ -22,10 +22,10 @@ inline uint4 philox(uint4 counter, uint2 key)
 #define PURPOSE_COLOR 3u
 #define PURPOSE_SCHEDULE 4u
 
-inline uint4 draw4(const ulong seed, const uint level, const uint sweep, const uint site, const uint purpose,
+inline uint4 draw4(const ulong seed, const uint level, const uint turn, const uint site, const uint purpose,
                    const uint attempt)
 {
-    return philox((uint4)(site, sweep, level << 8 | purpose, attempt), (uint2)((uint)seed, (uint)(seed >> 32)));
+    return philox((uint4)(site, turn, level << 8 | purpose, attempt), (uint2)((uint)seed, (uint)(seed >> 32)));
 }
 
 // A whole number 0 .. n-1 from 64 random bits; the bias is below n / 2^64.

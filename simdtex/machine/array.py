@@ -85,8 +85,8 @@ class ProcessorArray:
         """X-Net shifts that bring each PE one word from every neighbour of its site, per layer (layers,).
 
         A shift moves one word of every PE to one of the 8 adjacent PEs, around the edges of the array. A neighbour that
-        is d rows and e columns of PEs away takes max(|d|, |e|) of them; where PEs of a layer need different ways for
-        the same neighbour, at the seam of a picture that does not fill the array say, all go each way in turn.
+        is d rows and e columns of PEs away takes ``max(|d|, |e|)`` of them; where PEs of a layer need different ways
+        for the same neighbour, at the seam of a picture that does not fill the array say, all go each way in turn.
         Neighbours that the same PE holds take none. The sites are those of the grid: on a coarser level neighbours are
         farther apart.
         """

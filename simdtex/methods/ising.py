@@ -202,7 +202,7 @@ class _Run:
             if info.tile and not old:  # what tiles see of one another until the sweep ends
                 spins, old = snapshot(self.machine, self._flush(spins, queue), self.grid.height), True
             if info.sites.size == 1 and not info.tile:
-                queue.append((int(info.sites[0]), info.key))
+                queue.append((int(info.sites[0]), info.turn))
             elif info.sites.size:
                 spins = self._step(self._flush(spins, queue), info)
             if info.last:
@@ -215,7 +215,7 @@ class _Run:
         relaxed = []
         for k in range(0, info.sites.size, most):
             sites = machine.put(info.sites[k : k + most])
-            drawn = ising_relax(machine, spins, sites, self.offsets, grid, self.chances, self.seed, info.key)
+            drawn = ising_relax(machine, spins, sites, self.offsets, grid, self.chances, self.seed, info.turn)
             relaxed.append((sites, drawn))
             self._sync(sites.size, spins)
         for sites, drawn in relaxed:

@@ -312,7 +312,7 @@ def _sweep(
         for part, sites in machine.pieces(info.sites, grid, size):  # 6.2.2
             if outcomes:
                 _tell(run, level, field, meter, where, False)
-            outcomes.append((part, _relax(run, part, level, grid, field, sites, info.key)))
+            outcomes.append((part, _relax(run, part, level, grid, field, sites, info.turn)))
             work = 2 * level.candidates.size * neighbours * channels * len(sites)
             machine.sync(work)
             relaxed += len(sites)
@@ -325,7 +325,7 @@ def _sweep(
 
 
 def _relax(
-    run: _Run, machine: Machine, level: _Level, grid: Grid, field: Field, sites: NDArray[np.int32], key: int
+    run: _Run, machine: Machine, level: _Level, grid: Grid, field: Field, sites: NDArray[np.int32], turn: int
 ) -> tuple[Array, lcpdf.Relaxed, Array]:
     """Steps 6.2.2.1 to 6.2.2.3 for sites that relax together: the sites, what they take, and how warm they are."""
     options = run.options
@@ -338,7 +338,7 @@ def _relax(
         distances = coherence(machine, distances, candidates, here, field, offsets, grid, favour)
     density = options.pixel == "density"
     if relaxation == "gibbs":  # 6.2.2.2
-        relaxed = lcpdf.draw(machine, distances, candidates, here, window, density, run.seed, number, key)
+        relaxed = lcpdf.draw(machine, distances, candidates, here, window, density, run.seed, number, turn)
     elif not density:
         relaxed = lcpdf.best(machine, distances, candidates)
     elif run.sample.channels == 1 and window.top == 255:

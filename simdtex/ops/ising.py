@@ -57,13 +57,13 @@ def _relax(
     grid: Grid,
     chances: NDArray[np.uint32],
     seed: int,
-    key: int,
+    turn: int,
 ) -> NDArray[np.uint8]:
     temperature, chain = divmod(np.arange(len(spins))[:, None], len(spins) // len(chances))
     r = grid.neighbours(sites, offsets)
     there = r >= 0
     up = np.where(there, spins.reshape(len(spins), -1)[:, r], 0).sum(1, dtype=np.intp)
-    bits = random.draw4(seed, 0, key, sites, random.DRAW, chain)[0]
+    bits = random.draw4(seed, 0, turn, sites, random.DRAW, chain)[0]
     relaxed: NDArray[np.uint8] = (bits < chances[temperature, there.sum(0), up]).astype(np.uint8)
     return relaxed
 
@@ -81,8 +81,8 @@ def _sequence(
     chances: NDArray[np.uint32],
     seed: int,
 ) -> NDArray[np.uint8]:
-    for site, key in queue:
-        _commit(spins, site[None], _relax(spins, site[None], offsets, grid, chances, seed, int(key)))
+    for site, turn in queue:
+        _commit(spins, site[None], _relax(spins, site[None], offsets, grid, chances, seed, int(turn)))
     return spins
 
 
@@ -91,7 +91,7 @@ def _model(offsets: Array, grid: Grid, chances: Array, seed: int) -> tuple[Any, 
 
 
 def _launch_relax(
-    machine: OpenCL, spins: Array, sites: Array, offsets: Array, grid: Grid, chances: Array, seed: int, key: int
+    machine: OpenCL, spins: Array, sites: Array, offsets: Array, grid: Grid, chances: Array, seed: int, turn: int
 ) -> Array:
     chains, temperatures = int(spins.shape[0]), int(chances.shape[0])
     relaxed = machine.empty((chains, sites.size), np.uint8)
@@ -100,7 +100,7 @@ def _launch_relax(
         machine.kernel("ising", "ising_relax"),
         (sites.size, seeds, temperatures),
         *(sites, np.int32(sites.size), spins, np.int32(prod(spins.shape[1:])), np.int32(seeds)),
-        *(*_model(offsets, grid, chances, seed), np.uint32(key), relaxed),
+        *(*_model(offsets, grid, chances, seed), np.uint32(turn), relaxed),
     )
     return relaxed
 
@@ -130,7 +130,7 @@ def _launch_sequence(
 
 
 ising_relax = Operation("ising", _relax, _launch_relax)
-"""``ising_relax(machine, spins, sites, offsets, grid, chances, seed, key)``: what the sites of a step become.
+"""``ising_relax(machine, spins, sites, offsets, grid, chances, seed, turn)``: what the sites of a step become.
 
 Old values are read. Returns (chains, S) uint8. Cost: O(chains S N), 10 rounds of Philox each.
 """
@@ -141,6 +141,6 @@ ising_commit = Operation("ising", _commit, _launch_commit)
 ising_sequence = Operation("ising", _sequence, _launch_sequence)
 """``ising_sequence(machine, spins, queue, offsets, grid, chances, seed)``: steps of one site each, in place.
 
-``queue`` (Q, 2) int32 is the site and the key of each step, in order. The same bits as Q times `ising_relax` and
+``queue`` (Q, 2) int32 is the site and the turn of each step, in order. The same bits as Q times `ising_relax` and
 `ising_commit`, in one launch.
 """

@@ -150,7 +150,7 @@ def _draw_reference(
     noisy: bool,
     seed: int,
     level: int,
-    sweep: int,
+    turn: int,
 ) -> Relaxed:
     w = weights(distances.distance, win.scale)
     positions = candidates.positions[: candidates.size]
@@ -160,7 +160,7 @@ def _draw_reference(
             _, mass = _legal(candidates.pixels[c][positions], win)
             w = np.where(w > 0, np.maximum(random.below(np.zeros_like(mass), mass, w.T).T, 1), 0)
     cumulative = np.cumsum(w, 0, dtype=np.uint64)
-    lo, hi, *_ = random.draw4(seed, level, sweep, sites, random.DRAW, 0)
+    lo, hi, *_ = random.draw4(seed, level, turn, sites, random.DRAW, 0)
     target = random.below(lo, hi, cumulative[-1])
     choice = positions[(cumulative > target).argmax(0)]
     values = np.zeros((channels, sites.size), np.uint16)
@@ -168,7 +168,7 @@ def _draw_reference(
         x = candidates.pixels[c][choice].astype(np.int64)
         if noisy:
             low, mass = _legal(x, win)
-            bits = random.draw4(seed, level, sweep, sites, random.DRAW, 1 + c)[0].astype(np.uint64)
+            bits = random.draw4(seed, level, turn, sites, random.DRAW, 1 + c)[0].astype(np.uint64)
             u = low + ((bits * mass) >> np.uint64(32)).astype(np.uint32)
             x = x + np.searchsorted(win.noise, u, side="right") - win.radius
         values[c] = x
@@ -192,9 +192,9 @@ def _draw_launch(
     noisy: bool,
     seed: int,
     level: int,
-    sweep: int,
+    turn: int,
 ) -> Relaxed:
-    counters = (np.uint64(seed), np.uint32(level), np.uint32(sweep))
+    counters = (np.uint64(seed), np.uint32(level), np.uint32(turn))
     kernel = (machine.constant(win.noise), np.int32(win.radius if noisy else -1), np.int32(win.top))
     return _take(machine, "draw", distances, candidates, win, sites, *counters, *kernel)
 

@@ -18,14 +18,14 @@ Active = Callable[[], NDArray[np.bool_]]
 class Info(NamedTuple):
     """What a step decided.
 
-    ``sites`` (S,) int32 pixel indices that relax together, none of them twice. ``key`` keys the random numbers of
+    ``sites`` (S,) int32 pixel indices that relax together, none of them twice. ``turn`` keys the random numbers of
     their relaxation: no site is ever relaxed twice under the same. ``last`` whether a sweep ends with this step.
     ``tile`` None, or (rows, cols) of tiles that relax on their own: neighbours in another tile are then read as they
     were when the sweep began.
     """
 
     sites: NDArray[np.int32]
-    key: int
+    turn: int
     last: bool
     tile: tuple[int, int] | None = None
 
