@@ -86,6 +86,7 @@ def test_readme_command_runs(any_device, material, line):
     words = shlex.split(small(line))
     words += ["--order", "8"] if "synth" in words else []  # quicker
     words += ["--order", "4", "--seeds", "1"] if "schedules" in words else []
+    words += ["--sweeps", "20", "--burn-in", "10"] if "ising" in words[1:2] else []
     environment = os.environ | {"SIMDTEX_DEVICE": str(any_device.index)}
     done = subprocess.run(
         [sys.executable, "-m", *words], env=environment, capture_output=True, text=True, timeout=120, check=False
