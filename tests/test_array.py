@@ -96,6 +96,12 @@ def test_texts_that_name_no_array(text):
         parse_array(text)
 
 
+def test_too_large_an_array():
+    assert parse_array("2048x2048").size == 2**22
+    with pytest.raises(ValueError, match="give a smaller one, say 128x128"):
+        parse_array("2048x2049")
+
+
 def test_an_unknown_mapping():
     with pytest.raises(ValueError, match="choose one of: cut-and-stack, hierarchical"):
         parse_array("4x4", "round-robin")

@@ -446,8 +446,8 @@ def test_an_object_without_a_name_is_refused_before_the_run():
 
 BAD = [
     *((name, "choose one of: " + ", ".join(SCHEDULES)) for name in ("rows", "", "Luby", "luby ", "luby:3", ":")),
-    *((f"random-subset:{p}", "no share of sites; give one above 0 and up to 1: random-subset:0.5")
-      for p in ("2", "0", "-0.5", "x", "", "nan", "inf", "1.0001")),
+    *((f"random-subset:{p}", "no share of sites; give one from 0.001 to 1: random-subset:0.5")
+      for p in ("2", "0", "0.0009", "-0.5", "x", "", "nan", "inf", "1.0001")),
     *((f"block:{size}", "no size of a tile; give rows x columns from 1x1 up: block:16x16")
       for size in ("0x3", "3x0", "16", "", "x", "3x", "-1x4", "2.5x3", "3x4x5", "1" * 10 + "x1")),
 ]  # fmt: skip
@@ -464,8 +464,8 @@ def test_a_bad_name_is_refused_with_a_remedy(name, words):
 @pytest.mark.parametrize(
     ("make", "arguments", "error", "words"),
     [
-        (schedules.RandomSubset, (0,), ValueError, "give one above 0 and up to 1"),
-        (schedules.RandomSubset, (1.5,), ValueError, "give one above 0 and up to 1"),
+        (schedules.RandomSubset, (0,), ValueError, "give one from 0.001 to 1"),
+        (schedules.RandomSubset, (1.5,), ValueError, "give one from 0.001 to 1"),
         (schedules.Block, (0, 3), ValueError, "rows of a tile is 0; give 1 or more"),
         (schedules.Block, (3, -1), ValueError, "columns of a tile is -1; give 1 or more"),
         (schedules.Block, (2.5, 3), TypeError, "rows of a tile must be a whole number"),

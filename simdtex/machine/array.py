@@ -28,6 +28,9 @@ ARRAYS = {
 }
 """Rows and columns of the MP-1 in the sizes that it came in."""
 
+LARGEST = 2**22
+"""PEs of the largest array: a launch has as many work-items."""
+
 
 class Place(NamedTuple):
     """Where pixels live: ``layer`` the virtual layer, ``pe`` the PE's number, row by row."""
@@ -142,4 +145,6 @@ def parse_array(text: str, mapping: str = "cut-and-stack") -> ProcessorArray:
     if str(text) not in ARRAYS and not sides:
         raise ValueError(f"unknown array {text!r}; give rows x columns such as 128x128, or one of: {', '.join(ARRAYS)}")
     rows, cols = (int(sides[1]), int(sides[2])) if sides else ARRAYS[str(text)]
+    if rows * cols > LARGEST:
+        raise ValueError(f"an array of {text} PEs is beyond {LARGEST}; give a smaller one, say 128x128")
     return ProcessorArray(rows, cols, mapping)

@@ -91,7 +91,7 @@ def _random_subset(text: str) -> Schedule:
     try:
         return RandomSubset(float(text))
     except ValueError:
-        raise ValueError(f"{text!r} is no share of sites; give one above 0 and up to 1: random-subset:0.5") from None
+        raise ValueError(f"{text!r} is no share of sites; give one from 0.001 to 1: random-subset:0.5") from None
 
 
 def _block(text: str) -> Schedule:

@@ -89,12 +89,12 @@ class RandomSubset(Scattered):
     Parameters
     ----------
     p : float
-        Above 0, up to 1.
+        0.001 to 1.
     """
 
     def __init__(self, p: float = 0.5) -> None:
-        if not 0 < p <= 1:
-            raise ValueError(f"{p} is no share of sites; give one above 0 and up to 1: random-subset:0.5")
+        if not 0.001 <= p <= 1:  # below, a small lattice takes forever
+            raise ValueError(f"{p} is no share of sites; give one from 0.001 to 1: random-subset:0.5")
         self.p = p
         self.name = "random-subset" if p == 0.5 else f"random-subset:{float(p)!r}".removesuffix(".0")
 
