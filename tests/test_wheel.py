@@ -35,6 +35,7 @@ def wheel(tmp_path_factory):
 
 def test_the_wheel_carries_the_kernels_and_nothing_else(wheel):
     names = zipfile.ZipFile(wheel).namelist()
+    assert "simdtex/report/templates/page.html" in names
     kernels = ROOT / "kernels"
     sources = [path for path in kernels.rglob("*") if path.suffix in (".cl", ".h")]
     assert sources
@@ -66,3 +67,10 @@ def test_synthesis_with_the_installed_wheel(wheel, tmp_path, any_device):
     with Image.open(elsewhere / "out.png") as picture:
         assert picture.size == (24, 20)  # width x height
     assert sorted(path.name for path in elsewhere.iterdir()) == ["out.png", "sample.png"]
+    run(
+        scripts / "simdtex",
+        *("schedules", "sample.png", "--schedules", "coloring,synchronous", "--seeds", 1, "--size", 20, "--order", 2),
+        *("-o", "report", "--device", any_device.index),
+        cwd=elsewhere,
+    )
+    assert "breaks (14)" in (elsewhere / "report" / "index.html").read_text(encoding="utf-8")
