@@ -24,7 +24,7 @@ class State(NamedTuple):
     """
 
     pixel: NDArray[np.int32]
-    group: NDArray[np.int64]
+    group: NDArray[np.int32]
     groups: int
     seed: int
     level: int
@@ -48,9 +48,11 @@ class Partition:
 
     def init(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int) -> State:
         """Lay out the groups, once a level."""
-        numbers, group = np.unique(np.ravel(self.groups(machine, grid, offsets, order, seed)), return_inverse=True)
-        nothing = np.zeros(0, np.int32)
-        return State(grid.sites(), group, numbers.size, seed, level, 0, nothing, np.zeros(0, np.int64), 0)
+        group = np.ravel(self.groups(machine, grid, offsets, order, seed))
+        if group.min() < 0 or group.max() >= group.size:  # numbers with wide gaps
+            group = np.unique(group, return_inverse=True)[1]
+        pixel, group, nothing = grid.sites(), group.astype(np.int32), np.zeros(0, np.int32)
+        return State(pixel, group, int(group.max()) + 1, seed, level, 0, nothing, np.zeros(0, np.int64), 0)
 
     def step(self, state: State, active: Active) -> tuple[State, Info]:
         """The next group that has active sites; a sweep goes by what was active when it began."""
@@ -67,11 +69,11 @@ class Partition:
         if self.shuffled:
             bits = random.draw4(state.seed, state.level, sweep, turn, random.SCHEDULE)[0]
             turn = np.argsort(np.argsort(bits, kind="stable"), kind="stable")
-        when = turn[state.group[active]]
-        order = np.argsort(when, kind="stable")
-        changes = np.flatnonzero(np.diff(when[order])) + 1
-        ends = np.append(changes, when.size)  # an empty sweep is one empty group
-        return state._replace(sweep=sweep, sites=state.pixel[active][order], ends=ends, done=0)
+        when = turn.astype(np.int32)[state.group[active]]
+        sizes = np.bincount(when, minlength=1)
+        ends = np.cumsum(sizes[sizes > 0]) if when.size else sizes[:1]  # an empty sweep is one empty group
+        sites = state.pixel[active][np.argsort(when, kind="stable")]
+        return state._replace(sweep=sweep, sites=sites, ends=ends, done=0)
 
 
 class Coloring(Partition):
