@@ -216,7 +216,7 @@ def synthesize(
     Cost: sweeps x sites x candidates x |N| x channels x 2 fma, about 7 sweeps a level. Memory on the device, in bytes:
     14 + 2 channels per output pixel (20 + 4 channels with the schedule ``block``), 8 channels + 8 per pixel of the
     sample with its margin, and the machine's scratch memory or, if that is more, 65 per candidate. On the host: about
-    40 per output pixel.
+    50 per output pixel.
     """
     offsets = neighbourhood_offsets(options.order)
     levels = _number_of_levels(pixels.shape[:2], offsets, shape, options)  # 1

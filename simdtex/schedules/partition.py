@@ -51,7 +51,7 @@ class Partition:
         group = np.ravel(self.groups(machine, grid, offsets, order, seed))
         if group.min() < 0 or group.max() >= group.size:  # numbers with wide gaps
             group = np.unique(group, return_inverse=True)[1]
-        pixel, group, nothing = grid.sites(), group.astype(np.int32), np.zeros(0, np.int32)
+        pixel, group, nothing = grid.sites(), group.astype(np.int32, copy=False), np.zeros(0, np.int32)
         return State(pixel, group, int(group.max()) + 1, seed, level, 0, nothing, np.zeros(0, np.int64), 0)
 
     def step(self, state: State, active: Active) -> tuple[State, Info]:
