@@ -14,11 +14,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Plot
 from numpy.typing import NDArray
 
+from simdtex.comparison import Spread
 from simdtex.estimates import FAIR, LEVEL, Estimate, Finding
 from simdtex.exact import CRITICAL
 from simdtex.methods.ising import Chains
 from simdtex.report.page import Figure, Section, Table, Text, write_report
-from simdtex.report.plots import INK, figure_png, named_rows, new_figure, styles, tidy
+from simdtex.report.plots import INK, dots, figure_png, named_rows, new_figure, styles, tidy
 
 __all__ = ["conclusion", "results", "terminal_tables", "write_ising"]
 
@@ -224,19 +225,8 @@ def _panels(found: Sequence[Finding], wide: float = 3.6) -> tuple[Plot, dict[flo
 
 def _bars(axes: Axes, rows: Sequence[Finding], means: Sequence[float], errors: Sequence[float]) -> None:
     looks = styles({row.schedule: row.independent for row in rows})
-    for place, (row, mean, error) in enumerate(zip(rows, means, errors, strict=True)):
-        look = looks[row.schedule]
-        axes.errorbar(
-            mean,
-            place,
-            xerr=error,
-            fmt=look.marker,
-            color=look.color,
-            markerfacecolor=look.color if look.fill else "white",
-            markersize=6,
-            elinewidth=1.4,
-            capsize=3,
-        )
+    found = [Spread(mean, error, ()) for mean, error in zip(means, errors, strict=True)]
+    dots(axes, dict(zip(looks, found, strict=True)), looks)
 
 
 def _energy(found: Sequence[Finding]) -> Figure:
