@@ -278,8 +278,9 @@ def _autocorrelation(found: Sequence[Finding]) -> Figure:
             axes.plot(times[1], place, look.marker, color=look.color, markersize=6, markerfacecolor="white")
         axes.set_xscale("log")
         tidy(axes, f"T = {t:g}", "sweeps")
-        low, high = axes.get_xlim()
-        ticks = [tick for tick in (1, 2, 5, 10, 20, 50, 100, 200, 500) if low <= tick <= high]
+        high = 1.5 * max(max(row.energy.tau, row.magnetisation.tau) for row in rows)
+        axes.set_xlim(0.8, high)  # no time is below 1
+        ticks = [tick for tick in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if tick <= high]
         axes.set_xticks(ticks, [f"{tick}" for tick in ticks])
         axes.minorticks_off()
     return Figure(
