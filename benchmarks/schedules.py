@@ -18,7 +18,7 @@ import samples
 from rich.console import Console
 
 import simdtex
-from simdtex.comparison import DEFAULTS, FIGURES, compare
+from simdtex.comparison import FIGURES, compare
 from simdtex.report import schedule_plots as plots
 from simdtex.report.schedules import reading, terminal_tables
 
@@ -45,7 +45,6 @@ def main():
         found = compare(
             known[name],
             (options.size, options.size),
-            DEFAULTS,
             seeds=range(1, options.seeds + 1),
             device=machine,
             array="maspar-mp1-16k",

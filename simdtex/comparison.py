@@ -17,20 +17,16 @@ from simdtex import schedules as known
 from simdtex.image import check_sample
 from simdtex.machine import Machine, open_machine
 from simdtex.methods.mrf import make_options
-from simdtex.options import whole
 from simdtex.quality import COPIED_PATCH, Quality, measure
 from simdtex.random import as_seed
 from simdtex.recorder import Noted, Recorder, Sweep
 from simdtex.run import Progress
 from simdtex.schedules import Schedule
-from simdtex.synthesis import synthesize
+from simdtex.synthesis import check_shape, synthesize
 
 __all__ = ["FIGURES", "Comparison", "Entry", "Now", "Recorder", "Run", "Spread", "Sweep", "compare"]
 
 Tell = Callable[[Progress], Any]
-
-DEFAULTS = ("coloring", "coloring-fixed", "luby", "checkerboard", "synchronous", "random-subset", "block")
-"""The schedules that relax many sites a step."""
 
 
 @dataclass(frozen=True)
@@ -260,7 +256,7 @@ class Now:
 def compare(
     sample: ArrayLike,
     shape: tuple[int, int],
-    schedules: Sequence[str | Schedule] = DEFAULTS,
+    schedules: Sequence[str | Schedule] = known.TOGETHER,
     *,
     seeds: Sequence[int] = (1, 2, 3),
     channel_axis: int | None = None,
@@ -435,10 +431,4 @@ def _check_sides(sample: tuple[int, ...], shape: tuple[int, int]) -> tuple[int, 
             f"the sample of {sample[0]} rows x {sample[1]} columns is too small to compare with; "
             f"give {COPIED_PATCH}x{COPIED_PATCH} pixels or more"
         )
-    try:
-        rows, cols = shape
-    except (TypeError, ValueError):
-        raise ValueError(f"shape must be two whole numbers (rows, columns), not {shape!r}") from None
-    whole("rows of the output", rows, COPIED_PATCH)
-    whole("columns of the output", cols, COPIED_PATCH)
-    return int(rows), int(cols)
+    return check_shape(shape, COPIED_PATCH)

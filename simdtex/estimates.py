@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, sqrt
 from typing import Any
 
@@ -185,7 +185,7 @@ def _finding(run: Any, t: int) -> Finding:
 def _judged(found: Finding, least: float) -> Finding:
     sigmas = {"energy": abs(found.energy_sigmas), "magnetisation": abs(found.magnetisation_sigmas)}
     worst = max(sigmas, key=lambda name: sigmas[name])
-    return Finding(**{**vars(found), "differs": worst if sigmas[worst] > least else ""})
+    return replace(found, differs=worst if sigmas[worst] > least else "")
 
 
 def threshold(seeds: int, tests: int) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from simdtex.lattice import Grid
 from simdtex.run import Progress
-from simdtex.schedules import Active, Info, Schedule, neighbours_in
+from simdtex.schedules import Active, Info, Schedule, Watched, neighbours_in
 
 __all__ = ["Noted", "Recorder", "Sweep"]
 
@@ -119,22 +119,17 @@ class Recorder:
         return np.asarray(apart if self._axis is None else apart.any(axis=self._axis), np.bool_)
 
 
-class Noted:
+class Noted(Watched):
     """A schedule whose steps are noted down, to be checked when the clock has stopped."""
 
     def __init__(self, schedule: Schedule) -> None:
-        self.schedule = schedule
-        self.name = schedule.name
+        super().__init__(schedule)
         self.claims: list[bool] = []
         self.levels: list[tuple[int, Grid, NDArray[np.int32], list[NDArray[np.int32]]]] = []
 
-    def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
-        """As the schedule says."""
-        return self.schedule.independent(grid, offsets)
-
     def init(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int) -> Any:
         """The schedule's own state."""
-        self.claims.append(bool(self.schedule.independent(grid, offsets)))
+        self.claims.append(bool(self.independent(grid, offsets)))
         self.levels.append((level, grid, offsets, []))
         return self.schedule.init(machine, grid, offsets, order, seed, level)
 

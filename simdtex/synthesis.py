@@ -103,7 +103,7 @@ def synthesize(
     """
     one_of("method", method, METHODS)
     pixels = check_sample(sample, channel_axis)
-    size = _check_shape(shape)
+    size = check_shape(shape)
     chosen = mrf.make_options(**options)
     seed = as_seed(rng)
     image, output = mrf.synthesize(open_machine(device), pixels, size, chosen, seed, _seeing(callback, channel_axis))
@@ -238,13 +238,14 @@ def _restored(image: NDArray[Any], channel_axis: int | None) -> NDArray[Any]:
     return image[..., 0] if channel_axis is None else np.moveaxis(image, -1, channel_axis)
 
 
-def _check_shape(shape: Any) -> tuple[int, int]:
+def check_shape(shape: Any, least: int = 1) -> tuple[int, int]:
+    """The rows and columns of an output; raises unless they are two whole numbers of at least `least`."""
     try:
         rows, cols = shape
     except (TypeError, ValueError):
         raise ValueError(f"shape must be two whole numbers (rows, columns), not {shape!r}") from None
-    whole("rows of the output", rows, 1)
-    whole("columns of the output", cols, 1)
+    whole("rows of the output", rows, least)
+    whole("columns of the output", cols, least)
     return int(rows), int(cols)
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import functools
+import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
@@ -70,6 +72,22 @@ def mrf_options(command: Callable[..., None]) -> Callable[..., None]:
     for option in reversed(_MRF_OPTIONS):
         command = option(command)
     return command
+
+
+def command_line(context: click.Context) -> str:
+    """What was given to a command, so that a reader can give it again."""
+    words = ["simdtex", str(context.command.name)]
+    for parameter in context.command.params:
+        name = parameter.name or ""
+        if context.get_parameter_source(name) is not ParameterSource.COMMANDLINE:
+            continue
+        given = context.params[name]
+        for value in given if isinstance(given, tuple) else [given]:
+            if isinstance(parameter, click.Option):
+                words.append(parameter.opts[-1])
+            if not (isinstance(parameter, click.Option) and parameter.is_flag):
+                words.append(str(value))
+    return shlex.join(words)
 
 
 def check_distinct(outputs: list[Path], inputs: list[Path]) -> None:

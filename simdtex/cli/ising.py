@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 import time
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 import click
 from rich.console import Console
 
-from simdtex.cli.common import DEVICE, plainly, progress_bar
+from simdtex.cli.common import DEVICE, command_line, plainly, progress_bar
 
 SCHEDULES = (
     "coloring,coloring-fixed,luby,checkerboard,raster,random-scan,"
@@ -104,8 +103,7 @@ def ising(
     if output:
         settings = {"device": machine.name, "rows": shape[0], "columns": shape[1], "seed": seed, **options}
         settings |= {"boundary": "torus", "temperatures": temperatures}
-        command = shlex.join(["simdtex", *sys.argv[1:]])
-        report.write_ising(output, found, runs, pictures, settings, command)
+        report.write_ising(output, found, runs, pictures, settings, command_line(click.get_current_context()))
     if not quiet:
         where = f"{output / 'index.html'}: " if output else ""
         click.echo(f"{where}{time.perf_counter() - began:.0f} s on {machine.name}")

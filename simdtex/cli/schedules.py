@@ -3,19 +3,16 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import click
-from click.core import ParameterSource
 from rich.console import Console
 
-from simdtex.cli.common import DEFAULTS, DEVICE, mrf_options, plainly, progress_bar, standing
-
-SCHEDULES = "coloring,coloring-fixed,luby,checkerboard,synchronous,random-subset,block"
+from simdtex.cli.common import DEFAULTS, DEVICE, command_line, mrf_options, plainly, progress_bar, standing
+from simdtex.schedules import TOGETHER
 
 
 @click.command()
@@ -29,7 +26,11 @@ SCHEDULES = "coloring,coloring-fixed,luby,checkerboard,synchronous,random-subset
     help="Folder for the report.",
 )
 @click.option(
-    "--schedules", "names", default=SCHEDULES, metavar="A,B,...", help="Which to compare.  [those of many sites a step]"
+    "--schedules",
+    "names",
+    default=",".join(TOGETHER),
+    metavar="A,B,...",
+    help="Which to compare.  [those of many sites a step]",
 )
 @click.option("--seeds", default=3, show_default=True, help="Runs of each schedule, with seeds one after another.")
 @click.option("--seed", default=1, show_default=True, help="The first of them.")
@@ -85,7 +86,7 @@ def schedules(
             callback=tell,
             **{name: value for name, value in options.items() if value is not None},
         )
-    write_comparison(output, found, _command_line(click.get_current_context()))
+    write_comparison(output, found, command_line(click.get_current_context()))
     if quiet:
         return
     console = Console(width=None if sys.stdout.isatty() else 200)
@@ -95,21 +96,6 @@ def schedules(
         f"{output / 'index.html'}: {len(chosen)} schedules, {seeds} {'seed' if seeds == 1 else 'seeds'}, "
         f"{time.perf_counter() - began:.0f} s on {found.device}"
     )
-
-
-def _command_line(context: click.Context) -> str:
-    """What was given, so that a reader can give it again."""
-    words = ["simdtex", "schedules"]
-    for parameter in context.command.params:
-        name = parameter.name or ""
-        if context.get_parameter_source(name) is not ParameterSource.COMMANDLINE:
-            continue
-        value = str(context.params[name])
-        if isinstance(parameter, click.Option):
-            words += [parameter.opts[-1]] if parameter.is_flag else [parameter.opts[-1], value]
-        else:
-            words.append(value)
-    return shlex.join(words)
 
 
 def _sample(path: Path | None) -> tuple[Any, int | None]:

@@ -53,7 +53,6 @@ class Account:
     def __init__(self, array: ProcessorArray, packed: bool) -> None:
         self.array, self.packed = array, packed
         self.levels: list[dict[str, Any]] = []
-        self._seconds: tuple[float, float] = (0.0, 0.0)
         self._shifts: NDArray[np.int64] = np.zeros(0, np.int64)
         self._neighbours = 0
 

@@ -93,36 +93,33 @@ class ProcessorArray:
         Neighbours that the same PE holds take none. The sites are those of the grid: on a coarser level neighbours are
         farther apart.
         """
-        high, wide = self.layers(grid)
         down = _moves(self, grid.height, grid.spacing, self.rows, grid.torus, offsets[:, 0])
         across = _moves(self, grid.width, grid.spacing, self.cols, grid.torus, offsets[:, 1])
-        shifts = np.zeros(high * wide, np.int64)
-        for a in range(high):
-            for b in range(wide):
-                for di, dj in offsets.tolist():
-                    ways = np.maximum.outer(abs(down.get((a, di), _NONE)), abs(across.get((b, dj), _NONE)))
-                    shifts[a * wide + b] += int(ways.sum())
-        return shifts
-
-
-_NONE = np.zeros(0, np.int64)
+        shifts = np.zeros(self.layers(grid), np.int64)
+        for di, dj in offsets.tolist():
+            u, v = down[di][:, None, :, None], across[dj][None, :, None, :]
+            shifts += np.where((u >= 0) & (v >= 0), np.maximum(u, v), 0).sum((0, 1))
+        return shifts.ravel()
 
 
 def _moves(
     array: ProcessorArray, length: int, spacing: int, pes: int, torus: bool, offsets: NDArray[np.int32]
-) -> dict[tuple[int, int], NDArray[np.int64]]:
-    """(layer, offset) -> how many PEs away the neighbours along one axis lie, each different way once."""
+) -> dict[int, NDArray[np.int64]]:
+    """Offset -> how many PEs away the neighbours along one axis lie, (ways, layers): each different way once, or -1."""
     count = -(-length // spacing)
     site = np.arange(count, dtype=np.int64)
     layer, pe = array._axis(site * spacing, length, pes)
-    moves: dict[tuple[int, int], NDArray[np.int64]] = {}
+    moves = {}
     for d in set(offsets.tolist()):
         to = site + d
         there = np.ones(count, bool) if torus else (to >= 0) & (to < count)
         way = array._axis(to % count * spacing, length, pes)[1] - pe
         way = (way + pes // 2) % pes - pes // 2  # the shorter way around
-        for a in np.unique(layer[there]):
-            moves[int(a), int(d)] = np.unique(way[there & (layer == a)]).astype(np.int64)
+        pairs = np.unique(np.stack([layer[there], way[there]]), axis=1)
+        first = np.searchsorted(pairs[0], pairs[0])  # of the pairs of the same layer
+        number = np.arange(pairs.shape[1]) - first
+        moves[d] = np.full((number.max(initial=0) + 1, -(-length // pes)), -1, np.int64)
+        moves[d][number, pairs[0]] = abs(pairs[1])
     return moves
 
 

@@ -14,7 +14,7 @@ from importlib.metadata import entry_points
 
 from simdtex.schedules.partition import Block, Checkerboard, Coloring, FixedColoring, Partition, Raster, Synchronous
 from simdtex.schedules.scattered import Luby, RandomScan, RandomSubset, Scattered
-from simdtex.schedules.schedule import Active, Checked, Info, Schedule, neighbours_in
+from simdtex.schedules.schedule import Active, Checked, Info, Schedule, Watched, neighbours_in
 
 __all__ = [
     "SCHEDULES",
@@ -33,6 +33,7 @@ __all__ = [
     "Scattered",
     "Schedule",
     "Synchronous",
+    "Watched",
     "get",
     "neighbours_in",
 ]
@@ -49,6 +50,9 @@ SCHEDULES: dict[str, Callable[[], Schedule]] = {
     "block": Block,
 }
 """The schedules by name."""
+
+TOGETHER = ("coloring", "coloring-fixed", "luby", "checkerboard", "synchronous", "random-subset", "block")
+"""Those that relax many sites a step."""
 
 GROUP = "simdtex.schedules"
 """Entry points of this group are schedules too: packages can bring their own."""

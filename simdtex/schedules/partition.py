@@ -139,7 +139,7 @@ class Synchronous(Partition):
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Only on a lattice without neighbours."""
-        return neighbourless(grid, offsets)
+        return neighbourless(grid)
 
     def groups(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """One for all."""
@@ -186,8 +186,7 @@ class Block(Partition):
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Only where one tile holds the whole lattice."""
         assert self.tile is not None
-        one = grid.rows <= self.tile[0] and grid.cols <= self.tile[1]
-        return one or neighbourless(grid, offsets)
+        return grid.rows <= self.tile[0] and grid.cols <= self.tile[1]
 
     def groups(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """The place within the tile."""
@@ -197,6 +196,6 @@ class Block(Partition):
         return place
 
 
-def neighbourless(grid: Grid, offsets: NDArray[np.int32]) -> bool:
-    """Whether no site of the lattice has a neighbour, as on a lattice of one site."""
-    return bool((grid.neighbours(grid.sites(), offsets) < 0).all())
+def neighbourless(grid: Grid) -> bool:
+    """Whether no site of the lattice has a neighbour: every neighbourhood holds the four nearest."""
+    return grid.rows * grid.cols == 1

@@ -100,7 +100,7 @@ class RandomSubset(Scattered):
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Only on a lattice without neighbours."""
-        return neighbourless(grid, offsets)
+        return neighbourless(grid)
 
     def choose(self, state: State, wanting: NDArray[np.int64], active: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Toss a coin for each."""

@@ -64,7 +64,25 @@ def neighbours_in(grid: Grid, offsets: NDArray[np.int32], sites: NDArray[np.int3
     return int(sites[s]), int(r[k, s])
 
 
-class Checked:
+class Watched:
+    """A schedule within another; a subclass looks at what it does.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    """
+
+    def __init__(self, schedule: Schedule) -> None:
+        self.schedule = schedule
+        self.name = schedule.name
+        self.tile = getattr(schedule, "tile", None)
+
+    def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
+        """As the schedule says."""
+        return self.schedule.independent(grid, offsets)
+
+
+class Checked(Watched):
     """A schedule that is watched: what it says of itself is checked at every step.
 
     Parameters
@@ -77,31 +95,24 @@ class Checked:
     schedule claims independence and two of its sites are neighbours. Cost: O(sites x neighbours) a step, on the host.
     """
 
-    def __init__(self, schedule: Schedule) -> None:
-        self.schedule = schedule
-        self.name = schedule.name
-
-    def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
-        """As the schedule says."""
-        return self.schedule.independent(grid, offsets)
-
     def init(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int) -> Any:
-        """The schedule's own state, and the lattice to check against."""
-        return self.schedule.init(machine, grid, offsets, order, seed, level), grid, offsets
+        """The schedule's own state, the lattice to check against, and whether the schedule claims independence."""
+        inner = self.schedule.init(machine, grid, offsets, order, seed, level)
+        return inner, grid, offsets, self.independent(grid, offsets)
 
     def step(self, state: Any, active: Active) -> tuple[Any, Info]:
         """The schedule's own step, once it has been checked."""
-        inner, grid, offsets = state
+        inner, grid, offsets, claims = state
         inner, info = self.schedule.step(inner, active)
         if np.unique(info.sites).size != info.sites.size:
             raise RuntimeError(f"the schedule {self.name} relaxes a site twice in one step")
         if not np.isin(info.sites, grid.sites()).all():
             raise RuntimeError(f"the schedule {self.name} relaxes sites that are not of the level's lattice")
-        met = neighbours_in(grid, offsets, info.sites) if self.independent(grid, offsets) else None
+        met = neighbours_in(grid, offsets, info.sites) if claims else None
         if met:
             here, there = (divmod(site, grid.width) for site in met)
             raise RuntimeError(
                 f"the schedule {self.name} claims independent sites, but {here} and {there} are neighbours "
                 "and relax together: equation (14)"
             )
-        return (inner, grid, offsets), info
+        return (inner, grid, offsets, claims), info
