@@ -20,13 +20,13 @@ from simdtex.methods.mrf import make_options
 from simdtex.quality import COPIED_PATCH, Quality, measure
 from simdtex.random import as_seed
 from simdtex.recorder import Noted, Recorder, Sweep
-from simdtex.run import Progress
+from simdtex.run import Relaxing
 from simdtex.schedules import Schedule
 from simdtex.synthesis import check_shape, synthesize
 
 __all__ = ["FIGURES", "Comparison", "Entry", "Now", "Recorder", "Run", "Spread", "Sweep", "compare"]
 
-Tell = Callable[[Progress], Any]
+Tell = Callable[[Relaxing], Any]
 
 
 @dataclass(frozen=True)
@@ -249,7 +249,7 @@ class Now:
     seed: int
     run: int
     runs: int
-    progress: Progress
+    progress: Relaxing
     fraction: float
 
 
@@ -412,7 +412,7 @@ class _Job:
         return image, output.statistics
 
 
-def _tell(callback: Callable[[Now], Any], schedule: str, seed: int, number: int, runs: int, progress: Progress) -> None:
+def _tell(callback: Callable[[Now], Any], schedule: str, seed: int, number: int, runs: int, progress: Relaxing) -> None:
     callback(Now(schedule, seed, number, runs, progress, (number - 1 + progress.fraction) / runs))
 
 

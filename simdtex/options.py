@@ -3,10 +3,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import fields
 from math import isfinite
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+def build(options: type[T], method: str, given: Mapping[str, Any], also: tuple[str, ...] = ()) -> T:
+    """A method's options from what the user gave; an unknown name is a TypeError that lists the valid ones."""
+    valid = [f.name for f in fields(options)]  # type: ignore[arg-type]
+    for name in given:
+        if name not in valid:
+            raise TypeError(
+                f"unknown option {name!r} of the method {method!r}; choose from: {', '.join([*also, *valid])}"
+            )
+    return options(**given)
 
 
 def one_of(name: str, value: Any, valid: Iterable[str]) -> None:

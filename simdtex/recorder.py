@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.lattice import Grid
-from simdtex.run import Progress
+from simdtex.run import Relaxing
 from simdtex.schedules import Active, Info, Schedule, Watched, neighbours_in
 
 __all__ = ["Noted", "Recorder", "Sweep"]
 
-Tell = Callable[[Progress], Any]
+Tell = Callable[[Relaxing], Any]
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class Recorder:
         self._level = -1
         self._last: list[NDArray[Any]] = []
 
-    def __call__(self, progress: Progress) -> None:
+    def __call__(self, progress: Relaxing) -> None:
         """Record if a sweep has ended."""
         if self._then:
             self._then(progress)

@@ -4,24 +4,60 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from math import sqrt
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.lattice import Grid
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Progress:
-    """Where a run stands; what a callback is called with after every piece of a step.
+    """Where a run stands; what a callback is called with several times a second.
 
     Attributes
     ----------
     level, levels : int
         The present level (0 is the finest, and the last) and their number.
+    fraction : float
+        Share of the expected work that is done, 0 to 1; an estimate.
+    image : callable
+        ``image()`` reads back a picture, (rows, cols[, channels]) in the sample's type: that of the level, or, where
+        the level has none before its end, of the one before.
+    doing : str
+        The level and what is being done in it, in words.
+    stage : str or None
+        The name of the picture that is complete now: the end of a sweep, or of a level that has none.
+    """
+
+    level: int
+    levels: int
+    fraction: float
+    image: Callable[[], NDArray[Any]]
+
+    @property
+    def doing(self) -> str:  # noqa: D102
+        return f"level {self.level}"
+
+    @property
+    def stage(self) -> str | None:  # noqa: D102
+        return None
+
+    def maps(self) -> dict[str, NDArray[np.float64]]:
+        """What the stage has beside its picture: arrays (rows, cols), 0 to 1, by name."""
+        return {}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Relaxing(Progress):
+    """The progress of the method ``mrf``, told after every piece of a step.
+
+    Attributes
+    ----------
     sweep : int
         The present sweep of the level, from 1.
     step : int
@@ -32,35 +68,79 @@ class Progress:
         Mean temperature of the level, 0 to 1, at the beginning of the sweep.
     end_of_sweep : bool
         Whether the sweep ends with this piece.
-    fraction : float
-        Share of the expected work that is done, 0 to 1; an estimate.
-    image : callable
-        ``image()`` reads back the level's picture, (rows, cols[, channels]) in the sample's type.
     temperature : callable
         ``temperature()`` reads back the level's temperatures, (rows, cols), 0 to 1.
     """
 
-    level: int
-    levels: int
     sweep: int
     step: int
     phase: str
     temperature_left: float
     end_of_sweep: bool
-    fraction: float
-    image: Callable[[], NDArray[Any]]
     temperature: Callable[[], NDArray[Any]]
 
+    @property
+    def doing(self) -> str:  # noqa: D102
+        return f"level {self.level}, sweep {self.sweep}, temperature {self.temperature_left:.3f}"
 
-Callback = Callable[[Progress], Any]
+    @property
+    def stage(self) -> str | None:  # noqa: D102
+        return f"level{self.level}-sweep{self.sweep:02d}" if self.end_of_sweep else None
+
+    def maps(self) -> dict[str, NDArray[np.float64]]:
+        """The temperatures."""
+        return {"temperature": self.temperature()}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sampling(Progress):
+    """The progress of the method ``multires``, told after every piece of a level.
+
+    Attributes
+    ----------
+    end_of_level : bool
+        Whether the level ends with this piece.
+    candidates : callable
+        ``candidates()`` reads back among how many candidates each pixel of the level was drawn, (rows, cols) whole
+        numbers, at the level's end.
+    """
+
+    end_of_level: bool
+    candidates: Callable[[], NDArray[Any]]
+
+    @property
+    def stage(self) -> str | None:  # noqa: D102
+        return f"level{self.level}" if self.end_of_level else None
+
+    def maps(self) -> dict[str, NDArray[np.float64]]:
+        """The candidates, on a logarithmic scale from 1 to the most that a pixel of the level has."""
+        counts = self.candidates()
+        return {"candidates": np.log(counts) / np.log(max(2, counts.max()))}
+
+
+Callback = Callable[[Any], Any]
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A level at its end: ``level``; ``image`` (rows, cols[, channels]) in the sample's type."""
+    """A level at its end.
+
+    Attributes
+    ----------
+    level : int
+        0 is the finest.
+    image : (rows, cols[, channels]) array
+        In the sample's type.
+    source : (rows, cols, 2) int32 array or None
+        ``multires``: for every pixel of the level, the (row, column) of the sample's level that it was copied from.
+    candidates : (rows, cols) int32 array or None
+        ``multires``: among how many candidates each pixel was drawn.
+    """
 
     level: int
     image: NDArray[Any]
+    source: NDArray[Any] | None = None
+    candidates: NDArray[Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -70,30 +150,51 @@ class Output:
     Attributes
     ----------
     source : (rows, cols, 2) int32 array
-        For every output pixel the (row, column) of the sample pixel it was taken from.
-    temperature : (rows, cols) float64 array
-        What is left of the pixel temperatures, 0 to 1.
+        For every output pixel the (row, column) of the sample pixel it was taken from; with ``multires``, of the one
+        that its highest frequencies were taken from.
+    temperature : (rows, cols) float64 array or None
+        ``mrf``: what is left of the pixel temperatures, 0 to 1.
     stages : list of Stage
         Each level's picture at its end, the coarsest first.
     statistics : dict
         ``device``, ``seed``, ``options``, ``seconds``, ``device_seconds`` (of kernels; None unless the machine was
-        opened with ``profile=True``), ``accounting``, and ``levels``: one dict per level with
-        ``level``, ``rows``, ``cols``, ``candidates``, ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation
-        (12)), ``seconds``, and ``equilibrium``: the ``sweeps``, ``steps`` and ``relaxations`` until no temperature
-        was left, free sweeps not counted. ``accounting`` is what the run costs on a processor array, or, where none
-        was given, packed on a full MP-1: ``array``, ``mapping``, ``emulated``; ``layers``, virtual layers; ``shifts``,
-        X-Net shifts of a word that bring every pixel of the finest level all its neighbours, for either mapping;
-        ``steps``; ``passes``, SIMD steps: one for each virtual layer of a step that has an active site; ``active``,
-        the mean number of active PEs per pass; ``utilisation``, that over all PEs; ``sites``, relaxations; ``moved``,
-        words that each PE shifted; ``routed``, words through the router; ``flop``, 32-bit operations in the
-        distances; ``model_seconds``, the time of a MasPar MP-1 by the model of
-        `simdtex.machine.accounting.Account`; and ``launches``, kernels enqueued on the device.
+        opened with ``profile=True``), and ``levels``: one dict per level with ``level``, ``rows``, ``cols``,
+        ``candidates``, ``seconds``, and what is particular to the method.
+
+    Notes
+    -----
+    A level of ``mrf`` has ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation (12)), and ``equilibrium``: the
+    ``sweeps``, ``steps`` and ``relaxations`` until no temperature was left, free sweeps not counted. Its statistics
+    also have ``accounting``, what the run costs on a processor array, or, where none was given, packed on a full MP-1:
+    ``array``, ``mapping``, ``emulated``; ``layers``, virtual layers; ``shifts``, X-Net shifts of a word that bring
+    every pixel of the finest level all its neighbours, for either mapping; ``steps``; ``passes``, SIMD steps: one for
+    each virtual layer of a step that has an active site; ``active``, the mean number of active PEs per pass;
+    ``utilisation``, that over all PEs; ``sites``, relaxations; ``moved``, words that each PE shifted; ``routed``,
+    words through the router; ``flop``, 32-bit operations in the distances; ``model_seconds``, the time of a MasPar
+    MP-1 by the model of `simdtex.machine.accounting.Account`; and ``launches``, kernels enqueued on the device.
+
+    A level of ``multires`` has the mean number of ``candidates`` of a pixel and ``most`` of them; ``nodes``, pixels of
+    the levels above in the sample's pyramid, and ``compared``, the mean number of them that a pixel was compared with
+    until all its candidates were found.
     """
 
     source: NDArray[Any]
-    temperature: NDArray[Any]
+    temperature: NDArray[Any] | None = None
     stages: list[Stage] = field(default_factory=list)
     statistics: dict[str, Any] = field(default_factory=dict)
+
+
+def paced(count: int, least: int) -> Iterator[tuple[int, int]]:
+    """Ranges (first, end) that make up 0..count, of a size that takes the loop's body about a tenth of a second.
+
+    `least` is the size of the first, and of the smallest.
+    """
+    first, size = 0, least
+    while first < count:
+        end, began = min(count, first + size), time.perf_counter()
+        yield first, end
+        first, seconds = end, max(time.perf_counter() - began, 1e-3)
+        size = max(least, int(size * min(4.0, 0.1 / seconds)))
 
 
 class Meter:

@@ -69,10 +69,8 @@ class Sample:
             levels = planes.astype(np.uint16)
         else:
             self.top = 2 ** min(12, int((33 - log2(values)) / 2)) - 1
-            half = planes.astype(np.float64) / 2  # so that no difference overflows
-            half_unit = float(half.max() - half.min()) / self.top or 0.5
-            self.unit = 2 * half_unit
-            levels = np.rint((half - half.min()) / half_unit).astype(np.uint16)
+            stretched, self.unit = stretch(planes, self.top)
+            levels = stretched.astype(np.uint16)
         self._lay(levels, margin)
 
     @classmethod
@@ -189,15 +187,31 @@ class Sample:
         step = np.moveaxis(values.astype(np.int64) - self.working[:, source], 0, -1)
         if not step.any():
             return np.ascontiguousarray(own)
-        moved = own.astype(np.float64) + step * self.unit
-        if self.pixels.dtype == np.bool_:
-            return np.ascontiguousarray(moved > 0.5)
-        if np.issubdtype(self.pixels.dtype, np.integer):
-            bounds = np.iinfo(self.pixels.dtype)
-            most = float(bounds.max)  # which may be one more than the type holds
-            most = most if int(most) <= bounds.max else float(np.nextafter(most, 0))
-            moved = np.clip(np.rint(moved), bounds.min, most)
-        taken: NDArray[Any] = np.where(step == 0, own, moved.astype(self.pixels.dtype))
-        if self.pixels.dtype != np.uint8:  # whose legal levels are 0 to 255
-            taken = np.clip(taken, self.pixels.min(), self.pixels.max())
-        return taken
+        return moved(own, step * self.unit, self.pixels)
+
+
+def stretch(pixels: NDArray[Any], top: int) -> tuple[NDArray[np.int64], float]:
+    """Pixels of any real type stretched over the whole numbers 0..top, and the size of 1 in their own unit."""
+    half = pixels.astype(np.float64) / 2  # so that no difference overflows
+    half_unit = float(half.max() - half.min()) / top or 0.5
+    return np.rint((half - half.min()) / half_unit).astype(np.int64), 2 * half_unit
+
+
+def moved(own: NDArray[Any], by: NDArray[np.floating[Any]], pixels: NDArray[Any]) -> NDArray[Any]:
+    """Pixels of a sample moved by a difference and projected onto the closest legal ones; others stay as they are.
+
+    Legal are 0 to 255 for 8 bits, and what lies between the sample's smallest and largest pixel otherwise.
+    """
+    with np.errstate(over="ignore"):  # what is beyond the largest double is brought back
+        values = own.astype(np.float64) + by
+    if pixels.dtype == np.bool_:
+        legal: NDArray[Any] = values > 0.5
+    elif pixels.dtype.kind == "f":
+        legal = np.clip(values, float(pixels.min()), float(pixels.max())).astype(pixels.dtype)
+    else:
+        bounds = np.iinfo(pixels.dtype)
+        most = float(bounds.max)  # which may be one more than the type holds
+        most = most if int(most) <= bounds.max else float(np.nextafter(most, 0))
+        legal = np.clip(np.rint(values), bounds.min, most).astype(pixels.dtype)
+        legal = legal if pixels.dtype == np.uint8 else np.clip(legal, pixels.min(), pixels.max())
+    return np.where(by == 0, own, legal)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex.image import check_sample
 from simdtex.lattice import Grid, neighbourhood_offsets
 from simdtex.machine import Machine, open_machine
-from simdtex.methods import mrf
+from simdtex.methods import mrf, multires
 from simdtex.ops import lcpdf as parzen
 from simdtex.ops.histogram import histogram
 from simdtex.ops.neighbourhood import Field, neighbourhood
@@ -23,7 +23,7 @@ from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 from simdtex.sample import Sample
 
-METHODS = ("mrf",)
+METHODS: dict[str, Any] = {"mrf": mrf, "multires": multires}
 
 
 @overload
@@ -104,9 +104,9 @@ def synthesize(
     one_of("method", method, METHODS)
     pixels = check_sample(sample, channel_axis)
     size = check_shape(shape)
-    chosen = mrf.make_options(**options)
-    seed = as_seed(rng)
-    image, output = mrf.synthesize(open_machine(device), pixels, size, chosen, seed, _seeing(callback, channel_axis))
+    chosen = METHODS[method].make_options(**options)
+    seed, seen = as_seed(rng), _seeing(callback, channel_axis)
+    image, output = METHODS[method].synthesize(open_machine(device), pixels, size, chosen, seed, seen)
     image = _restored(image, channel_axis)
     if not full_output:
         return image

@@ -28,8 +28,8 @@ from simdtex.ops.operation import Array
 from simdtex.ops.snapshot import snapshot
 from simdtex.ops.start import start
 from simdtex.ops.temperature import temperature
-from simdtex.options import one_of, real, true_or_false, whole
-from simdtex.run import Callback, Meter, Output, Progress, Stage
+from simdtex.options import build, one_of, real, true_or_false, whole
+from simdtex.run import Callback, Meter, Output, Relaxing, Stage
 from simdtex.sample import Candidates, Sample
 
 PRESETS: dict[str, dict[str, Any]] = {
@@ -145,11 +145,7 @@ class Options:
 def make_options(preset: str = "default", **given: Any) -> Options:
     """Options from a preset and what the user gave; unknown names are a TypeError that lists the valid ones."""
     one_of("preset", preset, PRESETS)
-    valid = [f.name for f in fields(Options)]
-    unknown = [name for name in given if name not in valid]
-    if unknown:
-        raise TypeError(f"unknown option {unknown[0]!r} of the method 'mrf'; choose from: preset, {', '.join(valid)}")
-    return replace(Options(**PRESETS[preset]), **given)
+    return build(Options, "mrf", PRESETS[preset] | given, also=("preset",))
 
 
 @dataclass(frozen=True)
@@ -202,7 +198,7 @@ def synthesize(
     seed : int
         Key of every random number.
     callback : callable, optional
-        Called with a `simdtex.run.Progress` after every piece of a step.
+        Called with a `simdtex.run.Relaxing` after every piece of a step.
 
     Returns
     -------
@@ -354,7 +350,7 @@ def _tell(run: _Run, level: _Level, field: Field, meter: Meter, where: dict[str,
     if run.callback:
         image, warmth = partial(_picture, run, level, field), partial(_warmth, run, level, field)
         now: dict[str, Any] = {"end_of_sweep": last, "fraction": meter.fraction, "image": image, "temperature": warmth}
-        run.callback(Progress(levels=run.levels, **where, **now))
+        run.callback(Relaxing(levels=run.levels, **where, **now))
 
 
 def _temperatures(run: _Run, level: _Level, field: Field) -> NDArray[np.uint16]:

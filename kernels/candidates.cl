@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "common/philox.h"
+
+#ifndef FEATURES
+#define FEATURES 9 // of a node
+#endif
+#define MOST 32 // levels
+
+// The candidates of a pixel and a draw of one of them, De Bonet's equations (8) to (12).
+//
+// Nodes are the pixels of the levels above the one that is sampled. A pixel's parent structure, equation (8), is made
+// of the features of the nodes above it. The output's lattice is made of tiles, each laid out like the sample's.
+//
+// analysis   (levels,)          of the sample's pyramid: rows, columns, where the level begins in `features`
+// features   (nodes, FEATURES)  level after level
+// threshold  (levels, FEATURES) the largest difference that passes, the square root of T Z in (9) to (11)
+// synthesis  (levels,)          of the output's pyramid: rows, columns, where the level begins in `source` and `counts`
+// source     (pixels,)          the pixel of the sample's level that each was copied from; those of the levels above are
+//                               read, those of this level are written
+// counts     (pixels, 2) out    candidates of each pixel, and nodes it was compared with to find them
+
+typedef struct {
+    int level, top, match;
+    __global const int4 *analysis;
+    __global const int *features;
+    __global const uint *threshold;
+    int own[MOST]; // the pixel's own parent structure: for each level the node in `features`
+} Parents;
+
+// Equations (9) to (11) for the features of one level: no component differs by more than its threshold.
+inline bool similar(const Parents *own, const int level, const int node)
+{
+    __global const int *u = own->features + node * FEATURES, *v = own->features + own->own[level] * FEATURES;
+    __global const uint *most = own->threshold + level * FEATURES;
+    for (int m = 0; m < FEATURES; ++m)
+        if (abs_diff(u[m], v[m]) > most[m])
+            return false;
+    return true;
+}
+
+// Goes through the nodes from the top down. Parents are compared before their children, so one that fails rejects all
+// that is below it. What is left in the lowest level of nodes gives candidates: its children, or, with `match`, the one
+// child in the pixel's own place among its siblings. Stops at candidate number `wanted`, whose node is then (row, col)
+// and which is its child number `child`. Returns how many candidates came before, and counts the nodes compared.
+inline int scan(const Parents *own, const int wanted, int *row, int *col, int *child, int *compared)
+{
+    int count = 0, level = own->top, r = 0, c = 0;
+    int4 lattice = own->analysis[level];
+    *compared = 0;
+    for (;;) {
+        ++*compared;
+        if (similar(own, level, lattice.z + r * lattice.y + c)) {
+            if (level > own->level + 1) { // on to the first child
+                lattice = own->analysis[--level];
+                r *= 2;
+                c *= 2;
+                continue;
+            }
+            const int4 below = own->analysis[own->level];
+            const int children = own->match ? 1 : min(2, below.x - 2 * r) * min(2, below.y - 2 * c);
+            if (wanted - count < children) {
+                *row = r;
+                *col = c;
+                *child = wanted - count;
+                return wanted;
+            }
+            count += children;
+        }
+        // On to the next sibling, or to that of the nearest ancestor that has one. All nodes of the top are siblings.
+        for (; level < own->top; r /= 2, c /= 2) {
+            const int next_col = !(c & 1) && c + 1 < lattice.y, next_row = !(r & 1) && r + 1 < lattice.x;
+            if (next_col || next_row) {
+                c = next_col ? c + 1 : c & ~1;
+                r += next_col ? 0 : 1;
+                break;
+            }
+            lattice = own->analysis[++level];
+        }
+        if (level == own->top && ++c == lattice.y) {
+            c = 0;
+            if (++r == lattice.x)
+                return count;
+        }
+    }
+}
+
+// One work-item per pixel, of the pixels first .. end-1 of a level. Two scans, to count and to find the one that is
+// drawn: no list is kept.
+__kernel void candidates(const ulong seed, const int level, const int top, const int match,
+                         __global const int4 *restrict analysis, __global const int *restrict features,
+                         __global const uint *restrict threshold, __global const int4 *restrict synthesis,
+                         const int first, const int end, __global int *restrict source, __global int2 *restrict counts)
+{
+    const int4 here = synthesis[level], tile = analysis[level];
+    const int s = first + get_global_id(0);
+    if (s >= end)
+        return;
+    const int i = s / here.y, j = s % here.y;
+    const int p = i % tile.x, q = j % tile.y; // within its tile
+    Parents own = {level, top, match, analysis, features, threshold};
+    for (int k = level + 1; k <= top; ++k) {
+        const int4 above = analysis[k], there = synthesis[k];
+        const int up = k - level;
+        const int r = i / tile.x * above.x + (p >> up), c = j / tile.y * above.y + (q >> up);
+        own.own[k] = above.z + source[there.z + r * there.y + c];
+    }
+    int row, col, child, compared, again;
+    const int count = scan(&own, INT_MAX, &row, &col, &child, &compared); // the size of C_i
+    const uint4 bits = draw4(seed, level, 0, s, PURPOSE_DRAW, 0);
+    scan(&own, below(bits.x, bits.y, count), &row, &col, &child, &again); // uniform, equation (12)
+    const int wide = min(2, tile.y - 2 * col);
+    // A node at the sample's edge may lack the child in this place: then it gives the one beside it.
+    row = min(tile.x - 1, 2 * row + (match ? p & 1 : child / wide));
+    col = min(tile.y - 1, 2 * col + (match ? q & 1 : child % wide));
+    source[here.z + s] = row * tile.y + col;
+    counts[here.z + s] = (int2)(count, compared);
+}

@@ -1,0 +1,376 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Multiresolution sampling: the procedure of De Bonet (1997).
+
+`simdtex.analysis.analyse` is the first phase; `resample` is the second, his SynthesizePyramid and CollapsePyramid level
+by level. Numbers in parentheses are the paper's equations. Level 0 is the finest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from functools import partial
+from math import inf, prod
+from numbers import Real
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simdtex.analysis import Analysis, analyse
+from simdtex.machine import Machine
+from simdtex.ops.candidates import Sampled, Structure, candidates
+from simdtex.ops.laplacian import laplacian_collapse
+from simdtex.ops.operation import Array
+from simdtex.options import build, one_of, real, whole
+from simdtex.run import Callback, Output, Sampling, Stage, paced
+
+ANY = 2**32 - 1
+"""The threshold that every difference passes."""
+
+LAUNCH = 4e8
+"""Comparisons that the first launch of a level may take if no node fails."""
+
+STEPS, MOST = 100, 4
+"""`suggest_alpha` tries the multiples of 1/100 up to 4."""
+
+STRETCHES, STRETCH = 16, 256
+"""Of pixels, in each level, that `suggest_alpha` counts the candidates of."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """The options of the method ``multires``.
+
+    Parameters
+    ----------
+    alpha : float or "auto"
+        Of T = alpha / k**beta (13), 0 or more: 0 tiles the sample, infinity samples every band on its own. ``"auto"``
+        takes what `simdtex.suggest_alpha` does for ``target``.
+    beta : float
+        Of the same, 0 or more. k counts levels from the lowest frequency upward.
+    target : float
+        With ``alpha="auto"``, candidates that a pixel is to have on average.
+    thresholds : array, optional
+        T itself, in place of alpha and beta: one row for each level but the finest, the lowest frequency first; one
+        column for all features or one for each.
+    orientations : int
+        Of the first and of the second derivatives of a Gaussian in the filter bank (7); 0 leaves the bands alone.
+    sigma : float
+        Of that Gaussian, in pixels.
+    filter_size : int
+        Rows and columns of the filters; odd. A level smaller than that has no responses.
+    features : {"luminance", "channels"}
+        Whether features are made of the luminance or of every channel. Bands are copied with all their channels.
+    levels : int, optional
+        Of the pyramids. None: down to a single pixel.
+    phase : {"match", "free"}
+        Whether a candidate must stand in an even or odd row and column as the pixel does. ``"free"`` is the paper's
+        text.
+    boundary : {"torus", "open"}
+        Whether pyramids wrap around, or continue as in a mirror.
+    """
+
+    alpha: float | str = 0.3
+    beta: float = 0.0
+    target: float = 1.5
+    thresholds: ArrayLike | None = None
+    orientations: int = 4
+    sigma: float = 0.7
+    filter_size: int = 3
+    features: str = "luminance"
+    levels: int | None = None
+    phase: str = "match"
+    boundary: str = "torus"
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        if isinstance(self.alpha, str):
+            if self.alpha != "auto":
+                raise ValueError(f"alpha is {self.alpha!r}; give a number of at least 0, or 'auto'")
+        elif not (isinstance(self.alpha, Real) and self.alpha == inf):
+            real("alpha", self.alpha, 0)
+        real("beta", self.beta, 0)
+        real("target", self.target, 1)
+        whole("orientations", self.orientations, 0)
+        real("sigma", self.sigma, 0, above=True)
+        whole("filter_size", self.filter_size, 3)
+        if self.filter_size % 2 == 0:
+            raise ValueError(f"filter_size is {self.filter_size}; give an odd number, 3 or 5")
+        one_of("features", self.features, ("luminance", "channels"))
+        if self.levels is not None:
+            whole("levels", self.levels, 1)
+        one_of("phase", self.phase, ("match", "free"))
+        one_of("boundary", self.boundary, ("torus", "open"))
+        if self.thresholds is not None:
+            _check_thresholds(self.thresholds)
+
+    @property
+    def analysis(self) -> dict[str, Any]:
+        """Those that bear on the analysis."""
+        names = ("orientations", "sigma", "filter_size", "features", "levels", "boundary")
+        return {name: getattr(self, name) for name in names}
+
+
+def make_options(**given: Any) -> Options:
+    """Options from what the user gave; unknown names are a TypeError that lists the valid ones."""
+    return build(Options, "multires", given)
+
+
+# -- thresholds -----------------------------------------------------------------------------------------------
+
+
+def thresholds(levels: int, options: Options, alpha: float) -> NDArray[np.float64]:
+    """T of every level (levels, 1 or M), the finest first: alpha / k**beta (13), or the user's table."""
+    if options.thresholds is None:
+        k = np.arange(levels, 0, -1)  # 1 at the top
+        return alpha / (k**options.beta).astype(np.float32).astype(np.float64)[:, None]
+    table = np.asarray(options.thresholds, np.float64)
+    table = table if table.ndim == 2 else table[:, None]
+    if len(table) != levels - 1:
+        raise ValueError(
+            f"thresholds has {len(table)} rows; give one for each level but the finest, {levels - 1}, "
+            f"or levels={len(table) + 1}"
+        )
+    return np.concatenate([np.zeros((1, table.shape[1])), table[::-1]])
+
+
+def differences(analysis: Analysis, table: NDArray[np.float64]) -> NDArray[np.uint32]:
+    """The largest difference of each feature (levels, M) whose square, divided by Z, is not above T, (9) to (11)."""
+    if table.shape[1] not in (1, analysis.energy.shape[1]):
+        raise ValueError(
+            f"thresholds has {table.shape[1]} columns; give 1, or {analysis.energy.shape[1]}, one for each feature"
+        )
+    with np.errstate(invalid="ignore", over="ignore"):
+        largest = np.sqrt(table * analysis.energy)
+    return np.where(np.isinf(table), ANY, np.minimum(largest, ANY)).astype(np.uint32)
+
+
+def suggest_alpha(machine: Machine, analysis: Analysis, options: Options) -> float:
+    """The alpha at which a pixel has `Options.target` candidates on average, counted on the sample itself.
+
+    Parameters
+    ----------
+    machine : Machine
+    analysis : Analysis
+    options : Options
+        Of which ``target``, ``beta`` and ``phase`` matter, beside those of the analysis.
+
+    Returns
+    -------
+    float
+        The least multiple of 1/100 at which the number of candidates of the sample's own pixels, averaged over each
+        level but the top and then over these levels, reaches the target; 4 where none below does.
+
+    Notes
+    -----
+    Cost: eight or nine scans of at most 4096 pixels of each level.
+    """
+    low, high = 0, MOST * STEPS
+    while high - low > 1:  # candidates only grow with alpha
+        middle = (low + high) // 2
+        reached = _mean_candidates(machine, analysis, options, middle / STEPS) >= options.target
+        low, high = (low, middle) if reached else (middle, high)
+    return high / STEPS
+
+
+def _mean_candidates(machine: Machine, analysis: Analysis, options: Options, alpha: float) -> float:
+    structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
+    itself = [np.arange(rows * cols, dtype=np.int32) for rows, cols in analysis.shapes]
+    sampled = _sampled(machine, analysis.shapes, itself)
+    means, begin = [], 0
+    for level, (rows, cols) in enumerate(analysis.shapes[:-1]):  # upward: what a level needs is still itself
+        n = rows * cols
+        firsts = [0] if n <= STRETCHES * STRETCH else [i * n // STRETCHES for i in range(STRETCHES)]
+        counts = []
+        for first in firsts:
+            end = n if len(firsts) == 1 else first + STRETCH
+            sampled = candidates(machine, structure, sampled, level, first, end, options.phase == "match", 0)
+            counts.append(machine.get(sampled.counts[begin + first : begin + end])[:, 0])
+        means.append(float(np.concatenate(counts).mean()))
+        begin += n
+    return float(np.mean(means)) if means else inf
+
+
+# -- the second phase: synthesis ------------------------------------------------------------------------------
+
+
+def synthesize(
+    machine: Machine,
+    pixels: NDArray[Any],
+    shape: tuple[int, int],
+    options: Options,
+    seed: int,
+    callback: Callback | None = None,
+) -> tuple[NDArray[Any], Output]:
+    """Both phases: `analyse`, and `resample`, which says what comes in and out."""
+    return resample(machine, analyse(machine, pixels, **options.analysis), shape, options, seed, callback)
+
+
+def resample(
+    machine: Machine,
+    analysis: Analysis,
+    shape: tuple[int, int],
+    options: Options,
+    seed: int,
+    callback: Callback | None = None,
+) -> tuple[NDArray[Any], Output]:
+    """The second phase of the paper: SynthesizePyramid and CollapsePyramid, level by level.
+
+    Parameters
+    ----------
+    machine : Machine
+        What executes the steps.
+    analysis : Analysis
+        Of the sample, made with the same options.
+    shape : (int, int)
+        Rows and columns of the output.
+    options : Options
+    seed : int
+        Key of every random number.
+    callback : callable, optional
+        Called with a `simdtex.run.Sampling` after every piece of a level.
+
+    Returns
+    -------
+    image : (rows, cols, channels) array
+        In the sample's type.
+    output : simdtex.run.Output
+        Source map, stages with their source maps and candidates, statistics.
+
+    Notes
+    -----
+    A level is one step: no pixel depends on another of its level. Cost: for every pixel at most two comparisons with
+    each node above it and feature, some hundredths of that at usual thresholds. Memory on the device, in bytes: 20 +
+    7 channels per output pixel, beside the analysis; on the host about twice that.
+    """
+    began, worked = perf_counter(), machine.seconds
+    shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
+    total = sum(rows * cols for rows, cols in shapes)
+    _check_memory(machine, analysis, shape)
+    alpha = suggest_alpha(machine, analysis, options) if isinstance(options.alpha, str) else options.alpha
+    structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
+    top = analysis.levels - 1
+    row, col = np.indices(shapes[top], np.int32) % np.array(analysis.shapes[top], np.int32)[:, None, None]
+    copied = (row * np.int32(analysis.shapes[top][1]) + col).ravel()  # the top level is copied, repeated to fill
+    sampled = _sampled(machine, shapes, [*(np.zeros(r * c, np.int32) for r, c in shapes[:top]), copied])
+    stages: list[Stage] = []
+    reports: list[dict[str, Any]] = []
+    picture, done = None, 0
+
+    def tell(level: int, pixels: int, ended: bool) -> None:
+        if callback:
+            last = stages[-1]  # already read back
+            now: dict[str, Any] = {"fraction": (done + pixels) / total, "end_of_level": ended}
+            now |= {"image": partial(getattr, last, "image"), "candidates": partial(getattr, last, "candidates")}
+            callback(Sampling(level=level, levels=analysis.levels, **now))
+
+    for level in reversed(range(analysis.levels)):  # Loop i from top level downto 0
+        level_began = perf_counter()
+        (rows, cols), begin = shapes[level], sum(r * c for r, c in shapes[:level])
+        nodes = sum(r * c for r, c in analysis.shapes[level + 1 :])
+        if level < top:
+            least = 1 + int(LAUNCH / (nodes * analysis.features.shape[1]))
+            for first, end in paced(rows * cols, least):  # Loop x', y': (9) to (12)
+                sampled = candidates(machine, structure, sampled, level, first, end, options.phase == "match", seed)
+                machine.sync()
+                tell(level, end, ended=False)
+        source, counts = (machine.get(a[begin : begin + rows * cols]) for a in (sampled.source, sampled.counts))
+        source, counts = source.reshape(rows, cols), counts.reshape(rows, cols, 2)
+        picture = _collapsed(machine, analysis, level, source, picture)
+        image = analysis.sample.picture(machine.get(picture), source if level == 0 else None)
+        place = np.stack(np.divmod(source, np.int32(analysis.shapes[level][1])), -1)
+        stages.append(Stage(level, image, place, np.ascontiguousarray(counts[..., 0])))
+        done += rows * cols
+        reports.append(
+            {
+                "level": level,
+                "rows": rows,
+                "cols": cols,
+                "candidates": float(counts[..., 0].mean()),
+                "most": int(counts[..., 0].max()),
+                "nodes": nodes,
+                "compared": float(counts[..., 1].mean()),
+                "seconds": perf_counter() - level_began,
+            }
+        )
+        tell(level, 0, ended=True)
+
+    used = {"alpha": alpha, "levels": analysis.levels}
+    if options.thresholds is not None:
+        used["thresholds"] = np.asarray(options.thresholds).tolist()
+    statistics = {
+        "device": machine.name,
+        "seed": seed,
+        "options": {f.name: getattr(options, f.name) for f in fields(Options)} | used,
+        "seconds": perf_counter() - began,
+        "device_seconds": None if worked is None else (machine.seconds or 0.0) - worked,
+        "levels": reports,
+    }
+    return image, Output(place, None, stages, statistics)
+
+
+def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int], spacing: int) -> tuple[int, int]:
+    """Rows and columns of a level of the output, which is made of whole tiles and the beginning of one more.
+
+    Parameters
+    ----------
+    shape, sample : (int, int)
+        Rows and columns of the output and of the sample.
+    own : (int, int)
+        Of the sample's level.
+    spacing : int
+        2**level.
+    """
+    rows, cols = (n // m * k + -(-(n % m) // spacing) for n, m, k in zip(shape, sample, own, strict=True))
+    return rows, cols
+
+
+def _lattice(shapes: Sequence[tuple[int, int]], first: int) -> NDArray[np.int32]:
+    """Rows, columns and beginning of each level where levels stand one after another, from one of them on."""
+    begins = np.cumsum([0, *(rows * cols * (level >= first) for level, (rows, cols) in enumerate(shapes))])
+    return np.array([(*shape, begin, 0) for shape, begin in zip(shapes, begins, strict=False)], np.int32)
+
+
+def _structure(machine: Machine, analysis: Analysis, table: NDArray[np.float64]) -> Structure:
+    most, lattice = machine.put(differences(analysis, table)), machine.put(_lattice(analysis.shapes, 1))
+    return Structure(analysis.features, most, lattice)
+
+
+def _sampled(machine: Machine, shapes: Sequence[tuple[int, int]], source: Sequence[NDArray[np.int32]]) -> Sampled:
+    together = np.concatenate(source)
+    counts = np.tile(np.array([1, 0], np.int32), (together.size, 1))
+    return Sampled(machine.put(together), machine.put(counts), machine.put(_lattice(shapes, 0)))
+
+
+def _collapsed(
+    machine: Machine, analysis: Analysis, level: int, source: NDArray[np.int32], coarse: Array | None
+) -> Array:
+    """G of a level of the output, from its source map and G of the level above."""
+    band = analysis.bands[level]
+    if coarse is None:
+        residue = machine.get(band)
+        return machine.put(np.ascontiguousarray(residue.reshape(len(residue), -1)[:, source]))
+    return laplacian_collapse(machine, band, machine.put(source), coarse, analysis.torus)
+
+
+def _check_thresholds(table: ArrayLike) -> None:
+    try:
+        values = np.asarray(table, np.float64)
+    except (TypeError, ValueError):
+        raise TypeError("thresholds must be an array of numbers, its rows of equal length") from None
+    if values.ndim not in (1, 2) or not values.size:
+        raise ValueError(f"thresholds has shape {values.shape}; give one row for each level but the finest")
+    if not (values >= 0).all():
+        raise ValueError("thresholds must be numbers of at least 0")
+
+
+def _check_memory(machine: Machine, analysis: Analysis, shape: tuple[int, int]) -> None:
+    pixels, (channels, *_) = prod(shape), analysis.sample.planes.shape
+    if pixels * max(channels, 2) * 4 // 3 >= 2**31:
+        raise ValueError(
+            f"an output of {shape[0]} rows x {shape[1]} columns is beyond 2**31 values; give a smaller size"
+        )
+    held = prod(analysis.shapes[0]) * 6 * channels + prod(analysis.features.shape) * 4
+    machine.require(pixels * (20 + 7 * channels) + held)

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The candidates of a pixel and a draw of one of them, De Bonet's equations (8) to (12).
+
+The pixels of the levels above the one that is sampled are called nodes. Candidates are numbered as the scan meets
+them: from the top down, parents before children, the children of a node row by row.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex import random
+from simdtex.ops.operation import Array, Operation
+
+if TYPE_CHECKING:
+    from simdtex.machine.opencl import OpenCL
+
+TOGETHER = 2**22
+"""Pixels times candidates that the twin looks at together."""
+
+
+class Structure(NamedTuple):
+    """The parent structures of the sample's pyramid, equation (8), and what they are compared by.
+
+    ``features`` (nodes, M) int32, of the levels from 1 on, level after level; ``threshold`` (levels, M) uint32, the
+    largest difference that passes; ``lattice`` (levels, 4) int32: rows, columns, where the level begins in
+    ``features``, 0.
+    """
+
+    features: Array
+    threshold: Array
+    lattice: Array
+
+
+class Sampled(NamedTuple):
+    """The output's pyramid so far, made of tiles laid out like the sample's.
+
+    ``source`` (pixels,) int32, level after level: the pixel of the sample's level that each was copied from; ``counts``
+    (pixels, 2) int32: candidates of each, and nodes it was compared with; ``lattice`` (levels, 4) int32: rows, columns,
+    where the level begins in the other two, 0.
+    """
+
+    source: Array
+    counts: Array
+    lattice: Array
+
+
+def _reference(
+    structure: Structure, sampled: Sampled, level: int, first: int, end: int, match: bool, seed: int
+) -> Sampled:
+    begin = int(sampled.lattice[level, 2])
+    step = max(1, TOGETHER // (4 * int(structure.lattice[level + 1, :2].prod())))
+    for s in range(first, end, step):
+        sites = np.arange(s, min(end, s + step))
+        choice, counts = _drawn(structure, sampled, level, sites, match, seed)
+        sampled.source[begin + sites] = choice
+        sampled.counts[begin + sites] = counts
+    return sampled
+
+
+def _drawn(
+    structure: Structure, sampled: Sampled, level: int, sites: NDArray[np.intp], match: bool, seed: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Choice (S,) and counts (S, 2) of some sites."""
+    tile = structure.lattice[level, :2]
+    i, j = np.divmod(sites, sampled.lattice[level, 1])
+    p, q = i % tile[0], j % tile[1]
+    # Nodes in the order of the scan, and which of them have passed so far, (S, nodes).
+    top = len(structure.lattice) - 1
+    row, col = np.divmod(np.arange(structure.lattice[top, :2].prod()), structure.lattice[top, 1])
+    passing = np.ones((sites.size, row.size), bool)
+    compared = np.zeros(sites.size, np.intp)
+    for k in range(top, level, -1):
+        compared += passing.sum(1)
+        rows, cols, start = structure.lattice[k, :3]
+        above = (i // tile[0] * rows + (p >> k - level), j // tile[1] * cols + (q >> k - level))
+        own = sampled.source[sampled.lattice[k, 2] + above[0] * sampled.lattice[k, 1] + above[1]]
+        u = structure.features[start + own].astype(np.int64)
+        v = structure.features[start + row * cols + col].astype(np.int64)
+        for m, threshold in enumerate(structure.threshold[k]):
+            passing &= abs(u[:, None, m] - v[None, :, m]) <= threshold
+        if k > level + 1 or not match:
+            parent, row, col = _children(row, col, structure.lattice[k - 1])
+            passing = passing[:, parent]
+    number = np.cumsum(passing, 1)
+    lo, hi, *_ = random.draw4(seed, level, 0, sites, random.DRAW, 0)
+    wanted = random.below(lo, hi, number[:, -1])
+    drawn = (number > wanted[:, None]).argmax(1)
+    row, col = row[drawn], col[drawn]
+    if match:
+        row, col = np.minimum(2 * row + p % 2, tile[0] - 1), np.minimum(2 * col + q % 2, tile[1] - 1)
+    return row * tile[1] + col, np.stack([number[:, -1], compared], -1)
+
+
+def _children(
+    row: NDArray[np.intp], col: NDArray[np.intp], lattice: NDArray[np.int32]
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Parent, row and column of the children that there are of some nodes, node by node, row by row."""
+    child_row = (2 * row[:, None] + [0, 0, 1, 1]).ravel()
+    child_col = (2 * col[:, None] + [0, 1, 0, 1]).ravel()
+    there = (child_row < lattice[0]) & (child_col < lattice[1])
+    return np.repeat(np.arange(row.size), 4)[there], child_row[there], child_col[there]
+
+
+def _launch(
+    machine: OpenCL,
+    structure: Structure,
+    sampled: Sampled,
+    level: int,
+    first: int,
+    end: int,
+    match: bool,
+    seed: int,
+) -> Sampled:
+    levels, count = structure.threshold.shape
+    machine.launch(
+        machine.kernel("candidates", "candidates", FEATURES=count),
+        (end - first,),
+        *(np.uint64(seed), np.int32(level), np.int32(levels - 1), np.int32(match)),
+        *(structure.lattice, structure.features, structure.threshold),
+        *(sampled.lattice, np.int32(first), np.int32(end), sampled.source, sampled.counts),
+    )
+    return sampled
+
+
+candidates = Operation("candidates", _reference, _launch)
+"""``candidates(machine, structure, sampled, level, first, end, match, seed)``: pixels first .. end-1 of a level.
+
+``sampled`` is changed in place. With ``match`` a candidate stands where the pixel does among its siblings, in an even
+or odd row and column; else any child of a node that passes is one. A node at the sample's edge that lacks the child in
+question gives the one beside it. Cost: at most 2 x nodes x M comparisons a pixel; 12 bytes of memory a pixel.
+"""

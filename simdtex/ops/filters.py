@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Local texture measures, De Bonet's equation (7): a level's band and its responses to a bank of filters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.ops.laplacian import within
+from simdtex.ops.operation import Array, Operation
+
+if TYPE_CHECKING:
+    from simdtex.machine.opencl import OpenCL
+
+UNIT_BITS = 14
+"""Taps are whole multiples of 2**-14."""
+
+
+def bank(orientations: int, sigma: float, side: int) -> NDArray[np.int32]:
+    """First and second derivatives of a Gaussian in a number of directions: edges and lines.
+
+    Parameters
+    ----------
+    orientations : int
+        n of them: directions of the derivative at the angles pi a / n, a = 0 .. n-1, from the column axis towards the
+        row axis.
+    sigma : float
+        Of the Gaussian, in pixels.
+    side : int
+        Rows and columns of a filter; odd.
+
+    Returns
+    -------
+    (2 n, side, side) int32 array
+        In 2**-14, the n first derivatives first; to be correlated with a picture. The positive taps of each add up to
+        about 1, all of them to 0.
+    """
+    y, x = np.mgrid[:side, :side] - side // 2
+    gauss = np.exp(-(x * x + y * y) / (2 * sigma * sigma))
+    taps = []
+    for degree in (1, 2):
+        for a in range(orientations):
+            angle = np.pi * a / orientations
+            u = (x * np.cos(angle) + y * np.sin(angle)) / sigma
+            f = gauss * (u if degree == 1 else u * u - 1)
+            if degree == 2:
+                f -= gauss * f.sum() / gauss.sum()
+            whole = np.rint(f / f[f > 0].sum() * 2**UNIT_BITS).astype(np.int32)
+            whole[side // 2, side // 2] -= whole.sum()
+            taps.append(whole)
+    return np.array(taps)
+
+
+def _reference(
+    picture: NDArray[np.int32], band: NDArray[np.int32], taps: NDArray[np.int32], torus: bool
+) -> NDArray[np.int32]:
+    _, rows, cols = picture.shape
+    reach = taps.shape[1] // 2
+    row, col = (within(np.arange(-reach, n + reach), n, torus) for n in (rows, cols))
+    features = []
+    for g, own in zip(picture, band, strict=True):
+        around = g[np.ix_(row, col)].astype(np.int64)
+        features.append(own)
+        for f in taps:
+            total = np.zeros((rows, cols), np.int64)
+            for a, b in np.ndindex(f.shape):
+                total += f[a, b] * around[a : a + rows, b : b + cols]
+            features.append((total + (1 << UNIT_BITS - 1)) >> UNIT_BITS)
+    return np.stack(features, -1).reshape(rows * cols, -1).astype(np.int32)
+
+
+def _launch(machine: OpenCL, picture: Array, band: Array, taps: Array, torus: bool) -> Array:
+    planes, rows, cols = picture.shape
+    count, side = taps.shape[0], taps.shape[1]
+    features = machine.empty((rows * cols, planes * (1 + count)), np.int32)
+    machine.launch(
+        machine.kernel("filters", "filters"),
+        (rows * cols, planes * (1 + count)),
+        *(picture, band, np.int32(planes), np.int32(rows), np.int32(cols), np.int32(torus)),
+        *(taps, np.int32(count), np.int32(side), features),
+    )
+    return features
+
+
+filters = Operation("filters", _reference, _launch)
+"""``filters(machine, picture, band, taps, torus)``: (rows * cols, planes * (1 + filters)) int32, F^0, F^1, ... (7).
+
+``picture`` and ``band`` (planes, rows, cols) int32 are G and L of a level; ``taps`` comes from `bank`. Cost: side**2
+multiply-adds of 64 bits for each pixel, plane and filter.
+"""

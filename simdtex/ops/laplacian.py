@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The Laplacian pyramid of Burt and Adelson in whole numbers, De Bonet's equations (5) and (6).
+
+Pictures are (planes, rows, cols) int32. A level has half the rows and columns of the one below it, rounded up. Sums
+stay within 32 bits for whole numbers below 2**24.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.ops.operation import Array, Operation
+
+if TYPE_CHECKING:
+    from simdtex.machine.opencl import OpenCL
+
+
+def half(shape: tuple[int, ...]) -> tuple[int, int]:
+    """Rows and columns of the level above one of these rows and columns."""
+    return -(-shape[0] // 2), -(-shape[1] // 2)
+
+
+def within(index: NDArray[np.intp], n: int, torus: bool) -> NDArray[np.intp]:
+    """Indices brought to 0 .. n-1, as on a torus or in a mirror on the outer pixels (kernels/common/border.h)."""
+    period = n if torus else max(1, 2 * n - 2)
+    index = index % period
+    return np.where(index < n, index, period - index)
+
+
+def _reduce(fine: NDArray[np.int32], torus: bool) -> NDArray[np.int32]:
+    g = fine.astype(np.int64)
+    for axis in (1, 2):
+        n = g.shape[axis]
+        near = [g.take(within(np.arange(0, n, 2) + a, n, torus), axis) for a in range(-2, 3)]
+        g = near[0] + 4 * near[1] + 6 * near[2] + 4 * near[3] + near[4]
+    return ((g + 128) >> 8).astype(np.int32)
+
+
+def _expanded(
+    coarse: NDArray[np.int32], shape: tuple[int, ...], tile: tuple[int, ...], torus: bool
+) -> NDArray[np.int64]:
+    """2up(G_{i+1}) at a level of these rows and columns, made of tiles of those."""
+    g = coarse.astype(np.int64)
+    for axis in (1, 2):
+        n = g.shape[axis]
+        number, place = np.divmod(np.arange(shape[axis - 1]), tile[axis - 1])
+        parent = number * half(tile)[axis - 1] + place // 2
+        near = [g.take(within(parent + a, n, torus), axis) for a in (-1, 0, 1)]
+        first = (place % 2 == 0).reshape((-1, 1) if axis == 1 else -1)
+        g = np.where(first, near[0] + 6 * near[1] + near[2], 4 * near[1] + 4 * near[2])
+    return (g + 32) >> 6
+
+
+def _band(fine: NDArray[np.int32], coarse: NDArray[np.int32], torus: bool) -> NDArray[np.int32]:
+    shape = fine.shape[1:]
+    return (fine - _expanded(coarse, shape, shape, torus)).astype(np.int32)
+
+
+def _collapse(
+    band: NDArray[np.int32], source: NDArray[np.int32], coarse: NDArray[np.int32], torus: bool
+) -> NDArray[np.int32]:
+    taken = band.reshape(len(band), -1)[:, source]
+    return (taken + _expanded(coarse, source.shape, band.shape[1:], torus)).astype(np.int32)
+
+
+def _sizes(*numbers: int) -> tuple[np.int32, ...]:
+    return tuple(np.int32(n) for n in numbers)
+
+
+def _launch_reduce(machine: OpenCL, fine: Array, torus: bool) -> Array:
+    planes, rows, cols = fine.shape
+    coarse = machine.empty((planes, *half((rows, cols))), np.int32)
+    machine.launch(
+        machine.kernel("laplacian", "laplacian_reduce"),
+        (coarse.shape[1] * coarse.shape[2], planes),
+        *(fine, *_sizes(planes, rows, cols, torus), coarse),
+    )
+    return coarse
+
+
+def _launch_band(machine: OpenCL, fine: Array, coarse: Array, torus: bool) -> Array:
+    planes, rows, cols = fine.shape
+    band = machine.empty(fine.shape, np.int32)
+    machine.launch(
+        machine.kernel("laplacian", "laplacian_band"),
+        (rows * cols, planes),
+        *(fine, coarse, *_sizes(planes, rows, cols, torus), band),
+    )
+    return band
+
+
+def _launch_collapse(machine: OpenCL, band: Array, source: Array, coarse: Array, torus: bool) -> Array:
+    rows, cols = source.shape
+    fine = machine.empty((band.shape[0], rows, cols), np.int32)
+    machine.launch(
+        machine.kernel("laplacian", "laplacian_collapse"),
+        (rows * cols, band.shape[0]),
+        *(band, *_sizes(*band.shape, torus), source, *_sizes(rows, cols), coarse, *_sizes(*coarse.shape[1:]), fine),
+    )
+    return fine
+
+
+laplacian_reduce = Operation("laplacian", _reduce, _launch_reduce)
+"""``laplacian_reduce(machine, fine, torus)``: G_{i+1} of G_i, equation (6). Cost: 25 multiply-adds a pixel of it."""
+
+laplacian_band = Operation("laplacian", _band, _launch_band)
+"""``laplacian_band(machine, fine, coarse, torus)``: L_i of G_i and G_{i+1}, equation (5)."""
+
+laplacian_collapse = Operation("laplacian", _collapse, _launch_collapse)
+"""``laplacian_collapse(machine, band, source, coarse, torus)``: G_i of L_i and G_{i+1}.
+
+``source`` (rows, cols) int32 are the pixels of ``band`` that make up L_i, which may be of another size.
+"""
