@@ -6,7 +6,7 @@ from importlib.metadata import version
 from simdtex.device import DeviceError, devices
 from simdtex.machine import open_machine
 from simdtex.run import Output, Progress
-from simdtex.synthesis import lcpdf, synthesize
+from simdtex.synthesis import lcpdf, suggest_alpha, synthesize
 
 __version__ = version("simdtex")
 
@@ -17,5 +17,6 @@ __all__ = [
     "devices",
     "lcpdf",
     "open_machine",
+    "suggest_alpha",
     "synthesize",
 ]

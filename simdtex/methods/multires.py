@@ -74,7 +74,7 @@ class Options:
 
     alpha: float | str = 0.3
     beta: float = 0.0
-    target: float = 1.5
+    target: float = 1.2
     thresholds: ArrayLike | None = None
     orientations: int = 4
     sigma: float = 0.7
@@ -105,6 +105,8 @@ class Options:
         one_of("boundary", self.boundary, ("torus", "open"))
         if self.thresholds is not None:
             _check_thresholds(self.thresholds)
+            if self.alpha == "auto":
+                raise ValueError("alpha is 'auto' and there are thresholds; give one of the two")
 
     @property
     def analysis(self) -> dict[str, Any]:
@@ -180,12 +182,11 @@ def _mean_candidates(machine: Machine, analysis: Analysis, options: Options, alp
     itself = [np.arange(rows * cols, dtype=np.int32) for rows, cols in analysis.shapes]
     sampled = _sampled(machine, analysis.shapes, itself)
     means, begin = [], 0
-    for level, (rows, cols) in enumerate(analysis.shapes[:-1]):  # upward: what a level needs is still itself
-        n = rows * cols
-        firsts = [0] if n <= STRETCHES * STRETCH else [i * n // STRETCHES for i in range(STRETCHES)]
-        counts = []
-        for first in firsts:
-            end = n if len(firsts) == 1 else first + STRETCH
+    for level, (rows, cols) in enumerate(analysis.shapes[:-1]):  # upward: the levels above are still the sample itself
+        n, counts = rows * cols, []
+        few = n <= STRETCHES * STRETCH
+        for first in [0] if few else [i * n // STRETCHES for i in range(STRETCHES)]:
+            end = n if few else first + STRETCH
             sampled = candidates(machine, structure, sampled, level, first, end, options.phase == "match", 0)
             counts.append(machine.get(sampled.counts[begin + first : begin + end])[:, 0])
         means.append(float(np.concatenate(counts).mean()))
@@ -204,8 +205,12 @@ def synthesize(
     seed: int,
     callback: Callback | None = None,
 ) -> tuple[NDArray[Any], Output]:
-    """Both phases: `analyse`, and `resample`, which says what comes in and out."""
-    return resample(machine, analyse(machine, pixels, **options.analysis), shape, options, seed, callback)
+    """Both phases: `analyse`, then `resample`, which says what comes in and out."""
+    began, worked = perf_counter(), machine.seconds
+    analysis = analyse(machine, pixels, **options.analysis)
+    image, output = resample(machine, analysis, shape, options, seed, callback)
+    output.statistics.update(_seconds(machine, began, worked))
+    return image, output
 
 
 def resample(
@@ -251,6 +256,7 @@ def resample(
     _check_memory(machine, analysis, shape)
     alpha = suggest_alpha(machine, analysis, options) if isinstance(options.alpha, str) else options.alpha
     structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
+    match = options.phase == "match"
     top = analysis.levels - 1
     row, col = np.indices(shapes[top], np.int32) % np.array(analysis.shapes[top], np.int32)[:, None, None]
     copied = (row * np.int32(analysis.shapes[top][1]) + col).ravel()  # the top level is copied, repeated to fill
@@ -273,7 +279,7 @@ def resample(
         if level < top:
             least = 1 + int(LAUNCH / (nodes * analysis.features.shape[1]))
             for first, end in paced(rows * cols, least):  # Loop x', y': (9) to (12)
-                sampled = candidates(machine, structure, sampled, level, first, end, options.phase == "match", seed)
+                sampled = candidates(machine, structure, sampled, level, first, end, match, seed)
                 machine.sync()
                 tell(level, end, ended=False)
         source, counts = (machine.get(a[begin : begin + rows * cols]) for a in (sampled.source, sampled.counts))
@@ -283,32 +289,27 @@ def resample(
         place = np.stack(np.divmod(source, np.int32(analysis.shapes[level][1])), -1)
         stages.append(Stage(level, image, place, np.ascontiguousarray(counts[..., 0])))
         done += rows * cols
-        reports.append(
-            {
-                "level": level,
-                "rows": rows,
-                "cols": cols,
-                "candidates": float(counts[..., 0].mean()),
-                "most": int(counts[..., 0].max()),
-                "nodes": nodes,
-                "compared": float(counts[..., 1].mean()),
-                "seconds": perf_counter() - level_began,
-            }
-        )
+        most, (mean, compared) = int(counts[..., 0].max()), counts.mean((0, 1)).tolist()
+        report = {"level": level, "rows": rows, "cols": cols, "candidates": mean, "most": most}
+        reports.append(report | {"nodes": nodes, "compared": compared, "seconds": perf_counter() - level_began})
         tell(level, 0, ended=True)
 
-    used = {"alpha": alpha, "levels": analysis.levels}
+    used: dict[str, Any] = {"alpha": alpha, "levels": analysis.levels}
     if options.thresholds is not None:
-        used["thresholds"] = np.asarray(options.thresholds).tolist()
+        used |= {"alpha": None, "thresholds": np.asarray(options.thresholds).tolist()}
     statistics = {
         "device": machine.name,
         "seed": seed,
         "options": {f.name: getattr(options, f.name) for f in fields(Options)} | used,
-        "seconds": perf_counter() - began,
-        "device_seconds": None if worked is None else (machine.seconds or 0.0) - worked,
+        **_seconds(machine, began, worked),
         "levels": reports,
     }
     return image, Output(place, None, stages, statistics)
+
+
+def _seconds(machine: Machine, began: float, worked: float | None) -> dict[str, float | None]:
+    device = None if worked is None else (machine.seconds or 0.0) - worked
+    return {"seconds": perf_counter() - began, "device_seconds": device}
 
 
 def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int], spacing: int) -> tuple[int, int]:
