@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the options of `mrf` do to a texture, by figures and for the eye.
+"""What the options of a method do to a texture, by figures and for the eye.
 
-    python benchmarks/study.py [--out docs/study] [--seeds 1] [--only brick,grass] [--device TEXT]
+    python benchmarks/study.py [--method mrf] [--out docs/study] [--seeds N] [--only brick,grass] [--device TEXT]
 
-Writes table.csv (mean over the seeds) and one sheet of pictures per sample, and prints each line as it is made.
-Outputs are twice the sample in each direction.
+Writes a table (mean over the seeds) and one sheet of pictures per sample, and prints each line as it is made:
+table.csv and NAME.png for `mrf`, multires.csv and multires-NAME.png for `multires`, whose first line is `mrf` with its
+defaults. Outputs are twice the sample in each direction.
 """
 
 import argparse
 import csv
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import samples
@@ -19,7 +21,7 @@ import simdtex
 from simdtex.quality import measure
 from simdtex.report.sheet import contact_sheet
 
-SETTINGS = {
+MRF = {
     "default": {},
     "coherence=0": {"coherence": 0.0},
     "coherence=0.5": {"coherence": 0.5},
@@ -36,17 +38,61 @@ SETTINGS = {
     "preset=paper, icm": {"preset": "paper", "relaxation": "icm", "coarsest": "gibbs"},
     "preset=paper, bandwidth=0.15": {"preset": "paper", "bandwidth": 0.15},
 }
-IN_COLOUR = ("default", "coherence=0", "coherence=0.5", "coherence=2", "order=8", "relaxation=gibbs")
+MULTIRES = {
+    "default": {},
+    "alpha=0": {"alpha": 0.0},
+    "alpha=0.05": {"alpha": 0.05},
+    "alpha=0.1": {"alpha": 0.1},
+    "alpha=0.2": {"alpha": 0.2},
+    "alpha=0.4": {"alpha": 0.4},
+    "alpha=0.6": {"alpha": 0.6},
+    "alpha=inf": {"alpha": np.inf},
+    "alpha=auto": {"alpha": "auto"},
+    "alpha=1, beta=1": {"alpha": 1.0, "beta": 1.0},
+    "phase=free": {"phase": "free"},
+    "orientations=0": {"orientations": 0},
+    "orientations=2": {"orientations": 2},
+    "orientations=8": {"orientations": 8},
+    "filter_size=5, sigma=1": {"filter_size": 5, "sigma": 1.0},
+    "features=channels": {"features": "channels"},
+    "boundary=open": {"boundary": "open"},
+}
 FIGURES = ("plausibility", "coverage", "copying", "histogram_distance", "seam")
+
+
+class Study(NamedTuple):
+    """The settings of a method, those that colour or grey samples leave out, and what the files are called."""
+
+    settings: dict
+    skipped: dict
+    seeds: int
+    table: str
+    prefix: str
+
+
+STUDIES = {
+    "mrf": Study(MRF, {"colour": list(MRF)[6:], "grey": []}, 1, "table.csv", ""),
+    "multires": Study(MULTIRES, {"colour": [], "grey": ["features=channels"]}, 3, "multires.csv", "multires-"),
+}
+
+
+def tried(method):
+    """The settings to try in turn: label, options, seeds (None: as many as asked for)."""
+    if method != "mrf":
+        yield "mrf", {"method": "mrf"}, 1
+    for label, given in STUDIES[method].settings.items():
+        yield label, {"method": method, **given}, None
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--method", choices=STUDIES, default="mrf")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "docs" / "study")
-    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--seeds", type=int, help="1 with mrf and 3 with multires unless given")
     parser.add_argument("--only", default="")
     parser.add_argument("--device")
     options = parser.parse_args()
+    study = STUDIES[options.method]
     machine = simdtex.open_machine(options.device)
     print(f"device: {machine.name}")
     options.out.mkdir(parents=True, exist_ok=True)
@@ -57,28 +103,31 @@ def main():
         sample = known[name]
         in_colour = sample.ndim == 3
         pictures = [(name, sample)]
-        for setting, given in SETTINGS.items():
-            if in_colour and setting not in IN_COLOUR:
+        for setting, given, fixed in tried(options.method):
+            if setting in study.skipped["colour" if in_colour else "grey"]:
                 continue
             figures, seconds = [], []
-            for seed in range(1, options.seeds + 1):
+            for seed in range(1, (fixed or options.seeds or study.seeds) + 1):
                 began = time.perf_counter()
-                made = simdtex.synthesize(
+                made, output = simdtex.synthesize(
                     sample,
                     (2 * sample.shape[0], 2 * sample.shape[1]),
                     channel_axis=-1 if in_colour else None,
                     rng=seed,
                     device=machine,
+                    full_output=True,
                     **given,
                 )
                 seconds.append(time.perf_counter() - began)
                 figures.append([getattr(measure(sample, made), figure) for figure in FIGURES])
+            if given.get("alpha") == "auto":
+                setting = f"{setting} ({output.statistics['options']['alpha']:g})"
             mean = np.mean(figures, 0)
             rows.append([name, setting, *(f"{value:.2f}" for value in mean)])
             print(f"{name:8}{setting:32}", *rows[-1][2:], f"{np.mean(seconds):.1f} s", flush=True)
             pictures.append((setting, made))
-        contact_sheet(pictures, options.out / f"{name}.png", columns=4)
-    with open(options.out / "table.csv", "w", newline="", encoding="utf-8") as file:
+        contact_sheet(pictures, options.out / f"{study.prefix}{name}.png", columns=4)
+    with open(options.out / study.table, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["sample", "setting", *(figure.replace("_", " ") for figure in FIGURES)])
         writer.writerows(rows)

@@ -112,10 +112,10 @@ def synthesize(
     chosen = METHODS[method].make_options(**options)
     seed, seen = as_seed(rng), _seeing(callback, channel_axis)
     image, output = METHODS[method].synthesize(open_machine(device), pixels, size, chosen, seed, seen)
-    image = _restored(image, channel_axis)
+    image = restored(image, channel_axis)
     if not full_output:
         return image
-    stages = [replace(stage, image=_restored(stage.image, channel_axis)) for stage in output.stages]
+    stages = [replace(stage, image=restored(stage.image, channel_axis)) for stage in output.stages]
     return image, replace(output, stages=stages)
 
 
@@ -127,15 +127,15 @@ def suggest_alpha(
     device: str | Machine | None = None,
     **options: Any,
 ) -> float:
-    """The threshold of the method ``multires`` at which pixels of this sample have a number of candidates.
+    """The threshold of the method ``multires`` at which this sample's coarser levels leave a choice.
 
     Parameters
     ----------
     sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
         As in `synthesize`.
     target : float
-        Candidates that a pixel is to have on average, 1 or more. At 1 nothing but the sample itself is left to choose;
-        the more, the less of its order is kept.
+        Candidates that a pixel of the coarser half of the levels is to have on average, 1 or more. At 1 there is
+        nothing to choose, and the sample is tiled; the more, the less of its order is kept.
     channel_axis : int, optional
         As in `synthesize`.
     device : str, optional
@@ -146,9 +146,9 @@ def suggest_alpha(
     Returns
     -------
     float
-        alpha, the least multiple of 1/100 at which the number of candidates of the sample's own pixels, averaged over
-        each level but the top and then over these levels, reaches the target; 4 where none below does. ``alpha="auto"``
-        takes the same.
+        alpha, the least multiple of 1/100 at which the candidates of the sample's own pixels, averaged over each of
+        these levels and then over the levels, reach the target; 4 where none below does. ``alpha="auto"`` takes the
+        same. Finer levels do not count: their flat parts have many candidates at any alpha.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def suggest_alpha(
 
     Notes
     -----
-    Cost: nine scans of at most 4096 pixels of each level, less than a second for 256 x 256 pixels on two cores.
+    Cost: nine scans of at most 4096 pixels of each of these levels.
 
     Examples
     --------
@@ -288,12 +288,13 @@ def _seeing(callback: Callback | None, channel_axis: int | None) -> Callback | N
 
     def seen(progress: Any) -> Any:
         read: Callable[[], NDArray[Any]] = progress.image
-        return callback(replace(progress, image=lambda: _restored(read(), channel_axis)))
+        return callback(replace(progress, image=lambda: restored(read(), channel_axis)))
 
     return seen
 
 
-def _restored(image: NDArray[Any], channel_axis: int | None) -> NDArray[Any]:
+def restored(image: NDArray[Any], channel_axis: int | None) -> NDArray[Any]:
+    """A picture (rows, cols, channels) with the axes that the sample has."""
     return image[..., 0] if channel_axis is None else np.moveaxis(image, -1, channel_axis)
 
 

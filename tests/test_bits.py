@@ -18,6 +18,8 @@ import simdtex
 ROOT = Path(__file__).resolve().parent.parent
 REQUIRED = bool(os.environ.get("SIMDTEX_REQUIRE_OPENCL"))
 
+MULTIRES = {"method": "multires"}
+
 # sample shape, channels, type, output shape, options
 RUNS = {
     "defaults": ((13, 12), None, np.uint8, (11, 14), {"order": 8}),
@@ -62,6 +64,38 @@ RUNS = {
         (13, 10),
         {"order": 5, "phases": "all", "edges": "reflect", "levels": 3, "xi": -20.0},
     ),
+    "multires": ((13, 11), None, np.uint8, (15, 18), MULTIRES),
+    "multires-colour": (
+        (11, 14),
+        3,
+        np.uint8,
+        (12, 23),
+        MULTIRES | {"features": "channels", "orientations": 2, "sigma": 1.0, "filter_size": 5, "alpha": 0.9},
+    ),
+    "multires-luminance": ((9, 10), 3, np.uint8, (13, 8), MULTIRES | {"alpha": 3, "beta": 1, "levels": 4}),
+    "multires-open-free": (
+        (12, 9),
+        None,
+        np.uint8,
+        (10, 13),
+        MULTIRES | {"boundary": "open", "phase": "free", "alpha": 0.5},
+    ),
+    "multires-16-bit": ((12, 12), None, np.uint16, (9, 16), MULTIRES | {"boundary": "open", "alpha": 1}),
+    "multires-float64-two-channels": ((10, 13), 2, np.float64, (14, 7), MULTIRES | {"phase": "free", "beta": 0.5}),
+    "multires-bool": ((12, 11), None, np.bool_, (13, 13), MULTIRES | {"alpha": 1.5}),
+    "multires-thresholds": (
+        (9, 7),
+        None,
+        np.uint8,
+        (11, 15),
+        MULTIRES | {"orientations": 1, "thresholds": [[0, 0, 0], [2, 1, np.inf], [0.5, 4, 1], [0.2, 0.7, 0.3]]},
+    ),
+    "multires-auto": ((14, 13), None, np.uint8, (17, 12), MULTIRES | {"alpha": "auto", "target": 1.5}),
+    "multires-larger-than-the-sample": ((7, 6), None, np.uint8, (33, 29), MULTIRES | {"alpha": 1.5}),
+    "multires-smaller-than-the-sample": ((23, 26), None, np.uint8, (5, 4), MULTIRES | {"orientations": 0}),
+    "multires-a-row": ((9, 8), None, np.uint8, (1, 17), MULTIRES),
+    "multires-of-a-row": ((1, 17), None, np.uint8, (3, 40), MULTIRES | {"alpha": 1, "boundary": "open"}),
+    "multires-all-candidates": ((8, 9), None, np.float32, (10, 13), MULTIRES | {"alpha": np.inf}),
 }
 SOME = ("defaults", "colour-gibbs-density")
 
@@ -80,7 +114,7 @@ MIXED = [
 
 
 def synthesis(name, device):
-    """Everything that a run gives but its times: the image, source map, temperatures and stages."""
+    """Everything that a run gives but its times: the image, source map, temperatures, stages and counts."""
     sample_shape, channels, dtype, shape, options = RUNS[name]
     sample = texture(sample_shape, channels, dtype, 5)
     axis = None if channels is None else -1
@@ -88,7 +122,10 @@ def synthesis(name, device):
         sample, shape, channel_axis=axis, rng=2**40 + 3, device=device, full_output=True, **options
     )
     counts = [{k: v for k, v in level.items() if k != "seconds"} for level in output.statistics["levels"]]
-    return [image, output.source, output.temperature, *(stage.image for stage in output.stages)], counts
+    stages = [array for stage in output.stages for array in (stage.image, stage.source, stage.candidates)]
+    arrays = [image, output.source, output.temperature, *stages]
+    assert sum(array is None for array in arrays) == (1 if "method" in options else 2 * len(output.stages))
+    return [array for array in arrays if array is not None], [counts, output.statistics["options"].get("alpha")]
 
 
 @functools.cache
@@ -120,6 +157,11 @@ def test_the_form_of_a_launch_changes_no_bit(cl_device, options):
 @pytest.mark.parametrize("options", MIXED, ids=named)
 def test_the_form_of_a_launch_changes_no_bit_of_a_colour(cl_device, options):
     check("colour-gibbs-density", opencl(cl_device, **options))
+
+
+def test_the_work_group_changes_no_bit_of_multires(cl_device):
+    """It has no other form: its launches keep no distances."""
+    check("multires-colour", opencl(cl_device, work_group=3))
 
 
 def test_small_scratch_memory_makes_many_pieces(cl_device):
@@ -216,7 +258,12 @@ def library(pattern):
     return found[0] if found else None
 
 
-@pytest.mark.parametrize("name", ["a-row", *(pytest.param(name, marks=pytest.mark.slow) for name in SOME)])
+QUICK = ("a-row", "multires-open-free")
+
+
+@pytest.mark.parametrize(
+    "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in (*SOME, "multires"))]
+)
 def test_rusticl_has_the_references_bits(tmp_path, name):
     """Mesa's runtime on its software rasteriser: slow, and independent of all others."""
     found = library("**/libRusticlOpenCL.so.1")
@@ -251,11 +298,13 @@ runs = [
     (colour, -1, {"order": 1, "levels": 2, "edges": "reflect", "pixel": "density", "coarsest": "same"}),
     (grey, None, {"order": 1, "levels": 1, "schedule": "luby"}),
     (grey, None, {"order": 1, "levels": 1, "schedule": "block:2x3", "array": "2x2"}),
+    (grey, None, {"method": "multires", "alpha": 0.6}),
+    (colour, -1, {"method": "multires", "boundary": "open", "phase": "free", "features": "channels", "alpha": 0.5}),
 ]
 machines = [OpenCL(info, work_group=group, vector=vector) for group, vector in ((None, 16), (3, 4), (4, 1))]
 for number, (sample, axis, options) in enumerate(runs):
     for machine in machines[: 3 if number == 0 else 1]:
-        options |= {"rng": 1, "free_sweeps": 1, "channel_axis": axis}
+        options |= {"rng": 1, "channel_axis": axis} | ({} if "method" in options else {"free_sweeps": 1})
         ours = simdtex.synthesize(sample, (5, 7), device=machine, **options)
         assert_same_bits(ours, simdtex.synthesize(sample, (5, 7), device=REFERENCE, **options))
 for options in ({"temperature": np.full((5, 6), 0.5)}, {"estimator": "histogram"}):

@@ -2,7 +2,6 @@
 """Sheets, animations, false colours and stages are whole files of the right pictures."""
 
 import os
-from dataclasses import dataclass
 
 import numpy as np
 import PIL.Image
@@ -13,6 +12,7 @@ from hypothesis import strategies as st
 from simdtex import image
 from simdtex.report import sheet
 from simdtex.report.stages import StageWriter
+from simdtex.run import Relaxing, Sampling
 
 
 def contains(picture, part):
@@ -129,23 +129,28 @@ def test_source_colours_tell_positions_apart():
         sheet.source_colours(source[..., 0], (16, 24))
 
 
-@dataclass
-class Moment:
-    """What a run would tell its callback."""
+def moment(level, sweep, full, end_of_sweep=True):
+    """What a run of mrf would tell its callback."""
+    picture = full[:: 2**level, :: 2**level]
+    return Relaxing(
+        level=level,
+        levels=3,
+        fraction=0.5,
+        image=lambda: picture,
+        sweep=sweep,
+        step=sweep,
+        phase="relax",
+        temperature_left=0.5,
+        end_of_sweep=end_of_sweep,
+        temperature=lambda: np.full(picture.shape[:2], 0.5),
+    )
 
-    level: int
-    sweep: int
-    full: np.ndarray
-    end_of_sweep: bool = True
-    levels: int = 3
-    phase: str = "relax"
-    temperature_left: float = 0.5
 
-    def image(self):
-        return self.full[:: 2**self.level, :: 2**self.level]
-
-    def temperature(self):
-        return np.full(self.image().shape[:2], 0.5)
+def level_of(level, full, counts, end_of_level=True):
+    """What a run of multires would tell its callback."""
+    picture = full[:: 2**level, :: 2**level]
+    where = {"level": level, "levels": 2, "fraction": 0.5, "end_of_level": end_of_level}
+    return Sampling(image=lambda: picture, candidates=lambda: counts, **where)
 
 
 @pytest.mark.parametrize(("dtype", "channels"), [("uint8", (3,)), ("uint16", ()), ("float32", (5,))])
@@ -156,8 +161,8 @@ def test_stages(tmp_path, dtype, channels):
     assert not folder.exists()
     for level in (2, 1, 0):
         for sweep in (1, 2):
-            writer(Moment(level, sweep, full, end_of_sweep=False))
-            writer(Moment(level, sweep, full))
+            writer(moment(level, sweep, full, end_of_sweep=False))
+            writer(moment(level, sweep, full))
     writer.finish()
     names = {f"{kind}level{level}-sweep{sweep:02d}.png" for kind in ("", "temperature-")
              for level in range(3) for sweep in (1, 2)}  # fmt: skip
@@ -177,13 +182,31 @@ def test_stages(tmp_path, dtype, channels):
         assert film.size == (130, 101)
 
 
+def test_stages_of_levels_without_sweeps(tmp_path):
+    folder = tmp_path / "stages"
+    full = np.random.default_rng(0).integers(0, 256, (20, 24), dtype=np.uint8)
+    writer = StageWriter(folder)
+    for level in (1, 0):
+        counts = np.ones((20 >> level, 24 >> level), np.int32)
+        counts[0, :3] = 1, 10, 100
+        writer(level_of(level, full, counts, end_of_level=False))
+        writer(level_of(level, full, counts))
+    writer.finish()
+    names = {f"{kind}level{level}.png" for kind in ("", "candidates-") for level in (0, 1)}
+    assert set(os.listdir(folder)) == names | {"sheet.png", "animation.gif"}
+    np.testing.assert_array_equal(image.read(folder / "level1.png").pixels, full[::2, ::2])
+    few, some, most = image.read(folder / "candidates-level0.png").pixels[0, :3]
+    np.testing.assert_array_equal([few, some, most], sheet.heat([0, 0.5, 1]))
+    StageWriter(folder)  # an earlier run's files may be replaced
+
+
 def test_stages_of_a_large_or_interrupted_run(tmp_path):
     writer = StageWriter(tmp_path / "a")
     writer.finish()
     assert not (tmp_path / "a").exists()
     full = np.add.outer(np.arange(1101), np.arange(700)).astype(np.uint16)
     for level in (2, 1):
-        writer(Moment(level, 1, full))
+        writer(moment(level, 1, full))
     writer.finish()
     with PIL.Image.open(tmp_path / "a" / "animation.gif") as film:
         assert max(film.size) <= 512
@@ -203,7 +226,7 @@ def test_stage_folder_is_checked_and_cleared(tmp_path):
         (folder / name).touch()
     writer = StageWriter(folder)
     assert len(os.listdir(folder)) == 3
-    writer(Moment(0, 1, np.zeros((4, 4), bool)))
+    writer(moment(0, 1, np.zeros((4, 4), bool)))
     assert sorted(os.listdir(folder)) == ["level0-sweep01.png", "temperature-level0-sweep01.png"]
     (folder / "notes.txt").touch()
     with pytest.raises(ValueError, match=r"notes\.txt"):

@@ -22,3 +22,10 @@ sampler would have failed one in a few hundred choices of the seeds."""
 
 CONTRAST = 1e-12
 """Relative error of plain float64 expressions of a few operations against each other."""
+
+TAP = 0.5 + 1e-9
+"""Of a tap of the filter bank, in its units of 2**-14, against the float64 formula: it is the closest whole number. The
+rest is for what another libm rounds otherwise. The centre makes up for the others, so what is exact is the sum, 0."""
+
+HALF = 0.5 + 1e-6
+"""Of a whole number against the float64 that it is the closest to. The rest is for float64 itself, at up to 2**30."""

@@ -16,7 +16,7 @@ from click.core import ParameterSource
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from simdtex.methods.mrf import Options
+from simdtex.methods import mrf, multires
 
 
 def plainly(command: Callable[..., None]) -> Callable[..., None]:
@@ -36,7 +36,7 @@ def plainly(command: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
-DEFAULTS = Options()
+DEFAULTS, MULTIRES = mrf.Options(), multires.Options()
 
 DEVICE = click.option(
     "--device",
@@ -46,32 +46,122 @@ DEVICE = click.option(
 )
 
 
+LEVELS = click.option("--levels", type=int, help="Of the multigrid, or of the pyramid.  [as many as the sample feeds]")
+BOUNDARY = click.option("--boundary", help=f"torus (the result tiles) or open.  [{DEFAULTS.boundary}]")
+
 _MRF_OPTIONS = (
-    click.option("--preset", help="default, or paper: the 1998 rules to the letter."),
-    click.option("--order", type=int, help=f"Neighbours within sqrt(order): 8 has 24, 18 has 60.  [{DEFAULTS.order}]"),
-    click.option("--levels", type=int, help="Of the multigrid.  [as many as the sample feeds]"),
-    click.option("--relaxation", help=f"icm (the mode) or gibbs (a draw).  [{DEFAULTS.relaxation}]"),
-    click.option("--bandwidth", type=float, help=f"Of the Parzen kernel, in units of h_opt.  [{DEFAULTS.bandwidth}]"),
+    click.option("--preset", help="mrf: default, or paper: the 1998 rules to the letter."),
     click.option(
-        "--coherence", type=float, help=f"Preference for continuing a neighbour's source.  [{DEFAULTS.coherence}]"
+        "--order", type=int, help=f"mrf: neighbours within sqrt(order): 8 has 24, 18 has 60.  [{DEFAULTS.order}]"
     ),
-    click.option("--xi", type=float, help=f"Cooling, below 0; further down is faster.  [{DEFAULTS.xi}]"),
+    click.option("--relaxation", help=f"mrf: icm (the mode) or gibbs (a draw).  [{DEFAULTS.relaxation}]"),
     click.option(
-        "--free-sweeps", type=int, help=f"Sweeps over all sites after a level's equilibrium.  [{DEFAULTS.free_sweeps}]"
+        "--bandwidth", type=float, help=f"mrf: of the Parzen kernel, in units of h_opt.  [{DEFAULTS.bandwidth}]"
     ),
-    click.option("--pixel", help=f"source (pixels of the sample) or density (grey levels).  [{DEFAULTS.pixel}]"),
-    click.option("--phases", help=f"decimated or all: candidates at coarse levels.  [{DEFAULTS.phases}]"),
-    click.option("--edges", help=f"auto, reflect or whole: candidates at the sample's edge.  [{DEFAULTS.edges}]"),
-    click.option("--coarsest", help=f"gibbs or same: how the coarsest level relaxes.  [{DEFAULTS.coarsest}]"),
-    click.option("--boundary", help=f"torus (the result tiles) or open.  [{DEFAULTS.boundary}]"),
+    click.option(
+        "--coherence", type=float, help=f"mrf: preference for continuing a neighbour's source.  [{DEFAULTS.coherence}]"
+    ),
+    click.option("--xi", type=float, help=f"mrf: cooling, below 0; further down is faster.  [{DEFAULTS.xi}]"),
+    click.option(
+        "--free-sweeps",
+        type=int,
+        help=f"mrf: sweeps over all sites after a level's equilibrium.  [{DEFAULTS.free_sweeps}]",
+    ),
+    click.option("--pixel", help=f"mrf: source (pixels of the sample) or density (grey levels).  [{DEFAULTS.pixel}]"),
+    click.option("--phases", help=f"mrf: decimated or all: candidates at coarse levels.  [{DEFAULTS.phases}]"),
+    click.option("--edges", help=f"mrf: auto, reflect or whole: candidates at the sample's edge.  [{DEFAULTS.edges}]"),
+    click.option("--coarsest", help=f"mrf: gibbs or same: how the coarsest level relaxes.  [{DEFAULTS.coarsest}]"),
+)
+
+_MULTIRES_OPTIONS = (
+    click.option("--orientations", type=int, help=f"multires: of edge and line filters.  [{MULTIRES.orientations}]"),
+    click.option("--sigma", type=float, help=f"multires: of the filters, in pixels.  [{MULTIRES.sigma}]"),
+    click.option("--filter-size", type=int, help=f"multires: rows of a filter, odd.  [{MULTIRES.filter_size}]"),
+    click.option("--features", help=f"multires: of the luminance or of all channels.  [{MULTIRES.features}]"),
+    click.option("--phase", help=f"multires: match or free: candidates among siblings.  [{MULTIRES.phase}]"),
 )
 
 
-def mrf_options(command: Callable[..., None]) -> Callable[..., None]:
-    """The options of the method ``mrf`` that any command takes which runs it."""
-    for option in reversed(_MRF_OPTIONS):
-        command = option(command)
-    return command
+_THRESHOLD_OPTIONS = (
+    click.option(
+        "--alpha", metavar="FLOAT|auto", help=f"multires: threshold; more is freer, auto finds one.  [{MULTIRES.alpha}]"
+    ),
+    click.option(
+        "--beta", type=float, help=f"multires: stricter at high frequencies, alpha / k^beta.  [{MULTIRES.beta:g}]"
+    ),
+    click.option("--target", type=float, help=f"multires: mean candidates for --alpha auto.  [{MULTIRES.target}]"),
+    click.option(
+        "--thresholds",
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        help="multires: a table of thresholds, a line of numbers for each level.",
+    ),
+)
+
+Command = Callable[..., None]
+
+
+def _with(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
+    def decorate(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
+
+
+mrf_options = _with(*_MRF_OPTIONS, LEVELS, BOUNDARY)
+"""The options of the method ``mrf`` that any command takes which runs it."""
+
+multires_options = _with(*_MULTIRES_OPTIONS, LEVELS, BOUNDARY)
+"""Those of ``multires``, but for its thresholds."""
+
+method_options = _with(LEVELS, BOUNDARY, *_MRF_OPTIONS, *_THRESHOLD_OPTIONS, *_MULTIRES_OPTIONS)
+"""Those of every method."""
+
+
+def given(options: dict[str, Any]) -> dict[str, Any]:
+    """The options that were given, alpha and a table of thresholds as numbers."""
+    chosen = {name: value for name, value in options.items() if value is not None}
+    if chosen.get("alpha", "auto") != "auto":
+        try:
+            chosen["alpha"] = float(chosen["alpha"])
+        except ValueError:
+            raise ValueError(f"--alpha {chosen['alpha']} is not a number; give one of at least 0, or auto") from None
+    if "thresholds" in chosen:
+        chosen["thresholds"] = _table(chosen["thresholds"])
+    return chosen
+
+
+def numbers(name: str, text: str) -> list[float]:
+    """Numbers parted by commas. ``a,b,...,z`` goes on from b by the same steps, ``a,...,z`` by steps of a."""
+    words = [word.strip() for word in text.split(",")]
+    try:
+        if "..." not in words:
+            return [float(word) for word in words]
+        gap = words.index("...")
+        begin, (last,) = [float(word) for word in words[:gap]], [float(word) for word in words[gap + 1 :]]
+        step = begin[-1] - begin[-2] if len(begin) > 1 else begin[0]
+        if not 0 < step <= (last - begin[0]) / 1e-9 or (last - begin[-1]) / step > 1000:
+            raise ValueError
+    except (ValueError, IndexError):
+        raise ValueError(f"{name} {text} must be numbers parted by commas, as 0.1,0.2 or 0.05,0.10,...,0.30") from None
+    steps = int((last - begin[-1]) / step + 1e-9)
+    return [*begin, *(round(begin[-1] + i * step, 9) for i in range(1, steps + 1))]
+
+
+def _table(path: Path) -> list[list[float]]:
+    """Numbers parted by commas or blanks, a line for each level."""
+    try:
+        lines = path.read_text(encoding="utf-8").replace(",", " ").splitlines()
+        return [[float(word) for word in line.split()] for line in lines if line.strip()]
+    except (UnicodeDecodeError, ValueError):
+        raise ValueError(f"{path} is not a table of numbers; give a line of them for each level") from None
+
+
+def candidates_per_level(levels: list[dict[str, Any]]) -> str:
+    """The mean candidates of each level that was sampled, the coarsest first."""
+    return " ".join(f"{level['candidates']:.3g}" for level in levels[1:])
 
 
 def command_line(context: click.Context) -> str:
@@ -121,8 +211,3 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[float, str, str], None]]:
             last = job
 
         yield show
-
-
-def standing(progress: Any) -> str:
-    """Where a run stands, for the progress bar."""
-    return f"level {progress.level}, sweep {progress.sweep}, temperature {progress.temperature_left:.3f}"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from simdtex.cli.common import DEVICE, plainly, progress_bar, standing
+from simdtex.cli.common import DEVICE, plainly, progress_bar
 
 
 @click.command()
@@ -39,9 +39,7 @@ def demo(output: Path, size: str, seed: int, device: str | None) -> None:
         sample = getattr(data, name)()[:128, :128]
         began = time.perf_counter()
         with progress_bar(quiet=False) as show:
-            made = synthesize(
-                sample, shape, rng=seed, device=machine, callback=lambda p: show(p.fraction, standing(p), "")
-            )
+            made = synthesize(sample, shape, rng=seed, device=machine, callback=lambda p: show(p.fraction, p.doing, ""))
         seconds = time.perf_counter() - began
         image.write(output / f"{name}.png", made)
         pictures += [(f"{name}, the sample", sample), (f"{name}, {seconds:.1f} s", made)]

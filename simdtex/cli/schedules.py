@@ -11,7 +11,7 @@ from typing import Any
 import click
 from rich.console import Console
 
-from simdtex.cli.common import DEFAULTS, DEVICE, command_line, mrf_options, plainly, progress_bar, standing
+from simdtex.cli.common import DEFAULTS, DEVICE, command_line, given, mrf_options, plainly, progress_bar
 from simdtex.schedules import TOGETHER
 
 
@@ -74,7 +74,7 @@ def schedules(
 
         def tell(now: Any) -> None:
             job = f"run {now.run} of {now.runs}: {now.schedule}, seed {now.seed}"
-            show(now.fraction, standing(now.progress), job)
+            show(now.fraction, now.progress.doing, job)
 
         found = compare(
             pixels,
@@ -84,7 +84,7 @@ def schedules(
             channel_axis=channel_axis,
             device=device,
             callback=tell,
-            **{name: value for name, value in options.items() if value is not None},
+            **given(options),
         )
     write_comparison(output, found, command_line(click.get_current_context()))
     if quiet:

@@ -10,32 +10,47 @@ from typing import Any
 import click
 from rich.console import Console
 
-from simdtex.cli.common import DEFAULTS, DEVICE, check_distinct, mrf_options, plainly, progress_bar, standing
+from simdtex.cli.common import (
+    DEFAULTS,
+    DEVICE,
+    candidates_per_level,
+    check_distinct,
+    given,
+    method_options,
+    plainly,
+    progress_bar,
+)
 
 
 @click.command()
 @click.argument("sample", type=click.Path(path_type=Path))
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Picture to write.")
 @click.option("--size", metavar="WIDTHxHEIGHT", help="Of the output, in pixels. Default: twice the sample.")
-@click.option("--method", default="mrf", show_default=True, help="mrf: Paget and Longstaff 1998.")
-@mrf_options
+@click.option(
+    "--method", default="mrf", show_default=True, help="mrf: Paget and Longstaff 1998. multires: De Bonet 1997."
+)
+@method_options
 @click.option(
     "--schedule",
-    help="Which sites relax together: coloring, coloring-fixed, luby, checkerboard, synchronous, random-subset[:P], "
-    f"raster, random-scan or block[:ROWSxCOLS].  [{DEFAULTS.schedule}]",
+    help="mrf: which sites relax together: coloring, coloring-fixed, luby, checkerboard, synchronous, "
+    f"random-subset[:P], raster, random-scan or block[:ROWSxCOLS].  [{DEFAULTS.schedule}]",
 )
-@click.option("--check-schedule", is_flag=True, default=None, help="Check equation (14) at every step.")
+@click.option("--check-schedule", is_flag=True, default=None, help="mrf: check equation (14) at every step.")
 @click.option(
-    "--array", metavar="ROWSxCOLS", help="Run on a processor array, or maspar-mp1-1k to -16k.  [sites are packed]"
+    "--array", metavar="ROWSxCOLS", help="mrf: run on a processor array, or maspar-mp1-1k to -16k.  [sites are packed]"
 )
-@click.option("--mapping", help=f"cut-and-stack or hierarchical: how pixels lie on the array.  [{DEFAULTS.mapping}]")
 @click.option(
-    "--emulate/--no-emulate", default=None, help="Launch one work-item per PE, or only account for the array."
+    "--mapping", help=f"mrf: cut-and-stack or hierarchical: how pixels lie on the array.  [{DEFAULTS.mapping}]"
 )
-@click.option("--accounting", is_flag=True, help="Print what the run costs on the array, or on a full MP-1.")
+@click.option(
+    "--emulate/--no-emulate", default=None, help="mrf: launch one work-item per PE, or only account for the array."
+)
+@click.option("--accounting", is_flag=True, help="mrf: print what the run costs on the array, or on a full MP-1.")
 @click.option("--seed", type=int, help="Same seed, same picture on every device.  [a fresh one, printed]")
 @DEVICE
-@click.option("--stages", type=click.Path(path_type=Path), metavar="DIR", help="Write every level and sweep.")
+@click.option(
+    "--stages", type=click.Path(path_type=Path), metavar="DIR", help="Write every level and sweep as pictures."
+)
 @click.option("--source-map", type=click.Path(path_type=Path), metavar="FILE", help="Write it: .npz, .npy, .png.")
 @click.option(
     "--also",
@@ -66,6 +81,8 @@ def synth(
     from simdtex.report.stages import StageWriter
     from simdtex.synthesis import synthesize
 
+    if accounting and method != "mrf":
+        raise ValueError(f"--accounting is of the method mrf, not {method}; leave it out")
     picture = image.read(sample)
     pixels = picture.pixels
     height, width = pixels.shape[:2]
@@ -84,7 +101,7 @@ def synth(
         with progress_bar(quiet) as show:
 
             def callback(progress: Any) -> None:
-                show(progress.fraction, standing(progress), "")
+                show(progress.fraction, progress.doing, "")
                 if writer:
                     writer(progress)
 
@@ -97,7 +114,7 @@ def synth(
                 device=device,
                 callback=callback,
                 full_output=True,
-                **{name: value for name, value in options.items() if value is not None},
+                **given(options),
             )
     finally:
         if writer:
@@ -113,6 +130,9 @@ def synth(
             f"{output}: {shape[1]}x{shape[0]} from {width}x{height} in {time.perf_counter() - began:.1f} s "
             f"on {run.statistics['device']}, seed {run.statistics['seed']}"
         )
+        if method == "multires":
+            levels, alpha = run.statistics["levels"], run.statistics["options"]["alpha"]
+            click.echo(f"alpha {alpha}; candidates per level, coarse to fine: {candidates_per_level(levels)}")
     if accounting:
         render(run.statistics["accounting"], Console())
 

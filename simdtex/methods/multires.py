@@ -51,7 +51,7 @@ class Options:
     beta : float
         Of the same, 0 or more. k counts levels from the lowest frequency upward.
     target : float
-        With ``alpha="auto"``, candidates that a pixel is to have on average.
+        With ``alpha="auto"``, candidates that a pixel of the coarser levels is to have on average.
     thresholds : array, optional
         T itself, in place of alpha and beta: one row for each level but the finest, the lowest frequency first; one
         column for all features or one for each.
@@ -74,7 +74,7 @@ class Options:
 
     alpha: float | str = 0.3
     beta: float = 0.0
-    target: float = 1.2
+    target: float = 1.1
     thresholds: ArrayLike | None = None
     orientations: int = 4
     sigma: float = 0.7
@@ -150,7 +150,10 @@ def differences(analysis: Analysis, table: NDArray[np.float64]) -> NDArray[np.ui
 
 
 def suggest_alpha(machine: Machine, analysis: Analysis, options: Options) -> float:
-    """The alpha at which a pixel has `Options.target` candidates on average, counted on the sample itself.
+    """The alpha at which pixels have `Options.target` candidates on average, counted on the sample itself.
+
+    Only the coarser half of the levels that are sampled counts: what is chosen there rearranges the sample. At the
+    finer ones flat parts have many candidates at any alpha.
 
     Parameters
     ----------
@@ -162,12 +165,12 @@ def suggest_alpha(machine: Machine, analysis: Analysis, options: Options) -> flo
     Returns
     -------
     float
-        The least multiple of 1/100 at which the number of candidates of the sample's own pixels, averaged over each
-        level but the top and then over these levels, reaches the target; 4 where none below does.
+        The least multiple of 1/100 at which the candidates of the sample's own pixels, averaged over each of these
+        levels and then over the levels, reach the target; 4 where none below does.
 
     Notes
     -----
-    Cost: eight or nine scans of at most 4096 pixels of each level.
+    Cost: eight or nine scans of at most 4096 pixels of each of these levels.
     """
     low, high = 0, MOST * STEPS
     while high - low > 1:  # candidates only grow with alpha
@@ -181,16 +184,16 @@ def _mean_candidates(machine: Machine, analysis: Analysis, options: Options, alp
     structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
     itself = [np.arange(rows * cols, dtype=np.int32) for rows, cols in analysis.shapes]
     sampled = _sampled(machine, analysis.shapes, itself)
-    means, begin = [], 0
-    for level, (rows, cols) in enumerate(analysis.shapes[:-1]):  # upward: the levels above are still the sample itself
-        n, counts = rows * cols, []
+    means = []
+    for level in range((analysis.levels - 1) // 2, analysis.levels - 1):  # upward: what is above is still the sample
+        begin, n = pixels(analysis.shapes[:level]), pixels(analysis.shapes[level : level + 1])
         few = n <= STRETCHES * STRETCH
+        counts = []
         for first in [0] if few else [i * n // STRETCHES for i in range(STRETCHES)]:
             end = n if few else first + STRETCH
             sampled = candidates(machine, structure, sampled, level, first, end, options.phase == "match", 0)
             counts.append(machine.get(sampled.counts[begin + first : begin + end])[:, 0])
         means.append(float(np.concatenate(counts).mean()))
-        begin += n
     return float(np.mean(means)) if means else inf
 
 
@@ -199,7 +202,7 @@ def _mean_candidates(machine: Machine, analysis: Analysis, options: Options, alp
 
 def synthesize(
     machine: Machine,
-    pixels: NDArray[Any],
+    sample: NDArray[Any],
     shape: tuple[int, int],
     options: Options,
     seed: int,
@@ -207,7 +210,7 @@ def synthesize(
 ) -> tuple[NDArray[Any], Output]:
     """Both phases: `analyse`, then `resample`, which says what comes in and out."""
     began, worked = perf_counter(), machine.seconds
-    analysis = analyse(machine, pixels, **options.analysis)
+    analysis = analyse(machine, sample, **options.analysis)
     image, output = resample(machine, analysis, shape, options, seed, callback)
     output.statistics.update(_seconds(machine, began, worked))
     return image, output
@@ -252,7 +255,7 @@ def resample(
     """
     began, worked = perf_counter(), machine.seconds
     shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
-    total = sum(rows * cols for rows, cols in shapes)
+    total = pixels(shapes)
     _check_memory(machine, analysis, shape)
     alpha = suggest_alpha(machine, analysis, options) if isinstance(options.alpha, str) else options.alpha
     structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
@@ -265,17 +268,16 @@ def resample(
     reports: list[dict[str, Any]] = []
     picture, done = None, 0
 
-    def tell(level: int, pixels: int, ended: bool) -> None:
+    def tell(level: int, sampled: int, ended: bool) -> None:
         if callback:
             last = stages[-1]  # already read back
-            now: dict[str, Any] = {"fraction": (done + pixels) / total, "end_of_level": ended}
+            now: dict[str, Any] = {"fraction": (done + sampled) / total, "end_of_level": ended}
             now |= {"image": partial(getattr, last, "image"), "candidates": partial(getattr, last, "candidates")}
             callback(Sampling(level=level, levels=analysis.levels, **now))
 
     for level in reversed(range(analysis.levels)):  # Loop i from top level downto 0
         level_began = perf_counter()
-        (rows, cols), begin = shapes[level], sum(r * c for r, c in shapes[:level])
-        nodes = sum(r * c for r, c in analysis.shapes[level + 1 :])
+        (rows, cols), begin, nodes = shapes[level], pixels(shapes[:level]), pixels(analysis.shapes[level + 1 :])
         if level < top:
             least = 1 + int(LAUNCH / (nodes * analysis.features.shape[1]))
             for first, end in paced(rows * cols, least):  # Loop x', y': (9) to (12)
@@ -310,6 +312,11 @@ def resample(
 def _seconds(machine: Machine, began: float, worked: float | None) -> dict[str, float | None]:
     device = None if worked is None else (machine.seconds or 0.0) - worked
     return {"seconds": perf_counter() - began, "device_seconds": device}
+
+
+def pixels(shapes: Sequence[tuple[int, int]]) -> int:
+    """Of some levels together."""
+    return sum(rows * cols for rows, cols in shapes)
 
 
 def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int], spacing: int) -> tuple[int, int]:

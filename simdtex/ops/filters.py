@@ -50,7 +50,7 @@ def bank(orientations: int, sigma: float, side: int) -> NDArray[np.int32]:
             whole = np.rint(f / f[f > 0].sum() * 2**UNIT_BITS).astype(np.int32)
             whole[side // 2, side // 2] -= whole.sum()
             taps.append(whole)
-    return np.array(taps)
+    return np.array(taps, np.int32).reshape(-1, side, side)
 
 
 def _reference(

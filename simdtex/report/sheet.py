@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from functools import cache
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,7 @@ def contact_sheet(
     path: PathLike | None = None,
     *,
     columns: int | None = None,
+    captions: Sequence[str] | None = None,
 ) -> Picture:
     """Lay labelled pictures out on one sheet, each under its label.
 
@@ -59,6 +61,8 @@ def contact_sheet(
         Where to write the sheet as well; the suffix names the format.
     columns : int, optional
         Pictures in a row; by default as many as make the sheet about square.
+    captions : sequence of str, optional
+        A line below each picture.
 
     Returns
     -------
@@ -69,7 +73,8 @@ def contact_sheet(
     Raises
     ------
     ValueError
-        There are no pictures, `columns` is less than 1, or `path` cannot be written.
+        There are no pictures, `columns` is less than 1, captions are more or fewer than pictures,
+        or `path` cannot be written.
     """
     if not pictures:
         raise ValueError("there are no pictures for the sheet: give at least one")
@@ -77,20 +82,25 @@ def contact_sheet(
         raise ValueError(f"columns is {columns}: give 1 or more")
     if path is not None:
         check_writable(path, np.uint8, 3)
+    below = [""] * len(pictures) if captions is None else list(captions)
+    if len(below) != len(pictures):
+        raise ValueError(f"there are {len(below)} captions for {len(pictures)} pictures: give one for each")
     shown = [(label, _cell(_rgb(to_display(picture)))) for label, picture in pictures]
     font = PIL.ImageFont.load_default(TEXT)
     strip = TEXT + 6
-    height = max(picture.shape[0] for _, picture in shown) + strip + GAP
-    width = GAP + max(max(picture.shape[1], int(np.ceil(font.getlength(label)))) for label, picture in shown)
+    height = max(picture.shape[0] for _, picture in shown) + strip + (0 if captions is None else strip) + GAP
+    texts = [*(label for label, _ in shown), *below]
+    width = GAP + max(*(picture.shape[1] for _, picture in shown), *(ceil(font.getlength(text)) for text in texts))
     across = columns or max(1, round(float(np.sqrt(len(shown) * height / width))))
     across = min(across, len(shown))
     down = -(-len(shown) // across)
     sheet = PIL.Image.new("RGB", (GAP + across * width, GAP + down * height), "white")
     draw = PIL.ImageDraw.Draw(sheet)
-    for number, (label, picture) in enumerate(shown):
+    for number, ((label, picture), caption) in enumerate(zip(shown, below, strict=True)):
         top, left = GAP + number // across * height, GAP + number % across * width
         draw.text((left, top), label, fill="black", font=font)
         sheet.paste(PIL.Image.fromarray(picture), (left, top + strip))
+        draw.text((left, top + strip + picture.shape[0] + 2), caption, fill="black", font=font)
     pixels = np.array(sheet, dtype=np.uint8)
     if path is not None:
         write(path, pixels)

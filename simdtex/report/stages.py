@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The stages of a run as pictures: every level, every sweep, and where it was still hot."""
+"""The stages of a run as pictures: every level, every sweep, and what each has beside its picture."""
 
 from __future__ import annotations
 
 import os
 import re
 from pathlib import Path
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,46 +22,22 @@ from simdtex.report.sheet import (
     heat,
     reduction,
 )
+from simdtex.run import Progress
 
-__all__ = ["Progress", "StageWriter"]
+__all__ = ["StageWriter"]
 
 Picture = NDArray[np.uint8]
 
-_STAGE = re.compile(r"(temperature-)?level\d+-sweep\d+\.png|sheet\.png|animation\.gif")
-
-
-class Progress(Protocol):
-    """What a run tells its callback, as far as the stages need it.
-
-    Attributes
-    ----------
-    level, sweep : int
-        The level, 0 is the finest, and the sweep within it.
-    end_of_sweep : bool
-        Whether a sweep has just ended.
-    """
-
-    @property
-    def level(self) -> int: ...  # noqa: D102
-    @property
-    def sweep(self) -> int: ...  # noqa: D102
-    @property
-    def end_of_sweep(self) -> bool: ...  # noqa: D102
-
-    def image(self) -> NDArray[Any]:
-        """Pixels of the level's grid, (rows, cols[, channels]), the sample's type."""
-        ...
-
-    def temperature(self) -> NDArray[Any]:
-        """Pixel temperatures of the level's grid, (rows, cols), 0 to 1."""
-        ...
+_STAGE = re.compile(r"((temperature|candidates)-)?level\d+(-sweep\d+)?\.png|sheet\.png|animation\.gif")
 
 
 class StageWriter:
-    """A callback that writes the picture and the temperatures of every sweep into a folder.
+    """A callback that writes the pictures of a run into a folder as they are completed.
 
-    It writes ``level{l}-sweep{k}.png`` and ``temperature-level{l}-sweep{k}.png`` at the end of
-    each sweep, and on `finish` ``sheet.png``, the last picture of each level at one size, and
+    Of ``mrf`` it writes ``level{l}-sweep{k}.png`` and ``temperature-level{l}-sweep{k}.png`` at the
+    end of each sweep; of ``multires``, ``level{l}.png`` and ``candidates-level{l}.png`` at the end
+    of each level, brighter where a pixel had more candidates, on a logarithmic scale from 1. On
+    `finish` it writes ``sheet.png``, the last picture of each level at one size, and
     ``animation.gif``. Pictures are 8-bit previews; each file is written whole or not at all.
 
     Parameters
@@ -96,17 +71,18 @@ class StageWriter:
         self._shapes: dict[int, tuple[int, ...]] = {}
 
     def __call__(self, progress: Progress) -> None:
-        """Write one stage if a sweep has ended; else do nothing."""
-        if not progress.end_of_sweep:
+        """Write one stage if it is complete; else do nothing."""
+        name = progress.stage
+        if name is None:
             return
         self._start()
         values = progress.image()
         if self._limits is None and values.dtype.kind != "b":
             self._limits = float(values.min()), float(values.max())
         picture = to_display(values, self._limits)
-        name = f"level{progress.level}-sweep{progress.sweep:02d}.png"
-        write(self.folder / name, _savable(picture))
-        write(self.folder / f"temperature-{name}", heat(progress.temperature()))
+        write(self.folder / f"{name}.png", _savable(picture))
+        for kind, values in progress.maps().items():
+            write(self.folder / f"{kind}-{name}.png", heat(values))
         self._keep(progress.level, picture)
 
     def finish(self) -> None:

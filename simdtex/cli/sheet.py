@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex sheet``: one sample under several thresholds."""
+
+from __future__ import annotations
+
+import secrets
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from simdtex.cli.common import (
+    DEVICE,
+    candidates_per_level,
+    check_distinct,
+    given,
+    multires_options,
+    numbers,
+    plainly,
+    progress_bar,
+)
+
+
+@click.command()
+@click.argument("sample", type=click.Path(path_type=Path))
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Sheet to write.")
+@click.option(
+    "--alphas",
+    default="0.05,0.10,...,0.30",
+    show_default=True,
+    metavar="A,B,...",
+    help="Thresholds, one picture each; auto is not among them.",
+)
+@click.option("--betas", default="0,1", show_default=True, metavar="A,B,...", help="One row of pictures each.")
+@click.option("--size", metavar="WIDTHxHEIGHT", help="Of each picture, in pixels. Default: twice the sample.")
+@multires_options
+@click.option("--seed", type=int, help="Of every picture.  [a fresh one, printed]")
+@DEVICE
+@click.option("-q", "--quiet", is_flag=True, help="No progress bar and no numbers.")
+@plainly
+def sheet(
+    sample: Path,
+    output: Path,
+    alphas: str,
+    betas: str,
+    size: str | None,
+    seed: int | None,
+    device: str | None,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Show what thresholds alpha / k^beta make of SAMPLE: Figures 11 and 12 of De Bonet (1997) on one sheet.
+
+    Below each picture stand the mean candidates of its levels, coarse to fine.
+    """
+    from simdtex import image
+    from simdtex.report.sheet import contact_sheet
+    from simdtex.series import series
+
+    image.check_writable(output, np.uint8, 3)
+    check_distinct([output], [sample])
+    picture = image.read(sample)
+    height, width = picture.pixels.shape[:2]
+    shape = image.parse_size(size) if size else (2 * height, 2 * width)
+    across = numbers("--alphas", alphas)
+    seed = secrets.randbits(32) if seed is None else seed
+    with progress_bar(quiet) as show:
+        made = series(
+            picture.pixels,
+            shape,
+            across,
+            numbers("--betas", betas),
+            channel_axis=picture.channel_axis,
+            rng=seed,
+            device=device,
+            callback=lambda fraction, _: show(fraction, "sampling", ""),
+            **given(options),
+        )
+    limits = float(picture.pixels.min()), float(picture.pixels.max())
+    cells, captions = [], []
+    for number, member in enumerate(made):
+        if number % len(across) == 0:
+            cells.append((sample.name, image.to_display(picture.pixels, limits)))
+            captions.append(f"{width}x{height}, candidates coarse to fine:")
+        label, counts = f"alpha {member.alpha:g}, beta {member.beta:g}", candidates_per_level(member.levels)
+        cells.append((label, image.to_display(member.image, limits)))
+        captions.append(counts)
+        if not quiet:
+            click.echo(f"{label}: candidates {counts}, {member.seconds:.2f} s")
+    contact_sheet(cells, output, columns=1 + len(across), captions=captions)
+    if not quiet:
+        click.echo(f"{output}: {len(made)} pictures of {shape[1]}x{shape[0]} from {width}x{height}, seed {seed}")

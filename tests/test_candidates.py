@@ -1,0 +1,459 @@
+"""The candidates of a pixel and the draw of one of them, against De Bonet's pseudo-code as plain loops."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, host, opencl
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import chi2_contingency, chisquare
+from tolerances import SIGNIFICANCE
+
+from simdtex import random
+from simdtex.ops import candidates as module
+from simdtex.ops.candidates import Sampled, Structure, candidates
+
+ALL = 2**32 - 1
+SMALL = (-1, 0, 1, 2), (0, 1, 2, ALL)  # what features and thresholds are drawn from
+EXTREME = (-(2**31), 1 - 2**31, -1, 0, 2**31 - 1), (0, 1, 2**31 - 1, 2**31, ALL - 2, ALL - 1, ALL)
+
+
+class Problem(NamedTuple):
+    """Two pyramids of which only the output's top level has been sampled: everything in NumPy arrays."""
+
+    tiles: list  # rows and columns of the sample's levels, the finest first
+    shapes: list  # of the output's
+    structure: Structure
+    sampled: Sampled
+
+    @property
+    def top(self):
+        return len(self.tiles) - 1
+
+    def on(self, machine):
+        """Structure and Sampled as arrays of a machine."""
+        return Structure(*map(machine.put, self.structure)), Sampled(*map(machine.put, self.sampled))
+
+    def pixels(self, level):
+        return self.shapes[level][0] * self.shapes[level][1]
+
+    def own(self, level):
+        """Where a level is in ``source`` and ``counts``."""
+        begin = sum(self.pixels(below) for below in range(level))
+        return slice(begin, begin + self.pixels(level))
+
+    def with_thresholds(self, threshold):
+        threshold = np.broadcast_to(threshold, self.structure.threshold.shape).astype(np.uint32)
+        return self._replace(structure=self.structure._replace(threshold=threshold))
+
+    def with_features(self, features):
+        features = features.astype(np.int32)
+        levels = len(self.tiles)
+        threshold = np.zeros((levels, features.shape[1]), np.uint32)
+        return self._replace(structure=self.structure._replace(features=features, threshold=threshold))
+
+
+def lattice(shapes, first):
+    begins = np.cumsum([0, *(r * c if level >= first else 0 for level, (r, c) in enumerate(shapes))])
+    return np.array([(*shape, begin, 0) for shape, begin in zip(shapes, begins[:-1], strict=True)], np.int32)
+
+
+def problem(seed=0, *, tile=(7, 6), shape=(17, 13), levels=4, features=3, kinds=4, of=SMALL):
+    """A problem from a seed: nodes of a few kinds, some with a feature of their own; any sources at the top."""
+    rng = np.random.default_rng(seed)
+    tiles = [tile]
+    while len(tiles) < levels:
+        tiles.append(((tiles[-1][0] + 1) // 2, (tiles[-1][1] + 1) // 2))
+    shapes = [
+        tuple(n // m * k + -(-(n % m) // 2**level) for n, m, k in zip(shape, tile, own, strict=True))
+        for level, own in enumerate(tiles)
+    ]
+    nodes = sum(r * c for r, c in tiles[1:])
+    measured = rng.choice(of[0], (kinds, features))[rng.integers(0, kinds, nodes)]
+    measured = np.where(rng.random(measured.shape) < 0.2 / features, rng.choice(of[0], measured.shape), measured)
+    threshold = rng.choice(of[1], (levels, features))
+    structure = Structure(measured.astype(np.int32), threshold.astype(np.uint32), lattice(tiles, 1))
+    total = sum(r * c for r, c in shapes)
+    source, counts = np.full(total, -1, np.int32), np.tile(np.array([1, 0], np.int32), (total, 1))
+    copied = shapes[-1][0] * shapes[-1][1]
+    source[-copied:] = rng.integers(0, tiles[-1][0] * tiles[-1][1], copied)
+    return Problem(tiles, shapes, structure, Sampled(source, counts, lattice(shapes, 0)))
+
+
+def any_problem(seed, features):
+    """A problem of any small shape, with one to five levels above the finest."""
+    rng = np.random.default_rng(seed)
+    return problem(
+        seed,
+        tile=tuple(rng.integers(1, 10, 2).tolist()),
+        shape=tuple(rng.integers(1, 15, 2).tolist()),
+        levels=int(rng.integers(2, 7)),
+        features=int(rng.choice(features)),
+        kinds=int(rng.integers(1, 6)),
+        of=(SMALL, EXTREME)[rng.integers(2)],
+    )
+
+
+def problems(features=(1, 2, 3)):
+    return st.builds(any_problem, st.integers(0, 2**32 - 1), st.just(features))
+
+
+seeds = st.integers(0, 2**64 - 1)
+phases = pytest.mark.parametrize("match", [True, False], ids=["match", "free"])
+
+
+def sampled_on(machine, p, match, seed, ends=lambda pixels: [pixels]):
+    """Source and counts of all levels, each sampled by the operation after the ones above it."""
+    structure, sampled = p.on(machine)
+    for level in reversed(range(p.top)):
+        first = 0
+        for end in ends(p.pixels(level)):
+            sampled = candidates(machine, structure, sampled, level, first, end, match, seed)
+            first = end
+    return host(machine, sampled[:2])
+
+
+def one_level(p, source, level, match, seed=0, machine=REFERENCE):
+    """Source and counts of one level, given the sources of those above."""
+    p = p._replace(sampled=p.sampled._replace(source=source))
+    structure, sampled = p.on(machine)
+    found = candidates(machine, structure, sampled, level, 0, p.pixels(level), match, seed)
+    return [a[p.own(level)] for a in host(machine, found[:2])]
+
+
+# -- the paper's loops ----------------------------------------------------------------------------------------
+
+
+class Plain:
+    """The pseudo-code SynthesizePyramid, for one pixel, in Python numbers."""
+
+    def __init__(self, p, source):
+        self.p, self.threshold = p, p.structure.threshold.tolist()
+        self.source = [source[p.own(level)].reshape(shape).tolist() for level, shape in enumerate(p.shapes)]
+        rows, self.features = iter(p.structure.features.tolist()), [None]
+        for shape in p.tiles[1:]:
+            self.features.append([[next(rows) for _ in range(shape[1])] for _ in range(shape[0])])
+
+    def parents(self, level, i, j):
+        """(row, column) in the sample's levels above that the nodes above pixel (i, j) were copied from."""
+        rows, cols = self.p.tiles[level]
+        found = {}
+        for v in range(level + 1, len(self.p.tiles)):
+            r = i // rows * self.p.tiles[v][0] + i % rows // 2 ** (v - level)
+            c = j // cols * self.p.tiles[v][1] + j % cols // 2 ** (v - level)
+            found[v] = divmod(self.source[v][r][c], self.p.tiles[v][1])
+        return found
+
+    def child(self, level, i, j):
+        """The child of the copied parent that stands as pixel (i, j) does among its siblings, or beside."""
+        (rows, cols), (r, c) = self.p.tiles[level], self.parents(level, i, j)[level + 1]
+        return min(2 * r + i % rows % 2, rows - 1), min(2 * c + j % cols % 2, cols - 1)
+
+    def similar(self, v, a, b):
+        u, w = self.features[v][a[0]][a[1]], self.features[v][b[0]][b[1]]
+        # Loop j for each feature
+        return all(abs(x - y) <= threshold for x, y, threshold in zip(u, w, self.threshold[v], strict=True))
+
+    def passes(self, level, own, x, y):
+        """Whether all that is above (x, y) of a level is similar to `own`."""
+        for v in range(self.p.top, level, -1):  # Loop v from top level downto i+1
+            if not self.similar(v, (x // 2 ** (v - level), y // 2 ** (v - level)), own[v]):
+                return False
+        return True
+
+    def candidates(self, level, i, j, match):
+        """C, in the order of the scan."""
+        own, found, (rows, cols) = self.parents(level, i, j), [], self.p.tiles[level]
+        for x in range(rows):  # Loop (x, y) over the analysis level
+            for y in range(cols):
+                if match and not (in_place(x, i % rows, rows) and in_place(y, j % cols, cols)):
+                    continue
+                if self.passes(level, own, x, y):
+                    found.append((x, y))
+        path = range(self.p.top - level, -1, -1)  # parents before children, row by row
+        return sorted(found, key=lambda q: [(q[0] >> up, q[1] >> up) for up in path])
+
+    def compared(self, level, i, j):
+        """Nodes above the level whose own ancestors all pass."""
+        own, count = self.parents(level, i, j), 0
+        for v in range(level + 1, len(self.p.tiles)):
+            count += sum(self.passes(v, own, r, c) for r, c in np.ndindex(*self.p.tiles[v]))
+        return count
+
+
+def in_place(x, place, size):
+    """Whether row x stands as `place` does among its siblings, or beside, where its parent has no such child."""
+    return x % 2 == place % 2 or (x % 2 == 0 and x == size - 1)
+
+
+def check_against_loops(p, match, seed):
+    """Every level, with any candidates, not only those that the operation draws, as the sources of those above."""
+    rng = np.random.default_rng(seed % 2**32)
+    source = p.sampled.source.copy()
+    for level in reversed(range(p.top)):
+        choice, counts = one_level(p, source, level, match, seed)
+        loops, taken = Plain(p, source), []
+        lo, hi, *_ = (bits.tolist() for bits in random.draw4(seed, level, 0, np.arange(p.pixels(level)), random.DRAW))
+        for s, (i, j) in enumerate(np.ndindex(*p.shapes[level])):
+            found = [x * p.tiles[level][1] + y for x, y in loops.candidates(level, i, j, match)]
+            assert counts[s].tolist() == [len(found), loops.compared(level, i, j)]
+            assert choice[s] == found[(hi[s] << 32 | lo[s]) * len(found) >> 64]
+            taken.append(rng.choice(found))
+        source[p.own(level)] = taken
+
+
+@phases
+@given(p=problems(), seed=seeds)
+@settings(max_examples=60)
+def test_the_reference_is_the_papers_loops(match, p, seed):
+    check_against_loops(p, match, seed)
+
+
+@phases
+@pytest.mark.parametrize(
+    ("tile", "shape", "levels"),
+    [
+        ((8, 8), (8, 8), 4),
+        ((7, 5), (14, 10), 4),  # whole tiles
+        ((5, 7), (17, 4), 3),  # whole tiles and part of one; less than a tile
+        ((1, 9), (1, 20), 5),
+        ((11, 1), (7, 3), 2),
+        ((1, 1), (3, 4), 3),
+        ((17, 3), (5, 8), 6),
+        ((6, 7), (9, 16), 2),  # a large top
+    ],
+    ids=str,
+)
+def test_the_reference_is_the_papers_loops_on_lattices_of_every_kind(tile, shape, levels, match):
+    for kinds, of in ((3, SMALL), (4, EXTREME)):
+        check_against_loops(problem(1, tile=tile, shape=shape, levels=levels, kinds=kinds, of=of), match, 2**40 + 5)
+
+
+# -- one result, however it is computed -----------------------------------------------------------------------
+
+
+@phases
+@given(p=problems(features=(1, 9)), seed=seeds)
+@settings(max_examples=40)
+def test_a_device_has_the_references_bits(machine, match, p, seed):
+    assert_same_bits(sampled_on(machine, p, match, seed), sampled_on(REFERENCE, p, match, seed))
+
+
+@phases
+@pytest.mark.parametrize("features", [1, 9, 27])
+def test_any_number_of_features_has_the_references_bits(machine, features, match):
+    for seed, of in ((1, SMALL), (2, EXTREME)):
+        p = problem(seed, tile=(13, 14), shape=(16, 31), levels=5, features=features, of=of)
+        source, counts = sampled_on(REFERENCE, p, match, seed)
+        assert counts[:, 0].max() > 4, "there is something to choose from"
+        assert_same_bits(sampled_on(machine, p, match, seed), [source, counts])
+
+
+@phases
+@pytest.mark.parametrize("work_group", [3, 16])
+def test_the_work_group_changes_no_bit(cl_device, work_group, match):
+    p = problem(3, tile=(9, 11), shape=(20, 25), levels=4)
+    theirs = sampled_on(REFERENCE, p, match, 7)
+    assert_same_bits(sampled_on(opencl(cl_device, work_group=work_group), p, match, 7), theirs)
+
+
+@given(p=problems(), cuts=st.lists(st.floats(0, 1), max_size=4), match=st.booleans())
+@settings(max_examples=20)
+def test_any_division_into_ranges_changes_no_bit(machine, p, cuts, match):
+    def ends(pixels):
+        return [*sorted({int(cut * pixels) for cut in cuts} - {0, pixels}), pixels]
+
+    whole = sampled_on(REFERENCE, p, match, 11)
+    for m in (REFERENCE, machine):
+        assert_same_bits(sampled_on(m, p, match, 11, ends), whole)
+
+
+@phases
+def test_the_references_own_division_changes_no_bit(monkeypatch, match):
+    p = problem(4)
+    whole = sampled_on(REFERENCE, p, match, 5)
+    for together in (1, 200):
+        monkeypatch.setattr(module, "TOGETHER", together)
+        assert_same_bits(sampled_on(REFERENCE, p, match, 5), whole)
+
+
+def test_nothing_but_the_range_is_written(machine):
+    p = problem(5)
+    for m in (REFERENCE, machine):
+        structure, sampled = p.on(m)
+        candidates(m, structure, sampled, 2, 0, p.pixels(2), True, 1)
+        before = host(m, sampled[:2])
+        candidates(m, structure, sampled, 1, 3, 17, True, 1)
+        for ours, theirs in zip(host(m, sampled[:2]), before, strict=True):
+            own = range(p.own(1).start + 3, p.own(1).start + 17)
+            assert_same_bits(np.delete(ours, own, 0), np.delete(theirs, own, 0))
+            assert (ours[own] != theirs[own]).any()
+        for ours, theirs in zip(host(m, structure), p.structure, strict=True):
+            assert_same_bits(ours, theirs)
+
+
+# -- what must hold of the sets -------------------------------------------------------------------------------
+
+
+def test_what_lies_below_a_node_that_fails_is_not_compared(machine):
+    """Of the four nodes at the top one passes; all of the level below would."""
+    p = problem(6, tile=(8, 8), shape=(8, 8), levels=3, features=1)
+    features = np.zeros((20, 1))
+    features[16:, 0] = [0, 5, 5, 5]
+    p = p.with_features(features)
+    p.sampled.source[p.own(2)] = 0
+    for m in (REFERENCE, machine):
+        source, counts = sampled_on(m, p, True, 1)
+        assert counts[p.own(1)].tolist() == [[1, 4]] * 16
+        assert counts[p.own(0)].tolist() == [[4, 4 + 4]] * 64, "of 20 nodes"
+        row, col = np.divmod(source[p.own(0)], 8)
+        assert (row < 4).all()
+        assert (col < 4).all()
+
+
+@given(problems(), st.booleans(), seeds)
+@settings(max_examples=25)
+def test_the_set_is_never_empty(p, match, seed):
+    """The child of the copied parent is always in it, so a source's own parent was similar to what was copied."""
+    source, counts = sampled_on(REFERENCE, p, match, seed)
+    loops = Plain(p, source)
+    assert counts.min(0)[0] >= 1
+    assert (source >= 0).all()
+    for level in range(p.top):
+        for s, (i, j) in enumerate(np.ndindex(*p.shapes[level])):
+            found = loops.candidates(level, i, j, match)
+            assert loops.child(level, i, j) in found
+            assert divmod(loops.source[level][i][j], p.tiles[level][1]) in found
+            assert counts[p.own(level)][s, 0] == len(found)
+
+
+@phases
+@given(p=problems(), more=st.integers(1, 2**32), seed=seeds)
+@settings(max_examples=25)
+def test_the_set_grows_with_the_thresholds(match, p, more, seed):
+    """Any set of thresholds, and one in which some are higher, with the same sources above."""
+    rng = np.random.default_rng(seed % 2**32)
+    low = p.structure.threshold.astype(np.int64)
+    raised = low + np.where(rng.random(low.shape) < 0.5, rng.choice([1, more], low.shape), 0)
+    higher = p.with_thresholds(np.minimum(raised, ALL))
+    source, counts = sampled_on(REFERENCE, p, match, seed)
+    few, many = Plain(p, source), Plain(higher, source)
+    for level in range(p.top):
+        drawn, more_counts = one_level(higher, source, level, match, seed)
+        assert (more_counts >= counts[p.own(level)]).all()
+        for s in rng.permutation(p.pixels(level))[:8].tolist():
+            i, j = divmod(s, p.shapes[level][1])
+            wide = many.candidates(level, i, j, match)
+            assert set(few.candidates(level, i, j, match)) <= set(wide)
+            assert divmod(int(drawn[s]), p.tiles[level][1]) in wide
+
+
+@given(p=problems(), seed=seeds)
+@settings(max_examples=25)
+def test_every_node_passes_the_highest_threshold(machine, p, seed):
+    p = p.with_thresholds(ALL)
+    for m in (REFERENCE, machine):
+        for match in (True, False):
+            _, counts = sampled_on(m, p, match, seed)
+            for level in range(p.top):
+                rows, cols = p.tiles[level + 1 if match else level]
+                nodes = sum(r * c for r, c in p.tiles[level + 1 :])
+                assert (counts[p.own(level)] == (rows * cols, nodes)).all()
+
+
+@given(p=problems(), seed=seeds)
+@settings(max_examples=25)
+def test_thresholds_of_zero_leave_the_child_of_what_was_copied(machine, p, seed):
+    """Where no two nodes are alike. What was copied is then continued through all levels."""
+    nodes = len(p.structure.features)
+    p = p.with_features(np.random.default_rng(seed % 2**32).permutation(nodes)[:, None])
+    for m in (REFERENCE, machine):
+        source, counts = sampled_on(m, p, True, seed)
+        free_source, free_counts = sampled_on(m, p, False, seed)
+        loops, free = Plain(p, source), Plain(p, free_source)
+        for level in range(p.top):
+            rows, cols = p.tiles[level]
+            assert (counts[p.own(level)][:, 0] == 1).all()
+            for s, (i, j) in enumerate(np.ndindex(*p.shapes[level])):
+                assert divmod(loops.source[level][i][j], cols) == loops.child(level, i, j)
+                r, c = free.parents(level, i, j)[level + 1]
+                x, y = divmod(free.source[level][i][j], cols)
+                assert (x // 2, y // 2) == (r, c)
+                assert free_counts[p.own(level)][s, 0] == min(2, rows - 2 * r) * min(2, cols - 2 * c)
+
+
+def test_differences_beyond_31_bits_are_compared(machine):
+    """The largest difference there is of two features passes a threshold of its own size, and of no less."""
+    p = problem(7, tile=(1, 6), shape=(1, 6), levels=2, features=1)
+    least, most = -(2**31), 2**31 - 1
+    p = p.with_features(np.array([[least], [0], [most]]))
+    p.sampled.source[p.own(1)] = [0, 1, 2]
+    expected = {2**31 - 2: (1, 1, 1), 2**31 - 1: (1, 2, 2), 2**31: (2, 3, 2), ALL - 1: (2, 3, 2), ALL: (3, 3, 3)}
+    for threshold, numbers in expected.items():
+        for m in (REFERENCE, machine):
+            _, counts = sampled_on(m, p.with_thresholds(threshold), True, 1)
+            assert counts[p.own(0)].tolist() == [[n, 3] for n in numbers for _ in range(2)]
+
+
+# -- the draw, equation (12) ----------------------------------------------------------------------------------
+
+
+def many_tiles(tile, rows, cols, levels, **options):
+    """A problem whose output is many tiles that all begin with the same source at the top."""
+    p = problem(8, tile=tile, shape=(tile[0] * rows, tile[1] * cols), levels=levels, **options)
+    r, c = p.tiles[-1]
+    p.sampled.source[p.own(p.top)] = np.tile(np.arange(r * c).reshape(r, c), (rows, cols)).ravel()
+    return p
+
+
+@phases
+@pytest.mark.parametrize("seed", [1, 2**33 + 7, 2**64 - 1])
+def test_the_draw_is_uniform(seed, match):
+    """Pixels in the same place of every tile have the same parent structure, one level below the top."""
+    tile, rows, cols = (5, 6), 30, 40
+    p = many_tiles(tile, rows, cols, 2, features=1, kinds=3).with_thresholds(1)
+    source, counts = sampled_on(REFERENCE, p, match, seed)
+    loops, tested = Plain(p, source), 0
+    drawn = source[p.own(0)].reshape(rows, tile[0], cols, tile[1])
+    number = counts[p.own(0)][:, 0].reshape(rows, tile[0], cols, tile[1])
+    for i, j in np.ndindex(*tile):
+        expected = sorted(x * tile[1] + y for x, y in loops.candidates(0, i, j, match))
+        assert (number[:, i, :, j] == len(expected)).all()
+        found, times = np.unique(drawn[:, i, :, j], return_counts=True)
+        assert found.tolist() == expected, "each is drawn sometimes, and nothing else"
+        if len(expected) > 1:
+            assert chisquare(times).pvalue > SIGNIFICANCE
+            tested += 1
+    assert tested >= 10, "there is something to draw from"
+
+
+def numbers(p, level, seed):
+    """Which of all nodes each pixel of a level was drawn from, where all pass; `match`."""
+    source, _ = sampled_on(REFERENCE, p, True, seed)
+    cols = p.tiles[level][1]
+    row, col = np.divmod(source[p.own(level)], cols)
+    return row // 2 * ((cols + 1) // 2) + col // 2
+
+
+def check_independent(a, b):
+    table = np.zeros((a.max() + 1, b.max() + 1), int)
+    np.add.at(table, (a, b), 1)
+    assert (table.sum(0) > 0).all()
+    assert chi2_contingency(table).pvalue > SIGNIFICANCE
+
+
+def test_draws_of_other_levels_seeds_and_pixels_are_others():
+    """The same pixel number at two levels, and with two seeds; a pixel and the next, and the one it comes from."""
+    tile, rows, cols = (6, 8), 24, 24
+    p = many_tiles(tile, rows, cols, 3, features=1).with_thresholds(ALL)
+    fine, coarse = numbers(p, 0, 9), numbers(p, 1, 9)
+    check_independent(fine[: coarse.size], coarse)
+    check_independent(fine[:-1], fine[1:])
+    check_independent(coarse[:-1], coarse[1:])
+    for seed in (8, 9 + 2**32, 2**63 + 9):
+        check_independent(fine, numbers(p, 0, seed))
+    above = coarse.reshape(rows * 3, cols * 4).repeat(2, 0).repeat(2, 1).ravel()
+    check_independent(fine, above)
+    with pytest.raises(AssertionError):
+        check_independent(fine, fine)

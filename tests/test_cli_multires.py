@@ -1,0 +1,226 @@
+"""``simdtex synth --method multires`` and ``simdtex sheet``, end to end."""
+
+import re
+
+import numpy as np
+import pytest
+from cases import texture
+from click.testing import CliRunner
+
+import simdtex
+from simdtex import image
+from simdtex.cli import main
+from simdtex.cli.common import numbers
+from simdtex.series import series
+from simdtex.source_map import load_source_map
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with a small grey sample, one in colour, and nothing else."""
+    image.write(tmp_path / "sample.png", texture((16, 12)))
+    image.write(tmp_path / "colour.png", texture((16, 12), 3))
+    return tmp_path
+
+
+def run(*args):
+    return CliRunner().invoke(main, [str(arg) for arg in args])
+
+
+def synth(folder, *args):
+    arguments = ["synth", folder / "sample.png", "-o", folder / "out.png", "--method", "multires", "--seed", 5]
+    return run(*arguments, "--device", "reference", *args)
+
+
+def sheet(folder, *args):
+    arguments = ["sheet", folder / "sample.png", "-o", folder / "sheet.png", "--seed", 5, "--device", "reference"]
+    return run(*arguments, *args)
+
+
+def files(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+# ---------------------------------------------------------------- synth
+
+
+def test_everything_at_once(folder):
+    args = [
+        "--size",
+        "30x26",
+        "--alpha",
+        "0.6",
+        "--beta",
+        "0.5",
+        "--orientations",
+        3,
+        "--sigma",
+        0.8,
+        "--filter-size",
+        5,
+    ]
+    args += ["--phase", "free", "--levels", 4, "--boundary", "open", "--stages", folder / "st"]
+    result = synth(folder, *args, "--source-map", folder / "s.npz", "--also", f"{folder}/colour.png={folder}/c.png")
+    assert result.exit_code == 0, result.output
+    made = image.read(folder / "out.png").pixels
+    options = {"alpha": 0.6, "beta": 0.5, "orientations": 3, "sigma": 0.8, "filter_size": 5}
+    options |= {"phase": "free", "levels": 4, "boundary": "open", "rng": 5, "device": "reference"}
+    expected = simdtex.synthesize(texture((16, 12)), (26, 30), method="multires", **options)
+    np.testing.assert_array_equal(made, expected)
+    source, colour = load_source_map(folder / "s.npz"), texture((16, 12), 3)
+    np.testing.assert_array_equal(image.read(folder / "c.png").pixels, colour[source[..., 0], source[..., 1]])
+    stages = {f"{kind}level{level}.png" for kind in ("", "candidates-") for level in range(4)}
+    assert set(files(folder / "st")) == stages | {"sheet.png", "animation.gif"}
+    assert "alpha 0.6; candidates per level, coarse to fine: " in result.output
+
+
+def test_alpha_0_tiles_and_auto_says_what_it_took(folder):
+    assert synth(folder, "--alpha", 0, "--size", "24x32").exit_code == 0
+    np.testing.assert_array_equal(image.read(folder / "out.png").pixels, np.tile(texture((16, 12)), (2, 2)))
+    result = synth(folder, "--alpha", "auto", "--target", 1.5)
+    expected = simdtex.suggest_alpha(texture((16, 12)), target=1.5, device="reference")
+    assert f"alpha {expected};" in result.output
+    assert "alpha inf;" in synth(folder, "--alpha", "inf").output
+    assert synth(folder, "-q").output == ""
+
+
+@pytest.mark.parametrize("text", ["0.1\n0.2\n0.3\n0.4\n", "0.1, 0.1\n0.2,0.2\n\n0.3 0.3\n0.4 inf\n"])
+def test_a_table_of_thresholds(folder, text):
+    (folder / "table.csv").write_text(text)
+    result = synth(folder, "--orientations", 0, "--thresholds", folder / "table.csv")
+    columns = 1 if "," not in text else 2
+    assert (result.exit_code == 0) == (columns == 1), result.output
+    if columns == 2:
+        assert "2 columns; give 1" in result.output
+        return
+    table = [0.1, 0.2, 0.3, 0.4]
+    options = {"orientations": 0, "thresholds": table, "rng": 5, "device": "reference"}
+    expected = simdtex.synthesize(texture((16, 12)), (32, 24), method="multires", **options)
+    np.testing.assert_array_equal(image.read(folder / "out.png").pixels, expected)
+
+
+BAD = {
+    "alpha": (["--alpha", "much"], "--alpha much is not a number; give one of at least 0, or auto"),
+    "negative alpha": (["--alpha", -1], "alpha is -1.0; give a number of at least 0"),
+    "beta": (["--beta", -1], "beta is -1.0"),
+    "target": (["--alpha", "auto", "--target", 0], "target is 0.0; give a number of at least 1"),
+    "filter size": (["--filter-size", 4], "give an odd number"),
+    "features": (["--features", "hue"], "choose one of: luminance, channels"),
+    "phase": (["--phase", "any"], "choose one of: match, free"),
+    "levels": (["--levels", 9], "levels=9 is too many for this sample; give at most 5"),
+    "an option of mrf": (["--order", 8], "choose from: alpha, beta"),
+    "accounting": (["--accounting"], "--accounting is of the method mrf"),
+    "no table": (["--thresholds", "none.csv"], "none.csv"),
+    "no numbers": (["--thresholds", "sample.png"], "is not a table of numbers"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_options_get_one_sentence_and_write_nothing(folder, case, monkeypatch):
+    monkeypatch.chdir(folder)
+    args, words = BAD[case]
+    result = synth(folder, *args, "--stages", folder / "st")
+    assert result.exit_code == 2
+    assert words in result.output and result.output.count("\n") == 1
+    assert files(folder) == ["colour.png", "sample.png"]
+
+
+def test_an_option_of_multires_is_none_of_mrf(folder):
+    result = run("synth", folder / "sample.png", "-o", folder / "out.png", "--alpha", 0.2)
+    assert result.exit_code == 2 and "unknown option 'alpha' of the method 'mrf'" in result.output
+
+
+# ---------------------------------------------------------------- sheet
+
+
+def test_a_sheet_of_both_figures(folder):
+    result = sheet(folder, "--alphas", "0,0.3,...,0.9", "--betas", "0,1", "--size", "20x18")
+    assert result.exit_code == 0, result.output
+    lines = result.output.splitlines()
+    assert [line.partition(":")[0] for line in lines[:-1]] == [
+        f"alpha {alpha}, beta {beta}" for beta in (0, 1) for alpha in (0, 0.3, 0.6, 0.9)
+    ]
+    assert all(re.search(r": candidates( [\d.]+){4}, [\d.]+ s$", line) for line in lines[:-1])
+    assert "candidates 1 1 1 1," in lines[0] and "8 pictures of 20x18 from 12x16, seed 5" in lines[-1]
+    pixels = image.read(folder / "sheet.png").pixels
+    assert pixels.dtype == np.uint8 and pixels.shape[2] == 3
+    assert set(files(folder)) == {"colour.png", "sample.png", "sheet.png"}
+
+
+def test_a_sheet_of_colour_says_the_seed(folder):
+    args = ["--alphas", "0.2", "--betas", "0", "--device", "reference", "--levels", 3]
+    result = run("sheet", folder / "colour.png", "-o", folder / "sheet.png", *args)
+    assert result.exit_code == 0 and re.search(r"seed \d+$", result.output.strip())
+    assert sheet(folder, "--alphas", "0.2", "--betas", "0", "-q").output == ""
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["--alphas", "0.1,x"], "--alphas 0.1,x must be numbers parted by commas"),
+        (["--alphas", ""], "must be numbers"),
+        (["--alphas", "-0.1"], "alpha is -0.1"),
+        (["--betas", "-1"], "beta is -1.0"),
+        (["--alphas", "0.1", "--phase", "any"], "choose one of: match, free"),
+        (["--size", "0x1"], "size"),
+        (["-o", "sheet.xyz"], "end its name in"),
+        (["-o", "sample.png"], "is an input and would be overwritten"),
+    ],
+)
+def test_bad_sheets_get_one_sentence_and_write_nothing(folder, args, words, monkeypatch):
+    monkeypatch.chdir(folder)
+    result = sheet(folder, *args)
+    assert result.exit_code == 2
+    assert words in result.output and result.output.count("\n") == 1
+    assert files(folder) == ["colour.png", "sample.png"]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("0.2", [0.2]),
+        ("0.2, 0.1,inf", [0.2, 0.1, float("inf")]),
+        ("0.05,...,0.30", [0.05, 0.1, 0.15, 0.2, 0.25, 0.3]),
+        ("0,0.1,...,0.35", [0, 0.1, 0.2, 0.3]),
+        ("1,2,...,2", [1, 2]),
+    ],
+)
+def test_numbers(text, expected):
+    assert numbers("--alphas", text) == expected
+
+
+@pytest.mark.parametrize(
+    "text", ["...", "0.1,...", "...,0.3", "0.1,...,0.2,0.3", "0,...,1", "2,1,...,0", "0,1e-9,...,1", "1,...,inf"]
+)
+def test_numbers_that_are_none(text):
+    with pytest.raises(ValueError, match=r"--alphas .* must be numbers parted by commas"):
+        numbers("--alphas", text)
+
+
+# ---------------------------------------------------------------- series
+
+
+def test_a_series_is_its_pictures_one_by_one():
+    sample, told = texture((16, 12), 3), []
+    found = series(
+        np.moveaxis(sample, -1, 0),
+        (18, 20),
+        [0.2, 0.8],
+        [0, 1],
+        channel_axis=0,
+        rng=7,
+        device="reference",
+        callback=lambda *now: told.append(now),
+        orientations=2,
+    )
+    assert [(member.alpha, member.beta) for member in found] == [(0.2, 0), (0.8, 0), (0.2, 1), (0.8, 1)]
+    for member in found:
+        options = {"alpha": member.alpha, "beta": member.beta, "orientations": 2, "rng": 7, "device": "reference"}
+        alone = simdtex.synthesize(sample, (18, 20), method="multires", channel_axis=-1, **options)
+        np.testing.assert_array_equal(np.moveaxis(member.image, 0, -1), alone)
+        assert [level["level"] for level in member.levels] == [4, 3, 2, 1, 0] and member.seconds > 0
+    shares = [share for share, _ in told]
+    assert shares == sorted(shares) and shares[-1] == 1
+    assert told[0][1] is None and told[-1][1] is found[2]
+    with pytest.raises(ValueError, match="no alpha or no beta"):
+        series(sample, (5, 5), [], channel_axis=-1)

@@ -1,0 +1,496 @@
+"""De Bonet's method as users see it: its limits, what a picture is made of, thresholds, contrast and colour."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, opencl, texture
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import chisquare
+from tolerances import SIGNIFICANCE
+
+import simdtex
+from simdtex.analysis import analyse
+from simdtex.methods import multires
+from simdtex.ops.candidates import Sampled, Structure, candidates
+
+INF = math.inf
+
+
+def run(sample, shape, **options):
+    """Image and output; the last axis of a sample of three holds the channels."""
+    given = {"rng": 1, "device": REFERENCE, "channel_axis": -1 if sample.ndim == 3 else None} | options
+    return simdtex.synthesize(sample, shape, method="multires", full_output=True, **given)
+
+
+def tiling(shape, size):
+    """The (row, column) that each pixel has in its own tile."""
+    row, col = np.indices(shape)
+    return np.stack([row % size[0], col % size[1]], -1)
+
+
+def sizes(shape, levels=None):
+    """Rows and columns of the levels of a pyramid."""
+    found = [tuple(shape)]
+    while max(found[-1]) > 1:
+        found.append(tuple(-(-n // 2) for n in found[-1]))
+    return found[:levels]
+
+
+def same_places(output, other):
+    """Whether two runs took everything from the same places, among the same number of candidates."""
+    pairs = zip(output.stages, other.stages, strict=True)
+    return all(np.array_equal(a.source, b.source) and np.array_equal(a.candidates, b.candidates) for a, b in pairs)
+
+
+def ancestors(stage, size, level):
+    """(row, column) of the pixels of another level above those of a stage, in an output of tiles of a sample's size."""
+    indices, up = np.indices(stage.source.shape[:2]), level - stage.level
+    own, their = sizes(size)[stage.level], sizes(size)[level]
+    return tuple(i // n * m + (i % n >> up) for i, n, m in zip(indices, own, their, strict=True))
+
+
+# -- alpha = 0: the sample, tiled -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [(8, 16), (13, 7), (5, 12), (6, 1)], ids=str)
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int32, np.float32, np.float64, np.bool_])
+def test_alpha_0_tiles_the_sample_to_the_bit(dtype, size):
+    sample = texture(size, dtype=dtype)
+    for whole in ((1, 1), (2, 3)):
+        shape = size[0] * whole[0], size[1] * whole[1]
+        image, output = run(sample, shape, alpha=0)
+        assert_same_bits(image, np.tile(sample, whole))
+        for stage, own in zip(output.stages, reversed(sizes(size)), strict=True):
+            assert np.array_equal(stage.source, tiling(stage.source.shape[:2], own))
+
+
+@pytest.mark.parametrize("shape", [(3, 5), (20, 17), (1, 30), (26, 8)], ids=str)
+def test_alpha_0_tiles_the_source_map_of_an_output_of_any_size(shape):
+    _, output = run(texture((13, 7)), shape, alpha=0)
+    assert all((stage.candidates == 1).all() for stage in output.stages)
+    assert np.array_equal(output.source, tiling(shape, (13, 7)))
+
+
+def test_alpha_0_without_phase_keeps_to_one_parent_and_scrambles_its_children():
+    _, output = run(texture((13, 7)), (39, 28), alpha=0, phase="free")
+    above, fine = output.stages[-2:]
+    assert np.array_equal(fine.source // 2, above.source[ancestors(fine, (13, 7), 1)])
+    inside = (fine.source < [12, 6]).all(-1)  # of parents with four children
+    assert (fine.candidates[inside] == 4).all()
+    assert (fine.candidates[(fine.source == [12, 6]).all(-1)] == 1).all()
+    assert chisquare(np.bincount((fine.source % 2 @ [2, 1])[inside])).pvalue > SIGNIFICANCE
+
+
+@pytest.mark.parametrize("size", [(8, 8), (13, 7)], ids=str)
+@pytest.mark.parametrize("channels", [None, 3])
+def test_alpha_0_on_an_open_plane_gives_the_sample_itself(size, channels):
+    sample = texture(size, channels)
+    image, output = run(sample, size, alpha=0, boundary="open")
+    assert_same_bits(image, sample)
+    _, output = run(sample, (20, 17), alpha=0, boundary="open")
+    assert np.array_equal(output.source, tiling((20, 17), size))
+
+
+def test_alpha_0_tiles_the_sample_on_a_device(any_device):
+    sample = texture((13, 7), 3)
+    image, _ = run(sample, (26, 14), alpha=0, device=opencl(any_device))
+    assert_same_bits(image, np.tile(sample, (2, 2, 1)))
+
+
+# -- alpha = infinity: every band on its own ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [(8, 8), (13, 7)], ids=str)
+@pytest.mark.parametrize("beta", [0, 1])
+def test_infinite_alpha_leaves_nothing_out(size, beta):
+    for phase in ("match", "free"):
+        _, output = run(texture(size), (17, 11), alpha=INF, beta=beta, phase=phase)
+        assert (output.stages[0].candidates == 1).all()
+        for stage in output.stages[1:]:
+            from_ = sizes(size)[stage.level + (phase == "match")]
+            assert (stage.candidates == math.prod(from_)).all()
+
+
+def test_infinite_alpha_draws_each_band_evenly_and_on_its_own():
+    _, output = run(texture((8, 8)), (64, 64), alpha=INF)
+    fine, above = output.stages[-1].source, output.stages[-2].source
+    assert np.array_equal(fine % 2, tiling((64, 64), (2, 2))), "a pixel's own row and column parity"
+    for p, q in itertools.product(range(2), range(2)):
+        parent = fine[p::2, q::2] // 2
+        assert chisquare(np.bincount((parent @ [4, 1]).ravel(), minlength=16)).pvalue > SIGNIFICANCE
+    of_parent = np.repeat(np.repeat(above, 2, 0), 2, 1) @ [4, 1]
+    pairs = of_parent * 16 + fine // 2 @ [4, 1]
+    assert chisquare(np.bincount(pairs.ravel(), minlength=256)).pvalue > SIGNIFICANCE
+
+
+def test_infinite_alpha_without_phase_draws_from_every_pixel():
+    _, output = run(texture((7, 5)), (35, 40), alpha=INF, phase="free")
+    for stage, (rows, cols) in zip(output.stages[1:], reversed(sizes((7, 5))[:-1]), strict=True):
+        drawn = np.bincount((stage.source @ [cols, 1]).ravel(), minlength=rows * cols)
+        assert chisquare(drawn).pvalue > SIGNIFICANCE
+
+
+# -- what a picture is made of --------------------------------------------------------------------------------
+
+
+def border(i, n, torus):
+    """Index i brought to 0 .. n-1."""
+    while not 0 <= i < n:
+        i = i % n if torus or n == 1 else -i if i < 0 else 2 * n - 2 - i
+    return i
+
+
+def halving(n, torus):
+    """Matrix that takes n pixels in a line to half as many."""
+    matrix = np.zeros((-(-n // 2), n))
+    for k in range(len(matrix)):
+        for step, weight in zip(range(-2, 3), (1, 4, 6, 4, 1), strict=True):
+            matrix[k, border(2 * k + step, n, torus)] += weight / 16
+    return matrix
+
+
+def doubling(n, tile, coarse, torus):
+    """Matrix that takes `coarse` pixels in a line to n, in tiles."""
+    matrix = np.zeros((n, coarse))
+    for i in range(n):
+        parent = i // tile * -(-tile // 2) + i % tile // 2
+        for step, weight in [(-1, 1 / 8), (0, 6 / 8), (1, 1 / 8)] if i % tile % 2 == 0 else [(0, 1 / 2), (1, 1 / 2)]:
+            matrix[i, border(parent + step, coarse, torus)] += weight
+    return matrix
+
+
+def expanded(coarse, shape, tile, torus):
+    row, col = (doubling(n, t, m, torus) for n, t, m in zip(shape, tile, coarse.shape, strict=False))
+    return np.einsum("ik,jl,klc->ijc", row, col, coarse)
+
+
+def reconstructions(sample, output, torus):
+    """The picture of every level, coarsest first: bands in floats, copied as the source maps say, and added up."""
+    gaussian = [sample.astype(float)]
+    while len(gaussian) < len(output.stages):
+        row, col = (halving(n, torus) for n in gaussian[-1].shape[:2])
+        gaussian.append(np.einsum("ki,lj,ijc->klc", row, col, gaussian[-1]))
+    picture = None
+    for stage in output.stages:
+        own = gaussian[stage.level]
+        if picture is not None:
+            shape = own.shape[:2]
+            band = own - expanded(gaussian[stage.level + 1], shape, shape, torus)
+            picture = band[tuple(np.moveaxis(stage.source, -1, 0))] + expanded(
+                picture, stage.source.shape[:2], shape, torus
+            )
+        else:
+            picture = own[tuple(np.moveaxis(stage.source, -1, 0))]
+        yield picture
+
+
+@pytest.mark.parametrize("boundary", ["torus", "open"])
+@pytest.mark.parametrize(("size", "shape"), [((16, 16), (40, 32)), ((13, 7), (20, 24)), ((9, 22), (4, 30))], ids=str)
+def test_every_level_is_its_copied_bands_added_up(size, shape, boundary):
+    sample = texture(size, 3)
+    for options in ({}, {"alpha": INF, "phase": "free"}, {"alpha": 1.0, "features": "channels"}):
+        _, output = run(sample, shape, boundary=boundary, **options)
+        for stage, expected in zip(output.stages, reconstructions(sample, output, boundary == "torus"), strict=True):
+            # Half a grey level is the last rounding; those of the levels are 2**-20 of the range each, a few dozen.
+            assert abs(stage.image - np.clip(expected, 0, 255)).max() < 1
+
+
+def test_float_pixels_stay_in_the_samples_range():
+    sample = texture((13, 7), dtype=np.float32)
+    image, output = run(sample, (20, 24), alpha=INF)
+    assert image.dtype == np.float32
+    assert all(sample.min() <= s.image.min() <= s.image.max() <= sample.max() for s in output.stages)
+    [*_, expected] = reconstructions(sample[..., None], output, torus=True)
+    beyond = (expected[..., 0] < sample.min()) | (expected[..., 0] > sample.max())
+    assert beyond.any() and np.isin(image[beyond], [sample.min(), sample.max()]).all()
+
+
+def alike(found, each, table):
+    """Of each level but the finest, whether two of its nodes are similar: equations (9) to (11) word for word.
+
+    `each` is the number of features of a plane; `table` T, the lowest frequency first.
+    """
+    result, begin = {}, 0
+    for level, size in list(enumerate(found.shapes))[1:]:
+        f = found.features[begin : begin + math.prod(size)].astype(float)
+        begin += math.prod(size)
+        z = (f**2).mean(0)
+        if level == found.levels - 1:
+            z[::each] = f[:, ::each].var(0)
+        t = np.broadcast_to(table[found.levels - 1 - level], z.shape)
+        with np.errstate(invalid="ignore"):
+            result[level] = (((f[:, None] - f) ** 2 <= t * z) | np.isinf(t)).all(-1)
+    return result
+
+
+def passing(similar, output, size, level):
+    """(rows, cols, nodes of the level above): whether the parent structures of a pixel and of a child are similar."""
+    stages = {stage.level: stage for stage in output.stages}
+    nodes = np.indices(sizes(size)[level + 1]).reshape(2, -1)
+    passed = True
+    for k in range(level + 1, len(stages)):
+        cols = sizes(size)[k][1]
+        own = stages[k].source[ancestors(stages[level], size, k)] @ [cols, 1]
+        row, col = nodes >> k - level - 1
+        passed = passed & similar[k][own][..., row * cols + col]
+    return passed
+
+
+def check_candidates(sample, shape, table, **options):
+    """Every pixel was drawn from its candidates, and they were counted, as the equations have it."""
+    _, output = run(sample, shape, **options)
+    size, phase = sample.shape[:2], options.pop("phase", "match")
+    bearing = {name: value for name, value in options.items() if name not in ("alpha", "beta", "thresholds")}
+    found = analyse(REFERENCE, sample.reshape(*size, -1), **bearing)
+    similar = alike(found, 1 + 2 * options.get("orientations", 4), table)
+    for stage in output.stages[1:]:
+        own, above = sizes(size)[stage.level : stage.level + 2]
+        passed = passing(similar, output, size, stage.level)
+        children = [np.minimum(2, n - 2 * i) for n, i in zip(own, np.indices(above), strict=True)]
+        each = 1 if phase == "match" else (children[0] * children[1]).ravel()
+        assert np.array_equal((passed * each).sum(-1), stage.candidates)
+        assert stage.candidates.min() >= 1
+        parent = stage.source // 2 @ [above[1], 1]
+        assert np.take_along_axis(passed, parent[..., None], -1).all(), "the parent is similar to the pixel's own"
+        assert (stage.source < own).all() and (stage.source >= 0).all()
+        if phase == "match":
+            wanted = np.minimum(stage.source // 2 * 2 + tiling(stage.candidates.shape, own) % 2, np.array(own) - 1)
+            assert np.array_equal(stage.source, wanted), "its parity, or the pixel beside it at a ragged edge"
+
+
+@given(
+    st.tuples(st.integers(1, 14), st.integers(1, 14)),
+    st.tuples(st.integers(1, 20), st.integers(1, 20)),
+    st.sampled_from([None, 2, 3]),
+    st.sampled_from([0, 0.3, 0.77, 1.5, 3.0, INF]),
+    st.sampled_from([0, 0.5, 1]),
+    st.fixed_dictionaries(
+        {},
+        optional={
+            "phase": st.just("free"),
+            "boundary": st.just("open"),
+            "features": st.just("channels"),
+            "orientations": st.sampled_from([1, 3]),
+            "filter_size": st.just(5),
+            "levels": st.sampled_from([1, 2, 3]),
+        },
+    ),
+)
+@settings(max_examples=80)
+def test_candidates_are_those_of_the_equations(size, shape, channels, alpha, beta, options):
+    levels = min(len(sizes(size)), options.get("levels", 30))
+    options |= {"levels": levels} if "levels" in options else {}
+    table = [[alpha / k**beta] for k in range(1, levels)]
+    check_candidates(texture(size, channels), shape, table, alpha=alpha, beta=beta, **options)
+
+
+@pytest.mark.parametrize("phase", ["match", "free"])
+def test_candidates_are_those_of_a_table_of_thresholds(phase):
+    rng = np.random.default_rng(5)
+    for columns in (1, 9):
+        table = rng.choice([0.1, 0.5, 2.0, 3.0, INF], (4, columns))
+        check_candidates(texture((13, 12)), (20, 17), table, thresholds=table, phase=phase)
+
+
+def test_without_orientations_bands_are_compared_alone():
+    table = [[0.5]] * 4
+    check_candidates(texture((13, 12)), (20, 17), table, alpha=0.5, orientations=0)
+    check_candidates(texture((13, 7), 3), (20, 17), table, alpha=0.5, orientations=0, features="channels")
+
+
+@pytest.mark.parametrize("options", [{}, {"phase": "free", "boundary": "open", "features": "channels"}], ids=str)
+def test_a_device_gives_the_same_bits(any_device, options):
+    sample = texture((13, 7), 3)
+    given = {"alpha": 0.6, "beta": 0.5} | options
+    image, output = run(sample, (26, 14), **given)
+    again, other = run(sample, (26, 14), device=opencl(any_device), **given)
+    assert_same_bits(again, image)
+    assert same_places(output, other)
+    for ours, theirs in zip(output.stages, other.stages, strict=True):
+        assert_same_bits(ours.image, theirs.image)
+
+
+def test_without_phase_is_another_picture():
+    sample = texture((16, 16))
+    match, free = (run(sample, (20, 24), phase=phase)[0] for phase in ("match", "free"))
+    assert (match != free).mean() > 0.1
+
+
+# -- alpha, beta and thresholds -------------------------------------------------------------------------------
+
+
+ALPHAS = [0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.3, 2.0, 4.0, INF]
+
+
+def test_candidates_grow_with_alpha():
+    sample = texture((24, 20), seed=3)
+    counts = [run(sample, (31, 29), alpha=alpha, levels=3)[1].stages[1].candidates for alpha in ALPHAS]
+    for fewer, more in itertools.pairwise(counts):
+        assert (fewer <= more).all(), "pixel by pixel where the levels above are the same"
+    assert counts[0].mean() < counts[5].mean() < counts[-1].mean()
+
+
+@pytest.mark.parametrize("phase", ["match", "free"])
+def test_candidates_grow_with_alpha_at_every_level(phase):
+    sample = texture((12, 14))
+    found = analyse(REFERENCE, sample[..., None])
+    begins = np.cumsum([0, *(math.prod(size) for size in found.shapes)])
+    lattice = np.array([(*size, begin, 0) for size, begin in zip(found.shapes, begins, strict=False)], np.int32)
+    nodes = lattice - [[0, 0, begins[1], 0]]
+    before = np.zeros(begins[-1])
+    for alpha in ALPHAS:
+        table = multires.thresholds(found.levels, multires.make_options(alpha=alpha), alpha)
+        structure = Structure(found.features, multires.differences(found, table), nodes)
+        counts = np.ones((begins[-1], 2), np.int32)
+        for level, size in enumerate(found.shapes[:-1]):  # all of it is the sample itself
+            source = np.concatenate([np.arange(math.prod(size), dtype=np.int32) for size in found.shapes])
+            sampled = Sampled(source, counts, lattice)
+            candidates(REFERENCE, structure, sampled, level, 0, math.prod(size), phase == "match", 1)
+        assert (counts[:, 0] >= before).all()
+        before = counts[:, 0]
+
+
+@pytest.mark.parametrize("beta", [0, 0.5, 1, 2.5])
+@pytest.mark.parametrize("levels", [2, 5, 9])
+def test_thresholds_are_alpha_over_the_number_of_the_level_from_the_top(levels, beta):
+    table = multires.thresholds(levels, multires.make_options(alpha=0.3, beta=beta), 0.3)
+    assert len(table) == levels
+    expected = [0.3 / (levels - level) ** beta for level in range(1, levels)]
+    assert np.array_equal(table[1:, 0].astype(np.float32), np.float32(expected))
+    assert table[-1] == 0.3
+
+
+def test_a_table_that_says_what_alpha_and_beta_do_gives_the_same():
+    sample = texture((13, 14))
+    for beta in (0, 1):
+        image, output = run(sample, (20, 22), alpha=0.7, beta=beta)
+        rows = [0.7 / k**beta for k in range(1, 4 + 1)]
+        for table in (rows, tuple(rows), np.array(rows)[:, None], np.tile(np.array(rows)[:, None], 9)):
+            same, other = run(sample, (20, 22), thresholds=table)
+            assert_same_bits(same, image)
+            assert same_places(output, other)
+
+
+def test_the_first_row_of_a_table_is_the_lowest_frequency():
+    sample = texture((12, 12))
+    _, output = run(sample, (12, 12), levels=3, thresholds=[INF, 0])
+    assert (output.stages[1].candidates == 9).all(), "every node of the top"
+    assert (output.stages[2].candidates == 1).all()
+    _, output = run(sample, (12, 12), levels=3, thresholds=[0, INF])
+    assert (output.stages[1].candidates == 1).all()
+    assert (output.stages[2].candidates == 4).all(), "all the children of one node of the top"
+
+
+def test_a_column_of_a_table_is_a_feature():
+    sample, free = texture((12, 12)), [INF] * 9
+    counts = [run(sample, (12, 12), levels=2, thresholds=[free])[1].stages[1].candidates]
+    for column in range(9):
+        row = [0.01 if m == column else INF for m in range(9)]
+        counts.append(run(sample, (12, 12), levels=2, thresholds=[row])[1].stages[1].candidates)
+    assert (counts[0] == 36).all()
+    assert all((c < 36).any() and c.min() >= 1 for c in counts[1:])
+    assert len({c.tobytes() for c in counts}) == 10
+
+
+# -- contrast and constants -----------------------------------------------------------------------------------
+
+
+DARK = texture((13, 12)) // 2
+SCALED = {
+    "uint8 + 100": DARK + 100,
+    "uint8 * 2 + 1": DARK * 2 + 1,
+    "uint16": DARK.astype(np.uint16) * 257 + 3,
+    "int16, negative": DARK.astype(np.int16) * 7 - 3000,
+    "int64": DARK.astype(np.int64) * 2**40 - 2**50,
+    "float32": DARK.astype(np.float32) * np.float32(2**-9) - np.float32(0.5),
+    "float64": DARK * 0.1 - 7.3,
+    "float64, large": DARK * 1e300,
+}
+
+
+@pytest.mark.parametrize("name", SCALED)
+def test_neither_contrast_nor_a_constant_changes_an_arrangement(name):
+    for options in ({}, {"alpha": 0.8, "beta": 1}, {"phase": "free", "boundary": "open", "alpha": "auto"}):
+        _, output = run(DARK, (20, 22), **options)
+        image, other = run(SCALED[name], (20, 22), **options)
+        assert image.dtype == SCALED[name].dtype
+        assert same_places(output, other)
+        assert output.statistics["options"]["alpha"] == other.statistics["options"]["alpha"]
+
+
+# -- colour ---------------------------------------------------------------------------------------------------
+
+
+def test_equal_channels_are_as_good_as_one():
+    grey = texture((13, 12))
+    image, output = run(grey, (20, 22), alpha=0.6)
+    for count, features in [(1, "luminance"), (1, "channels"), (2, "channels"), (3, "channels"), (3, "luminance")]:
+        many, other = run(np.repeat(grey[..., None], count, -1), (20, 22), alpha=0.6, features=features)
+        assert same_places(output, other)
+        assert_same_bits(many, np.ascontiguousarray(np.repeat(image[..., None], count, -1)))
+
+
+def test_the_features_of_channels_are_more_to_agree_in_than_those_of_the_luminance():
+    sample = texture((16, 16), 3)
+    counts = [run(sample, (32, 32), alpha=1.0, levels=3, features=f)[1] for f in ("luminance", "channels")]
+    luminance, channels = (output.stages[1].candidates.mean() for output in counts)
+    assert 1 <= channels < luminance
+
+
+def test_luminance_sees_nothing_of_a_texture_of_equal_luminance():
+    t = np.random.default_rng(2).integers(0, 23, (16, 16))
+    red, green = 46871 * t, 13933 * (22 - t)  # 0.2126 R + 0.7152 G is the same everywhere
+    sample = np.stack([red, green, np.full((16, 16), 2**20)], -1).astype(np.int32)
+    _, blind = run(sample, (32, 32), alpha=0)
+    assert (blind.stages[-1].candidates == 64).all(), "all there are"
+    _, seeing = run(sample, (32, 32), alpha=0, features="channels")
+    assert (seeing.stages[-1].candidates == 1).all()
+    assert np.array_equal(seeing.source, tiling((32, 32), (16, 16)))
+
+
+# -- suggest_alpha --------------------------------------------------------------------------------------------
+
+
+def mean_candidates(found, alpha, beta, phase):
+    """Candidates of the sample's own pixels, averaged over each level but the top and then over these."""
+    table = [[alpha / k**beta] for k in range(1, found.levels)]
+    similar, means = alike(found, 9, table), []
+    together = np.ones((1, 1), bool)
+    for level in reversed(range(found.levels - 1)):
+        above = np.indices(found.shapes[level + 1]).reshape(2, -1)
+        if level + 1 < found.levels - 1:  # their parents are similar too
+            parent = above[0] // 2 * found.shapes[level + 2][1] + above[1] // 2
+            together = together[np.ix_(parent, parent)] & similar[level + 1]
+        else:
+            together = similar[level + 1]
+        row, col = np.indices(found.shapes[level]).reshape(2, -1)
+        parent = row // 2 * found.shapes[level + 1][1] + col // 2
+        means.append(together[parent][:, parent if phase == "free" else slice(None)].sum(1).mean())
+    return np.mean(means)
+
+
+@pytest.mark.parametrize(
+    ("size", "options"),
+    [
+        ((12, 11), {}),
+        ((12, 11), {"beta": 1, "target": 1.26}),
+        ((16, 16), {"phase": "free", "target": 6.0}),
+        ((16, 16), {"boundary": "open", "target": 1.5}),
+        ((9, 5), {"levels": 3, "target": 2.0}),
+    ],
+    ids=str,
+)
+def test_a_suggested_alpha_is_the_least_that_reaches_the_target(size, options):
+    sample = texture(size)
+    alpha = simdtex.suggest_alpha(sample, device=REFERENCE, **options)
+    assert alpha == round(alpha * 100) / 100
+    assert 0.01 < alpha < 4
+    bearing = {name: value for name, value in options.items() if name in ("boundary", "levels")}
+    found = analyse(REFERENCE, sample[..., None], **bearing)
+    rest = options.get("beta", 0), options.get("phase", "match")
+    target = options.get("target", 1.2)
+    less = round(alpha * 100 - 1) / 100
+    assert mean_candidates(found, less, *rest) < target <= mean_candidates(found, alpha, *rest)

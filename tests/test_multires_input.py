@@ -1,0 +1,498 @@
+"""De Bonet's method as users see it: what it takes, what it says along the way, and what it refuses."""
+
+import logging
+import math
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, opencl, texture
+
+import simdtex
+from simdtex.machine.reference import Reference
+from simdtex.methods import multires
+
+INF = math.inf
+
+
+def synthesize(sample, shape, **options):
+    """An image; the last axis of a sample of three holds the channels."""
+    given = {"rng": 1, "device": REFERENCE, "channel_axis": -1 if np.ndim(sample) == 3 else None} | options
+    return simdtex.synthesize(sample, shape, method="multires", **given)
+
+
+def run(sample, shape, **options):
+    """Image and output."""
+    return synthesize(sample, shape, full_output=True, **options)
+
+
+def tiled(sample, shape):
+    """The beginning of so many repetitions of a sample as fill a shape."""
+    row, col = (np.arange(n) % m for n, m in zip(shape, sample.shape, strict=False))
+    return sample[np.ix_(row, col)]
+
+
+def halved(n, tile, times):
+    """Pixels in a line at a level of an output that is made of tiles: each is halved and rounded up on its own."""
+    whole, rest = divmod(n, tile)
+    for _ in range(times):
+        tile, rest = -(-tile // 2), -(-rest // 2)
+    return whole * tile + rest
+
+
+# -- samples and sizes ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", [np.bool_, np.uint8, np.int8, np.uint16, np.int32, np.int64, np.float16, np.float64])
+@pytest.mark.parametrize("alpha", [0.5, INF])
+def test_the_type_is_the_samples_and_pixels_stay_in_its_range(dtype, alpha):
+    sample = texture((13, 7), dtype=dtype)
+    image = synthesize(sample, (20, 17), alpha=alpha)
+    assert (image.dtype, image.shape) == (sample.dtype, (20, 17))
+    if dtype not in (np.bool_, np.uint8):  # whose pixels are all legal
+        assert sample.min() <= image.min() <= image.max() <= sample.max()
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2, -1, -2, -3])
+def test_the_channel_axis_is_kept(axis):
+    last = texture((9, 10), 3)
+    image, output = run(np.moveaxis(last, -1, axis), (12, 17), channel_axis=axis)
+    expected, other = run(last, (12, 17))
+    assert_same_bits(np.ascontiguousarray(np.moveaxis(image, axis, -1)), expected)
+    for ours, theirs in zip(output.stages, other.stages, strict=True):
+        assert np.array_equal(np.moveaxis(ours.image, axis, -1), theirs.image)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 40), (40, 1), (3, 2), (70, 45), (np.int64(4), 4)], ids=str)
+@pytest.mark.parametrize("boundary", ["torus", "open"])
+def test_any_size(shape, boundary):
+    for phase in ("match", "free"):
+        image, output = run(texture((13, 7)), shape, boundary=boundary, phase=phase)
+        assert image.shape == shape
+        assert output.source.shape == (*shape, 2)
+        assert (output.source < [13, 7]).all()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 5), (5, 1), (2, 2), (3, 3), (4, 4)], ids=str)
+def test_a_sample_too_small_for_the_filters_works_and_says_so(size, caplog):
+    sample = texture(size, 3)
+    for options in ({"alpha": 0}, {}, {"alpha": "auto", "phase": "free"}, {"boundary": "open", "alpha": INF}):
+        caplog.clear()
+        image, output = run(sample, (10, 15), **options)
+        assert image.shape == (10, 15, 3)
+        assert min(stage.candidates.min() for stage in output.stages) >= 1
+        [told] = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+        assert f"{size[0]} rows x {size[1]} columns" in told and "3 x 3" in told
+    image = synthesize(sample, (3 * size[0], 2 * size[1]), alpha=0)
+    assert_same_bits(image, np.tile(sample, (3, 2, 1)))
+
+
+@pytest.mark.parametrize(("size", "side"), [((5, 6), 3), ((9, 9), 5), ((8, 40), 5)], ids=str)
+def test_the_filters_fit_where_the_level_above_the_finest_is_as_large(size, side, caplog):
+    synthesize(texture(size), (10, 10), filter_size=side)
+    assert bool(caplog.records) == (min(size) == 8), "4 x 20 holds no filter of 5 x 5"
+
+
+def test_no_filters_are_missed_where_none_are_wanted(caplog):
+    synthesize(texture((4, 4)), (10, 10), orientations=0)
+    assert not caplog.records
+
+
+def test_a_constant_sample_gives_a_constant():
+    for dtype in (np.uint8, np.uint16, np.float64, np.bool_):
+        for options in ({"alpha": 0}, {"alpha": INF}, {"alpha": "auto"}):
+            image, output = run(np.ones((6, 7), dtype), (9, 20), **options)
+            assert_same_bits(image, np.ones((9, 20), dtype))
+            assert (output.stages[-1].candidates == 12).all(), "nothing tells one node from another"
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1.0, 1e300, 8e307])
+def test_float_pixels_of_any_magnitude(scale):
+    sample = texture((9, 10), dtype=np.float64) * scale
+    assert_same_bits(synthesize(sample, (18, 10), alpha=0), np.tile(sample, (2, 1)))
+    image = synthesize(sample, (18, 10), alpha=INF)
+    assert sample.min() <= image.min() < image.max() <= sample.max()
+
+
+@pytest.mark.parametrize("dtype", [np.int64, np.uint64, np.int8])
+def test_integer_pixels_of_any_magnitude(dtype):
+    bounds = np.iinfo(dtype)
+    sample = texture((9, 10), dtype=dtype)
+    sample[4, 4:6] = bounds.min, bounds.max
+    assert_same_bits(synthesize(sample, (18, 10), alpha=0), np.tile(sample, (2, 1)))
+    assert synthesize(sample, (18, 10), alpha=INF).dtype == dtype
+
+
+# -- seeds ----------------------------------------------------------------------------------------------------
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_others():
+    sample = texture((13, 12))
+    first, again, *others = (synthesize(sample, (20, 21), alpha=1.0, rng=s) for s in (5, 5, 6, 5 + 2**32, 5 + 2**63))
+    assert_same_bits(first, again)
+    assert len({image.tobytes() for image in (first, *others)}) == 4
+
+
+def test_a_generator_is_asked_for_a_seed_and_no_seed_is_a_fresh_one():
+    sample, shape = texture((13, 12)), (20, 21)
+    one, two = (synthesize(sample, shape, alpha=1.0, rng=np.random.default_rng(3)) for _ in range(2))
+    assert_same_bits(one, two)
+    image, output = run(sample, shape, alpha=1.0, rng=None)
+    assert_same_bits(synthesize(sample, shape, alpha=1.0, rng=output.statistics["seed"]), image)
+    assert (synthesize(sample, shape, alpha=1.0, rng=None) != image).any()
+
+
+# -- levels, stages and statistics ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shape", [(13, 7), (20, 30), (5, 3)], ids=str)
+@pytest.mark.parametrize("boundary", ["torus", "open"])
+def test_one_level_is_a_tiling(shape, boundary):
+    sample = texture((13, 7), 3, np.float32)
+    image, output = run(sample, shape, levels=1, boundary=boundary, alpha=INF)
+    assert_same_bits(image, tiled(sample, shape))
+    [stage] = output.stages
+    assert (stage.candidates == 1).all()
+    assert_same_bits(synthesize(sample, shape, levels=1, alpha="auto"), image)
+
+
+@pytest.mark.parametrize(
+    ("size", "most"), [((13, 7), 5), ((1, 1), 1), ((1, 5), 4), ((64, 2), 7), ((65, 3), 8), ((16, 16), 5)], ids=str
+)
+def test_the_most_levels_that_are_named_work_and_one_more_does_not(size, most):
+    sample = texture(size)
+    for levels in (most + 1, 1000):
+        with pytest.raises(ValueError, match=f"levels={levels} is too many for this sample; give at most {most}$"):
+            synthesize(sample, (9, 9), levels=levels)
+    image, output = run(sample, (9, 9), levels=most)
+    assert len(output.stages) == most
+    assert_same_bits(synthesize(sample, (9, 9)), image)
+
+
+@pytest.mark.parametrize("size", [(13, 7), (16, 8), (3, 20)], ids=str)
+@pytest.mark.parametrize("shape", [(20, 17), (39, 21), (2, 50)], ids=str)
+@pytest.mark.parametrize("levels", [None, 2])
+def test_the_stages_are_the_levels_of_every_tile_coarsest_first(size, shape, levels):
+    sample = texture(size, 2, np.uint16)
+    image, output = run(sample, shape, levels=levels)
+    count = levels or 1 + math.ceil(math.log2(max(size)))
+    assert [stage.level for stage in output.stages] == list(reversed(range(count)))
+    for stage in output.stages:
+        own = tuple(halved(n, m, stage.level) for n, m in zip(shape, size, strict=True))
+        assert (stage.image.shape, stage.image.dtype) == ((*own, 2), np.uint16)
+        assert (stage.source.shape, stage.source.dtype) == ((*own, 2), np.int32)
+        assert stage.candidates.shape == own
+        assert np.issubdtype(stage.candidates.dtype, np.integer)
+    assert_same_bits(output.stages[-1].image, image)
+    assert_same_bits(output.stages[-1].source, output.source)
+    assert output.temperature is None
+
+
+@pytest.mark.parametrize("alpha", [0.5, INF, "auto"])
+def test_the_statistics_count_what_was_done(alpha):
+    sample = texture((13, 7))
+    _, output = run(sample, (20, 17), alpha=alpha, rng=7)
+    told = output.statistics
+    assert (told["device"], told["seed"], told["device_seconds"]) == (REFERENCE.name, 7, None)
+    assert set(told["options"]) == {option.name for option in fields(multires.Options)}
+    expected = simdtex.suggest_alpha(sample, device=REFERENCE) if alpha == "auto" else alpha
+    assert told["options"]["alpha"] == expected
+    assert told["options"]["levels"] == 5
+    assert [level["level"] for level in told["levels"]] == [4, 3, 2, 1, 0]
+    nodes = [0, 1, 1 + 2, 1 + 2 + 8, 1 + 2 + 8 + 28]
+    assert [level["nodes"] for level in told["levels"]] == nodes
+    for level, stage in zip(told["levels"], output.stages, strict=True):
+        assert (level["rows"], level["cols"]) == stage.candidates.shape
+        assert level["most"] == stage.candidates.max()
+        assert level["candidates"] == stage.candidates.mean()
+        if alpha == INF:
+            assert level["compared"] == level["nodes"]
+        assert stage.level == 4 or 1 <= level["compared"] <= level["nodes"]
+        assert level["seconds"] >= 0
+    assert told["seconds"] >= sum(level["seconds"] for level in told["levels"])
+
+
+def test_the_statistics_tell_the_table_that_stood_for_alpha():
+    table = [[0.1], [0.2], [0.3], [0.4]]
+    for given in (table, np.array(table)):
+        _, output = run(texture((13, 7)), (9, 9), thresholds=given)
+        told = output.statistics["options"]
+        assert (told["alpha"], told["thresholds"]) == (None, table)
+
+
+# -- callbacks ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("axis", [None, 0])
+def test_progress_tells_every_piece_of_every_level(axis, monkeypatch):
+    last = texture((13, 7), None if axis is None else 3)
+    sample, seen = last if axis is None else np.moveaxis(last, -1, axis), []
+
+    def look(progress):
+        seen.append((progress, progress.image(), progress.candidates()))
+
+    whole, output = run(sample, (40, 30), channel_axis=axis)
+    monkeypatch.setattr(multires, "LAUNCH", 1)  # so that levels come in pieces
+    image = synthesize(sample, (40, 30), channel_axis=axis, callback=look)
+    assert_same_bits(image, whole)
+    fractions = [progress.fraction for progress, *_ in seen]
+    assert fractions == sorted(fractions)
+    assert fractions[0] > 0
+    assert fractions[-1] == 1
+    ends = [progress.level for progress, *_ in seen if progress.end_of_level]
+    assert ends == [4, 3, 2, 1, 0], "one end for each"
+    assert len(seen) > 2 * len(ends)
+    stages = {stage.level: stage for stage in output.stages}
+    for progress, picture, candidates in seen:
+        assert progress.levels == 5
+        shown = stages[progress.level + (not progress.end_of_level)]  # else the level before
+        assert_same_bits(picture, shown.image)
+        assert_same_bits(candidates, shown.candidates)
+        assert progress.doing == f"level {progress.level}"
+        assert progress.stage == (progress.doing.replace(" ", "") if progress.end_of_level else None)
+        [marks] = progress.maps().values()
+        assert marks.shape == candidates.shape and 0 <= marks.min() <= marks.max() <= 1
+
+
+@pytest.mark.parametrize("options", [{}, {"levels": 1}, {"alpha": "auto"}], ids=str)
+def test_progress_ends_at_1_and_a_callback_changes_nothing(options):
+    sample, seen = texture((13, 7)), []
+    image = synthesize(sample, (20, 17), callback=seen.append, **options)
+    assert (seen[-1].level, seen[-1].end_of_level, seen[-1].fraction) == (0, True, 1)
+    assert_same_bits(seen[-1].image(), image)
+    assert_same_bits(synthesize(sample, (20, 17), **options), image)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
+def test_what_a_callback_raises_gets_through_and_the_next_run_works(error, any_device):
+    sample, machine, calls = texture((13, 7), 3), opencl(any_device), []
+    before = synthesize(sample, (26, 14), device=machine)
+
+    def interrupt(progress):
+        calls.append(progress)
+        if len(calls) == 3:
+            raise error("enough")
+
+    with pytest.raises(error, match="enough"):
+        synthesize(sample, (26, 14), device=machine, callback=interrupt)
+    assert len(calls) == 3
+    assert_same_bits(synthesize(sample, (26, 14), device=machine), before)
+
+
+# -- memory ---------------------------------------------------------------------------------------------------
+
+
+class Asked(Reference):
+    """A machine that notes what memory it is asked for, and has only so much."""
+
+    def __init__(self, most=INF):
+        super().__init__()
+        self.sizes, self.most = [], most
+
+    def require(self, size):
+        self.sizes.append(size)
+        if size > self.most:
+            raise simdtex.DeviceError("too little memory")
+
+
+@pytest.mark.parametrize("channels", [None, 3])
+def test_memory_grows_with_the_output_and_with_nothing_else(channels):
+    sample, asked = texture((13, 7), channels), {}
+    for cols in (10, 20, 30, 70):
+        for options in ({"alpha": 0}, {"alpha": INF}, {"alpha": INF, "phase": "free"}):
+            machine = Asked()
+            synthesize(sample, (40, cols), device=machine, **options)
+            asked.setdefault(cols, set()).add(tuple(machine.sizes))
+    assert all(len(sizes) == 1 for sizes in asked.values()), "whatever the candidates"
+    analysis, synthesis = zip(*(sizes.pop() for sizes in asked.values()), strict=True)
+    assert len(set(analysis)) == 1
+    steps = np.diff(synthesis) / np.diff(list(asked)) / 40
+    assert (steps == 20 + 7 * (channels or 1)).all(), "bytes for each pixel"
+
+
+def test_too_little_memory_ends_a_run_before_anything_is_sampled():
+    calls, machine = [], Asked(200_000)
+    with pytest.raises(simdtex.DeviceError, match="too little memory"):
+        synthesize(texture((13, 7)), (400, 300), device=machine, callback=calls.append)
+    assert not calls
+
+
+@pytest.mark.parametrize("shape", [(2**31, 2**31), (1, 2**31), (2**70, 1), (2**16, 2**15)], ids=str)
+def test_an_output_beyond_32_bits_is_refused_before_any_sampling(shape, monkeypatch):
+    def never(*_):
+        raise AssertionError("sampled")
+
+    monkeypatch.setattr(multires, "candidates", never)
+    with pytest.raises(ValueError, match=f"{shape[0]} rows x {shape[1]} columns is beyond .*; give a smaller size"):
+        synthesize(texture((13, 7)), shape)
+
+
+# -- suggest_alpha --------------------------------------------------------------------------------------------
+
+
+def test_a_suggested_alpha_grows_with_the_target_between_its_ends():
+    sample = texture((12, 11))
+    targets = [1, 1.01, 1.1, 1.2, 1.5, 2, 3, 5, 8, 1e9]
+    alphas = [simdtex.suggest_alpha(sample, target=target, device=REFERENCE) for target in targets]
+    assert alphas == sorted(alphas)
+    assert alphas[0] == 0.01
+    assert alphas[-1] == 4
+    assert len(set(alphas)) > 5
+
+
+def test_a_suggested_alpha_of_a_sample_of_one_level_or_one_value_is_the_least():
+    for sample in (texture((1, 1)), np.ones((9, 9))):
+        assert simdtex.suggest_alpha(sample, target=2, device=REFERENCE) == 0.01
+    assert simdtex.suggest_alpha(texture((9, 9)), levels=1, device=REFERENCE) == 0.01
+
+
+def test_a_device_suggests_the_same_alpha(any_device):
+    sample = texture((13, 7), 3)
+    ours, theirs = (simdtex.suggest_alpha(sample, channel_axis=-1, device=d) for d in (REFERENCE, opencl(any_device)))
+    assert ours == theirs
+
+
+@pytest.mark.parametrize("axis", [None, 0])
+def test_automatic_alpha_is_the_suggested_one(axis):
+    sample = texture((12, 11), None if axis is None else 3)
+    given = sample if axis is None else np.moveaxis(sample, -1, axis)
+    options = {"target": 1.4, "beta": 0.5, "orientations": 2, "channel_axis": axis}
+    alpha = simdtex.suggest_alpha(given, device=REFERENCE, **options)
+    image, output = run(given, (13, 15), alpha="auto", **options)
+    assert output.statistics["options"]["alpha"] == alpha
+    same, other = run(given, (13, 15), alpha=alpha, **options)
+    assert_same_bits(same, image)
+    assert_same_bits(other.source, output.source)
+
+
+# -- what it refuses ------------------------------------------------------------------------------------------
+
+
+SAMPLE = texture((13, 7))
+FLOAT = texture((13, 7), dtype=np.float64)
+UNKNOWN = (
+    "unknown option '{}' of the method 'multires'; choose from: alpha, beta, target, thresholds, orientations, sigma, "
+    "filter_size, features, levels, phase, boundary"
+)
+
+
+def with_value(value):
+    sample = FLOAT.copy()
+    sample[4, 5] = value
+    return sample
+
+
+BAD = [
+    # the sample
+    ({"sample": with_value(np.nan)}, ValueError, "NaN|not finite"),
+    ({"sample": with_value(-np.inf)}, ValueError, "infinite|not finite"),
+    ({"sample": np.zeros((0, 5), np.uint8)}, ValueError, "empty"),
+    ({"sample": SAMPLE.astype(complex)}, TypeError, "real"),
+    ({"sample": SAMPLE.astype(str)}, TypeError, "convert it"),
+    ({"sample": [[1, 2], [3]]}, ValueError, "ragged: give rows of equal length"),
+    ({"sample": texture((9, 9), 3)}, ValueError, "or channel_axis=-1 if its last axis holds the channels"),
+    ({"channel_axis": -1}, ValueError, "give three axes"),
+    # the size
+    ({"shape": (0, 5)}, ValueError, "rows of the output is 0; give 1 or more"),
+    ({"shape": (5, -1)}, ValueError, "columns of the output is -1; give 1 or more"),
+    ({"shape": (5.0, 5)}, TypeError, "rows of the output must be a whole number"),
+    # the options
+    ({"alpha": -1}, ValueError, "alpha is -1; give a number of at least 0"),
+    ({"alpha": -math.inf}, ValueError, "alpha is -inf; give a number of at least 0"),
+    ({"alpha": math.nan}, ValueError, "alpha is nan; give a number of at least 0"),
+    ({"alpha": "x"}, ValueError, "alpha is 'x'; give a number of at least 0, or 'auto'"),
+    ({"alpha": True}, TypeError, "alpha must be a number, not True"),
+    ({"alpha": [0.1, 0.2]}, TypeError, "alpha must be a number"),
+    ({"beta": -0.5}, ValueError, "beta is -0.5; give a number of at least 0"),
+    ({"beta": math.inf}, ValueError, "beta is inf; give a number of at least 0"),
+    ({"beta": math.nan}, ValueError, "beta is nan; give a number of at least 0"),
+    ({"beta": "1"}, TypeError, "beta must be a number, not '1'"),
+    ({"target": 0.5}, ValueError, "target is 0.5; give a number of at least 1"),
+    ({"target": math.inf}, ValueError, "target is inf; give a number of at least 1"),
+    ({"target": None}, TypeError, "target must be a number, not None"),
+    ({"orientations": -1}, ValueError, "orientations is -1; give 0 or more"),
+    ({"orientations": 2.5}, TypeError, "orientations must be a whole number, not 2.5"),
+    ({"sigma": 0}, ValueError, "sigma is 0; give a number above 0"),
+    ({"sigma": -0.7}, ValueError, "sigma is -0.7; give a number above 0"),
+    ({"sigma": math.inf}, ValueError, "sigma is inf; give a number above 0"),
+    ({"sigma": "wide"}, TypeError, "sigma must be a number, not 'wide'"),
+    ({"filter_size": 4}, ValueError, "filter_size is 4; give an odd number, 3 or 5"),
+    ({"filter_size": 1}, ValueError, "filter_size is 1; give 3 or more"),
+    ({"filter_size": 2.0}, TypeError, "filter_size must be a whole number, not 2.0"),
+    ({"phase": "both"}, ValueError, "unknown phase 'both'; choose one of: match, free"),
+    ({"features": "hue"}, ValueError, "unknown features 'hue'; choose one of: luminance, channels"),
+    ({"boundary": "mirror"}, ValueError, "unknown boundary 'mirror'; choose one of: torus, open"),
+    ({"levels": 0}, ValueError, "levels is 0; give 1 or more"),
+    ({"levels": 2.0}, TypeError, "levels must be a whole number, not 2.0"),
+    ({"levels": "all"}, TypeError, "levels must be a whole number, not 'all'"),
+    ({"levels": 6}, ValueError, "levels=6 is too many for this sample; give at most 5"),
+    # thresholds
+    ({"thresholds": [[0.1], [0.1, 0.2]]}, TypeError, "an array of numbers, its rows of equal length"),
+    ({"thresholds": ["a", "b", "c", "d"]}, TypeError, "an array of numbers"),
+    ({"thresholds": "low"}, TypeError, "an array of numbers"),
+    ({"thresholds": [0.1, 0.2, -0.3, 0.4]}, ValueError, "thresholds must be numbers of at least 0"),
+    ({"thresholds": [0.1, 0.2, math.nan, 0.4]}, ValueError, "thresholds must be numbers of at least 0"),
+    ({"thresholds": np.ones((4, 9, 1))}, ValueError, r"shape \(4, 9, 1\); give one row for each level but the finest"),
+    ({"thresholds": []}, ValueError, r"shape \(0,\); give one row for each level but the finest"),
+    ({"thresholds": [[]] * 4}, ValueError, r"shape \(4, 0\); give one row for each level but the finest"),
+    ({"thresholds": 0.3}, ValueError, r"shape \(\); give one row for each level but the finest"),
+    ({"thresholds": [0.3] * 4, "alpha": "auto"}, ValueError, "alpha is 'auto' and there are thresholds; give one of"),
+    ({"thresholds": [0.3] * 3}, ValueError, "thresholds has 3 rows; give one for .* but the finest, 4, or levels=4"),
+    # names, the seed and the device
+    ({"gamma": 1}, TypeError, UNKNOWN.format("gamma")),
+    ({"order": 8}, TypeError, UNKNOWN.format("order")),
+    ({"preset": "paper"}, TypeError, UNKNOWN.format("preset")),
+    ({"method": "multi"}, ValueError, "unknown method 'multi'; choose one of: mrf, multires"),
+    ({"rng": -1}, ValueError, r"give a whole number from 0 to 2\*\*64 - 1"),
+    ({"device": "no such device"}, simdtex.DeviceError, "choose one of: .*reference"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "error", "words"), BAD, ids=lambda v: None)
+def test_bad_input_is_refused_with_a_remedy(change, error, words):
+    arguments = {"sample": SAMPLE, "shape": (6, 7), "method": "multires", "rng": 1, "device": "reference"} | change
+    with pytest.raises(error, match=words) as caught:
+        simdtex.synthesize(arguments.pop("sample"), arguments.pop("shape"), **arguments)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 500
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"target": 0.99}, ValueError, "target is 0.99; give a number of at least 1"),
+        ({"order": 8}, TypeError, UNKNOWN.format("order")),
+        ({"levels": 6}, ValueError, "levels=6 is too many for this sample; give at most 5"),
+        ({"thresholds": [0.3] * 4}, ValueError, "give one of the two"),
+        ({"sample": with_value(np.nan)}, ValueError, "NaN|not finite"),
+    ],
+    ids=lambda v: None,
+)
+def test_suggest_alpha_refuses_bad_input_with_a_remedy(change, error, words):
+    arguments = {"sample": SAMPLE, "device": "reference"} | change
+    with pytest.raises(error, match=words):
+        simdtex.suggest_alpha(arguments.pop("sample"), **arguments)
+
+
+@pytest.mark.parametrize("rows", [3, 5, 7])
+@pytest.mark.parametrize("columns", [1, 9])
+def test_a_table_of_too_few_or_too_many_rows_is_told_the_right_number(rows, columns):
+    table = np.full((rows, columns), 0.3)
+    for levels in (None, 5):
+        with pytest.raises(ValueError, match=f"thresholds has {rows} rows; give one .* but the finest, 4"):
+            synthesize(SAMPLE, (9, 9), levels=levels, thresholds=table)
+    for levels in (2, 4, 5):
+        assert synthesize(SAMPLE, (9, 9), levels=levels, thresholds=[0.3] * (levels - 1)).shape == (9, 9)
+
+
+def test_a_table_of_the_wrong_width_is_told_the_right_one():
+    colour = texture((13, 7), 3)
+    for options, width in [
+        ({}, 9),
+        ({"orientations": 2}, 5),
+        ({"features": "channels"}, 27),
+        ({"features": "channels", "orientations": 1}, 9),
+    ]:
+        with pytest.raises(ValueError, match=f"thresholds has 4 columns; give 1, or {width}, one for each feature"):
+            synthesize(colour, (9, 9), thresholds=np.full((4, 4), 0.3), **options)
+        assert synthesize(colour, (9, 9), thresholds=np.full((4, width), 0.3), **options).shape == (9, 9, 3)

@@ -1,0 +1,253 @@
+"""The sample in whole numbers that do not depend on its contrast, and the way back."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from cases import assert_same_bits, texture
+from hypothesis import given
+from hypothesis import strategies as st
+from tolerances import CONTRAST
+
+from simdtex.stretched import LUMA, TOP, Stretched
+
+DTYPES = [np.bool_, np.uint8, np.int8, np.uint16, np.int16, np.int32, np.uint32, np.int64, np.uint64]
+FLOATS = [np.float16, np.float32, np.float64]
+dtypes = pytest.mark.parametrize("dtype", [*DTYPES, *FLOATS], ids=lambda dtype: dtype.__name__)
+
+
+def identity(shape):
+    return np.arange(shape[0] * shape[1], dtype=np.int32).reshape(shape)
+
+
+def limits(dtype):
+    """The least and the greatest number of a type."""
+    if dtype == np.bool_:
+        return False, True
+    info = np.iinfo(dtype) if np.issubdtype(dtype, np.integer) else np.finfo(dtype)
+    return info.min, info.max
+
+
+def extremes(dtype, seed=0, shape=(6, 5, 2)):
+    """A sample of all a type's range: its limits, what is beside them, and numbers between."""
+    low, high = limits(dtype)
+    rng = np.random.default_rng(seed)
+    if dtype == np.bool_:
+        return rng.random(shape) < 0.5
+    if np.issubdtype(dtype, np.integer):
+        pixels = rng.integers(low, high, shape, dtype, endpoint=True)
+    else:
+        pixels = ((rng.random(shape) - 0.5) * 2 * float(high)).astype(dtype)
+    pixels.flat[:4] = low, high, low + 1, high - 1
+    return pixels
+
+
+def steps(pixels):
+    """The same in fractions. Float64 rounds 64-bit pixels first, but none so near a half that it would matter."""
+    values = [Fraction(x) for x in pixels.astype(object).ravel()]
+    low, span = min(values), max(values) - min(values)
+    return np.array([round((x - low) * TOP / span) if span else 0 for x in values]).reshape(pixels.shape)
+
+
+# -- there ----------------------------------------------------------------------------------------------------
+
+
+@dtypes
+def test_a_sample_is_stretched_over_the_whole_scale(dtype):
+    pixels = extremes(dtype)
+    sample = Stretched(pixels)
+    assert (sample.planes.dtype, sample.planes.shape) == (np.int32, (2, 6, 5))
+    assert sample.planes.flags.c_contiguous
+    assert (sample.planes.min(), sample.planes.max()) == (0, TOP)
+    assert (sample.planes == np.moveaxis(steps(pixels), -1, 0)).all()
+    low, high = (Fraction(int(x) if dtype in DTYPES else float(x)) for x in limits(dtype))
+    assert abs(Fraction(sample.unit) * TOP / (high - low) - 1) < CONTRAST
+
+
+@pytest.mark.parametrize("value", [0, 7, 255])
+@dtypes
+def test_a_constant_sample_is_all_zero(dtype, value):
+    pixels = np.full((3, 4, 2), value).astype(dtype)
+    sample = Stretched(pixels)
+    assert not sample.planes.any()
+    assert sample.unit == 1
+    assert_same_bits(sample.picture(sample.planes), pixels)
+
+
+@pytest.mark.parametrize("value", [-np.finfo(np.float64).max, np.finfo(np.float64).max, 5e-324])
+def test_an_extreme_constant_is_a_constant(value):
+    sample = Stretched(np.full((2, 2, 1), value))
+    assert not sample.planes.any()
+    assert_same_bits(sample.picture(sample.planes), sample.pixels)
+
+
+@pytest.mark.parametrize("spread", [5e-324, 1e-320, 1e-318, 1.5e-317, 1e-316, 1e-310, 1e-300])
+def test_the_smallest_of_floats_do_no_harm(spread):
+    """Below about 1e-302 the unit has fewer bits, or none, and the scale is not used to its end."""
+    pixels = texture((5, 4), 1, np.float64)
+    pixels = (pixels - pixels.min()) / np.ptp(pixels) * spread
+    sample = Stretched(pixels)
+    assert sample.planes.min() == 0
+    assert sample.planes.max() < 2 * TOP
+    assert_same_bits(sample.picture(sample.planes, identity((5, 4))), pixels)
+
+
+def by_contrast(dtype):
+    """Pairs (a, b) with which a byte s goes to a s + b of a type exactly."""
+    if np.issubdtype(dtype, np.integer):
+        low, high = limits(dtype)
+        low, high = max(low, -(2**53)), min(high, 2**53)  # what float64 holds
+        factors = [a for a in (1, 2, 3, 100, 257, 10**6, 2**40) if 255 * a <= high - low]
+        return [(a, b) for a in factors for b in (low, -7, 0, 11, high - 255 * a) if low <= b <= high - 255 * a]
+    shifts = (-14, -3, 0, 5) if dtype == np.float16 else (-120, -3, 0, 80)
+    return [(2.0**e, b * 2.0**e) for e in shifts for b in (-300, -1, 0, 17, 1000)]
+
+
+@dtypes
+def test_contrast_and_a_constant_change_nothing(dtype):
+    byte = texture((7, 6), 3)
+    sample = Stretched(byte)
+    given = by_contrast(dtype) if dtype != np.bool_ else []
+    for a, b in given:
+        if np.issubdtype(dtype, np.integer):
+            pixels = (byte.astype(object) * a + b).astype(dtype)
+        else:
+            pixels = (byte.astype(np.float64) * a + b).astype(dtype)
+            assert (pixels.astype(np.float64) == byte * a + b).all(), "exactly so"
+        other = Stretched(pixels)
+        assert_same_bits(other.planes, sample.planes)
+        assert abs(other.unit / (a * sample.unit) - 1) < CONTRAST
+    two = Stretched(byte > 128)
+    assert_same_bits(two.planes, Stretched((byte > 128) * np.uint8(99)).planes)
+
+
+def test_bytes_in_float64_between_0_and_1_are_stretched_as_bytes():
+    """Also where a s + b is itself rounded: what it is rounded to is no tie's other side."""
+    byte = texture((9, 8), 3)
+    for a, b in ((1 / 255, 0.0), (0.1, -0.3), (1e300, 1e300), (1e-290, 0.0)):
+        assert_same_bits(Stretched(byte * a + b).planes, Stretched(byte).planes)
+
+
+# -- luminance ------------------------------------------------------------------------------------------------
+
+
+def test_the_shares_of_the_luminance_are_those_of_bt_709():
+    assert sum(LUMA) == 2**16
+    assert tuple(round(share * 2**16) for share in (0.2126, 0.7152, 0.0722)) == LUMA
+
+
+@pytest.mark.parametrize("channels", [1, 2, 3, 5])
+def test_the_luminance(channels):
+    sample = Stretched(texture((6, 7), channels, np.uint16))
+    luminance = sample.luminance
+    assert (luminance.dtype, luminance.shape) == (np.int32, (1, 6, 7))
+    shares = LUMA if channels == 3 else [2**16 // channels] * channels
+    for i, j in np.ndindex(6, 7):
+        values = sample.planes[:, i, j].tolist()
+        exact = sum(Fraction(share * value, 2**16) for share, value in zip(shares, values, strict=True))
+        assert luminance[0, i, j] == (exact + Fraction(1, 2)).__floor__()
+        if channels != 3:  # of 5 the shares are 1 / 2**16 short of 1
+            lost = Fraction(2**16 - sum(shares), 2**16) * TOP
+            assert -Fraction(1, 2) <= Fraction(sum(values), channels) - luminance[0, i, j] <= lost + Fraction(1, 2)
+
+
+def test_the_luminance_of_grey_is_grey():
+    grey = texture((6, 7), 1, np.uint16)
+    sample = Stretched(grey)
+    assert_same_bits(sample.luminance, sample.planes)
+    assert_same_bits(Stretched(np.repeat(grey, 3, -1)).luminance, sample.planes)
+    assert_same_bits(Stretched(np.repeat(grey, 2, -1)).luminance, sample.planes)
+
+
+# -- and back -------------------------------------------------------------------------------------------------
+
+
+@dtypes
+def test_a_picture_of_the_sample_itself_is_the_sample_to_the_bit(dtype):
+    pixels = extremes(dtype)
+    sample = Stretched(pixels)
+    assert_same_bits(sample.picture(sample.planes, identity((6, 5))), pixels)
+    source = np.random.default_rng(1).integers(0, 30, (4, 9)).astype(np.int32)
+    copied = sample.picture(sample.planes.reshape(2, -1)[:, source], source)
+    assert_same_bits(copied, pixels.reshape(30, 2)[source])
+
+
+@pytest.mark.parametrize("zero", [0.0, -0.0])
+def test_a_copied_zero_keeps_its_sign(zero):
+    pixels = np.array([[[zero], [1.0]]])
+    sample = Stretched(pixels)
+    assert_same_bits(sample.picture(sample.planes, identity((1, 2))), pixels)
+
+
+@pytest.mark.parametrize("dtype", DTYPES[:5], ids=lambda dtype: dtype.__name__)
+def test_values_alone_give_back_types_of_up_to_16_bits(dtype):
+    """The scale is finer than they are. This is what stages of coarser levels rest on."""
+    pixels = extremes(dtype)
+    sample = Stretched(pixels)
+    assert_same_bits(sample.picture(sample.planes), pixels)
+
+
+@pytest.mark.parametrize("dtype", FLOATS[1:], ids=lambda dtype: dtype.__name__)
+def test_values_alone_give_floats_to_half_a_unit(dtype):
+    pixels = texture((6, 5), 2, dtype)
+    sample = Stretched(pixels)
+    picture = sample.picture(sample.planes)
+    assert picture.dtype == dtype
+    off = abs(picture.astype(np.float64) - pixels)
+    assert off.max() <= sample.unit / 2 + np.finfo(dtype).eps * abs(pixels).max()
+
+
+@dtypes
+def test_values_beyond_the_scale_are_projected_onto_legal_pixels(dtype):
+    """0 to 255 for 8 bits without a sign; else between the sample's smallest and largest pixel."""
+    pixels = texture((6, 5), 2, dtype)
+    pixels = pixels // 3 if np.issubdtype(dtype, np.integer) else pixels
+    sample, source = Stretched(pixels), identity((6, 5))
+    low, high = (0, 255) if dtype == np.uint8 else (pixels.min(), pixels.max())
+    for origin in (None, source):
+        for value, legal in ((-(2**25), low), (-4 * TOP, low), (4 * TOP, high), (2**25, high)):
+            picture = sample.picture(np.full_like(sample.planes, value), origin)
+            assert picture.dtype == dtype
+            assert (picture == np.asarray(legal, dtype)).all()
+
+
+@pytest.mark.parametrize("dtype", [np.int64, np.uint64, np.float64], ids=lambda dtype: dtype.__name__)
+def test_extreme_values_are_projected_without_overflow(dtype):
+    """Float64 has no number between 2**63 - 1024 and 2**63, so the closest legal one that it has is meant."""
+    pixels = extremes(dtype)
+    sample, (low, high) = Stretched(pixels), limits(dtype)
+    for origin in (None, identity((6, 5))):
+        assert (sample.picture(np.full_like(sample.planes, -(2**25)), origin) == low).all()
+        most = sample.picture(np.full_like(sample.planes, 2**25), origin)
+        # Where the value is the source's own, the pixel stays as it is.
+        assert (most.astype(np.float64) >= float(high) * (1 - 2**-52)).all()
+        assert (most <= high).all()
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int16], ids=lambda dtype: dtype.__name__)
+@given(seed=st.integers(0, 2**16))
+def test_whole_pixels_are_the_closest_to_the_value(dtype, seed):
+    pixels = texture((5, 4), 1, dtype, seed % 7)
+    sample = Stretched(pixels)
+    rng = np.random.default_rng(seed)
+    values = rng.integers(-TOP, 2 * TOP, sample.planes.shape, np.int32, endpoint=True)
+    source = rng.integers(0, 20, (5, 4)).astype(np.int32)
+    own, planes = pixels.ravel(), sample.planes.ravel()
+    span = int(own.max()) - int(own.min())
+    low, high = (0, 255) if dtype == np.uint8 else (int(own.min()), int(own.max()))
+    alone, moved = sample.picture(values), sample.picture(values, source)
+    for i, value in enumerate(values.ravel().tolist()):
+        s = source.flat[i]
+        exact = int(own.min()) + Fraction(value * span, TOP)
+        assert alone.flat[i] == min(max(round(exact), low), high)
+        exact = int(own[s]) + Fraction((value - int(planes[s])) * span, TOP)
+        assert moved.flat[i] == min(max(round(exact), low), high)
+
+
+def test_a_truth_value_turns_at_the_middle():
+    pixels = texture((5, 4), 1, np.bool_)
+    sample = Stretched(pixels)
+    values = np.array([-TOP, 0, TOP // 2, TOP // 2 + 1, TOP, 3 * TOP], np.int32).reshape(1, 2, 3)
+    picture = sample.picture(values)
+    assert picture.dtype == np.bool_
+    assert picture.ravel().tolist() == [False, False, False, True, True, True]
