@@ -159,15 +159,15 @@ def test_the_form_of_a_launch_changes_no_bit_of_a_colour(cl_device, options):
     check("colour-gibbs-density", opencl(cl_device, **options))
 
 
-def test_the_work_group_changes_no_bit_of_multires(cl_device):
-    """It has no other form: its launches keep no distances."""
-    check("multires-colour", opencl(cl_device, work_group=3))
-
-
 def test_small_scratch_memory_makes_many_pieces(cl_device):
     """Else the test above would show nothing."""
     small, large = opencl(cl_device, scratch=5_000, vector=4), opencl(cl_device)
     assert small.chunk(150, 24, 1) < 10 < large.chunk(150, 24, 1)
+
+
+def test_the_work_group_changes_no_bit_of_multires(cl_device):
+    """It has no other form: its launches keep no distances."""
+    check("multires-colour", opencl(cl_device, work_group=3))
 
 
 def test_the_references_pieces_change_no_bit():

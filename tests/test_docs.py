@@ -17,8 +17,10 @@ from skimage import data
 
 import simdtex
 from simdtex import cli
+from simdtex.cli.common import given
 from simdtex.image import write
-from simdtex.methods.mrf import PRESETS, Options
+from simdtex.methods.mrf import PRESETS
+from simdtex.synthesis import METHODS
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -84,7 +86,7 @@ def test_python_runs(any_device, code, page):
 @pytest.mark.parametrize("line", commands(README))
 def test_readme_command_runs(any_device, material, line):
     words = shlex.split(small(line))
-    words += ["--order", "8"] if "synth" in words else []  # quicker
+    words += ["--order", "8"] if "synth" in words and "multires" not in words else []  # quicker
     words += ["--order", "4", "--seeds", "1"] if "schedules" in words else []
     words += ["--sweeps", "20", "--burn-in", "10"] if "ising" in words[1:2] else []
     environment = os.environ | {"SIMDTEX_DEVICE": str(any_device.index)}
@@ -107,8 +109,10 @@ def test_readme_command_runs(any_device, material, line):
 def test_documented_command_parses(page, line):
     _, command, *words = shlex.split(line)
     context = cli.main.commands[command].make_context(command, words)
-    valid = {name: value for name, value in context.params.items() if value is not None and hasattr(Options, name)}
-    Options(**valid)
+    method = context.params.get("method", "multires" if command == "sheet" else "mrf")
+    known = METHODS[method].Options.__dataclass_fields__
+    valid = {name: value for name, value in given(context.params).items() if name in known}
+    METHODS[method].make_options(**valid)
     assert context.params.get("preset") in (None, *PRESETS)
 
 
@@ -178,18 +182,20 @@ def test_every_option_of_the_command_line_is_documented(name):
         assert documented(name) == options
 
 
-def test_every_option_of_mrf_is_on_the_command_line_and_in_the_docstrings():
-    names = set(Options.__dataclass_fields__)
-    options = {p.name for p in cli.main.commands["synth"].params}
-    assert names <= options
-    described = set(re.findall(r"^    (\w+) : ", Options.__doc__, re.MULTILINE))
+@pytest.mark.parametrize("method", METHODS)
+def test_every_option_of_a_method_is_on_the_command_line_and_in_the_docstrings(method):
+    options = METHODS[method].Options
+    names = set(options.__dataclass_fields__)
+    assert names <= {p.name for p in cli.main.commands["synth"].params}
+    described = set(re.findall(r"^    (\w+) : ", options.__doc__, re.MULTILINE))
     assert described == names
-    assert names | {"preset"} <= set(re.findall(r"``(\w+)``", simdtex.synthesize.__doc__))
+    assert names <= set(re.findall(r"``(\w+)``", simdtex.synthesize.__doc__))
 
 
-def test_every_option_of_mrf_has_its_page():
+@pytest.mark.parametrize("method", METHODS)
+def test_every_option_of_a_method_has_its_page(method):
     page = (ROOT / "docs" / "reference" / "options.rst").read_text(encoding="utf-8")
-    assert set(Options.__dataclass_fields__) <= set(re.findall(r"``(\w+)``", page))
+    assert set(METHODS[method].Options.__dataclass_fields__) <= set(re.findall(r"``(\w+)``", page))
 
 
 def test_paper_preset_is_described():

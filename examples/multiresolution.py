@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Gravel by multiresolution sampling, at several thresholds: python multiresolution.py [FOLDER] [--size 256].
+
+The threshold alpha says how alike two places must be to be exchanged. sheet.png shows what it does, candidates.png among
+how many candidates each pixel of each level was drawn, brighter where there were more.
+"""
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from skimage import data
+
+import simdtex
+from simdtex.image import write
+from simdtex.report.sheet import contact_sheet, enlarged, heat, source_colours
+from simdtex.source_map import apply_source_map
+
+parser = argparse.ArgumentParser(description=__doc__)
+parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
+parser.add_argument("--size", type=int, default=256, help="side of the textures, twice that of the sample")
+args = parser.parse_args()
+folder = args.folder or Path(tempfile.mkdtemp(prefix="simdtex-"))
+folder.mkdir(exist_ok=True)
+
+shape = (args.size, args.size)
+gravel = data.gravel()[: args.size // 2, : args.size // 2]
+pictures = [("the sample", gravel)]
+for alpha in (0, 0.1, 0.2, 0.4, "auto"):
+    texture, output = simdtex.synthesize(gravel, shape, method="multires", alpha=alpha, rng=1, full_output=True)
+    used = output.statistics["options"]["alpha"]
+    finest = output.statistics["levels"][-1]
+    print(f"alpha {used:4}: {finest['candidates']:.2f} candidates, {finest['compared']:.0f} of {finest['nodes']} compared")
+    pictures.append((f"alpha {used:g}", texture))
+contact_sheet(pictures, folder / "sheet.png", columns=3)
+
+# The last of them, that of "auto", level by level; brightness is the logarithm of the number of candidates.
+most = np.log(max(2, max(stage.candidates.max() for stage in output.stages)))
+maps = [
+    (f"level {stage.level}", enlarged(heat(np.log(stage.candidates) / most), shape, 2**stage.level))
+    for stage in output.stages
+]
+contact_sheet(maps, folder / "candidates.png", columns=4)
+
+# Another map of the material follows its source map, which is shown in false colours.
+height = gravel.astype(np.uint16) * 257
+write(folder / "texture.png", texture)
+write(folder / "height.png", apply_source_map(output.source, height, gravel.shape))
+write(folder / "source.png", source_colours(output.source, gravel.shape))
+print(f"sheet.png, candidates.png, texture.png, height.png and source.png are in {folder}")
