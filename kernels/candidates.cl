@@ -104,7 +104,7 @@ __kernel void candidates(const ulong seed, const int level, const int top, const
         const int r = i / tile.x * above.x + (p >> up), c = j / tile.y * above.y + (q >> up);
         own.own[k] = above.z + source[there.z + r * there.y + c];
     }
-    int row, col, child, compared, again;
+    int row = 0, col = 0, child = 0, compared, again;
     const int count = scan(&own, INT_MAX, &row, &col, &child, &compared); // the size of C_i
     const uint4 bits = draw4(seed, level, 0, s, PURPOSE_DRAW, 0);
     scan(&own, below(bits.x, bits.y, count), &row, &col, &child, &again); // uniform, equation (12)

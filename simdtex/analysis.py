@@ -131,7 +131,7 @@ def analyse(
         energy.append(_energy(measured[-1]))
     residue = slice(None, None, 1 + len(taps))
     energy[-1][residue] = _energy(measured[-1][:, residue], about_mean=True)
-    if len(taps) and not any(fits[1:]):
+    if len(taps) and len(shapes) > 1 and not any(fits[1:]):
         _log.warning(
             "no level above the finest of a sample of %d rows x %d columns is as large as the filters, %d x %d: "
             "candidates are compared by their bands alone",

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from functools import partial
 from math import inf, prod
 from numbers import Real
 from time import perf_counter
@@ -254,47 +253,29 @@ def resample(
     7 channels per output pixel, beside the analysis; on the host about twice that.
     """
     began, worked = perf_counter(), machine.seconds
-    shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
-    total = pixels(shapes)
     _check_memory(machine, analysis, shape)
+    shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
     alpha = suggest_alpha(machine, analysis, options) if isinstance(options.alpha, str) else options.alpha
     structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
-    match = options.phase == "match"
+    record = _Record(shapes, callback)
+
     top = analysis.levels - 1
-    row, col = np.indices(shapes[top], np.int32) % np.array(analysis.shapes[top], np.int32)[:, None, None]
-    copied = (row * np.int32(analysis.shapes[top][1]) + col).ravel()  # the top level is copied, repeated to fill
-    sampled = _sampled(machine, shapes, [*(np.zeros(r * c, np.int32) for r, c in shapes[:top]), copied])
-    stages: list[Stage] = []
-    reports: list[dict[str, Any]] = []
-    picture, done = None, 0
-
-    def tell(level: int, sampled: int, ended: bool) -> None:
-        if callback:
-            last = stages[-1]  # already read back
-            now: dict[str, Any] = {"fraction": (done + sampled) / total, "end_of_level": ended}
-            now |= {"image": partial(getattr, last, "image"), "candidates": partial(getattr, last, "candidates")}
-            callback(Sampling(level=level, levels=analysis.levels, **now))
-
+    sampled = _copied(machine, shapes, analysis.shapes[top])
+    picture = None
     for level in reversed(range(analysis.levels)):  # Loop i from top level downto 0
-        level_began = perf_counter()
-        (rows, cols), begin, nodes = shapes[level], pixels(shapes[:level]), pixels(analysis.shapes[level + 1 :])
+        nodes = pixels(analysis.shapes[level + 1 :])
         if level < top:
             least = 1 + int(LAUNCH / (nodes * analysis.features.shape[1]))
-            for first, end in paced(rows * cols, least):  # Loop x', y': (9) to (12)
-                sampled = candidates(machine, structure, sampled, level, first, end, match, seed)
+            for first, end in paced(pixels([shapes[level]]), least):  # Loop x', y'
+                match = options.phase == "match"
+                sampled = candidates(machine, structure, sampled, level, first, end, match, seed)  # (9) to (12)
                 machine.sync()
-                tell(level, end, ended=False)
-        source, counts = (machine.get(a[begin : begin + rows * cols]) for a in (sampled.source, sampled.counts))
-        source, counts = source.reshape(rows, cols), counts.reshape(rows, cols, 2)
-        picture = _collapsed(machine, analysis, level, source, picture)
+                record.tell(level, end)
+        source, counts = _read(machine, sampled, shapes, level)
+        picture = _collapsed(machine, analysis, level, source, picture)  # CollapsePyramid
         image = analysis.sample.picture(machine.get(picture), source if level == 0 else None)
         place = np.stack(np.divmod(source, np.int32(analysis.shapes[level][1])), -1)
-        stages.append(Stage(level, image, place, np.ascontiguousarray(counts[..., 0])))
-        done += rows * cols
-        most, (mean, compared) = int(counts[..., 0].max()), counts.mean((0, 1)).tolist()
-        report = {"level": level, "rows": rows, "cols": cols, "candidates": mean, "most": most}
-        reports.append(report | {"nodes": nodes, "compared": compared, "seconds": perf_counter() - level_began})
-        tell(level, 0, ended=True)
+        record.end(Stage(level, image, place, np.ascontiguousarray(counts[..., 0])), counts, nodes)
 
     used: dict[str, Any] = {"alpha": alpha, "levels": analysis.levels}
     if options.thresholds is not None:
@@ -304,9 +285,43 @@ def resample(
         "seed": seed,
         "options": {f.name: getattr(options, f.name) for f in fields(Options)} | used,
         **_seconds(machine, began, worked),
-        "levels": reports,
+        "levels": record.reports,
     }
-    return image, Output(place, None, stages, statistics)
+    return image, Output(place, None, record.stages, statistics)
+
+
+class _Record:
+    """The stages and reports of a run as it goes on, and what its callback is told of them."""
+
+    def __init__(self, shapes: list[tuple[int, int]], callback: Callback | None) -> None:
+        self.stages: list[Stage] = []
+        self.reports: list[dict[str, Any]] = []
+        self._shapes, self._callback = shapes, callback
+        self._began = perf_counter()
+
+    def tell(self, level: int, sampled: int, ended: bool = False) -> None:
+        """So many pixels of a level are sampled. Pictures are those of the last stage, which has been read back."""
+        if self._callback:
+            share = (pixels(self._shapes[level + 1 :]) + sampled) / pixels(self._shapes)
+            last = self.stages[-1]
+            now: dict[str, Any] = {"level": level, "levels": len(self._shapes), "fraction": share}
+            now |= {"image": lambda: last.image, "candidates": lambda: last.candidates}
+            self._callback(Sampling(end_of_level=ended, **now))
+
+    def end(self, stage: Stage, counts: NDArray[np.int32], nodes: int) -> None:
+        """A level is done; counts (rows, cols, 2) are candidates and nodes compared, of so many nodes."""
+        self.stages.append(stage)
+        (rows, cols), (mean, compared) = counts.shape[:2], counts.mean((0, 1)).tolist()
+        report = {
+            "level": stage.level,
+            "rows": rows,
+            "cols": cols,
+            "candidates": mean,
+            "most": int(counts[..., 0].max()),
+        }
+        self.reports.append(report | {"nodes": nodes, "compared": compared, "seconds": perf_counter() - self._began})
+        self._began = perf_counter()
+        self.tell(stage.level, rows * cols, ended=True)
 
 
 def _seconds(machine: Machine, began: float, worked: float | None) -> dict[str, float | None]:
@@ -350,6 +365,22 @@ def _sampled(machine: Machine, shapes: Sequence[tuple[int, int]], source: Sequen
     together = np.concatenate(source)
     counts = np.tile(np.array([1, 0], np.int32), (together.size, 1))
     return Sampled(machine.put(together), machine.put(counts), machine.put(_lattice(shapes, 0)))
+
+
+def _copied(machine: Machine, shapes: Sequence[tuple[int, int]], own: tuple[int, int]) -> Sampled:
+    """The top level, copied and repeated to fill; nothing yet below it."""
+    row, col = np.indices(shapes[-1], np.int32)
+    source = row % np.int32(own[0]) * np.int32(own[1]) + col % np.int32(own[1])
+    return _sampled(machine, shapes, [np.zeros(pixels(shapes[:-1]), np.int32), source.ravel()])
+
+
+def _read(
+    machine: Machine, sampled: Sampled, shapes: Sequence[tuple[int, int]], level: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """A level's source (rows, cols) and counts (rows, cols, 2)."""
+    begin, end = pixels(shapes[:level]), pixels(shapes[: level + 1])
+    source, counts = machine.get(sampled.source[begin:end]), machine.get(sampled.counts[begin:end])
+    return source.reshape(shapes[level]), counts.reshape(*shapes[level], 2)
 
 
 def _collapsed(
