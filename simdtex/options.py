@@ -48,5 +48,12 @@ def real(name: str, value: Any, least: float, *, above: bool = False) -> None:
     """Raise unless the value is a finite number of at least (or above) `least`."""
     if isinstance(value, bool) or not isinstance(value, Real):
         raise TypeError(f"{name} must be a number, not {value!r}")
-    if not isfinite(value) or value < least or (above and value == least):
+    if not _finite(value) or value < least or (above and value == least):
         raise ValueError(f"{name} is {value}; give a number {'above' if above else 'of at least'} {least}")
+
+
+def _finite(value: Real) -> bool:
+    try:
+        return isfinite(value)
+    except OverflowError:  # a whole number beyond the largest double
+        return False

@@ -192,9 +192,14 @@ class Sample:
 
 def stretch(pixels: NDArray[Any], top: int) -> tuple[NDArray[np.int64], float]:
     """Pixels of any real type stretched over the whole numbers 0..top, and the size of 1 in their own unit."""
-    half = pixels.astype(np.float64) / 2  # so that no difference overflows
-    half_unit = float(half.max() - half.min()) / top or 0.5
-    return np.rint((half - half.min()) / half_unit).astype(np.int64), 2 * half_unit
+    if pixels.dtype.kind in "iu":
+        whole = pixels.astype(np.uint64)  # modulo 2**64, so a difference from the least is exact
+        half = (whole - pixels.min().astype(np.uint64)) / np.float64(2)
+    else:
+        half = pixels.astype(np.float64) / 2  # so that no difference overflows
+        half = half - half.min()
+    half_unit = float(half.max()) / top or 0.5
+    return np.rint(half / half_unit).astype(np.int64), 2 * half_unit
 
 
 def moved(own: NDArray[Any], by: NDArray[np.floating[Any]], pixels: NDArray[Any]) -> NDArray[Any]:

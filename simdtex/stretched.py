@@ -42,9 +42,10 @@ class Stretched:
     def luminance(self) -> NDArray[np.int32]:
         """(1, rows, cols): of three channels that of linear red, green and blue, else the channels' mean."""
         planes = self.planes.astype(np.int64)
-        shares = LUMA if len(planes) == 3 else (2**16 // len(planes),) * len(planes)
-        total = np.tensordot(np.array(shares), planes, 1)
-        return ((total + 2**15) >> 16).astype(np.int32)[None]
+        if len(planes) == 3:
+            total = np.tensordot(np.array(LUMA), planes, 1)
+            return np.asarray((total + 2**15) >> 16, np.int32)[None]
+        return np.asarray((2 * planes.sum(0) + len(planes)) // (2 * len(planes)), np.int32)[None]
 
     def picture(self, values: NDArray[np.int32], source: NDArray[np.int32] | None = None) -> NDArray[Any]:
         """The picture that values stand for, projected onto legal pixels of the sample's type.

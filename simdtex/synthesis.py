@@ -168,6 +168,8 @@ def suggest_alpha(
     True
     """
     pixels = check_sample(sample, channel_axis)
+    if "alpha" in options:
+        raise TypeError("suggest_alpha finds alpha; leave it out")
     chosen = multires.make_options(alpha="auto", target=target, **options)
     machine = open_machine(device)
     return multires.suggest_alpha(machine, analyse(machine, pixels, **chosen.analysis), chosen)

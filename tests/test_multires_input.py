@@ -81,8 +81,9 @@ def test_a_sample_too_small_for_the_filters_works_and_says_so(size, caplog):
         image, output = run(sample, (10, 15), **options)
         assert image.shape == (10, 15, 3)
         assert min(stage.candidates.min() for stage in output.stages) >= 1
-        [told] = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
-        assert f"{size[0]} rows x {size[1]} columns" in told and "3 x 3" in told
+        told = [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+        assert len(told) == (size != (1, 1)), "where there are no candidates, nothing is missed"
+        assert all(f"{size[0]} rows x {size[1]} columns" in note and "3 x 3" in note for note in told)
     image = synthesize(sample, (3 * size[0], 2 * size[1]), alpha=0)
     assert_same_bits(image, np.tile(sample, (3, 2, 1)))
 
@@ -95,6 +96,7 @@ def test_the_filters_fit_where_the_level_above_the_finest_is_as_large(size, side
 
 def test_no_filters_are_missed_where_none_are_wanted(caplog):
     synthesize(texture((4, 4)), (10, 10), orientations=0)
+    synthesize(texture((4, 4)), (10, 10), levels=1)
     assert not caplog.records
 
 
@@ -298,7 +300,7 @@ class Asked(Reference):
 @pytest.mark.parametrize("channels", [None, 3])
 def test_memory_grows_with_the_output_and_with_nothing_else(channels):
     sample, asked = texture((13, 7), channels), {}
-    for cols in (10, 20, 30, 70):
+    for cols in (14, 28, 42, 70):  # whole tiles
         for options in ({"alpha": 0}, {"alpha": INF}, {"alpha": INF, "phase": "free"}):
             machine = Asked()
             synthesize(sample, (40, cols), device=machine, **options)
@@ -307,7 +309,7 @@ def test_memory_grows_with_the_output_and_with_nothing_else(channels):
     analysis, synthesis = zip(*(sizes.pop() for sizes in asked.values()), strict=True)
     assert len(set(analysis)) == 1
     steps = np.diff(synthesis) / np.diff(list(asked)) / 40
-    assert (steps == 20 + 7 * (channels or 1)).all(), "bytes for each pixel"
+    assert np.ptp(steps) == 0 and steps[0] <= 4 + 2 * (12 + 4 * (channels or 1)), "bytes for each pixel"
 
 
 def test_too_little_memory_ends_a_run_before_anything_is_sampled():
@@ -318,11 +320,11 @@ def test_too_little_memory_ends_a_run_before_anything_is_sampled():
 
 
 @pytest.mark.parametrize("shape", [(2**31, 2**31), (1, 2**31), (2**70, 1), (2**16, 2**15)], ids=str)
-def test_an_output_beyond_32_bits_is_refused_before_any_sampling(shape, monkeypatch):
-    def never(*_):
-        raise AssertionError("sampled")
+def test_an_output_beyond_32_bits_is_refused_before_any_work(shape, monkeypatch):
+    def never(*_, **__):
+        raise AssertionError("worked")
 
-    monkeypatch.setattr(multires, "candidates", never)
+    monkeypatch.setattr(multires, "analyse", never)
     with pytest.raises(ValueError, match=f"{shape[0]} rows x {shape[1]} columns is beyond .*; give a smaller size"):
         synthesize(texture((13, 7)), shape)
 
@@ -331,9 +333,9 @@ def test_an_output_beyond_32_bits_is_refused_before_any_sampling(shape, monkeypa
 
 
 def test_a_suggested_alpha_grows_with_the_target_between_its_ends():
-    sample = texture((12, 11))
+    sample = texture((24, 20))
     targets = [1, 1.01, 1.1, 1.2, 1.5, 2, 3, 5, 8, 1e9]
-    alphas = [simdtex.suggest_alpha(sample, target=target, device=REFERENCE) for target in targets]
+    alphas = [simdtex.suggest_alpha(sample, target=target, levels=4, device=REFERENCE) for target in targets]
     assert alphas == sorted(alphas)
     assert alphas[0] == 0.01
     assert alphas[-1] == 4
@@ -409,12 +411,12 @@ BAD = [
     ({"beta": "1"}, TypeError, "beta must be a number, not '1'"),
     ({"target": 0.5}, ValueError, "target is 0.5; give a number of at least 1"),
     ({"target": math.inf}, ValueError, "target is inf; give a number of at least 1"),
-    ({"target": None}, TypeError, "target must be a number, not None"),
     ({"orientations": -1}, ValueError, "orientations is -1; give 0 or more"),
     ({"orientations": 2.5}, TypeError, "orientations must be a whole number, not 2.5"),
-    ({"sigma": 0}, ValueError, "sigma is 0; give a number above 0"),
-    ({"sigma": -0.7}, ValueError, "sigma is -0.7; give a number above 0"),
-    ({"sigma": math.inf}, ValueError, "sigma is inf; give a number above 0"),
+    ({"sigma": 0}, ValueError, "sigma is 0; give a number of at least 0.2"),
+    ({"sigma": -0.7}, ValueError, "sigma is -0.7; give a number of at least 0.2"),
+    ({"sigma": math.inf}, ValueError, "sigma is inf; give a number of at least 0.2"),
+    ({"sigma": 101}, ValueError, "sigma is 101; give at most 100"),
     ({"sigma": "wide"}, TypeError, "sigma must be a number, not 'wide'"),
     ({"filter_size": 4}, ValueError, "filter_size is 4; give an odd number, 3 or 5"),
     ({"filter_size": 1}, ValueError, "filter_size is 1; give 3 or more"),
@@ -424,10 +426,9 @@ BAD = [
     ({"boundary": "mirror"}, ValueError, "unknown boundary 'mirror'; choose one of: torus, open"),
     ({"levels": 0}, ValueError, "levels is 0; give 1 or more"),
     ({"levels": 2.0}, TypeError, "levels must be a whole number, not 2.0"),
-    ({"levels": "all"}, TypeError, "levels must be a whole number, not 'all'"),
     ({"levels": 6}, ValueError, "levels=6 is too many for this sample; give at most 5"),
     # thresholds
-    ({"thresholds": [[0.1], [0.1, 0.2]]}, TypeError, "an array of numbers, its rows of equal length"),
+    ({"thresholds": [[0.1], [0.1, 0.2]]}, ValueError, "thresholds is ragged; give rows of equal length"),
     ({"thresholds": ["a", "b", "c", "d"]}, TypeError, "an array of numbers"),
     ({"thresholds": "low"}, TypeError, "an array of numbers"),
     ({"thresholds": [0.1, 0.2, -0.3, 0.4]}, ValueError, "thresholds must be numbers of at least 0"),
@@ -437,7 +438,7 @@ BAD = [
     ({"thresholds": [[]] * 4}, ValueError, r"shape \(4, 0\); give one row for each level but the finest"),
     ({"thresholds": 0.3}, ValueError, r"shape \(\); give one row for each level but the finest"),
     ({"thresholds": [0.3] * 4, "alpha": "auto"}, ValueError, "alpha is 'auto' and there are thresholds; give one of"),
-    ({"thresholds": [0.3] * 3}, ValueError, "thresholds has 3 rows; give one for .* but the finest, 4, or levels=4"),
+    ({"thresholds": [0.3] * 3}, ValueError, "thresholds has 3 rows; give 4, one for .* but the finest, or levels=4"),
     # names, the seed and the device
     ({"gamma": 1}, TypeError, UNKNOWN.format("gamma")),
     ({"order": 8}, TypeError, UNKNOWN.format("order")),
@@ -479,7 +480,7 @@ def test_suggest_alpha_refuses_bad_input_with_a_remedy(change, error, words):
 def test_a_table_of_too_few_or_too_many_rows_is_told_the_right_number(rows, columns):
     table = np.full((rows, columns), 0.3)
     for levels in (None, 5):
-        with pytest.raises(ValueError, match=f"thresholds has {rows} rows; give one .* but the finest, 4"):
+        with pytest.raises(ValueError, match=f"thresholds has {rows} rows; give 4, one .* but the finest"):
             synthesize(SAMPLE, (9, 9), levels=levels, thresholds=table)
     for levels in (2, 4, 5):
         assert synthesize(SAMPLE, (9, 9), levels=levels, thresholds=[0.3] * (levels - 1)).shape == (9, 9)

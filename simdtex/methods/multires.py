@@ -31,6 +31,9 @@ ANY = 2**32 - 1
 LAUNCH = 4e8
 """Comparisons that the first launch of a level may take if no node fails."""
 
+WIDEST = 100
+"""The largest sigma; a filter of one far narrower does not know it from a larger one."""
+
 STEPS, MOST = 100, 4
 """`suggest_alpha` tries the multiples of 1/100 up to 4."""
 
@@ -57,7 +60,7 @@ class Options:
     orientations : int
         Of the first and of the second derivatives of a Gaussian in the filter bank (7); 0 leaves the bands alone.
     sigma : float
-        Of that Gaussian, in pixels.
+        Of that Gaussian, in pixels; 0.2 to 100.
     filter_size : int
         Rows and columns of the filters; odd. A level smaller than that has no responses.
     features : {"luminance", "channels"}
@@ -93,7 +96,9 @@ class Options:
         real("beta", self.beta, 0)
         real("target", self.target, 1)
         whole("orientations", self.orientations, 0)
-        real("sigma", self.sigma, 0, above=True)
+        real("sigma", self.sigma, 0.2)
+        if self.sigma > WIDEST:
+            raise ValueError(f"sigma is {self.sigma}; give at most {WIDEST}")
         whole("filter_size", self.filter_size, 3)
         if self.filter_size % 2 == 0:
             raise ValueError(f"filter_size is {self.filter_size}; give an odd number, 3 or 5")
@@ -125,14 +130,16 @@ def make_options(**given: Any) -> Options:
 def thresholds(levels: int, options: Options, alpha: float) -> NDArray[np.float64]:
     """T of every level (levels, 1 or M), the finest first: alpha / k**beta (13), or the user's table."""
     if options.thresholds is None:
-        k = np.arange(levels, 0, -1)  # 1 at the top
-        return alpha / (k**options.beta).astype(np.float32).astype(np.float64)[:, None]
+        k = np.arange(levels, 0, -1, dtype=np.float64)[:, None]  # 1 at the top
+        with np.errstate(over="ignore"):
+            divisor = (k ** float(options.beta)).astype(np.float32)  # so that the last bit of a libm does not show
+        return np.full_like(k, inf) if alpha == inf else float(alpha) / divisor.astype(np.float64)
     table = np.asarray(options.thresholds, np.float64)
     table = table if table.ndim == 2 else table[:, None]
     if len(table) != levels - 1:
+        fewer = f", or levels={len(table) + 1}" if len(table) < levels - 1 else ""
         raise ValueError(
-            f"thresholds has {len(table)} rows; give one for each level but the finest, {levels - 1}, "
-            f"or levels={len(table) + 1}"
+            f"thresholds has {len(table)} rows; give {levels - 1}, one for each level but the finest{fewer}"
         )
     return np.concatenate([np.zeros((1, table.shape[1])), table[::-1]])
 
@@ -209,6 +216,7 @@ def synthesize(
 ) -> tuple[NDArray[Any], Output]:
     """Both phases: `analyse`, then `resample`, which says what comes in and out."""
     began, worked = perf_counter(), machine.seconds
+    _check_size(shape, sample.shape[-1])
     analysis = analyse(machine, sample, **options.analysis)
     image, output = resample(machine, analysis, shape, options, seed, callback)
     output.statistics.update(_seconds(machine, began, worked))
@@ -250,12 +258,14 @@ def resample(
     -----
     A level is one step: no pixel depends on another of its level. Cost: for every pixel at most two comparisons with
     each node above it and feature, some hundredths of that at usual thresholds. Memory on the device, in bytes: 20 +
-    7 channels per output pixel, beside the analysis; on the host about twice that.
+    5.3 channels per output pixel, beside the analysis; on the host about twice that.
     """
     began, worked = perf_counter(), machine.seconds
-    _check_memory(machine, analysis, shape)
+    channels = len(analysis.sample.planes)
+    _check_size(shape, channels)
     shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
-    alpha = suggest_alpha(machine, analysis, options) if isinstance(options.alpha, str) else options.alpha
+    machine.require(pixels(shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis))
+    alpha = suggest_alpha(machine, analysis, options) if isinstance(options.alpha, str) else float(options.alpha)
     structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
     record = _Record(shapes, callback)
 
@@ -396,20 +406,24 @@ def _collapsed(
 
 def _check_thresholds(table: ArrayLike) -> None:
     try:
-        values = np.asarray(table, np.float64)
-    except (TypeError, ValueError):
-        raise TypeError("thresholds must be an array of numbers, its rows of equal length") from None
+        values = np.asarray(table)
+    except ValueError:
+        raise ValueError("thresholds is ragged; give rows of equal length") from None
+    if values.dtype.kind not in "iuf":
+        raise TypeError(f"thresholds must be an array of numbers, not of {values.dtype}")
     if values.ndim not in (1, 2) or not values.size:
         raise ValueError(f"thresholds has shape {values.shape}; give one row for each level but the finest")
     if not (values >= 0).all():
         raise ValueError("thresholds must be numbers of at least 0")
 
 
-def _check_memory(machine: Machine, analysis: Analysis, shape: tuple[int, int]) -> None:
-    pixels, (channels, *_) = prod(shape), analysis.sample.planes.shape
-    if pixels * max(channels, 2) * 4 // 3 >= 2**31:
+def _check_size(shape: tuple[int, int], channels: int) -> None:
+    if prod(shape) * max(channels, 4) >= 2**31:  # what kernels count in 32 bits, all levels together
         raise ValueError(
             f"an output of {shape[0]} rows x {shape[1]} columns is beyond 2**31 values; give a smaller size"
         )
-    held = prod(analysis.shapes[0]) * 6 * channels + prod(analysis.features.shape) * 4
-    machine.require(pixels * (20 + 7 * channels) + held)
+
+
+def _held(analysis: Analysis) -> int:
+    """Bytes of an analysis on the device."""
+    return 4 * (pixels(analysis.shapes) * len(analysis.sample.planes) + int(prod(analysis.features.shape)))

@@ -38,6 +38,7 @@ def bank(orientations: int, sigma: float, side: int) -> NDArray[np.int32]:
         about 1, all of them to 0.
     """
     y, x = np.mgrid[:side, :side] - side // 2
+    sigma = float(sigma)
     gauss = np.exp(-(x * x + y * y) / (2 * sigma * sigma))
     taps = []
     for degree in (1, 2):

@@ -2,7 +2,7 @@
 """The Laplacian pyramid of Burt and Adelson in whole numbers, De Bonet's equations (5) and (6).
 
 Pictures are (planes, rows, cols) int32. A level has half the rows and columns of the one below it, rounded up. Sums
-stay within 32 bits for whole numbers below 2**24.
+stay within 32 bits where what is reduced is below 2**23, and what is collapsed below 2**25.
 """
 
 from __future__ import annotations

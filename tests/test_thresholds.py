@@ -1,0 +1,65 @@
+"""Thresholds of unusual size and type, and the alpha that is looked for."""
+
+from fractions import Fraction
+from math import inf
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, texture
+
+import simdtex
+from simdtex.analysis import analyse
+from simdtex.methods.multires import STRETCH, STRETCHES, Options, differences, suggest_alpha, thresholds
+
+
+@pytest.mark.parametrize("beta", [20, 20.0, 100, 1000.0, Fraction(1, 2)])
+def test_a_large_beta_is_no_more_than_strict(beta):
+    table = thresholds(11, Options(beta=beta), 0.3)[:, 0]
+    assert table[-1] == 0.3, "k is 1 at the top"
+    assert (np.diff(table) >= 0).all() and (table >= 0).all() and np.isfinite(table).all()
+    assert np.isinf(thresholds(11, Options(alpha=inf, beta=beta), inf)).all()
+
+
+def test_numbers_of_any_kind_are_thresholds():
+    sample, options = texture((13, 9)), {"method": "multires", "rng": 1, "device": "reference"}
+    plain = simdtex.synthesize(sample, (12, 14), alpha=0.25, sigma=0.75, **options)
+    for kind in (Fraction, np.float32, np.float64):
+        other = simdtex.synthesize(sample, (12, 14), alpha=kind(0.25), sigma=kind(0.75), **options)
+        assert_same_bits(other, plain)
+
+
+@pytest.mark.parametrize("name", ["alpha", "beta", "target", "sigma"])
+def test_a_number_beyond_all_others_is_refused(name):
+    with pytest.raises(ValueError, match=f"{name} is 1000"):
+        Options(**{name: 10**400})
+
+
+@pytest.mark.parametrize("table", [[True, False], ["1", "2"], [1j, 2], [None, 1], [10**400, 1]], ids=str)
+def test_thresholds_are_numbers(table):
+    with pytest.raises(TypeError, match="thresholds must be an array of numbers"):
+        Options(thresholds=table)
+
+
+def test_infinite_thresholds_let_every_difference_pass():
+    found = analyse(REFERENCE, texture((13, 9))[..., None])
+    table = np.full((found.levels, 1), inf)
+    table[2] = 0
+    largest = differences(found, table)
+    assert (largest[2] == 0).all() and (np.delete(largest, 2, 0) == 2**32 - 1).all()
+
+
+def test_the_alpha_that_is_looked_for_is_not_given():
+    with pytest.raises(TypeError, match="suggest_alpha finds alpha; leave it out"):
+        simdtex.suggest_alpha(texture((9, 9)), alpha=0.3)
+
+
+def test_alpha_of_a_sample_too_large_to_count_whole(any_device):
+    """Stretches of its levels stand for the rest; with two levels the finest is the one that counts."""
+    sample = texture((72, 80))
+    assert sample.size > STRETCH * STRETCHES
+    found = analyse(REFERENCE, sample[..., None], levels=2)
+    options = Options(alpha="auto", target=3, levels=2)
+    alpha = suggest_alpha(REFERENCE, found, options)
+    assert simdtex.suggest_alpha(sample, target=3, levels=2, device=str(any_device.index)) == alpha
+    assert 0.01 < alpha < 4
+    assert suggest_alpha(REFERENCE, found, Options(alpha="auto", target=6, levels=2)) > alpha
