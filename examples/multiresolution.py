@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gravel by multiresolution sampling, at several thresholds: python multiresolution.py [FOLDER] [--size 256].
 
-The threshold alpha says how alike two places must be to be exchanged. sheet.png shows what it does, candidates.png among
-how many candidates each pixel of each level was drawn, brighter where there were more.
+The threshold alpha says how alike two places must be to be exchanged. sheet.png shows what it does,
+candidates.png among how many candidates each pixel of each level was drawn: the more, the brighter.
 """
 
 import argparse
@@ -27,15 +27,16 @@ folder.mkdir(exist_ok=True)
 shape = (args.size, args.size)
 gravel = data.gravel()[: args.size // 2, : args.size // 2]
 pictures = [("the sample", gravel)]
-for alpha in (0, 0.1, 0.2, 0.4, "auto"):
+for alpha in ("auto", 0, 0.1, 0.2, 0.4):
     texture, output = simdtex.synthesize(gravel, shape, method="multires", alpha=alpha, rng=1, full_output=True)
     used = output.statistics["options"]["alpha"]
     finest = output.statistics["levels"][-1]
-    print(f"alpha {used:4}: {finest['candidates']:.2f} candidates, {finest['compared']:.0f} of {finest['nodes']} compared")
-    pictures.append((f"alpha {used:g}", texture))
+    compared = f"{finest['compared']:.0f} of {finest['nodes']} nodes compared"
+    print(f"alpha {used:4}: {finest['candidates']:.2f} candidates at the finest level, {compared}")
+    pictures.append((f"alpha {used:g} (auto)" if alpha == "auto" else f"alpha {used:g}", texture))
 contact_sheet(pictures, folder / "sheet.png", columns=3)
 
-# The last of them, that of "auto", level by level; brightness is the logarithm of the number of candidates.
+# The last of them level by level; brightness is the logarithm of the number of candidates.
 most = np.log(max(2, max(stage.candidates.max() for stage in output.stages)))
 maps = [
     (f"level {stage.level}", enlarged(heat(np.log(stage.candidates) / most), shape, 2**stage.level))

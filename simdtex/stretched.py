@@ -40,7 +40,7 @@ class Stretched:
 
     @property
     def luminance(self) -> NDArray[np.int32]:
-        """(1, rows, cols): of three channels that of linear red, green and blue, else the channels' mean."""
+        """(1, rows, cols): of three channels that of red, green and blue as they come, else their mean."""
         planes = self.planes.astype(np.int64)
         if len(planes) == 3:
             total = np.tensordot(np.array(LUMA), planes, 1)

@@ -48,8 +48,8 @@ class Options:
     Parameters
     ----------
     alpha : float or "auto"
-        Of T = alpha / k**beta (13), 0 or more: 0 tiles the sample, infinity samples every band on its own. ``"auto"``
-        takes what `simdtex.suggest_alpha` does for ``target``.
+        Of T = alpha / k**beta (13), 0 or more: 0 tiles the sample (but for parts that are equal to the bit), infinity
+        samples every band on its own. ``"auto"`` takes what `simdtex.suggest_alpha` does for ``target``.
     beta : float
         Of the same, 0 or more. k counts levels from the lowest frequency upward.
     target : float
