@@ -84,34 +84,70 @@ inline int scan(const Parents *own, const int wanted, int *row, int *col, int *c
     }
 }
 
-// One work-item per pixel, of the pixels first .. end-1 of a level. Two scans, to count and to find the one that is
-// drawn: no list is kept.
-__kernel void candidates(const ulong seed, const int level, const int top, const int match,
-                         __global const int4 *restrict analysis, __global const int *restrict features,
-                         __global const uint *restrict threshold, __global const int4 *restrict synthesis,
-                         const int first, const int end, __global int *restrict source, __global int2 *restrict counts)
+// The parent structure of pixel (i, j).
+inline void find_parents(Parents *own, __global const int4 *synthesis, __global const int *source, const int i,
+                         const int j)
+{
+    const int4 tile = own->analysis[own->level];
+    for (int k = own->level + 1; k <= own->top; ++k) {
+        const int4 above = own->analysis[k], there = synthesis[k];
+        const int up = k - own->level;
+        const int r = i / tile.x * above.x + (i % tile.x >> up), c = j / tile.y * above.y + (j % tile.y >> up);
+        own->own[k] = above.z + source[there.z + r * there.y + c];
+    }
+}
+
+// The size of C_i, (9), for the pixels first .. end-1 of a level. One work-item per pixel; siblings have the same
+// parents, so the first of them counts for all.
+__kernel void candidates_count(const int level, const int top, const int match, __global const int4 *restrict analysis,
+                               __global const int *restrict features, __global const uint *restrict threshold,
+                               __global const int4 *restrict synthesis, const int first, const int end,
+                               __global const int *restrict source, __global int2 *restrict counts)
 {
     const int4 here = synthesis[level], tile = analysis[level];
     const int s = first + get_global_id(0);
     if (s >= end)
         return;
-    const int i = s / here.y, j = s % here.y;
-    const int p = i % tile.x, q = j % tile.y; // within its tile
-    Parents own = {level, top, match, analysis, features, threshold};
-    for (int k = level + 1; k <= top; ++k) {
-        const int4 above = analysis[k], there = synthesis[k];
-        const int up = k - level;
-        const int r = i / tile.x * above.x + (p >> up), c = j / tile.y * above.y + (q >> up);
-        own.own[k] = above.z + source[there.z + r * there.y + c];
+    const int i = s / here.y, j = s % here.y, p = i % tile.x, q = j % tile.y;
+    const int top_row = i - (p & 1), left = j - (q & 1);
+    const int rows = min(min(2, tile.x - (p & ~1)), here.x - top_row); // of siblings
+    const int cols = min(min(2, tile.y - (q & ~1)), here.y - left);
+    for (int k = 0; k < rows * cols; ++k) {
+        const int sibling = (top_row + k / cols) * here.y + left + k % cols;
+        if (sibling >= first && sibling < s)
+            return;
     }
-    int row = 0, col = 0, child = 0, compared, again;
-    const int count = scan(&own, INT_MAX, &row, &col, &child, &compared); // the size of C_i
+    Parents own = {level, top, match, analysis, features, threshold};
+    find_parents(&own, synthesis, source, i, j);
+    int row, col, child, compared;
+    const int count = scan(&own, INT_MAX, &row, &col, &child, &compared);
+    for (int k = 0; k < rows * cols; ++k) {
+        const int sibling = (top_row + k / cols) * here.y + left + k % cols;
+        if (sibling >= s && sibling < end)
+            counts[here.z + sibling] = (int2)(count, compared);
+    }
+}
+
+// A uniform draw from C_i, (12), by its number in the order of the scan: no list is kept. One work-item per pixel.
+__kernel void candidates_draw(const ulong seed, const int level, const int top, const int match,
+                              __global const int4 *restrict analysis, __global const int *restrict features,
+                              __global const uint *restrict threshold, __global const int4 *restrict synthesis,
+                              const int first, const int end, __global int *restrict source,
+                              __global const int2 *restrict counts)
+{
+    const int4 here = synthesis[level], tile = analysis[level];
+    const int s = first + get_global_id(0);
+    if (s >= end)
+        return;
+    const int i = s / here.y, j = s % here.y, p = i % tile.x, q = j % tile.y;
+    Parents own = {level, top, match, analysis, features, threshold};
+    find_parents(&own, synthesis, source, i, j);
     const uint4 bits = draw4(seed, level, 0, s, PURPOSE_DRAW, 0);
-    scan(&own, below(bits.x, bits.y, count), &row, &col, &child, &again); // uniform, equation (12)
+    int row = 0, col = 0, child = 0, compared;
+    scan(&own, below(bits.x, bits.y, counts[here.z + s].x), &row, &col, &child, &compared);
     const int wide = min(2, tile.y - 2 * col);
     // A node at the sample's edge may lack the child in this place: then it gives the one beside it.
     row = min(tile.x - 1, 2 * row + (match ? p & 1 : child / wide));
     col = min(tile.y - 1, 2 * col + (match ? q & 1 : child % wide));
     source[here.z + s] = row * tile.y + col;
-    counts[here.z + s] = (int2)(count, compared);
 }

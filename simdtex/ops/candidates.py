@@ -115,14 +115,13 @@ def _launch(
     match: bool,
     seed: int,
 ) -> Sampled:
-    levels, count = structure.threshold.shape
-    machine.launch(
-        machine.kernel("candidates", "candidates", FEATURES=count),
-        (end - first,),
-        *(np.uint64(seed), np.int32(level), np.int32(levels - 1), np.int32(match)),
-        *(structure.lattice, structure.features, structure.threshold),
-        *(sampled.lattice, np.int32(first), np.int32(end), sampled.source, sampled.counts),
-    )
+    levels, features = structure.threshold.shape
+    above = (np.int32(level), np.int32(levels - 1), np.int32(match))
+    pyramids = (structure.lattice, structure.features, structure.threshold, sampled.lattice)
+    pixels = (np.int32(first), np.int32(end), sampled.source, sampled.counts)
+    for name, key in (("candidates_count", ()), ("candidates_draw", (np.uint64(seed),))):
+        kernel = machine.kernel("candidates", name, FEATURES=features)
+        machine.launch(kernel, (end - first,), *key, *above, *pyramids, *pixels)
     return sampled
 
 
@@ -131,5 +130,5 @@ candidates = Operation("candidates", _reference, _launch)
 
 ``sampled`` is changed in place. With ``match`` a candidate stands where the pixel does among its siblings, in an even
 or odd row and column; else any child of a node that passes is one. A node at the sample's edge that lacks the child in
-question gives the one beside it. Cost: at most 2 x nodes x M comparisons a pixel; 12 bytes of memory a pixel.
+question gives the one beside it. Cost: at most 3/4 x nodes x M comparisons a pixel; 12 bytes of memory a pixel.
 """
