@@ -5,8 +5,7 @@
 
 Prints seconds (the best of a few runs, kernels compiled before) of whole syntheses, their growth with the output, the
 sample and alpha, the nodes of the sample that a pixel of the finest level is compared with as a share of all, the time
-by kernel, the NumPy reference's time next to the device's, and memory. A warm picture is one whose kernels have been
-compiled by a run before.
+by kernel, the NumPy reference's time next to the device's, and memory.
 """
 
 import argparse
@@ -23,7 +22,7 @@ import simdtex
 NAMES = ("brick", "grass", "gravel")
 
 JOB = """
-import json, resource, time
+import json, sys, time
 began = time.time()
 from skimage import data
 import simdtex
@@ -33,17 +32,21 @@ def callback(progress):
 start = time.time()
 simdtex.synthesize(data.gravel()[:256, :256], (1024, 1024), method="multires", rng=1, device=sys.argv[1] or None,
                    callback=callback)
-print(json.dumps([time.time() - start, first[0], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
+print(json.dumps([time.time() - start, first[0]]))
 """
 
 MEMORY = """
-import resource, sys
+import sys
 import numpy, simdtex
 sample, output, channels = (int(n) for n in sys.argv[1:4])
 sample = numpy.random.default_rng(1).integers(0, 256, (sample, sample, channels), dtype=numpy.uint8)
 simdtex.synthesize(sample, (output, output), method="multires", alpha=0.0, rng=1, channel_axis=-1,
                    device=sys.argv[4] or None)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+HIGH_WATER = """
+with open("/proc/self/status") as file:  # ru_maxrss would count the process that started this one
+    print(next(line for line in file if line.startswith("VmHWM")).split()[1])
 """
 
 
@@ -72,32 +75,30 @@ def best_of(repeats, machine, sample, side, **options):
     return statistics["seconds"], statistics["levels"][-1]
 
 
-def scan(finest):
-    """What the scan of the finest level did."""
-    share = finest["compared"] / finest["nodes"]
-    return f"{finest['candidates']:7.1f} candidates, {finest['compared']:7.1f} of {finest['nodes']} nodes: {share:.2%}"
+def job(repeats, machine, name, side, output, alpha=0.3):
+    """Print what one synthesis takes, and what the scan of its finest level did."""
+    seconds, finest = best_of(repeats, machine, picture(name, side), output, alpha=alpha)
+    what = f"{name:6} {side:3} -> {output:4}, alpha {alpha:4}"
+    took = f"{seconds:7.3f} s, {1e6 * seconds / output**2:6.2f} us a pixel"
+    compared = f"{finest['compared']:6.1f} of {finest['nodes']} nodes ({finest['compared'] / finest['nodes']:.2%})"
+    print(f"{what}: {took}, {finest['candidates']:6.1f} candidates, {compared}")
 
 
 def jobs(machine, repeats):
     for side, output in ((128, 256), (256, 1024)):
         for name in NAMES:
             for alpha in (0.2, 0.3):
-                seconds, finest = best_of(repeats, machine, picture(name, side), output, alpha=alpha)
-                print(f"{name:8} {side}x{side} -> {output}x{output}, alpha {alpha}: {seconds:6.2f} s {scan(finest)}")
-
-
-def growth(machine, repeats):
+                job(repeats, machine, name, side, output, alpha)
+    print("the output grows")
     for output in (128, 256, 512, 1024, 2048):
-        seconds, _ = best_of(repeats, machine, picture("gravel", 128), output)
-        print(f"output {output:4}: {seconds:6.2f} s, {1e6 * seconds / output**2:5.2f} us a pixel")
+        job(repeats, machine, "gravel", 128, output)
+    print("the sample grows")
     for side in (32, 64, 128, 256, 512):
-        seconds, finest = best_of(repeats, machine, picture("gravel", side), 512)
-        print(f"sample {side:4}: {seconds:6.2f} s {scan(finest)}")
+        job(repeats, machine, "gravel", side, 512)
+    print("alpha grows")
     for name in NAMES:
         for alpha in (0.0, 0.1, 0.2, 0.4, 0.8, np.inf):
-            few = 1 if alpha == np.inf else repeats
-            seconds, finest = best_of(few, machine, picture(name, 128), 256, alpha=alpha)
-            print(f"{name:8} alpha {alpha:3}: {seconds:6.2f} s {scan(finest)}")
+            job(1 if alpha == np.inf else repeats, machine, name, 128, 256, alpha)
 
 
 def by_kernel(device):
@@ -114,8 +115,9 @@ def by_kernel(device):
     run(machine, picture("gravel", 256), 1024)
     spent.clear()
     seconds = run(machine, picture("gravel", 256), 1024)["seconds"]
+    print(f"by kernel, gravel 256 -> 1024, {seconds:.3f} s")
     for name, busy in sorted(spent.items(), key=lambda item: -item[1]):
-        print(f"{name:18} {busy:8.4f} s {busy / seconds:6.1%} of the run's {seconds:.2f} s")
+        print(f"{name:18} {busy:7.3f} s, {busy / seconds:.1%}")
 
 
 def held(machine, sample, side):
@@ -147,10 +149,11 @@ def memory(machine, device):
     """Bytes per pixel, of the process and of the machine's arrays, from two sizes each."""
     rng = np.random.default_rng(1)
     for channels in (1, 3):
-        for what, small, large in (("output", (8, 1024), (8, 3072)), ("sample", (256, 64), (768, 64))):
+        for what, small, large in (("output", (8, 1024), (8, 3072)), ("sample", (1024, 64), (3072, 64))):
             process, arrays = [], []
             for side, output in (small, large):
-                process.append(int(output_of(MEMORY, str(side), str(output), str(channels), device or "")))
+                kib = output_of(MEMORY + HIGH_WATER, str(side), str(output), str(channels), device or "")
+                process.append(1024 * int(kib))
                 sample = rng.integers(0, 256, (side, side, channels), dtype=np.uint8)
                 arrays.append(held(machine, sample, output))
             more = max(large) ** 2 - max(small) ** 2
@@ -167,13 +170,15 @@ def main():
     machine = simdtex.open_machine(options.device)
     print(f"device: {machine.name}, {machine.info.compute_units} compute units")
     jobs(machine, options.repeats)
-    growth(machine, options.repeats)
     by_kernel(options.device)
     device, _ = best_of(options.repeats, machine, picture("gravel", 64), 128)
     reference, _ = best_of(options.repeats, simdtex.open_machine("reference"), picture("gravel", 64), 128)
-    print(f"64x64 -> 128x128: {reference:.2f} s in NumPy, {device:.3f} s on the device: {reference / device:.0f} times")
-    seconds, first, peak = json.loads(output_of(JOB, options.device or ""))
-    print(f"a process of its own: {seconds:.1f} s, first progress after {first:.1f} s, peak memory {peak:.0f} MiB")
+    ratio = reference / device
+    print(f"gravel 64 -> 128: {reference:.2f} s in NumPy, {device:.3f} s on the device: {ratio:.0f} times")
+    printed, kib = output_of(JOB + HIGH_WATER, options.device or "").splitlines()
+    seconds, first = json.loads(printed)
+    print(f"gravel 256 -> 1024 in a process of its own: {seconds:.1f} s, first progress after {first:.1f} s, ", end="")
+    print(f"peak memory {int(kib) / 1024:.0f} MiB")
     memory(machine, options.device)
 
 

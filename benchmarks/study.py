@@ -11,6 +11,7 @@ defaults. Outputs are twice the sample in each direction.
 import argparse
 import csv
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,21 +39,29 @@ MRF = {
     "preset=paper, icm": {"preset": "paper", "relaxation": "icm", "coarsest": "gibbs"},
     "preset=paper, bandwidth=0.15": {"preset": "paper", "bandwidth": 0.15},
 }
+IN_COLOUR = ("default", "coherence=0", "coherence=0.5", "coherence=2", "order=8", "relaxation=gibbs")
 MULTIRES = {
-    "default": {},
     "alpha=0": {"alpha": 0.0},
     "alpha=0.05": {"alpha": 0.05},
     "alpha=0.1": {"alpha": 0.1},
     "alpha=0.2": {"alpha": 0.2},
+    "default": {},
     "alpha=0.4": {"alpha": 0.4},
     "alpha=0.6": {"alpha": 0.6},
+    "alpha=1": {"alpha": 1.0},
     "alpha=inf": {"alpha": np.inf},
     "alpha=auto": {"alpha": "auto"},
+    "alpha=auto, target=1.2": {"alpha": "auto", "target": 1.2},
+    "alpha=auto, beta=1": {"alpha": "auto", "beta": 1.0},
     "alpha=1, beta=1": {"alpha": 1.0, "beta": 1.0},
+    "alpha=4, beta=2": {"alpha": 4.0, "beta": 2.0},
+    "alpha=8, beta=3": {"alpha": 8.0, "beta": 3.0},
     "phase=free": {"phase": "free"},
     "orientations=0": {"orientations": 0},
     "orientations=2": {"orientations": 2},
     "orientations=8": {"orientations": 8},
+    "sigma=0.5": {"sigma": 0.5},
+    "sigma=1": {"sigma": 1.0},
     "filter_size=5, sigma=1": {"filter_size": 5, "sigma": 1.0},
     "features=channels": {"features": "channels"},
     "boundary=open": {"boundary": "open"},
@@ -60,19 +69,42 @@ MULTIRES = {
 FIGURES = ("plausibility", "coverage", "copying", "histogram_distance", "seam")
 
 
+def repetition(sample, made):
+    """Correlation of a picture with itself displaced by the sample's rows, columns and both, the mean of the three."""
+    rows, cols = sample.shape[:2]
+    centred = made - made.mean((0, 1))
+    ways = [np.roll(centred, by, (0, 1)) for by in ((rows, 0), (0, cols), (rows, cols))]
+    return np.mean([(centred * displaced).mean() for displaced in ways]) / (centred**2).mean()
+
+
 class Study(NamedTuple):
     """The settings of a method, those that colour or grey samples leave out, and what the files are called."""
 
     settings: dict
     skipped: dict
+    figures: tuple
     seeds: int
     table: str
     prefix: str
 
 
 STUDIES = {
-    "mrf": Study(MRF, {"colour": list(MRF)[6:], "grey": []}, 1, "table.csv", ""),
-    "multires": Study(MULTIRES, {"colour": [], "grey": ["features=channels"]}, 3, "multires.csv", "multires-"),
+    "mrf": Study(
+        settings=MRF,
+        skipped={"colour": [setting for setting in MRF if setting not in IN_COLOUR], "grey": []},
+        figures=FIGURES,
+        seeds=1,
+        table="table.csv",
+        prefix="",
+    ),
+    "multires": Study(
+        settings=MULTIRES,
+        skipped={"colour": [], "grey": ["features=channels"]},
+        figures=(*FIGURES, "repetition"),
+        seeds=3,
+        table="multires.csv",
+        prefix="multires-",
+    ),
 }
 
 
@@ -119,7 +151,8 @@ def main():
                     **given,
                 )
                 seconds.append(time.perf_counter() - began)
-                figures.append([getattr(measure(sample, made), figure) for figure in FIGURES])
+                found = {**asdict(measure(sample, made)), "repetition": repetition(sample, made)}
+                figures.append([found[figure] for figure in study.figures])
             if given.get("alpha") == "auto":
                 setting = f"{setting} ({output.statistics['options']['alpha']:g})"
             mean = np.mean(figures, 0)
@@ -129,7 +162,7 @@ def main():
         contact_sheet(pictures, options.out / f"{study.prefix}{name}.png", columns=4)
     with open(options.out / study.table, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["sample", "setting", *(figure.replace("_", " ") for figure in FIGURES)])
+        writer.writerow(["sample", "setting", *(figure.replace("_", " ") for figure in study.figures)])
         writer.writerows(rows)
 
 

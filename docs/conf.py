@@ -24,15 +24,18 @@ autodoc_typehints = "none"  # the docstrings give types, shapes and units
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 
-# The page of the study shows the table and all the pictures that benchmarks/study.py has written.
-table = (HERE / "study" / "table.csv").read_text(encoding="utf-8").splitlines()
-results = [".. csv-table::\n   :file: ../study/table.csv\n   :header-rows: 1\n"] if len(table) > 1 else []
-results += [
-    f".. figure:: /study/{picture.name}\n   :alt: {picture.stem}\n\n   {picture.stem.replace('-', ' ')}\n"
-    for picture in sorted((HERE / "study").glob("*.png"))
-]
+# The page of the study shows each method's table and all the pictures that benchmarks/study.py has written:
+# name of the result -> table, beginning of the pictures' names.
+STUDIES = {"study": ("table.csv", ""), "study-multires": ("multires.csv", "multires-")}
 (HERE / "generated").mkdir(exist_ok=True)
-(HERE / "generated" / "study.txt").write_text("\n".join(results) or "None yet.\n", encoding="utf-8")
+for result, (figures, prefix) in STUDIES.items():
+    others = tuple(other for _, other in STUDIES.values() if len(other) > len(prefix))
+    results = [f".. csv-table::\n   :file: ../study/{figures}\n   :header-rows: 1\n"]
+    for picture in sorted((HERE / "study").glob(f"{prefix}*.png")):
+        if not picture.name.startswith(others):
+            caption = picture.stem.removeprefix(prefix)
+            results.append(f".. figure:: /study/{picture.name}\n   :alt: {picture.stem}\n\n   {caption}\n")
+    (HERE / "generated" / f"{result}.txt").write_text("\n".join(results), encoding="utf-8")
 
 # The page of the schedules shows a few columns of what benchmarks/schedules.py has written: heading, form, factor.
 COST = {
