@@ -260,7 +260,7 @@ def mean_candidates(output):
 
 def candidates(machine, gravel):
     """Pictures of the levels and how many candidates each pixel had."""
-    _, output = run(machine, gravel, CELL)
+    _, output = run(machine, gravel, CELL, alpha=0.3)
     stages = [stage for stage in output.stages if stage.level < 6]
     most = max(stage.candidates.max() for stage in stages)
     colours = ListedColormap(heat(np.linspace(0, 1, 256)) / 255)

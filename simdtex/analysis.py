@@ -104,20 +104,25 @@ def analyse(
     Raises
     ------
     ValueError
-        More levels than the sample has.
+        More levels than the sample has, or a sample of 2**31 values or more.
 
     Notes
     -----
     Cost: 45 multiply-adds for every pixel and channel, and a third of filter_size**2 for every pixel and filter. Memory
-    on the device: 16 bytes for every pixel and channel, 2 for every pixel and feature.
+    on the device: 16 bytes for every pixel and channel (and luminance, where there is one beside them), 3 for every
+    pixel and feature.
     """
-    sample, torus = Stretched(pixels), boundary == "torus"
-    shapes = _level_shapes(sample.planes.shape[1:], levels)
-    channels = len(sample.planes)
+    rows, cols, channels = pixels.shape
     seen = 1 if features == "luminance" else channels  # planes that features are made of
     taps = bank(orientations, sigma, filter_size)
     width = seen * (1 + len(taps))
-    machine.require(prod(shapes[0]) * (16 * (channels + seen) + 2 * width))
+    if rows * cols * max(width, channels) >= 2**31:
+        raise ValueError(
+            f"a sample of {rows} rows x {cols} columns with {width} features is beyond 2**31 values; give a smaller one"
+        )
+    sample, torus = Stretched(pixels), boundary == "torus"
+    shapes = _level_shapes((rows, cols), levels)
+    machine.require(prod(shapes[0]) * (16 * (channels + (seen < channels)) + 3 * width))
 
     gaussian, bands = pyramid(machine, machine.put(sample.planes), len(shapes), torus)
     guide = gaussian, bands

@@ -13,6 +13,9 @@ from simdtex.sample import moved, stretch
 TOP = 2**20
 """The largest pixel. Sums of a pyramid of up to 30 levels then fit 32 bits (kernels/laplacian.cl)."""
 
+BLOCK = 2**18
+"""Values that are turned into pixels together."""
+
 LUMA = (13933, 46871, 4732)
 """Shares of red, green and blue in the luminance, in 2**-16: 0.2126, 0.7152, 0.0722 (ITU-R BT.709)."""
 
@@ -62,10 +65,19 @@ class Stretched:
         -------
         (rows, cols, channels) array
         """
+        _, rows, cols = values.shape
+        made = np.empty((rows, cols, len(values)), self.pixels.dtype)
+        step = max(1, BLOCK // (cols * len(values)))
+        for first in range(0, rows, step):  # double precision, for some rows at a time
+            part = slice(first, first + step)
+            made[part] = self._picture(values[:, part], None if source is None else source[part])
+        return made
+
+    def _picture(self, values: NDArray[np.int32], source: NDArray[np.int32] | None) -> NDArray[Any]:
         own: NDArray[Any] = self.pixels.min()
-        step = np.moveaxis(values, 0, -1).astype(np.float64)
+        by = np.moveaxis(values, 0, -1).astype(np.float64)
         if source is not None:
             own = self.pixels.reshape(-1, self.pixels.shape[-1])[source]
-            step -= np.moveaxis(self.planes.reshape(len(self.planes), -1)[:, source], 0, -1)
+            by -= np.moveaxis(self.planes.reshape(len(self.planes), -1)[:, source], 0, -1)
         with np.errstate(over="ignore"):
-            return moved(own, step * self.unit, self.pixels)
+            return moved(own, by * self.unit, self.pixels)

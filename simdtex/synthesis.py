@@ -168,9 +168,10 @@ def suggest_alpha(
     True
     """
     pixels = check_sample(sample, channel_axis)
-    if "alpha" in options:
-        raise TypeError("suggest_alpha finds alpha; leave it out")
-    chosen = multires.make_options(alpha="auto", target=target, **options)
+    for name in ("alpha", "thresholds"):
+        if name in options:
+            raise TypeError(f"suggest_alpha finds alpha; leave {name} out")
+    chosen = multires.make_options(target=target, **options)
     machine = open_machine(device)
     return multires.suggest_alpha(machine, analyse(machine, pixels, **chosen.analysis), chosen)
 

@@ -437,7 +437,6 @@ BAD = [
     ({"thresholds": []}, ValueError, r"shape \(0,\); give one row for each level but the finest"),
     ({"thresholds": [[]] * 4}, ValueError, r"shape \(4, 0\); give one row for each level but the finest"),
     ({"thresholds": 0.3}, ValueError, r"shape \(\); give one row for each level but the finest"),
-    ({"thresholds": [0.3] * 4, "alpha": "auto"}, ValueError, "alpha is 'auto' and there are thresholds; give one of"),
     ({"thresholds": [0.3] * 3}, ValueError, "thresholds has 3 rows; give 4, one for .* but the finest, or levels=4"),
     # names, the seed and the device
     ({"gamma": 1}, TypeError, UNKNOWN.format("gamma")),
@@ -464,7 +463,7 @@ def test_bad_input_is_refused_with_a_remedy(change, error, words):
         ({"target": 0.99}, ValueError, "target is 0.99; give a number of at least 1"),
         ({"order": 8}, TypeError, UNKNOWN.format("order")),
         ({"levels": 6}, ValueError, "levels=6 is too many for this sample; give at most 5"),
-        ({"thresholds": [0.3] * 4}, ValueError, "give one of the two"),
+        ({"thresholds": [0.3] * 4}, TypeError, "suggest_alpha finds alpha; leave thresholds out"),
         ({"sample": with_value(np.nan)}, ValueError, "NaN|not finite"),
     ],
     ids=lambda v: None,

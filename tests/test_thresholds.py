@@ -48,8 +48,14 @@ def test_infinite_thresholds_let_every_difference_pass():
     assert (largest[2] == 0).all() and (np.delete(largest, 2, 0) == 2**32 - 1).all()
 
 
+def test_a_sample_beyond_32_bits_is_refused_before_any_work():
+    vast = np.broadcast_to(np.uint8(0), (2**16, 2**13, 1))
+    with pytest.raises(ValueError, match=r"65536 rows x 8192 columns with 9 features is beyond .* give a smaller one"):
+        analyse(REFERENCE, vast)
+
+
 def test_the_alpha_that_is_looked_for_is_not_given():
-    with pytest.raises(TypeError, match="suggest_alpha finds alpha; leave it out"):
+    with pytest.raises(TypeError, match="suggest_alpha finds alpha; leave alpha out"):
         simdtex.suggest_alpha(texture((9, 9)), alpha=0.3)
 
 

@@ -132,7 +132,8 @@ def synth(
         )
         if method == "multires":
             levels, alpha = run.statistics["levels"], run.statistics["options"]["alpha"]
-            click.echo(f"alpha {alpha}; candidates per level, coarse to fine: {candidates_per_level(levels)}")
+            thresholds = "thresholds as given" if alpha is None else f"alpha {alpha}"
+            click.echo(f"{thresholds}; candidates per level, coarse to fine: {candidates_per_level(levels)}")
     if accounting:
         render(run.statistics["accounting"], Console())
 
