@@ -184,6 +184,11 @@ class Output:
     statistics: dict[str, Any] = field(default_factory=dict)
 
 
+def device_seconds(machine: Any, before: float | None) -> float | None:
+    """What a machine's device has worked since its `seconds` were so many; None where that is not measured."""
+    return None if before is None else (machine.seconds or 0.0) - before
+
+
 def paced(count: int, least: int) -> Iterator[tuple[int, int]]:
     """Ranges (first, end) that make up 0..count, of a size that takes the loop's body about a tenth of a second.
 

@@ -142,7 +142,7 @@ def numbers(name: str, text: str) -> list[float]:
         gap = words.index("...")
         begin, (last,) = [float(word) for word in words[:gap]], [float(word) for word in words[gap + 1 :]]
         step = begin[-1] - begin[-2] if len(begin) > 1 else begin[0]
-        if not 0 < step <= (last - begin[0]) / 1e-9 or (last - begin[-1]) / step > 1000:
+        if not step > 0 or not 0 <= (last - begin[-1]) / step <= 1000:
             raise ValueError
     except (ValueError, IndexError):
         raise ValueError(f"{name} {text} must be numbers parted by commas, as 0.1,0.2 or 0.05,0.10,...,0.30") from None

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import secrets
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +54,7 @@ def sheet(
     Below each picture stand the mean candidates of its levels, coarse to fine.
     """
     from simdtex import image
+    from simdtex.random import as_seed
     from simdtex.report.sheet import contact_sheet
     from simdtex.series import series
 
@@ -64,7 +64,7 @@ def sheet(
     height, width = picture.pixels.shape[:2]
     shape = image.parse_size(size) if size else (2 * height, 2 * width)
     across = numbers("--alphas", alphas)
-    seed = secrets.randbits(32) if seed is None else seed
+    seed = as_seed(seed)
     with progress_bar(quiet) as show:
         made = series(
             picture.pixels,

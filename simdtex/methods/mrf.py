@@ -29,7 +29,7 @@ from simdtex.ops.snapshot import snapshot
 from simdtex.ops.start import start
 from simdtex.ops.temperature import temperature
 from simdtex.options import build, one_of, real, true_or_false, whole
-from simdtex.run import Callback, Meter, Output, Relaxing, Stage
+from simdtex.run import Callback, Meter, Output, Relaxing, Stage, device_seconds
 from simdtex.sample import Candidates, Sample
 
 PRESETS: dict[str, dict[str, Any]] = {
@@ -255,7 +255,7 @@ def synthesize(
         "options": {f.name: getattr(options, f.name) for f in fields(Options)}
         | {"levels": levels, "schedule": schedule.name},
         "seconds": meter.seconds,
-        "device_seconds": None if worked is None else (machine.seconds or 0.0) - worked,
+        "device_seconds": device_seconds(machine, worked),
         "accounting": account.report() | {"emulated": emulated, "launches": machine.launches - launches},
         "levels": meter.reports,
     }

@@ -23,7 +23,7 @@ from simdtex.ops.candidates import Sampled, Structure, candidates
 from simdtex.ops.laplacian import laplacian_collapse
 from simdtex.ops.operation import Array
 from simdtex.options import build, one_of, real, whole
-from simdtex.run import Callback, Output, Sampling, Stage, paced
+from simdtex.run import Callback, Output, Sampling, Stage, device_seconds, paced
 
 ANY = 2**32 - 1
 """The threshold that every difference passes."""
@@ -224,7 +224,7 @@ def synthesize(
     _check_size(shape, sample.shape[-1])
     analysis = analyse(machine, sample, **options.analysis)
     image, output = resample(machine, analysis, shape, options, seed, callback)
-    output.statistics.update(_seconds(machine, began, worked))
+    output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
     return image, output
 
 
@@ -299,7 +299,8 @@ def resample(
         "device": machine.name,
         "seed": seed,
         "options": {f.name: getattr(options, f.name) for f in fields(Options)} | used,
-        **_seconds(machine, began, worked),
+        "seconds": perf_counter() - began,
+        "device_seconds": device_seconds(machine, worked),
         "levels": record.reports,
     }
     return image, Output(place, None, record.stages, statistics)
@@ -337,11 +338,6 @@ class _Record:
         self.reports.append(report | {"nodes": nodes, "compared": compared, "seconds": perf_counter() - self._began})
         self._began = perf_counter()
         self.tell(stage.level, rows * cols, ended=True)
-
-
-def _seconds(machine: Machine, began: float, worked: float | None) -> dict[str, float | None]:
-    device = None if worked is None else (machine.seconds or 0.0) - worked
-    return {"seconds": perf_counter() - began, "device_seconds": device}
 
 
 def pixels(shapes: Sequence[tuple[int, int]]) -> int:
