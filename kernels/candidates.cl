@@ -11,7 +11,8 @@
 // Nodes are the pixels of the levels above the one that is sampled. A pixel's parent structure, equation (8), is made
 // of the features of the nodes above it. The output's lattice is made of tiles, each laid out like the sample's.
 //
-// analysis   (levels,)          of the sample's pyramid: rows, columns, where the level begins in `features`
+// analysis   (levels,)          of the sample's pyramid: rows, columns, where the level begins in `features`, and whether
+//                               its last row (1) and column (2) stand for fewer pixels of the sample than the others
 // features   (nodes, FEATURES)  level after level
 // threshold  (levels, FEATURES) the largest difference that passes, the square root of T Z in (9) to (11)
 // synthesis  (levels,)          of the output's pyramid: rows, columns, where the level begins in `source` and `counts`
@@ -24,7 +25,8 @@ typedef struct {
     __global const int4 *analysis;
     __global const int *features;
     __global const uint *threshold;
-    int own[MOST]; // the pixel's own parent structure: for each level the node in `features`
+    int own[MOST];  // the pixel's own parent structure: for each level the node in `features`
+    int rows, cols; // of the lowest nodes those that may stand for the pixel's parent
 } Parents;
 
 // Equations (9) to (11) for the features of one level: no component differs by more than its threshold.
@@ -40,8 +42,9 @@ inline bool similar(const Parents *own, const int level, const int node)
 
 // Goes through the nodes from the top down. Parents are compared before their children, so one that fails rejects all
 // that is below it. What is left in the lowest level of nodes gives candidates: its children, or, with `match`, the one
-// child in the pixel's own place among its siblings. Stops at candidate number `wanted`, whose node is then (row, col)
-// and which is its child number `child`. Returns how many candidates came before, and counts the nodes compared.
+// child in the pixel's own place among its siblings, from a node that has all the pixels below it that the pixel's parent
+// has. Stops at candidate number `wanted`, whose node is then (row, col) and which is its child number `child`. Returns
+// how many candidates came before, and counts the nodes compared.
 inline int scan(const Parents *own, const int wanted, int *row, int *col, int *child, int *compared)
 {
     int count = 0, level = own->top, r = 0, c = 0;
@@ -57,7 +60,8 @@ inline int scan(const Parents *own, const int wanted, int *row, int *col, int *c
                 continue;
             }
             const int4 below = own->analysis[own->level];
-            const int children = own->match ? 1 : min(2, below.x - 2 * r) * min(2, below.y - 2 * c);
+            const int children =
+                own->match ? r < own->rows && c < own->cols : min(2, below.x - 2 * r) * min(2, below.y - 2 * c);
             if (wanted - count < children) {
                 *row = r;
                 *col = c;
@@ -95,6 +99,10 @@ inline void find_parents(Parents *own, __global const int4 *synthesis, __global 
         const int r = i / tile.x * above.x + (i % tile.x >> up), c = j / tile.y * above.y + (j % tile.y >> up);
         own->own[k] = above.z + source[there.z + r * there.y + c];
     }
+    const int4 above = own->analysis[own->level + 1];
+    const int last_row = above.x - 1, last_col = above.y - 1;
+    own->rows = above.w & 1 && i % tile.x / 2 != last_row ? last_row : above.x;
+    own->cols = above.w & 2 && j % tile.y / 2 != last_col ? last_col : above.y;
 }
 
 // The size of C_i, (9), for the pixels first .. end-1 of a level. One work-item per pixel; siblings have the same
@@ -146,8 +154,7 @@ __kernel void candidates_draw(const ulong seed, const int level, const int top, 
     int row = 0, col = 0, child = 0, compared;
     scan(&own, below(bits.x, bits.y, counts[here.z + s].x), &row, &col, &child, &compared);
     const int wide = min(2, tile.y - 2 * col);
-    // A node at the sample's edge may lack the child in this place: then it gives the one beside it.
-    row = min(tile.x - 1, 2 * row + (match ? p & 1 : child / wide));
-    col = min(tile.y - 1, 2 * col + (match ? q & 1 : child % wide));
+    row = 2 * row + (match ? p & 1 : child / wide);
+    col = 2 * col + (match ? q & 1 : child % wide);
     source[here.z + s] = row * tile.y + col;
 }

@@ -99,3 +99,13 @@ def response(g, taps, torus):
             total += int(taps[a, b]) * int(g[k, m])
         result[i, j] = rounded(total, 2**14)
     return result
+
+
+def as_large(size, level, place):
+    """Of the nodes along one axis above a level, those that stand for as much of the sample as the one above `place`.
+
+    The last node of a level may stand for fewer of the sample's `size` pixels than the others.
+    """
+    side = 2 ** (level + 1)
+    extents = [min(side, size - first) for first in range(0, size, side)]
+    return [extent >= extents[place // 2] for extent in extents]

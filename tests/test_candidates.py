@@ -7,6 +7,7 @@ import pytest
 from cases import REFERENCE, assert_same_bits, host, opencl
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_multires import as_large
 from scipy.stats import chi2_contingency, chisquare
 from tolerances import SIGNIFICANCE
 
@@ -56,7 +57,8 @@ class Problem(NamedTuple):
 
 def lattice(shapes, first):
     begins = np.cumsum([0, *(r * c if level >= first else 0 for level, (r, c) in enumerate(shapes))])
-    return np.array([(*shape, begin, 0) for shape, begin in zip(shapes, begins[:-1], strict=True)], np.int32)
+    edge = [(shapes[0][0] % 2**level > 0) + 2 * (shapes[0][1] % 2**level > 0) for level in range(len(shapes))]
+    return np.array([(*shape, *rest) for shape, *rest in zip(shapes, begins[:-1], edge, strict=True)], np.int32)
 
 
 def problem(seed=0, *, tile=(7, 6), shape=(17, 13), levels=4, features=3, kinds=4, of=SMALL):
@@ -76,8 +78,11 @@ def problem(seed=0, *, tile=(7, 6), shape=(17, 13), levels=4, features=3, kinds=
     structure = Structure(measured.astype(np.int32), threshold.astype(np.uint32), lattice(tiles, 1))
     total = sum(r * c for r, c in shapes)
     source, counts = np.full(total, -1, np.int32), np.tile(np.array([1, 0], np.int32), (total, 1))
-    copied = shapes[-1][0] * shapes[-1][1]
-    source[-copied:] = rng.integers(0, tiles[-1][0] * tiles[-1][1], copied)
+    row, col = (  # of any place at the top, if as many pixels are below it as below the pixel
+        np.where(i % n < n - 1, rng.integers(0, max(1, n - 1), shapes[-1]), rng.integers(0, n, shapes[-1]))
+        for i, n in zip(np.indices(shapes[-1]), tiles[-1], strict=True)
+    )
+    source[-row.size :] = (row * tiles[-1][1] + col).ravel()
     return Problem(tiles, shapes, structure, Sampled(source, counts, lattice(shapes, 0)))
 
 
@@ -146,9 +151,9 @@ class Plain:
         return found
 
     def child(self, level, i, j):
-        """The child of the copied parent that stands as pixel (i, j) does among its siblings, or beside."""
+        """The child of the copied parent that stands as pixel (i, j) does among its siblings."""
         (rows, cols), (r, c) = self.p.tiles[level], self.parents(level, i, j)[level + 1]
-        return min(2 * r + i % rows % 2, rows - 1), min(2 * c + j % cols % 2, cols - 1)
+        return min(2 * r + i % rows % 2, rows - 1), min(2 * c + j % cols % 2, cols - 1)  # the latter in phase "free"
 
     def similar(self, v, a, b):
         u, w = self.features[v][a[0]][a[1]], self.features[v][b[0]][b[1]]
@@ -167,12 +172,16 @@ class Plain:
         own, found, (rows, cols) = self.parents(level, i, j), [], self.p.tiles[level]
         for x in range(rows):  # Loop (x, y) over the analysis level
             for y in range(cols):
-                if match and not (in_place(x, i % rows, rows) and in_place(y, j % cols, cols)):
+                if match and not (self.in_place(level, 0, x, i % rows) and self.in_place(level, 1, y, j % cols)):
                     continue
                 if self.passes(level, own, x, y):
                     found.append((x, y))
         path = range(self.p.top - level, -1, -1)  # parents before children, row by row
         return sorted(found, key=lambda q: [(q[0] >> up, q[1] >> up) for up in path])
+
+    def in_place(self, level, axis, x, place):
+        """Whether x stands as `place` does among its siblings, below a parent as large in the sample as its own."""
+        return x % 2 == place % 2 and as_large(self.p.tiles[0][axis], level, place)[x // 2]
 
     def compared(self, level, i, j):
         """Nodes above the level whose own ancestors all pass."""
@@ -180,11 +189,6 @@ class Plain:
         for v in range(level + 1, len(self.p.tiles)):
             count += sum(self.passes(v, own, r, c) for r, c in np.ndindex(*self.p.tiles[v]))
         return count
-
-
-def in_place(x, place, size):
-    """Whether row x stands as `place` does among its siblings, or beside, where its parent has no such child."""
-    return x % 2 == place % 2 or (x % 2 == 0 and x == size - 1)
 
 
 def check_against_loops(p, match, seed):
@@ -357,9 +361,11 @@ def test_every_node_passes_the_highest_threshold(machine, p, seed):
         for match in (True, False):
             _, counts = sampled_on(m, p, match, seed)
             for level in range(p.top):
-                rows, cols = p.tiles[level + 1 if match else level]
-                nodes = sum(r * c for r, c in p.tiles[level + 1 :])
-                assert (counts[p.own(level)] == (rows * cols, nodes)).all()
+                (rows, cols), nodes = p.tiles[level], sum(r * c for r, c in p.tiles[level + 1 :])
+                for s, (i, j) in enumerate(np.ndindex(*p.shapes[level])):
+                    of = [sum(as_large(n, level, k)) for n, k in zip(p.tiles[0], (i % rows, j % cols), strict=True)]
+                    there = of[0] * of[1] if match else rows * cols
+                    assert counts[p.own(level)][s].tolist() == [there, nodes]
 
 
 @given(p=problems(), seed=seeds)
@@ -445,7 +451,7 @@ def check_independent(a, b):
 
 def test_draws_of_other_levels_seeds_and_pixels_are_others():
     """The same pixel number at two levels, and with two seeds; a pixel and the next, and the one it comes from."""
-    tile, rows, cols = (6, 8), 24, 24
+    tile, rows, cols = (8, 8), 24, 24
     p = many_tiles(tile, rows, cols, 3, features=1).with_thresholds(ALL)
     fine, coarse = numbers(p, 0, 9), numbers(p, 1, 9)
     check_independent(fine[: coarse.size], coarse)
@@ -453,7 +459,7 @@ def test_draws_of_other_levels_seeds_and_pixels_are_others():
     check_independent(coarse[:-1], coarse[1:])
     for seed in (8, 9 + 2**32, 2**63 + 9):
         check_independent(fine, numbers(p, 0, seed))
-    above = coarse.reshape(rows * 3, cols * 4).repeat(2, 0).repeat(2, 1).ravel()
+    above = coarse.reshape(rows * 4, cols * 4).repeat(2, 0).repeat(2, 1).ravel()
     check_independent(fine, above)
     with pytest.raises(AssertionError):
         check_independent(fine, fine)

@@ -1,11 +1,14 @@
 """Thresholds of unusual size and type, and the alpha that is looked for."""
 
+import math
 from fractions import Fraction
 from math import inf
 
 import numpy as np
 import pytest
 from cases import REFERENCE, assert_same_bits, texture
+from plain_multires import as_large
+from test_multires import alike
 
 import simdtex
 from simdtex.analysis import analyse
@@ -69,3 +72,51 @@ def test_alpha_of_a_sample_too_large_to_count_whole(any_device):
     assert simdtex.suggest_alpha(sample, target=3, levels=2, device=str(any_device.index)) == alpha
     assert 0.01 < alpha < 4
     assert suggest_alpha(REFERENCE, found, Options(alpha="auto", target=6, levels=2)) > alpha
+
+
+def mean_candidates(found, alpha, beta, phase):
+    """Candidates of the sample's own pixels: the mean over the means of the coarser half of the levels sampled."""
+    table = [[alpha / k**beta] for k in range(1, found.levels)]
+    similar, means = alike(found, 9, table), []
+    together = np.ones((1, 1), bool)
+    for level in reversed(range(found.levels - 1)):
+        above = np.indices(found.shapes[level + 1]).reshape(2, -1)
+        if level + 1 < found.levels - 1:  # their parents are similar too
+            parent = above[0] // 2 * found.shapes[level + 2][1] + above[1] // 2
+            together = together[np.ix_(parent, parent)] & similar[level + 1]
+        else:
+            together = similar[level + 1]
+        row, col = np.indices(found.shapes[level]).reshape(2, -1)
+        parent = row // 2 * found.shapes[level + 1][1] + col // 2
+        allowed = together[parent][:, parent if phase == "free" else slice(None)]
+        if phase == "match":
+            size = found.shapes[0]
+            large = [np.array([as_large(n, level, k) for k in x]) for n, x in zip(size, (row, col), strict=True)]
+            allowed = allowed & large[0][:, above[0]] & large[1][:, above[1]]
+        means.append(allowed.sum(1).mean())
+    return np.mean(means[: math.ceil(len(means) / 2)])
+
+
+@pytest.mark.parametrize(
+    ("size", "options"),
+    [
+        ((12, 11), {"target": 1.2}),
+        ((16, 16), {"target": 1.3, "beta": 1}),
+        ((16, 16), {"target": 5.5, "phase": "free"}),
+        ((24, 20), {"target": 1.4, "boundary": "open"}),
+        ((24, 20), {"target": 1.5, "levels": 4, "beta": 1}),
+        ((9, 5), {"target": 2.5, "levels": 3}),
+        ((9, 8), {"target": 3.0, "levels": 2}),
+    ],
+    ids=str,
+)
+def test_a_suggested_alpha_is_the_least_that_reaches_the_target(size, options):
+    sample = texture(size)
+    alpha = simdtex.suggest_alpha(sample, device=REFERENCE, **options)
+    assert alpha == round(alpha * 100) / 100
+    assert 0.01 < alpha < 4
+    bearing = {name: value for name, value in options.items() if name in ("boundary", "levels")}
+    found = analyse(REFERENCE, sample[..., None], **bearing)
+    rest = options.get("beta", 0), options.get("phase", "match")
+    less = round(alpha * 100 - 1) / 100
+    assert mean_candidates(found, less, *rest) < options["target"] <= mean_candidates(found, alpha, *rest)

@@ -362,9 +362,10 @@ def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int],
 
 
 def _lattice(shapes: Sequence[tuple[int, int]], first: int) -> NDArray[np.int32]:
-    """Rows, columns and beginning of each level where levels stand one after another, from one of them on."""
+    """Lattices as of `Structure` and `Sampled`, where levels stand one after another, from one of them on."""
     begins = np.cumsum([0, *(rows * cols * (level >= first) for level, (rows, cols) in enumerate(shapes))])
-    return np.array([(*shape, begin, 0) for shape, begin in zip(shapes, begins, strict=False)], np.int32)
+    ragged = [sum((n % 2**level > 0) << axis for axis, n in enumerate(shapes[0])) for level in range(len(shapes))]
+    return np.array([(*shape, *rest) for shape, *rest in zip(shapes, begins, ragged, strict=False)], np.int32)
 
 
 def _structure(machine: Machine, analysis: Analysis, table: NDArray[np.float64]) -> Structure:

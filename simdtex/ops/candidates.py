@@ -27,7 +27,8 @@ class Structure(NamedTuple):
 
     ``features`` (nodes, M) int32, of the levels from 1 on, level after level; ``threshold`` (levels, M) uint32, the
     largest difference that passes; ``lattice`` (levels, 4) int32: rows, columns, where the level begins in
-    ``features``, 0.
+    ``features``, and the sum of 1 if its last row, and 2 if its last column, stands for fewer pixels of the sample than
+    the others.
     """
 
     features: Array
@@ -75,14 +76,16 @@ def _drawn(
     compared = np.zeros(sites.size, np.intp)
     for k in range(top, level, -1):
         compared += passing.sum(1)
-        rows, cols, start = structure.lattice[k, :3]
+        rows, cols, start, ragged = structure.lattice[k]
         above = (i // tile[0] * rows + (p >> k - level), j // tile[1] * cols + (q >> k - level))
         own = sampled.source[sampled.lattice[k, 2] + above[0] * sampled.lattice[k, 1] + above[1]]
         u = structure.features[start + own].astype(np.int64)
         v = structure.features[start + row * cols + col].astype(np.int64)
         for m, threshold in enumerate(structure.threshold[k]):
             passing &= abs(u[:, None, m] - v[None, :, m]) <= threshold
-        if k > level + 1 or not match:
+        if k == level + 1 and match:
+            passing &= _whole(row, p // 2, rows, ragged & 1) & _whole(col, q // 2, cols, ragged & 2)
+        else:
             parent, row, col = _children(row, col, structure.lattice[k - 1])
             passing = passing[:, parent]
     number = np.cumsum(passing, 1)
@@ -91,8 +94,14 @@ def _drawn(
     drawn = (number > wanted[:, None]).argmax(1)
     row, col = row[drawn], col[drawn]
     if match:
-        row, col = np.minimum(2 * row + p % 2, tile[0] - 1), np.minimum(2 * col + q % 2, tile[1] - 1)
+        row, col = 2 * row + p % 2, 2 * col + q % 2
     return row * tile[1] + col, np.stack([number[:, -1], compared], -1)
+
+
+def _whole(node: NDArray[np.intp], parent: NDArray[np.intp], count: int, ragged: int) -> NDArray[np.bool_]:
+    """Whether nodes have all the pixels below them that pixels' parents have, (S, nodes), along one axis."""
+    last = count - 1
+    return np.asarray((node[None] != last) | (parent[:, None] == last) | (ragged == 0))
 
 
 def _children(
@@ -129,6 +138,7 @@ candidates = Operation("candidates", _reference, _launch)
 """``candidates(machine, structure, sampled, level, first, end, match, seed)``: pixels first .. end-1 of a level.
 
 ``sampled`` is changed in place. With ``match`` a candidate stands where the pixel does among its siblings, in an even
-or odd row and column; else any child of a node that passes is one. A node at the sample's edge that lacks the child in
-question gives the one beside it. Cost: at most 3/4 x nodes x M comparisons a pixel; 12 bytes of memory a pixel.
+or odd row and column, and below a node that stands for as many pixels of the sample as the pixel's parent does, which
+those at its edge may not; else any child of a node that passes is one. Cost: at most 3/4 x nodes x M comparisons a
+pixel; 12 bytes of memory a pixel.
 """
