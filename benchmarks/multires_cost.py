@@ -87,7 +87,7 @@ def job(repeats, machine, name, side, output, alpha=0.3):
 def jobs(machine, repeats):
     for side, output in ((128, 256), (256, 1024)):
         for name in NAMES:
-            for alpha in (0.2, "auto"):
+            for alpha in (0.2, 0.3, "auto"):
                 job(repeats, machine, name, side, output, alpha)
     print("the output grows")
     for output in (128, 256, 512, 1024, 2048):

@@ -74,7 +74,7 @@ class Options:
         Whether pyramids wrap around, or continue as in a mirror.
     """
 
-    alpha: float | str = "auto"
+    alpha: float | str = 0.3
     beta: float = 0.0
     target: float = 1.1
     thresholds: ArrayLike | None = None
