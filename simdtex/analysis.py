@@ -6,7 +6,6 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass
 from itertools import pairwise
-from math import prod
 from typing import Any
 
 import numpy as np
@@ -122,7 +121,7 @@ def analyse(
         )
     sample, torus = Stretched(pixels), boundary == "torus"
     shapes = _level_shapes((rows, cols), levels)
-    machine.require(prod(shapes[0]) * (16 * (channels + (seen < channels)) + 3 * width))
+    machine.require(rows * cols * (16 * (channels + (seen < channels)) + 3 * width))
 
     gaussian, bands = pyramid(machine, machine.put(sample.planes), len(shapes), torus)
     guide = gaussian, bands

@@ -57,3 +57,11 @@ def _finite(value: Real) -> bool:
         return isfinite(value)
     except OverflowError:  # a whole number beyond the largest double
         return False
+
+
+def within_32_bits(shape: tuple[int, int], values: int) -> None:
+    """Raise unless so many values for each pixel of an output can be counted in 32 bits."""
+    if shape[0] * shape[1] * values >= 2**31:
+        raise ValueError(
+            f"an output of {shape[0]} rows x {shape[1]} columns is beyond 2**31 values; give a smaller size"
+        )

@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from inspect import signature
 from math import inf
 
 import numpy as np
@@ -49,6 +50,11 @@ def test_infinite_thresholds_let_every_difference_pass():
     table[2] = 0
     largest = differences(found, table)
     assert (largest[2] == 0).all() and (np.delete(largest, 2, 0) == 2**32 - 1).all()
+
+
+def test_an_analysis_has_the_defaults_of_the_method():
+    given = {name: p.default for name, p in signature(analyse).parameters.items() if p.default is not p.empty}
+    assert given == Options().analysis
 
 
 def test_a_sample_beyond_32_bits_is_refused_before_any_work():

@@ -180,6 +180,13 @@ def command_line(context: click.Context) -> str:
     return shlex.join(words)
 
 
+def output_shape(size: str | None, pixels: Any) -> tuple[int, int]:
+    """Rows and columns of ``--size``, or by default twice those of the sample."""
+    from simdtex.image import parse_size
+
+    return parse_size(size) if size else (2 * pixels.shape[0], 2 * pixels.shape[1])
+
+
 def check_distinct(outputs: list[Path], inputs: list[Path]) -> None:
     """Raise where an output would overwrite another or an input."""
     resolved = [path.resolve() for path in outputs]

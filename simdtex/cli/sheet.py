@@ -16,6 +16,7 @@ from simdtex.cli.common import (
     given,
     multires_options,
     numbers,
+    output_shape,
     plainly,
     progress_bar,
 )
@@ -62,7 +63,7 @@ def sheet(
     check_distinct([output], [sample])
     picture = image.read(sample)
     height, width = picture.pixels.shape[:2]
-    shape = image.parse_size(size) if size else (2 * height, 2 * width)
+    shape = output_shape(size, picture.pixels)
     across = numbers("--alphas", alphas)
     seed = as_seed(seed)
     with progress_bar(quiet) as show:

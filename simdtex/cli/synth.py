@@ -17,6 +17,7 @@ from simdtex.cli.common import (
     check_distinct,
     given,
     method_options,
+    output_shape,
     plainly,
     progress_bar,
 )
@@ -86,7 +87,7 @@ def synth(
     picture = image.read(sample)
     pixels = picture.pixels
     height, width = pixels.shape[:2]
-    shape = image.parse_size(size) if size else (2 * height, 2 * width)
+    shape = output_shape(size, pixels)
     channels = 1 if picture.channel_axis is None else pixels.shape[-1]
     image.check_writable(output, pixels.dtype, channels)
     if source_map:

@@ -28,7 +28,7 @@ from simdtex.ops.operation import Array
 from simdtex.ops.snapshot import snapshot
 from simdtex.ops.start import start
 from simdtex.ops.temperature import temperature
-from simdtex.options import build, one_of, real, true_or_false, whole
+from simdtex.options import build, one_of, real, true_or_false, whole, within_32_bits
 from simdtex.run import Callback, Meter, Output, Relaxing, Stage, device_seconds
 from simdtex.sample import Candidates, Sample
 
@@ -423,9 +423,6 @@ def check_fit(sample: tuple[int, ...], radius: int, order: int) -> None:
 
 def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], copies: int) -> None:
     pixels, channels = shape[0] * shape[1], sample.channels
-    if pixels * channels * copies >= 2**31:
-        raise ValueError(
-            f"an output of {shape[0]} rows x {shape[1]} columns is beyond 2**31 values; give a smaller size"
-        )
+    within_32_bits(shape, channels * copies)
     field = copies * (6 + 2 * channels)
     machine.require(pixels * (8 + field) + sample.rows * sample.cols * (8 * channels + 73))

@@ -22,11 +22,14 @@ from simdtex.machine import Machine
 from simdtex.ops.candidates import Sampled, Structure, candidates
 from simdtex.ops.laplacian import laplacian_collapse
 from simdtex.ops.operation import Array
-from simdtex.options import build, one_of, real, whole
+from simdtex.options import build, one_of, real, whole, within_32_bits
 from simdtex.run import Callback, Output, Sampling, Stage, device_seconds, paced
 
 ANY = 2**32 - 1
 """The threshold that every difference passes."""
+
+VALUES = 4
+"""Values for each pixel of an output that kernels number: two counts, all levels together."""
 
 LAUNCH = 4e8
 """Comparisons that the first launch of a level may take if no node fails."""
@@ -221,7 +224,7 @@ def synthesize(
 ) -> tuple[NDArray[Any], Output]:
     """Both phases: `analyse`, then `resample`, which says what comes in and out."""
     began, worked = perf_counter(), machine.seconds
-    _check_size(shape, sample.shape[-1])
+    within_32_bits(shape, max(VALUES, sample.shape[-1]))  # before any work
     analysis = analyse(machine, sample, **options.analysis)
     image, output = resample(machine, analysis, shape, options, seed, callback)
     output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
@@ -267,7 +270,7 @@ def resample(
     """
     began, worked = perf_counter(), machine.seconds
     channels = len(analysis.sample.planes)
-    _check_size(shape, channels)
+    within_32_bits(shape, max(VALUES, channels))
     shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
     machine.require(pixels(shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis))
     alpha = _alpha(machine, analysis, options)
@@ -417,13 +420,6 @@ def _check_thresholds(table: ArrayLike) -> None:
         raise ValueError(f"thresholds has shape {values.shape}; give one row for each level but the finest")
     if not (values >= 0).all():
         raise ValueError("thresholds must be numbers of at least 0")
-
-
-def _check_size(shape: tuple[int, int], channels: int) -> None:
-    if prod(shape) * max(channels, 4) >= 2**31:  # what kernels count in 32 bits, all levels together
-        raise ValueError(
-            f"an output of {shape[0]} rows x {shape[1]} columns is beyond 2**31 values; give a smaller size"
-        )
 
 
 def _held(analysis: Analysis) -> int:
