@@ -5,8 +5,9 @@ from importlib.metadata import version
 
 from simdtex.device import DeviceError, devices
 from simdtex.machine import open_machine
+from simdtex.mixtures import mix
 from simdtex.run import Output, Progress
-from simdtex.synthesis import lcpdf, suggest_alpha, synthesize
+from simdtex.synthesis import lcpdf, suggest_alpha, synthesize, synthesize_solid
 
 __version__ = version("simdtex")
 
@@ -16,7 +17,9 @@ __all__ = [
     "Progress",
     "devices",
     "lcpdf",
+    "mix",
     "open_machine",
     "suggest_alpha",
     "synthesize",
+    "synthesize_solid",
 ]

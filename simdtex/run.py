@@ -31,7 +31,9 @@ class Progress:
     doing : str
         The level and what is being done in it, in words.
     stage : str or None
-        The name of the picture that is complete now: the end of a sweep, or of a level that has none.
+        The name of the picture that is complete now: the end of a sweep, of a level that has none, or of an iteration.
+    caption : str
+        What the picture is called on a sheet, where the last one of each name is shown.
     """
 
     level: int
@@ -46,6 +48,10 @@ class Progress:
     @property
     def stage(self) -> str | None:  # noqa: D102
         return None
+
+    @property
+    def caption(self) -> str:  # noqa: D102
+        return f"level {self.level}"
 
     def maps(self) -> dict[str, NDArray[np.float64]]:
         """What the stage has beside its picture: arrays (rows, cols), 0 to 1, by name."""
@@ -118,6 +124,38 @@ class Sampling(Progress):
         return {"candidates": np.log(counts) / np.log(max(2, counts.max()))}
 
 
+@dataclass(frozen=True, kw_only=True)
+class Iterating(Progress):
+    """The progress of the method ``pyramid``, told after every channel's turn; of a solid, after every part of it.
+
+    All is at level 0. The picture has the channels that have had their turn as of this iteration, the others as of the
+    one before; of a solid it is the block, (depth, rows, cols[, channels]).
+
+    Attributes
+    ----------
+    iteration, iterations : int
+        The present one, from 1, and their number.
+    end_of_iteration : bool
+        Whether the iteration ends here.
+    """
+
+    iteration: int
+    iterations: int
+    end_of_iteration: bool
+
+    @property
+    def doing(self) -> str:  # noqa: D102
+        return f"iteration {self.iteration} of {self.iterations}"
+
+    @property
+    def stage(self) -> str | None:  # noqa: D102
+        return f"iteration{self.iteration:02d}" if self.end_of_iteration else None
+
+    @property
+    def caption(self) -> str:  # noqa: D102
+        return f"iteration {self.iteration}"
+
+
 Callback = Callable[[Any], Any]
 
 
@@ -149,13 +187,13 @@ class Output:
 
     Attributes
     ----------
-    source : (rows, cols, 2) int32 array
+    source : (rows, cols, 2) int32 array or None
         For every output pixel the (row, column) of the sample pixel it was taken from; with ``multires``, of the one
-        that its highest frequencies were taken from.
+        that its highest frequencies were taken from. None with ``pyramid``, which takes no pixel from anywhere.
     temperature : (rows, cols) float64 array or None
         ``mrf``: what is left of the pixel temperatures, 0 to 1.
     stages : list of Stage
-        Each level's picture at its end, the coarsest first.
+        Each level's picture at its end, the coarsest first. None with ``pyramid``; its callback sees every iteration.
     statistics : dict
         ``device``, ``seed``, ``options``, ``seconds``, ``device_seconds`` (of kernels; None unless the machine was
         opened with ``profile=True``), and ``levels``: one dict per level with ``level``, ``rows``, ``cols``,
@@ -176,9 +214,14 @@ class Output:
     A level of ``multires`` has the mean number of ``candidates`` of a pixel and ``most`` of them; ``nodes``, pixels of
     the levels above in the sample's pyramid, and ``compared``, the mean number of them that a pixel was compared with
     until all its candidates were found.
+
+    ``pyramid`` has ``iterations`` in place of ``levels``: one dict per iteration with ``iteration``, ``seconds`` and
+    ``distances``: by name of the subband (and ``pixels``), how far the values were moved on average to match the
+    histogram, in standard deviations of the sample's subband, which is the Wasserstein distance of the two histograms;
+    the mean over orientations and channels.
     """
 
-    source: NDArray[Any]
+    source: NDArray[Any] | None
     temperature: NDArray[Any] | None = None
     stages: list[Stage] = field(default_factory=list)
     statistics: dict[str, Any] = field(default_factory=dict)

@@ -21,6 +21,7 @@ inline uint4 philox(uint4 counter, uint2 key)
 #define PURPOSE_DRAW 2u
 #define PURPOSE_COLOR 3u
 #define PURPOSE_SCHEDULE 4u
+#define PURPOSE_NOISE 5u
 
 inline uint4 draw4(const ulong seed, const uint level, const uint turn, const uint site, const uint purpose,
                    const uint attempt)

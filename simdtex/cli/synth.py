@@ -84,6 +84,8 @@ def synth(
 
     if accounting and method != "mrf":
         raise ValueError(f"--accounting is of the method mrf, not {method}; leave it out")
+    if method == "pyramid" and (source_map or also):
+        raise ValueError("the method pyramid takes no pixel from the sample; leave --source-map and --also out")
     picture = image.read(sample)
     pixels = picture.pixels
     height, width = pixels.shape[:2]
@@ -120,12 +122,13 @@ def synth(
     finally:
         if writer:
             writer.finish()
-    carried = [(maps.apply_source_map(run.source, other, (height, width)), path) for other, path in others]
+    source: Any = run.source
+    carried = [(maps.apply_source_map(source, other, (height, width)), path) for other, path in others]
     image.write(output, made)
     for array, path in carried:
         image.write(path, array)
     if source_map:
-        maps.save_source_map(source_map, run.source)
+        maps.save_source_map(source_map, source)
     if not quiet:
         click.echo(
             f"{output}: {shape[1]}x{shape[0]} from {width}x{height} in {time.perf_counter() - began:.1f} s "

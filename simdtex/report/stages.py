@@ -28,7 +28,9 @@ __all__ = ["StageWriter"]
 
 Picture = NDArray[np.uint8]
 
-_STAGE = re.compile(r"((temperature|candidates)-)?level\d+(-sweep\d+)?\.png|sheet\.png|animation\.gif")
+_STAGE = re.compile(
+    r"((temperature|candidates)-)?level\d+(-sweep\d+)?\.png|iteration\d+\.png|sheet\.png|animation\.gif"
+)
 
 
 class StageWriter:
@@ -36,8 +38,9 @@ class StageWriter:
 
     Of ``mrf`` it writes ``level{l}-sweep{k}.png`` and ``temperature-level{l}-sweep{k}.png`` at the
     end of each sweep; of ``multires``, ``level{l}.png`` and ``candidates-level{l}.png`` at the end
-    of each level, brighter where a pixel had more candidates, on a logarithmic scale from 1. On
-    `finish` it writes ``sheet.png``, the last picture of each level at one size, and
+    of each level, brighter where a pixel had more candidates, on a logarithmic scale from 1; of
+    ``pyramid``, ``iteration{k}.png``. On `finish` it writes ``sheet.png``, the last picture of each
+    level or iteration at one size, and
     ``animation.gif``. Pictures are 8-bit previews; each file is written whole or not at all.
 
     Parameters
@@ -67,7 +70,7 @@ class StageWriter:
         self._frames: list[tuple[int, Picture]] = []
         self._every = 1
         self._seen = 0
-        self._last: dict[int, Picture] = {}
+        self._last: dict[str, tuple[int, Picture]] = {}
         self._shapes: dict[int, tuple[int, ...]] = {}
 
     def __call__(self, progress: Progress) -> None:
@@ -83,14 +86,13 @@ class StageWriter:
         write(self.folder / f"{name}.png", _savable(picture))
         for kind, values in progress.maps().items():
             write(self.folder / f"{kind}-{name}.png", heat(values))
-        self._keep(progress.level, picture)
+        self._keep(progress, picture)
 
     def finish(self) -> None:
         """Write the sheet and the animation of what was seen; nothing if nothing was."""
         if not self._last:
             return
-        finest = min(self._last)
-        reference = self._last[finest]
+        finest, reference = list(self._last.values())[-1]
 
         def shown(level: int, picture: Picture) -> Picture:
             # a frame's pixel stands for a block of its own level's sites, 2^level pixels apart
@@ -98,8 +100,8 @@ class StageWriter:
             return enlarged(picture, (reference.shape[0], reference.shape[1]), step)
 
         sheet = [
-            ("level {}: {} x {}".format(level, *self._shapes[level]), shown(level, picture))
-            for level, picture in sorted(self._last.items(), reverse=True)
+            ("{}: {} x {}".format(caption, *self._shapes[level]), shown(level, picture))
+            for caption, (level, picture) in self._last.items()
         ]
         contact_sheet(sheet, self.folder / "sheet.png")
         frames = [shown(level, frame) for level, frame in self._frames]
@@ -119,9 +121,9 @@ class StageWriter:
         except OSError as error:
             raise ValueError(f"the folder {self.folder} cannot be written ({error.strerror}): choose another") from None
 
-    def _keep(self, level: int, picture: Picture) -> None:
-        small = fitted(picture, FRAME_SIDE)
-        self._last[level] = small
+    def _keep(self, progress: Progress, picture: Picture) -> None:
+        level, small = progress.level, fitted(picture, FRAME_SIDE)
+        self._last[progress.caption] = level, small
         self._shapes[level] = picture.shape[:2]
         if self._seen % self._every == 0:
             self._frames.append((level, small))

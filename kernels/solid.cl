@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "common/border.h"
+
+// Solid textures, Heeger and Bergen section 5: the Laplacian pyramid of a block in whole numbers, the block turned so
+// that its slices lie the other way, and the mean of several blocks. The Gaussian is (1, 4, 6, 4, 1) / 16 in each
+// direction. Every level is rounded, so a band and what it was taken from add up exactly.
+// Blocks are (depth, rows, cols). A launch is of the slices from `first` on: work-items (pixels of a slice, slices).
+// Two directions are summed in 32 bits, the third in 64: right up to |fine| < 2^23 and |coarse| < 2^25.
+
+// Index i, most often one of 0 .. n-1 already: a comparison is cheaper than a division.
+inline int inside(const int i, const int n, const int torus)
+{
+    return i >= 0 && i < n ? i : within(i, n, torus);
+}
+
+// G_{i+1} = 2down(G_i * g) in three directions: `coarse` has half as many slices, rows and columns, rounded up.
+__kernel void solid_reduce(__global const int *restrict fine, const int first, const int depth, const int rows,
+                           const int cols, const int torus, __global int *restrict coarse)
+{
+    const int half_rows = (rows + 1) / 2, half_cols = (cols + 1) / 2;
+    const int s = get_global_id(0), slice = first + (int)get_global_id(1);
+    if (s >= half_rows * half_cols || slice >= (depth + 1) / 2)
+        return;
+    const int i = 2 * (s / half_cols), j = 2 * (s % half_cols);
+    int row[5], col[5];
+    for (int a = 0; a < 5; ++a) {
+        row[a] = inside(i + a - 2, rows, torus) * cols;
+        col[a] = inside(j + a - 2, cols, torus);
+    }
+    const int weight[5] = {1, 4, 6, 4, 1};
+    long sum = 0;
+    for (int c = 0; c < 5; ++c) {
+        __global const int *g = fine + (size_t)inside(2 * slice + c - 2, depth, torus) * rows * cols;
+        int flat = 0;
+        for (int a = 0; a < 5; ++a) {
+            __global const int *p = g + row[a];
+            flat += weight[a] * (p[col[0]] + p[col[4]] + 4 * (p[col[1]] + p[col[3]]) + 6 * p[col[2]]);
+        }
+        sum += (long)weight[c] * flat;
+    }
+    coarse[(size_t)slice * half_rows * half_cols + s] = (int)((sum + (1 << 11)) >> 12);
+}
+
+// 2up(G_{i+1}) at the eight children of voxel (slice, i, j) of G_{i+1}, child 4 a + 2 b + c at a slices, b rows and
+// c columns on. In each direction the first child takes (1, 6, 1) / 8 around its parent, the second (4, 4) / 8.
+inline void expanded(__global const int *restrict coarse, const int depth, const int rows, const int cols,
+                     const int torus, const int slice, const int i, const int j, int *up)
+{
+    int row[3], flat[3][4];
+    for (int b = 0; b < 3; ++b)
+        row[b] = inside(i + b - 1, rows, torus) * cols;
+    const int left = inside(j - 1, cols, torus), right = inside(j + 1, cols, torus);
+    for (int a = 0; a < 3; ++a) {
+        __global const int *g = coarse + (size_t)inside(slice + a - 1, depth, torus) * rows * cols;
+        int one[3], two[3];
+        for (int b = 0; b < 3; ++b) {
+            __global const int *p = g + row[b];
+            one[b] = p[left] + 6 * p[j] + p[right];
+            two[b] = 4 * (p[j] + p[right]);
+        }
+        flat[a][0] = one[0] + 6 * one[1] + one[2];
+        flat[a][1] = two[0] + 6 * two[1] + two[2];
+        flat[a][2] = 4 * (one[1] + one[2]);
+        flat[a][3] = 4 * (two[1] + two[2]);
+    }
+    for (int c = 0; c < 4; ++c) {
+        up[c] = (int)(((long)flat[0][c] + 6 * (long)flat[1][c] + flat[2][c] + (1 << 8)) >> 9);
+        up[4 + c] = (int)((4 * ((long)flat[1][c] + flat[2][c]) + (1 << 8)) >> 9);
+    }
+}
+
+// What both directions share: out = in + sign * 2up(coarse), one work-item per voxel of `coarse`, so that its eight
+// children share the sums. `in` and `out` are depth x rows x cols.
+inline void add_expanded(__global const int *restrict in, __global const int *restrict coarse, const int first,
+                         const int depth, const int rows, const int cols, const int torus, const int sign,
+                         __global int *restrict out)
+{
+    const int half_depth = (depth + 1) / 2, half_rows = (rows + 1) / 2, half_cols = (cols + 1) / 2;
+    const int s = get_global_id(0), slice = first + (int)get_global_id(1);
+    if (s >= half_rows * half_cols || slice >= half_depth)
+        return;
+    const int i = s / half_cols, j = s % half_cols;
+    int up[8];
+    expanded(coarse, half_depth, half_rows, half_cols, torus, slice, i, j, up);
+    for (int c = 0; c < 8; ++c) {
+        const int z = 2 * slice + (c >> 2), y = 2 * i + (c >> 1 & 1), x = 2 * j + (c & 1);
+        if (z < depth && y < rows && x < cols) {
+            const size_t voxel = ((size_t)z * rows + y) * cols + x;
+            out[voxel] = in[voxel] + sign * up[c];
+        }
+    }
+}
+
+// L_i = G_i - 2up(G_{i+1}).
+__kernel void solid_band(__global const int *restrict fine, __global const int *restrict coarse, const int first,
+                         const int depth, const int rows, const int cols, const int torus, __global int *restrict band)
+{
+    add_expanded(fine, coarse, first, depth, rows, cols, torus, -1, band);
+}
+
+// G_i = L_i + 2up(G_{i+1}).
+__kernel void solid_collapse(__global const int *restrict band, __global const int *restrict coarse, const int first,
+                             const int depth, const int rows, const int cols, const int torus,
+                             __global int *restrict fine)
+{
+    add_expanded(band, coarse, first, depth, rows, cols, torus, 1, fine);
+}
+
+// The block with its axes in another order: voxel (slice, i, j) of `turned`, which has rows x cols pixels in each of
+// `depth` slices, is the block's voxel `far` slices, `down` rows and `along` columns of these steps on.
+__kernel void solid_turn(__global const int *restrict block, const int first, const int depth, const int rows,
+                         const int cols, const int far, const int down, const int along, __global int *restrict turned)
+{
+    const int s = get_global_id(0), slice = first + (int)get_global_id(1);
+    if (s >= rows * cols || slice >= depth)
+        return;
+    const int i = s / cols, j = s % cols;
+    turned[(size_t)slice * rows * cols + s] = block[(size_t)slice * far + (size_t)i * down + (size_t)j * along];
+}
+
+#ifndef COUNT
+#define COUNT 4
+#endif
+
+// The mean of the first COUNT (-D) of four arrays of n numbers, half rounded up, below zero too: one work-item per
+// number. Arrays past COUNT are not read.
+__kernel void solid_mean(__global const int *restrict a, __global const int *restrict b, __global const int *restrict c,
+                         __global const int *restrict d, const int n, __global int *restrict mean)
+{
+    const int s = get_global_id(0);
+    if (s >= n)
+        return;
+    const long sum = (long)a[s] + (COUNT > 1 ? b[s] : 0) + (COUNT > 2 ? c[s] : 0) + (COUNT > 3 ? d[s] : 0);
+    const long twice = 2 * sum + COUNT;
+    const long quotient = twice / (2 * COUNT);
+    mean[s] = (int)(quotient - (twice < quotient * (2 * COUNT)));
+}

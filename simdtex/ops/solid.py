@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Blocks of solid textures: their Laplacian pyramid in whole numbers, their slices the other ways, their mean.
+
+Blocks are (depth, rows, cols) int32. A level has half the slices, rows and columns of the one below it, rounded up.
+Results are right where what is reduced is below 2**23 and what is expanded below 2**25, positive or negative.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.ops.laplacian import within
+from simdtex.ops.operation import Array, Operation
+
+if TYPE_CHECKING:
+    from simdtex.machine.opencl import OpenCL
+
+MOST_ITEMS = 2**21
+"""Work-items of a launch, about: so that none is long on a slow device."""
+
+MOST_BLOCKS = 4
+"""Blocks that `solid_mean` takes."""
+
+
+def half(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """The shape of the level above one of this shape."""
+    return tuple(-(-n // 2) for n in shape)
+
+
+def _weighted(near: list[NDArray[np.int64]], weights: Sequence[int]) -> NDArray[np.int64]:
+    return np.asarray(sum(w * g for w, g in zip(weights, near, strict=True)))
+
+
+def _reduce(fine: NDArray[np.int32], torus: bool) -> NDArray[np.int32]:
+    g = fine.astype(np.int64)
+    for axis in range(3):
+        n = g.shape[axis]
+        near = [g.take(within(np.arange(0, n, 2) + a, n, torus), axis) for a in range(-2, 3)]
+        g = _weighted(near, (1, 4, 6, 4, 1))
+    return ((g + 2**11) >> 12).astype(np.int32)
+
+
+def _expanded(coarse: NDArray[np.int32], shape: tuple[int, ...], torus: bool) -> NDArray[np.int64]:
+    """2up(G_{i+1}) at a level of this shape."""
+    g = coarse.astype(np.int64)
+    for axis in range(3):
+        n = g.shape[axis]
+        near = [g.take(within(np.arange(n) + a, n, torus), axis) for a in (-1, 0, 1)]
+        children = np.stack([_weighted(near, (1, 6, 1)), _weighted(near, (0, 4, 4))], axis + 1)
+        g = children.reshape(*g.shape[:axis], 2 * n, *g.shape[axis + 1 :]).take(range(shape[axis]), axis)
+    return (g + 2**8) >> 9
+
+
+def _band(fine: NDArray[np.int32], coarse: NDArray[np.int32], torus: bool) -> NDArray[np.int32]:
+    return (fine - _expanded(coarse, fine.shape, torus)).astype(np.int32)
+
+
+def _collapse(band: NDArray[np.int32], coarse: NDArray[np.int32], torus: bool) -> NDArray[np.int32]:
+    return (band + _expanded(coarse, band.shape, torus)).astype(np.int32)
+
+
+def _turn(block: NDArray[np.int32], axes: Sequence[int]) -> NDArray[np.int32]:
+    return np.ascontiguousarray(block.transpose(axes))
+
+
+def _mean(blocks: Sequence[NDArray[np.int32]]) -> NDArray[np.int32]:
+    k = len(blocks)
+    _check_count(k)
+    total = np.sum(blocks, axis=0, dtype=np.int64)
+    return np.asarray((2 * total + k) // (2 * k), np.int32)
+
+
+def _check_count(k: int) -> None:
+    if not 1 <= k <= MOST_BLOCKS:
+        raise ValueError(f"there are {k} blocks to average: give 1 to {MOST_BLOCKS}")
+
+
+def _sizes(*numbers: int) -> tuple[np.int32, ...]:
+    return tuple(np.int32(n) for n in numbers)
+
+
+def _parts(slices: int, pixels: int) -> Iterator[tuple[np.int32, tuple[int, int]]]:
+    """The first slice of each launch, and its work-items: pixels of a slice, and slices."""
+    step = max(1, MOST_ITEMS // pixels)
+    for first in range(0, slices, step):
+        yield np.int32(first), (pixels, min(step, slices - first))
+
+
+def _launch_reduce(machine: OpenCL, fine: Array, torus: bool) -> Array:
+    depth, rows, cols = half(fine.shape)
+    coarse = machine.empty((depth, rows, cols), np.int32)
+    kernel = machine.kernel("solid", "solid_reduce")
+    for first, size in _parts(depth, rows * cols):
+        machine.launch(kernel, size, fine, first, *_sizes(*fine.shape, torus), coarse)
+    return coarse
+
+
+def _launch_expanded(machine: OpenCL, function: str, known: Array, coarse: Array, torus: bool) -> Array:
+    depth, rows, cols = coarse.shape
+    result = machine.empty(known.shape, np.int32)
+    kernel = machine.kernel("solid", function)
+    for first, size in _parts(depth, rows * cols):
+        machine.launch(kernel, size, known, coarse, first, *_sizes(*known.shape, torus), result)
+    return result
+
+
+def _launch_band(machine: OpenCL, fine: Array, coarse: Array, torus: bool) -> Array:
+    return _launch_expanded(machine, "solid_band", fine, coarse, torus)
+
+
+def _launch_collapse(machine: OpenCL, band: Array, coarse: Array, torus: bool) -> Array:
+    return _launch_expanded(machine, "solid_collapse", band, coarse, torus)
+
+
+def _launch_turn(machine: OpenCL, block: Array, axes: Sequence[int]) -> Array:
+    steps = (block.shape[1] * block.shape[2], block.shape[2], 1)
+    depth, rows, cols = (block.shape[axis] for axis in axes)
+    turned = machine.empty((depth, rows, cols), np.int32)
+    kernel = machine.kernel("solid", "solid_turn")
+    for first, size in _parts(depth, rows * cols):
+        machine.launch(kernel, size, block, first, *_sizes(depth, rows, cols, *(steps[axis] for axis in axes)), turned)
+    return turned
+
+
+def _launch_mean(machine: OpenCL, blocks: Sequence[Array]) -> Array:
+    k = len(blocks)
+    _check_count(k)
+    mean = machine.empty(blocks[0].shape, np.int32)
+    four = [*blocks, *[blocks[0]] * (MOST_BLOCKS - k)]
+    machine.launch(machine.kernel("solid", "solid_mean", COUNT=k), (mean.size,), *four, np.int32(mean.size), mean)
+    return mean
+
+
+solid_reduce = Operation("solid", _reduce, _launch_reduce)
+"""``solid_reduce(machine, fine, torus)``: G_{i+1} of the block G_i, half as large. Cost: 125 multiply-adds a voxel."""
+
+solid_band = Operation("solid", _band, _launch_band)
+"""``solid_band(machine, fine, coarse, torus)``: L_i of G_i and G_{i+1}. Cost: 12 multiply-adds a voxel of L_i."""
+
+solid_collapse = Operation("solid", _collapse, _launch_collapse)
+"""``solid_collapse(machine, band, coarse, torus)``: G_i of L_i and G_{i+1}, to the bit where they are its own."""
+
+solid_turn = Operation("solid", _turn, _launch_turn)
+"""``solid_turn(machine, block, axes)``: the block with its axes in this order, as `numpy.transpose` orders them.
+
+(0, 1, 2) has the x-y slices one behind the other, (1, 0, 2) the x-z slices, (2, 0, 1) the y-z slices.
+"""
+
+solid_mean = Operation("solid", _mean, _launch_mean)
+"""``solid_mean(machine, blocks)``: the mean of one to four int32 arrays of one shape, half rounded up.
+
+Of k arrays floor((2 sum + k) / (2 k)), for any values. The sum is taken in 64 bits.
+"""

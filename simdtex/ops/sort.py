@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The order of the values of every segment: a stable radix sort, the ties in a given order."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.ops.operation import Array, Operation
+
+if TYPE_CHECKING:
+    from simdtex.machine.opencl import OpenCL
+
+SCRATCH = 2**22
+"""Values that are sorted together, unless one segment has more: 16 bytes each for keys and indices, twice."""
+
+DIGITS = 256
+"""Values of the 8 bits that a pass sorts by."""
+
+
+def run_length(machine: OpenCL, segments: int, n: int) -> int:
+    """How many values of a segment a work-item takes in turn; it changes no bit.
+
+    Enough work-items to fill the device, but no run so short that its table of counters is the greater work.
+    """
+    on_gpu = machine.info.kind == "gpu"
+    items, least = (2**13, 256) if on_gpu else (8 * max(1, machine.info.compute_units), 4096)
+    runs = max(1, min(items // segments, n // least))
+    return -(-n // runs)
+
+
+def local(machine: OpenCL) -> tuple[int]:
+    """Work-items of a group where each takes a run: on a processor a few long ones are to be shared out."""
+    return (64,) if machine.info.kind == "gpu" else (1,)
+
+
+def _reference(values: NDArray[np.int32], first: NDArray[np.int32]) -> NDArray[np.int32]:
+    return first[np.argsort(values[:, first], axis=1, kind="stable")]
+
+
+def _launch(machine: OpenCL, values: Array, first: Array) -> Array:
+    segments, n = values.shape
+    order = machine.empty((segments, n), np.int32)
+    most = min(segments, max(1, SCRATCH // max(n, DIGITS)))
+    pairs, moved = (machine.empty((most, n, 2), np.uint32) for _ in range(2))
+    length = run_length(machine, most, n)
+    runs = -(-n // length)
+    counts, totals = machine.empty((most, runs, DIGITS), np.uint32), machine.empty((most, DIGITS), np.uint32)
+    group = local(machine)
+    read, count, scan, scatter = (
+        machine.kernel("sort", f"sort_{name}") for name in ("read", "count", "scan", "scatter")
+    )
+    for begin in range(0, segments, most):
+        pieces = min(most, segments - begin)
+        shape = np.array([pieces, n, runs, length], np.int32)
+        size = (pieces * runs,)
+        machine.launch(read, size, values, np.int32(begin), first, *shape, pairs, local=group)
+        for shift in range(0, 32, 8):
+            machine.launch(count, size, pairs, *shape, np.int32(shift), counts, local=group)
+            machine.launch(scan, (pieces * DIGITS,), np.int32(pieces), np.int32(runs), counts, totals)
+            machine.launch(
+                scatter,
+                size,
+                *(pairs, *shape, np.int32(shift), counts, totals, moved, np.int32(shift == 24), order, np.int32(begin)),
+                local=group,
+            )
+            pairs, moved = moved, pairs
+    return order
+
+
+sort = Operation("sort", _reference, _launch)
+"""``sort(machine, values, first)``: (segments, n) int32, the index in each segment of its k-th smallest value.
+
+``values`` is (segments, n) int32. Equal values come in the order of the permutation ``first`` (n,) int32.
+"""

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The steerable pyramid of Simoncelli and Freeman in whole numbers: its filters, and their transposes.
+
+Pictures are (planes, rows, cols) int32, bands (bands, planes, rows, cols) int32, and taps (bands, side, side) float32
+with an odd side, from `simdtex.steerable_filters`. Sums are float32, over terms, bands, tap rows and tap columns in
+this order, each product and each sum rounded. They are rounded to whole numbers in the end, and must fit 32 bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.ops.laplacian import within
+from simdtex.ops.operation import Array, Operation
+
+if TYPE_CHECKING:
+    from simdtex.machine.opencl import OpenCL
+
+PADDED = 2**24
+"""Most float32 values that are laid out at a time, fewer where the machine's scratch memory is smaller."""
+
+ROWS = {1: 4, 2: 4, 4: 2, 6: 2}
+"""Rows of a work-item by how many bands it makes: what is kept in registers."""
+
+
+def _around(picture: NDArray[np.int32], reach: int, torus: bool) -> NDArray[np.float32]:
+    """The pictures in float32 with so many pixels of what lies beyond the border on each side."""
+    row, col = (within(np.arange(-reach, n + reach), n, torus) for n in picture.shape[1:])
+    return picture[:, row[:, None], col].astype(np.float32)
+
+
+def _split(picture: NDArray[np.int32], taps: NDArray[np.float32], torus: bool, step: int) -> NDArray[np.int32]:
+    _, rows, cols = picture.shape
+    around = _around(picture, taps.shape[1] // 2, torus)
+    bands = []
+    for f in taps:
+        total = np.zeros(picture[:, ::step, ::step].shape, np.float32)
+        for a, b in np.ndindex(f.shape):
+            total += f[a, b] * around[:, a : a + rows : step, b : b + cols : step]
+        bands.append(np.rint(total))
+    return np.array(bands).astype(np.int32)
+
+
+def _join(
+    terms: Sequence[tuple[NDArray[np.int32], NDArray[np.float32], int]], shape: tuple[int, int], torus: bool
+) -> NDArray[np.int32]:
+    rows, cols = shape
+    total = np.zeros((terms[0][0].shape[1], rows, cols), np.float32)
+    for bands, taps, step in terms:
+        for band, f in zip(bands, taps[:, ::-1, ::-1], strict=True):
+            spread = np.zeros(total.shape, np.int32)
+            spread[:, ::step, ::step] = band
+            around = _around(spread, taps.shape[1] // 2, torus)
+            for a, b in np.ndindex(f.shape):
+                total += f[a, b] * around[:, a : a + rows, b : b + cols]
+    return np.rint(total).astype(np.int32)
+
+
+def _up(n: int, unit: int) -> int:
+    """The next multiple of a unit."""
+    return -(-n // unit) * unit
+
+
+def _sizes(*numbers: int) -> tuple[np.int32, ...]:
+    return tuple(np.int32(n) for n in numbers)
+
+
+def _pieces(machine: OpenCL, planes: int, rows: int, line: int, extra: int, unit: int) -> Iterator[tuple[int, ...]]:
+    """Planes, or rows of a plane, that fit in scratch memory: first plane, planes, first row, rows.
+
+    A row takes `line` values, and a piece `extra` rows more than its own, which are whole units.
+    """
+    most = min(PADDED, machine.scratch // 4)
+    together = max(1, most // ((_up(rows, unit) + extra) * line))
+    strip = rows if together > 1 else max(unit, (most // line - extra) // unit * unit)
+    for first in range(0, planes, together):
+        for first_row in range(0, rows, strip):
+            yield first, min(together, planes - first), first_row, min(strip, rows - first_row)
+
+
+def _launch_split(machine: OpenCL, picture: Array, taps: Array, torus: bool, step: int) -> Array:
+    planes, *size = picture.shape
+    count, side, _ = taps.shape
+    rows, cols = (-(-n // step) for n in size)
+    bands = machine.empty((count, planes, rows, cols), np.int32)
+    v, unit = machine.vector, ROWS.get(count, 1)
+    across = _up(cols, v)
+    pitch = _up(across + (side - 1) // step, v)
+    pad = machine.kernel("steerable", "steerable_pad", V=v, SPREAD=1, APART=step)
+    split = machine.kernel("steerable", "steerable_split", V=v, APART=step, BANDS=count, ROWS=unit)
+    padded = None
+    for first, together, first_row, some in _pieces(machine, planes, rows, step * step * pitch, side, unit):
+        height = step * (_up(some, unit) - 1) + side
+        if padded is None:  # the first piece is the largest
+            padded = machine.empty(together * height * step * pitch, np.float32)
+        machine.launch(
+            pad,
+            (height * step * pitch // v, together),
+            *(picture, *_sizes(*size, torus, side // 2, first, step * first_row, together, height, pitch), padded),
+        )
+        machine.launch(
+            split,
+            (_up(some, unit) // unit * across // v, together),
+            *(padded, *_sizes(together, height, pitch), taps, *_sizes(side, planes, rows, cols)),
+            *(*_sizes(first, first_row, some), bands),
+        )
+    return bands
+
+
+def _launch_join(
+    machine: OpenCL, terms: Sequence[tuple[Array, Array, int]], shape: tuple[int, int], torus: bool
+) -> Array:
+    planes, (rows, cols) = terms[0][0].shape[1], shape
+    picture = machine.empty((planes, rows, cols), np.int32)
+    v, unit = machine.vector, 2 * ROWS[1]
+    across = _up(cols, v)
+    side = max(taps.shape[1] for _, taps, _ in terms)
+    pitch = _up(across + side - 1, v)
+    join = machine.kernel("steerable", "steerable_join", V=v, ROWS=ROWS[1])
+    order = [(number, f) for number, (bands, _, _) in enumerate(terms) for f in range(bands.shape[0])]
+    padded = total = None
+    for first, together, first_row, some in _pieces(machine, planes, rows, pitch, side, unit):
+        height = _up(some, unit) + side - 1
+        if padded is None:  # the first piece is the largest
+            padded = machine.empty(together * height * pitch, np.float32)
+            total = machine.empty(together * some * across, np.float32)
+        for number, f in order:
+            bands, taps, step = terms[number]
+            own = taps.shape[1]
+            # Every other row is zeros, but where the rows repeat after an odd number even ones meet odd ones.
+            skip = 1 if rows == 1 or (torus and rows % 2) else step
+            machine.launch(
+                machine.kernel("steerable", "steerable_pad", V=v, SPREAD=step, APART=1),
+                (height * pitch // v, together),
+                *(bands, *_sizes(rows, cols, torus, own // 2, f * planes + first, first_row, together, height, pitch)),
+                padded,
+            )
+            machine.launch(
+                join,
+                (_up(some, ROWS[1] * skip) // ROWS[1] * across // v, together),
+                *(padded, *_sizes(together, height, pitch), taps, *_sizes(f, own, skip)),
+                *_sizes((number, f) == order[0], (number, f) == order[-1]),
+                *(total, *_sizes(rows, cols, first, first_row, some), picture),
+            )
+    return picture
+
+
+steerable_split = Operation("steerable", _split, _launch_split)
+"""``steerable_split(machine, picture, taps, torus, step)``: the picture correlated with each of the filters.
+
+At every step-th row and column from 0, where ``step`` is 1 or 2: (bands, planes, rows, cols) int32, sizes rounded up.
+Beyond the border comes the other side of a ``torus``, or the mirror image. Cost: side**2 multiply-adds a value.
+"""
+
+steerable_join = Operation("steerable", _join, _launch_join)
+"""``steerable_join(machine, terms, shape, torus)``: (planes, rows, cols) int32, the sum over all bands of all terms.
+
+``terms`` are (bands, taps, step): a band is spread over ``shape``, (rows, cols), with zeros between where the step is
+2, and correlated with its filter turned by 180 degrees. Cost: side**2 multiply-adds a pixel and band; half as many for
+a step of 2, but on a torus of an odd number of rows.
+"""

@@ -1,0 +1,75 @@
+"""White noise: uniform 32-bit words, a function of seed, level, plane and site alone."""
+
+import re
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, opencl
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import chisquare
+from tolerances import SIGNIFICANCE
+
+from simdtex import random
+from simdtex.machine.opencl import kernel_folder
+from simdtex.ops.noise import noise
+
+seeds = st.integers(0, 2**64 - 1)
+levels = st.integers(0, 30)
+
+
+def run(machine, *args):
+    return np.asarray(machine.get(noise(machine, *args)))
+
+
+@given(st.integers(1, 9), st.sampled_from([1, 2, 13]), seeds, levels)
+def test_the_reference_is_a_word_of_each_sites_draw(planes, n, seed, level):
+    values = run(REFERENCE, planes, n, seed, level)
+    assert (values.dtype, values.shape) == (np.int32, (planes, n))
+    for p, s in np.ndindex(planes, n):
+        word = int(random.draw4(seed, level, p // 4, s, 5, 0)[p % 4])
+        assert values[p, s] == (word if word < 2**31 else word - 2**32)
+
+
+@given(planes=st.integers(1, 9), n=st.sampled_from([1, 13, 100]), seed=seeds, level=levels)
+@settings(max_examples=40)
+def test_a_device_has_the_references_bits(machine, planes, n, seed, level):
+    args = planes, n, seed, level
+    assert_same_bits(run(machine, *args), run(REFERENCE, *args))
+
+
+@pytest.mark.parametrize("work_group", [3, 16])
+def test_the_shape_of_a_launch_changes_no_bit(cl_device, work_group):
+    assert_same_bits(run(opencl(cl_device, work_group=work_group), 6, 100, 9, 2), run(REFERENCE, 6, 100, 9, 2))
+
+
+def test_a_plane_is_the_same_whatever_is_beside_it():
+    whole = run(REFERENCE, 9, 50, 3, 1)
+    for planes, n in ((1, 50), (4, 50), (5, 7), (9, 1)):
+        assert_same_bits(run(REFERENCE, planes, n, 3, 1), whole[:planes, :n].copy())
+
+
+def test_another_seed_level_plane_or_site_is_another_number():
+    some = [run(REFERENCE, 9, 50, seed, level) for seed, level in ((3, 1), (4, 1), (3 + 2**32, 1), (3, 2))]
+    assert len(np.unique(some)) == 4 * 9 * 50  # 32-bit words: two in 1800 would be alike once in 2,600 seeds
+
+
+@pytest.mark.parametrize("shift", [0, 8, 16, 24])
+@pytest.mark.parametrize("plane", range(4))
+def test_every_byte_is_uniform(plane, shift):
+    values = run(REFERENCE, 4, 50_000, 11, 0)[plane].view(np.uint32)
+    assert chisquare(np.bincount(values >> shift & 255, minlength=256)).pvalue > SIGNIFICANCE
+
+
+def test_planes_and_neighbours_do_not_depend_on_each_other():
+    values = run(REFERENCE, 4, 50_000, 12, 0).view(np.uint32) >> 28
+    pairs = [(values[0], values[1]), (values[1], values[3]), (values[0][1:], values[0][:-1])]
+    for one, other in pairs:
+        assert chisquare(np.bincount(16 * one + other, minlength=256)).pvalue > SIGNIFICANCE
+
+
+def test_noise_has_a_purpose_of_its_own_that_the_kernels_know():
+    header = (kernel_folder() / "common" / "philox.h").read_text()
+    purposes = re.findall(r"#define PURPOSE_(\w+) (\d+)u\n", header)
+    assert ("NOISE", str(random.NOISE)) in purposes
+    assert len({number for _, number in purposes}) == len(purposes)
