@@ -7,7 +7,7 @@
 // and tap columns in this order, with each product and each sum rounded; the end result is rounded to a whole number.
 //
 // Pictures are (planes, rows, cols). They are filtered in pieces: rows first_row .. of planes first .., which
-// steerable_pad lays out in float32 with what lies beyond the border, so that filters read no index twice.
+// steerable_pad lays out in float32 with what lies beyond the border, so that the filters need no rule for it.
 // One work-item makes V adjacent columns of ROWS rows (-D V, -D ROWS), of one plane.
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -149,9 +149,11 @@ __kernel void steerable_join(__global const float *restrict padded, const int pl
             for (int r = 0; r < ROWS; ++r)
                 sum[r] += tap * LOAD(from + (a + r * skip) * pitch + b);
         }
+    __global int *to = picture + ((size_t)(first + plane) * rows + first_row + i) * cols + j;
+    #pragma unroll
     for (int r = 0; r < ROWS && i + r * skip < count; ++r) {
         if (end)
-            store_row(sum[r], cols - j, picture + ((size_t)(first + plane) * rows + first_row + i + r * skip) * cols + j);
+            store_row(sum[r], cols - j, to + r * skip * cols);
         else
             STORE(sum[r], running + r * skip * across * V);
     }

@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.image import check_sample
 from simdtex.machine import Machine, open_machine
-from simdtex.ops.laplacian import half, laplacian_band, laplacian_collapse, laplacian_reduce
+from simdtex.ops.fold import fold, folded, unfold
+from simdtex.ops.laplacian import laplacian_band, laplacian_collapse, laplacian_reduce
 from simdtex.ops.operation import Array
 from simdtex.ops.steerable import steerable_join, steerable_split
 from simdtex.options import one_of, whole
@@ -27,6 +28,9 @@ from simdtex.stretched import Stretched
 __all__ = ["Pyramid", "Transform", "decompose"]
 
 KINDS = ("steerable", "laplacian")
+
+BINOMIAL = np.outer([1, 4, 6, 4, 1], [1, 4, 6, 4, 1]).astype(np.float32) / 256
+"""Of the Laplacian pyramid."""
 
 
 class Transform:
@@ -47,11 +51,14 @@ class Transform:
     def __init__(self, machine: Machine, kind: str, levels: int, orientations: int, torus: bool) -> None:
         self._machine, self._steerable, self._levels, self._torus = machine, kind == "steerable", levels, torus
         self._sources: dict[tuple[int, ...], Array] = {}
+        self._binomial = {gain: machine.put(np.float32(gain) * BINOMIAL[None]) for gain in (-4, -2, -1, 1, 2, 4)}
+        self._itself = machine.put(np.ones((1, 1, 1), np.float32))
         if self._steerable:
             taps = filters(orientations)
             self._high, self._low = machine.put(taps.high[None]), machine.put(taps.low[None])
             self._bands = machine.put(taps.bands)
-            self._down, self._up = machine.put(taps.down[None]), machine.put(4 * taps.down[None])
+            self._down = machine.put(taps.down[None])
+            self._up = {gain: machine.put(np.float32(gain) * taps.down[None]) for gain in (1, 2, 4)}
 
     @property
     def names(self) -> list[str]:
@@ -71,7 +78,9 @@ class Transform:
         -------
         list of (bands, planes, rows, cols) int32 arrays of the machine
             Steerable: the high-pass residue H0, the oriented bands B_i of every level, finest first, the low-pass
-            residue. Laplacian: b^0, b^1, ... and the low-pass residue.
+            residue. Laplacian: b^0, b^1, ... and the low-pass residue. A level has half the rows and columns of the
+            one below, rounded up; but on a torus as many where they are odd, in the order of `simdtex.ops.fold`, so
+            that there is no seam.
         """
         if not self._steerable:
             return self._make_laplacian(picture)
@@ -81,7 +90,7 @@ class Transform:
         for _ in range(self._levels):
             below = low.reshape(low.shape[1:])
             subbands.append(steerable_split(self._machine, below, self._bands, self._torus, 1))
-            low = steerable_split(self._machine, below, self._down, self._torus, 2)
+            low = self._next(below)
         return [*subbands, low]
 
     def collapse(self, subbands: list[Array]) -> Array:
@@ -90,22 +99,66 @@ class Transform:
             return self._collapse_laplacian(subbands)
         high, *bands, low = subbands
         for own in reversed(bands):
-            terms = [(own, self._bands, 1), (low, self._up, 2)]
+            terms = [(own, self._bands, 1), self._previous(low, own.shape[2:])]
             low = steerable_join(self._machine, terms, own.shape[2:], self._torus)
             low = low.reshape((1, *low.shape))
         return steerable_join(self._machine, [(high, self._high, 1), (low, self._low, 1)], high.shape[2:], self._torus)
 
+    def _folds(self, shape: tuple[int, ...]) -> bool:
+        """Whether every second pixel of a picture would not be evenly spaced around it."""
+        return self._torus and any(n % 2 for n in shape)
+
+    def _next(self, low: Array) -> Array:
+        """2down(L1 low), (1, planes, ...)."""
+        if not self._folds(low.shape[1:]):
+            return steerable_split(self._machine, low, self._down, self._torus, 2)
+        blurred = steerable_split(self._machine, low, self._down, self._torus, 1)
+        coarse = fold(self._machine, blurred.reshape(low.shape))
+        return coarse.reshape((1, *coarse.shape))
+
+    def _previous(self, low: Array, shape: tuple[int, int]) -> tuple[Array, Array, int]:
+        """The term of the level below, of these rows and columns, that is L1 2up(low)."""
+        if not self._folds(shape):
+            return low, self._up[4], 2
+        gain, spread = self._spread(low.reshape(low.shape[1:]), shape)
+        return spread, self._up[gain], 1
+
+    def _spread(self, coarse: Array, shape: tuple[int, ...]) -> tuple[int, Array]:
+        """A level at its places on the one below, (1, planes, ...), and what the zeros between them take away."""
+        spread = unfold(self._machine, coarse, shape)
+        return prod(1 if n % 2 else 2 for n in shape), spread.reshape((1, *spread.shape))
+
     def _make_laplacian(self, picture: Array) -> list[Array]:
         gaussian = [picture]
         while len(gaussian) <= self._levels:
-            gaussian.append(laplacian_reduce(self._machine, gaussian[-1], self._torus))
-        bands = [laplacian_band(self._machine, fine, coarse, self._torus) for fine, coarse in pairwise(gaussian)]
+            gaussian.append(self._reduce(gaussian[-1]))
+        bands = [self._band(fine, coarse) for fine, coarse in pairwise(gaussian)]
         return [band.reshape((1, *band.shape)) for band in [*bands, gaussian[-1]]]
+
+    def _reduce(self, fine: Array) -> Array:
+        if not self._folds(fine.shape[1:]):
+            return laplacian_reduce(self._machine, fine, self._torus)
+        blurred = steerable_split(self._machine, fine, self._binomial[1], self._torus, 1)
+        return fold(self._machine, blurred.reshape(fine.shape))
+
+    def _band(self, fine: Array, coarse: Array) -> Array:
+        if not self._folds(fine.shape[1:]):
+            return laplacian_band(self._machine, fine, coarse, self._torus)
+        return self._plus_expanded(fine, coarse, -1)
+
+    def _plus_expanded(self, fine: Array, coarse: Array, sign: int) -> Array:
+        """A picture and the level above it expanded, or less that, on a torus with an odd side."""
+        gain, spread = self._spread(coarse, fine.shape[1:])
+        terms = [(fine.reshape((1, *fine.shape)), self._itself, 1), (spread, self._binomial[sign * gain], 1)]
+        return steerable_join(self._machine, terms, fine.shape[1:], self._torus)
 
     def _collapse_laplacian(self, subbands: list[Array]) -> Array:
         *bands, picture = (band.reshape(band.shape[1:]) for band in subbands)
         for band in reversed(bands):
             shape = band.shape[1:]
+            if self._folds(shape):
+                picture = self._plus_expanded(band, picture, 1)
+                continue
             if shape not in self._sources:
                 self._sources[shape] = self._machine.put(np.arange(prod(shape), dtype=np.int32).reshape(shape))
             picture = laplacian_collapse(self._machine, band, self._sources[shape], picture, self._torus)
@@ -137,7 +190,8 @@ class Pyramid:
     subbands : list of (bands, channels, rows, cols) float64 arrays
         In the picture's unit. Steerable: the high-pass residue, the oriented bands of every level, finest first, the
         low-pass residue; orientation i as in `simdtex.steerable_filters.filters`. Laplacian: a band for every level
-        and the low-pass residue. A low-pass picture has the mean of what it was made from, at every level.
+        and the low-pass residue. A low-pass picture has the mean of what it was made from, at every level. A level has
+        half the rows and columns of the one below, rounded up; on a torus as many where they are odd.
     kind, orientations, boundary
         As given to `decompose`.
     offset : float
@@ -160,10 +214,13 @@ class Pyramid:
         the steerable filters lose what `docs/concepts/pyramid.rst` says.
         """
         machine = open_machine(device)
-        whole_numbers = [machine.put(np.rint(band / self.unit).astype(np.int32)) for band in self.subbands]
         levels = len(self.subbands) - (2 if self.kind == "steerable" else 1)
+        whole_numbers = [np.rint(band / self.unit).astype(np.int32) for band in self.subbands]
+        if self.boundary == "torus":
+            orders = _orders(self.subbands[0].shape[2:], levels, self.kind)
+            whole_numbers = [band[..., r[:, None], c] for band, (r, c) in zip(whole_numbers, orders, strict=True)]
         transform = Transform(machine, self.kind, levels, self.orientations, self.boundary == "torus")
-        picture = machine.get(transform.collapse(whole_numbers))
+        picture = machine.get(transform.collapse([machine.put(band) for band in whole_numbers]))
         return np.ascontiguousarray(np.moveaxis(picture * self.unit + self.offset, 0, -1))
 
 
@@ -226,13 +283,20 @@ def decompose(
     picture = Stretched(pixels)
     transform = Transform(machine, kind, levels, orientations, boundary == "torus")
     subbands: list[Any] = [machine.get(band) for band in transform.make(machine.put(picture.planes))]
+    if boundary == "torus":
+        orders = _orders(pixels.shape[:2], levels, kind)
+        natural = [(np.argsort(rows)[:, None], np.argsort(cols)) for rows, cols in orders]
+        subbands = [band[..., rows, cols] for band, (rows, cols) in zip(subbands, natural, strict=True)]
     offset = float(pixels.min())
     return Pyramid([band * picture.unit for band in subbands], kind, orientations, boundary, offset, picture.unit)
 
 
-def level_shapes(shape: tuple[int, int], levels: int) -> list[tuple[int, int]]:
-    """Rows and columns of every level, and of the low-pass residue."""
-    shapes = [shape]
-    while len(shapes) <= levels:
-        shapes.append(half(shapes[-1]))
-    return shapes
+def _orders(shape: tuple[int, ...], levels: int, kind: str) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    """Where the rows and columns of every subband stand among those of the picture, on a torus, as ranks."""
+    places = [np.arange(n) for n in shape]
+    found = []
+    for _ in range(levels + 1):
+        rows, cols = (np.argsort(np.argsort(place)) for place in places)
+        found.append((rows, cols))
+        places = [place[folded(place.size)] for place in places]
+    return [found[0], *found] if kind == "steerable" else found

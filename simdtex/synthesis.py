@@ -77,7 +77,7 @@ def synthesize(
         ``boundary``, ``array``, ``mapping``, ``emulate``; see `simdtex.methods.mrf.Options`. ``multires``: ``alpha``,
         ``beta``, ``target``, ``thresholds``, ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``,
         ``phase``, ``boundary``; see `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``, ``levels``,
-        ``orientations``, ``iterations``, ``match``, ``bins``, ``edges``, ``color``, ``boundary``, ``start``; see
+        ``orientations``, ``iterations``, ``match``, ``bins``, ``edges``, ``color``, ``start``; see
         `simdtex.methods.pyramid.Options`.
 
     Returns
@@ -151,7 +151,7 @@ def synthesize_solid(
         Return statistics too.
     **options
         ``pyramid``, ``levels``, ``orientations``, ``iterations``, ``match``, ``bins``, ``edges``, ``color``,
-        ``boundary``, ``start``, ``solids``, ``slices``; see `simdtex.methods.solid.Options`. With
+        ``start``, ``solids``, ``slices``; see `simdtex.methods.solid.Options`. With
         ``pyramid="steerable"`` the 3-D Laplacian pyramid and the steerable pyramids of all x-y, x-z and y-z slices are
         matched; ``"laplacian"`` is the first alone.
 

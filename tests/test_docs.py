@@ -19,6 +19,7 @@ import simdtex
 from simdtex import cli
 from simdtex.cli.common import given
 from simdtex.image import write
+from simdtex.methods import solid
 from simdtex.methods.mrf import PRESETS
 from simdtex.synthesis import METHODS
 
@@ -26,6 +27,7 @@ ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = sorted(path for path in (ROOT / "docs").rglob("*.rst") if "_build" not in path.parts)
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+OF_COMMANDS = {"sheet": METHODS["multires"], "mix": METHODS["pyramid"], "solid": solid}
 REFERENCE = (ROOT / "docs" / "reference" / "command-line.rst").read_text(encoding="utf-8")
 
 
@@ -54,6 +56,11 @@ def small(code):
     """The same code or command at sizes that take a second."""
     code = code.replace("[:128, :128]", "[:16, :16]").replace("[128:256, 128:256]", "[16:32, 16:32]")
     code = code.replace("[266:362, 486:582]", "[266:282, 486:502]").replace("(10, 20), (64, 64)", "(5, 7), (6, 6)")
+    code = (
+        code.replace("(64, 64, 64)", "(8, 10, 12)")
+        .replace("block[:, 20]", "block[:, 2]")
+        .replace("--size 64", "--size 8")
+    )
     return code.replace("(256, 256)", "(40, 40)").replace("(192, 192)", "(40, 40)").replace("256x256", "40x40")
 
 
@@ -62,6 +69,7 @@ def material(tmp_path, monkeypatch):
     """A folder with the files that the texts speak of."""
     sample = data.brick()[:16, :16]
     write(tmp_path / "brick.png", sample)
+    write(tmp_path / "gravel.png", data.gravel()[:16, :16])
     write(tmp_path / "brick-height.png", sample.astype(np.uint16) * 257)
     write(tmp_path / "brick-normal.png", np.stack([sample] * 3, axis=-1))
     monkeypatch.chdir(tmp_path)
@@ -94,8 +102,8 @@ def test_readme_command_runs(any_device, material, line):
         [sys.executable, "-m", *words], env=environment, capture_output=True, text=True, timeout=120, check=False
     )
     assert done.returncode == 0, done.stderr
-    if "synth" in words:
-        outputs = [words[i + 1] for i, word in enumerate(words) if word == "-o"]
+    if {"synth", "solid", "mix"} & set(words):
+        outputs = [words[i + 1] for i, word in enumerate(words) if word in ("-o", "--view")]
         outputs += [word.partition("=")[2] for word in words if "=" in word]
         assert outputs and all((material / name).is_file() for name in outputs)
     if "--stages" in words:
@@ -109,10 +117,12 @@ def test_readme_command_runs(any_device, material, line):
 def test_documented_command_parses(page, line):
     _, command, *words = shlex.split(line)
     context = cli.main.commands[command].make_context(command, words)
-    method = context.params.get("method", "multires" if command == "sheet" else "mrf")
-    known = METHODS[method].Options.__dataclass_fields__
+    method = (
+        METHODS[context.params["method"]] if "method" in context.params else OF_COMMANDS.get(command, METHODS["mrf"])
+    )
+    known = method.Options.__dataclass_fields__
     valid = {name: value for name, value in given(context.params).items() if name in known}
-    METHODS[method].make_options(**valid)
+    method.make_options(**valid)
     assert context.params.get("preset") in (None, *PRESETS)
 
 
@@ -190,6 +200,23 @@ def test_every_option_of_a_method_is_on_the_command_line_and_in_the_docstrings(m
     described = set(re.findall(r"^    (\w+) : ", options.__doc__, re.MULTILINE))
     assert described == names
     assert names <= set(re.findall(r"``(\w+)``", simdtex.synthesize.__doc__))
+
+
+def test_every_option_of_solids_and_mixtures_is_on_the_command_line_and_in_the_docstrings():
+    names = set(solid.Options.__dataclass_fields__)
+    assert names <= {p.name for p in cli.main.commands["solid"].params}
+    assert names <= set(re.findall(r"``(\w+)``", simdtex.synthesize_solid.__doc__))
+    own = names - set(METHODS["pyramid"].Options.__dataclass_fields__)
+    assert set(re.findall(r"^    (\w+) : ", solid.Options.__doc__, re.MULTILINE)) == own
+    names = set(METHODS["pyramid"].Options.__dataclass_fields__)
+    names |= set(inspect.signature(simdtex.mix).parameters) - {
+        "shape",
+        "rng",
+        "callback",
+        "full_output",
+        "channel_axis",
+    }
+    assert names - {"options"} <= {p.name for p in cli.main.commands["mix"].params}
 
 
 @pytest.mark.parametrize("method", METHODS)

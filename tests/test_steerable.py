@@ -190,7 +190,7 @@ def test_an_impulse_is_spread_as_the_filter_lies(torus):
 # -- machines -------------------------------------------------------------------------------------------------
 
 
-@given(case=splits(counts=(1, 4)))  # the other banks follow below; each is compiled anew
+@given(case=splits(counts=(4,)))  # the other banks follow below; each is compiled anew
 @example(case=(noise((1, 1, 1)), any_taps(4, 9, 0), False, 2))
 @example(case=(noise((2, 2, 3)), any_taps(1, 9, 0), True, 2))
 @settings(max_examples=25)
@@ -218,16 +218,16 @@ def test_a_device_builds_and_collapses_to_the_references_bits(machine, orientati
 
 
 # Scratch for a few planes at a time, and for strips of a plane.
-SHAPES = [{"work_group": 3}, {"vector": 1}, {"scratch": 2**14}, {"scratch": 2**12, "vector": 4}]
+SHAPES = [{"work_group": 3, "vector": 4}, {"vector": 1}, {"scratch": 2**14}, {"scratch": 2**12}]
 
 
 @BORDERS
 @pytest.mark.parametrize("options", SHAPES, ids=str)
 def test_the_shape_of_a_launch_changes_no_bit(cl_device, options, torus):
     machine, picture = opencl(cl_device, **options), noise((4, 37, 41))
-    subbands = build(REFERENCE, picture, 4, 1, torus)
-    assert_same_bits(build(machine, picture, 4, 1, torus), subbands)
-    assert_same_bits(collapse(machine, subbands, 4, torus), collapse(REFERENCE, subbands, 4, torus))
+    subbands = build(REFERENCE, picture, 2, 1, torus)
+    assert_same_bits(build(machine, picture, 2, 1, torus), subbands)
+    assert_same_bits(collapse(machine, subbands, 2, torus), collapse(REFERENCE, subbands, 2, torus))
 
 
 @pytest.mark.parametrize(("scratch", "bound"), [(2**12, 2**12), (2**17, 2**17), (1, 10 * 48 * 4)])

@@ -49,3 +49,11 @@ PARSEVAL = {1: 0.001, 2: 0.003, 4: 0.002, 6: 0.007}
 ODD_TORUS = 0.1
 """As RECONSTRUCTION, for a torus of 65 x 97 pixels: at the seam, even rows and columns meet even ones where they are
 halved. 0.0873 is the most of four pictures, 1 to 3 levels and every bank."""
+
+DECORRELATED = 2e-3
+"""Of the covariance of decorrelated channels against the unit matrix, times the ratio of the deviations it joins: axes
+are whole multiples of 2**-14, each coefficient off by 3e-5 at most, and there are five; 6e-4 is the most seen."""
+
+DIRECTION = 2e-2
+"""Of a coefficient of the decorrelating transform against a plain singular value decomposition, relative to the largest.
+Roundings of 2**-15 turn axes, whose variances differ by 2 % of the largest at least, by less than this."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command line: ``simdtex synth``, ``sheet``, ``schedules``, ``ising``, ``devices`` and ``demo``."""
+"""The command line: ``simdtex synth``, ``solid``, ``mix``, ``sheet``, ``schedules``, ``ising`` and the rest."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from simdtex import __version__
 from simdtex.cli.demo import demo
 from simdtex.cli.devices import devices
 from simdtex.cli.ising import ising
+from simdtex.cli.mix import mix
 from simdtex.cli.schedules import schedules
 from simdtex.cli.sheet import sheet
+from simdtex.cli.solid import solid
 from simdtex.cli.synth import synth
 
 
@@ -20,5 +22,5 @@ def main() -> None:
     """More of a texture from a sample of it, by parallel relaxation on any OpenCL device."""
 
 
-for command in (synth, sheet, schedules, ising, devices, demo):
+for command in (synth, solid, mix, sheet, schedules, ising, devices, demo):
     main.add_command(command)

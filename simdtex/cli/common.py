@@ -16,7 +16,9 @@ from click.core import ParameterSource
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from simdtex.methods import mrf, multires
+from simdtex.methods import mrf, multires, pyramid
+
+Command = Callable[..., None]
 
 
 def plainly(command: Callable[..., None]) -> Callable[..., None]:
@@ -29,6 +31,9 @@ def plainly(command: Callable[..., None]) -> Callable[..., None]:
         except (ValueError, TypeError, OSError) as error:
             click.echo(f"simdtex: {error}", err=True)
             sys.exit(2)
+        except MemoryError:
+            click.echo("simdtex: the memory does not suffice for this; give a smaller size", err=True)
+            sys.exit(2)
         except KeyboardInterrupt:
             click.echo("simdtex: stopped; nothing but stages may have been written", err=True)
             sys.exit(130)
@@ -36,7 +41,7 @@ def plainly(command: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
-DEFAULTS, MULTIRES = mrf.Options(), multires.Options()
+DEFAULTS, MULTIRES, PYRAMID = mrf.Options(), multires.Options(), pyramid.Options()
 
 DEVICE = click.option(
     "--device",
@@ -45,9 +50,30 @@ DEVICE = click.option(
     "Default: SIMDTEX_DEVICE, else a GPU, else a CPU.",
 )
 
-
+SEED = click.option("--seed", type=int, help="Same seed, same picture on every device.  [a fresh one, printed]")
+QUIET = click.option("-q", "--quiet", is_flag=True, help="No progress bar and no summary.")
 LEVELS = click.option("--levels", type=int, help="Of the multigrid, or of the pyramid.  [as many as the sample feeds]")
-BOUNDARY = click.option("--boundary", help=f"torus (the result tiles) or open.  [{DEFAULTS.boundary}]")
+BOUNDARY = click.option("--boundary", help=f"mrf, multires: torus (the result tiles) or open.  [{DEFAULTS.boundary}]")
+
+_EDGES = {
+    "mrf": f"auto, reflect or whole: candidates at the sample's edge.  [{DEFAULTS.edges}]",
+    "pyramid": f"reflect or wrap: how the sample goes on beyond its edge.  [{PYRAMID.edges}]",
+}
+_ORIENTATIONS = {
+    "multires": f"of edge and line filters.  [{MULTIRES.orientations}]",
+    "pyramid": f"1, 2, 4 or 6, of the steerable pyramid.  [{PYRAMID.orientations}]",
+}
+
+
+def stages_option(what: str) -> Callable[[Command], Command]:
+    """``--stages``, which writes these pictures."""
+    return click.option("--stages", type=click.Path(path_type=Path), metavar="DIR", help=f"Write {what} as pictures.")
+
+
+def _shared(name: str, texts: dict[str, str], *methods: str, **kinds: Any) -> Callable[[Command], Command]:
+    """An option that means something to each of these methods."""
+    return click.option(name, help=" ".join(f"{method}: {texts[method]}" for method in methods), **kinds)
+
 
 _MRF_OPTIONS = (
     click.option("--preset", help="mrf: default, or paper: the 1998 rules to the letter."),
@@ -69,12 +95,10 @@ _MRF_OPTIONS = (
     ),
     click.option("--pixel", help=f"mrf: source (pixels of the sample) or density (grey levels).  [{DEFAULTS.pixel}]"),
     click.option("--phases", help=f"mrf: decimated or all: candidates at coarse levels.  [{DEFAULTS.phases}]"),
-    click.option("--edges", help=f"mrf: auto, reflect or whole: candidates at the sample's edge.  [{DEFAULTS.edges}]"),
     click.option("--coarsest", help=f"mrf: gibbs or same: how the coarsest level relaxes.  [{DEFAULTS.coarsest}]"),
 )
 
 _MULTIRES_OPTIONS = (
-    click.option("--orientations", type=int, help=f"multires: of edge and line filters.  [{MULTIRES.orientations}]"),
     click.option("--sigma", type=float, help=f"multires: of the filters, in pixels.  [{MULTIRES.sigma}]"),
     click.option("--filter-size", type=int, help=f"multires: rows of a filter, odd.  [{MULTIRES.filter_size}]"),
     click.option("--features", help=f"multires: of the luminance or of all channels.  [{MULTIRES.features}]"),
@@ -98,7 +122,22 @@ _THRESHOLD_OPTIONS = (
     ),
 )
 
-Command = Callable[..., None]
+
+def _pyramid_options(start: str, prefix: str = "") -> list[Callable[[Command], Command]]:
+    """Those of ``pyramid`` that no other method has; `start` is ``"METAVAR: What to begin with"``."""
+    metavar, begin = start.split(": ")
+
+    def option(name: str, text: str, **kinds: Any) -> Callable[[Command], Command]:
+        return click.option(name, help=prefix + text[0].lower() + text[1:] if prefix else text, **kinds)
+
+    return [
+        option("--pyramid", f"steerable or laplacian: whose histograms are matched.  [{PYRAMID.pyramid}]"),
+        option("--iterations", f"Times that all are matched, 0 or more.  [{PYRAMID.iterations}]", type=int),
+        option("--match", f"rank (exact) or lookup (the paper's tables).  [{PYRAMID.match}]"),
+        option("--bins", f"Of these tables, 2 to 4096.  [{PYRAMID.bins}]", type=int),
+        option("--color", f"decorrelate or channels: the colours that are matched.  [{PYRAMID.color}]"),
+        option("--start", f"{begin} to begin with.  [noise]", type=click.Path(path_type=Path), metavar=metavar),
+    ]
 
 
 def _with(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
@@ -110,14 +149,36 @@ def _with(*options: Callable[[Command], Command]) -> Callable[[Command], Command
     return decorate
 
 
-mrf_options = _with(*_MRF_OPTIONS, LEVELS, BOUNDARY)
+mrf_options = _with(*_MRF_OPTIONS, _shared("--edges", _EDGES, "mrf"), LEVELS, BOUNDARY)
 """The options of the method ``mrf`` that any command takes which runs it."""
 
-multires_options = _with(*_MULTIRES_OPTIONS, LEVELS, BOUNDARY)
+multires_options = _with(
+    _shared("--orientations", _ORIENTATIONS, "multires", type=int), *_MULTIRES_OPTIONS, LEVELS, BOUNDARY
+)
 """Those of ``multires``, but for its thresholds."""
 
-method_options = _with(LEVELS, BOUNDARY, *_MRF_OPTIONS, *_THRESHOLD_OPTIONS, *_MULTIRES_OPTIONS)
+method_options = _with(
+    LEVELS,
+    BOUNDARY,
+    _shared("--edges", _EDGES, "mrf", "pyramid"),
+    _shared("--orientations", _ORIENTATIONS, "multires", "pyramid", type=int),
+    *_MRF_OPTIONS,
+    *_THRESHOLD_OPTIONS,
+    *_MULTIRES_OPTIONS,
+    *_pyramid_options("IMAGE: A picture", "pyramid: "),
+)
 """Those of every method."""
+
+
+def pyramid_options(start: str) -> Callable[[Command], Command]:
+    """Those of a command that runs nothing but ``pyramid``; `start` is ``"METAVAR: What to begin with"``."""
+    return _with(
+        *_pyramid_options(start),
+        click.option("--levels", type=int, help="Of the pyramids.  [as many as leave 8 pixels a side]"),
+        click.option("--orientations", type=int, help=_ORIENTATIONS["pyramid"]),
+        click.option("--edges", help=_EDGES["pyramid"]),
+        BOUNDARY,
+    )
 
 
 def given(options: dict[str, Any]) -> dict[str, Any]:
@@ -164,6 +225,16 @@ def candidates_per_level(levels: list[dict[str, Any]]) -> str:
     return " ".join(f"{level['candidates']:.3g}" for level in levels[1:])
 
 
+def last_iteration(statistics: dict[str, Any]) -> str:
+    """Levels, iterations, and how far the last iteration had to move the subbands on average."""
+    reports = statistics["iterations"]
+    text = f"levels {statistics['options']['levels']}, iterations {len(reports)}"
+    moved = [by for name, by in reports[-1]["distances"].items() if name != "pixels"] if reports else []
+    if not moved:  # no iteration, or a constant sample
+        return text
+    return f"{text}, mean distance of the subbands in the last: {sum(moved) / len(moved):.3f} standard deviations"
+
+
 def command_line(context: click.Context) -> str:
     """What was given to a command, so that a reader can give it again."""
     words = ["simdtex", str(context.command.name)]
@@ -180,11 +251,13 @@ def command_line(context: click.Context) -> str:
     return shlex.join(words)
 
 
-def output_shape(size: str | None, pixels: Any) -> tuple[int, int]:
-    """Rows and columns of ``--size``, or by default twice those of the sample."""
+def output_shape(size: str | None, pixels: Any, start: Any = None) -> tuple[int, int]:
+    """Rows and columns of ``--size``, or by default those of a picture to begin with, or twice those of the sample."""
     from simdtex.image import parse_size
 
-    return parse_size(size) if size else (2 * pixels.shape[0], 2 * pixels.shape[1])
+    if size:
+        return parse_size(size)
+    return (2 * pixels.shape[0], 2 * pixels.shape[1]) if start is None else (start.shape[0], start.shape[1])
 
 
 def check_distinct(outputs: list[Path], inputs: list[Path]) -> None:
@@ -218,3 +291,31 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[float, str, str], None]]:
             last = job
 
         yield show
+
+
+@contextmanager
+def watching(
+    quiet: bool,
+    stages: Path | None,
+    limits: tuple[float, float],
+    shown: Callable[[Any], Any] = lambda progress: progress,
+) -> Iterator[Callable[[Any], None]]:
+    """A callback that moves a progress bar and, where there is a folder for them, writes the stages.
+
+    `limits` are black and white in their pictures, and `shown` turns the progress into that of a picture.
+    """
+    from simdtex.report.stages import StageWriter
+
+    writer = StageWriter(stages, limits=limits) if stages else None
+    try:
+        with progress_bar(quiet) as show:
+
+            def callback(progress: Any) -> None:
+                show(progress.fraction, progress.doing, "")
+                if writer:
+                    writer(shown(progress))
+
+            yield callback
+    finally:
+        if writer:
+            writer.finish()

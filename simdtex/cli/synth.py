@@ -13,22 +13,31 @@ from rich.console import Console
 from simdtex.cli.common import (
     DEFAULTS,
     DEVICE,
+    QUIET,
+    SEED,
     candidates_per_level,
     check_distinct,
     given,
+    last_iteration,
     method_options,
     output_shape,
     plainly,
-    progress_bar,
+    stages_option,
+    watching,
 )
 
 
 @click.command()
 @click.argument("sample", type=click.Path(path_type=Path))
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Picture to write.")
-@click.option("--size", metavar="WIDTHxHEIGHT", help="Of the output, in pixels. Default: twice the sample.")
 @click.option(
-    "--method", default="mrf", show_default=True, help="mrf: Paget and Longstaff 1998. multires: De Bonet 1997."
+    "--size", metavar="WIDTHxHEIGHT", help="Of the output, in pixels. Default: that of --start, else twice the sample."
+)
+@click.option(
+    "--method",
+    default="mrf",
+    show_default=True,
+    help="mrf: Paget and Longstaff 1998. multires: De Bonet 1997. pyramid: Heeger and Bergen 1995.",
 )
 @method_options
 @click.option(
@@ -47,11 +56,9 @@ from simdtex.cli.common import (
     "--emulate/--no-emulate", default=None, help="mrf: launch one work-item per PE, or only account for the array."
 )
 @click.option("--accounting", is_flag=True, help="mrf: print what the run costs on the array, or on a full MP-1.")
-@click.option("--seed", type=int, help="Same seed, same picture on every device.  [a fresh one, printed]")
+@SEED
 @DEVICE
-@click.option(
-    "--stages", type=click.Path(path_type=Path), metavar="DIR", help="Write every level and sweep as pictures."
-)
+@stages_option("every level, sweep or iteration")
 @click.option("--source-map", type=click.Path(path_type=Path), metavar="FILE", help="Write it: .npz, .npy, .png.")
 @click.option(
     "--also",
@@ -59,13 +66,14 @@ from simdtex.cli.common import (
     metavar="MAP=OUT",
     help="Carry the arrangement over to another map of the material (normal, height); may be repeated.",
 )
-@click.option("-q", "--quiet", is_flag=True, help="No progress bar and no summary.")
+@QUIET
 @plainly
 def synth(
     sample: Path,
     output: Path,
     size: str | None,
     method: str,
+    start: Path | None,
     seed: int | None,
     device: str | None,
     stages: Path | None,
@@ -79,7 +87,6 @@ def synth(
     from simdtex import image
     from simdtex import source_map as maps
     from simdtex.report.accounting import render
-    from simdtex.report.stages import StageWriter
     from simdtex.synthesis import synthesize
 
     if accounting and method != "mrf":
@@ -89,39 +96,30 @@ def synth(
     picture = image.read(sample)
     pixels = picture.pixels
     height, width = pixels.shape[:2]
-    shape = output_shape(size, pixels)
+    begin = image.read(start).pixels if start else None
+    shape = output_shape(size, pixels, begin)
     channels = 1 if picture.channel_axis is None else pixels.shape[-1]
     image.check_writable(output, pixels.dtype, channels)
     if source_map:
         image.check_writable(source_map, suffixes=maps.SOURCE_SUFFIXES)
     others = [_other_map(text, (height, width)) for text in also]
-    outputs = [output, *([source_map] if source_map else []), *(path for _, path in others)]
-    check_distinct(outputs, [sample, *(Path(text.partition("=")[0]) for text in also)])
-    writer = StageWriter(stages, limits=(float(pixels.min()), float(pixels.max()))) if stages else None
+    outputs = [output, *(path for path in (source_map, stages) if path), *(path for _, path in others)]
+    inputs = [sample, *([start] if start else []), *(Path(text.partition("=")[0]) for text in also)]
+    check_distinct(outputs, inputs)
 
     began = time.perf_counter()
-    try:
-        with progress_bar(quiet) as show:
-
-            def callback(progress: Any) -> None:
-                show(progress.fraction, progress.doing, "")
-                if writer:
-                    writer(progress)
-
-            made, run = synthesize(
-                pixels,
-                shape,
-                method=method,
-                channel_axis=picture.channel_axis,
-                rng=seed,
-                device=device,
-                callback=callback,
-                full_output=True,
-                **given(options),
-            )
-    finally:
-        if writer:
-            writer.finish()
+    with watching(quiet, stages, (float(pixels.min()), float(pixels.max()))) as callback:
+        made, run = synthesize(
+            pixels,
+            shape,
+            method=method,
+            channel_axis=picture.channel_axis,
+            rng=seed,
+            device=device,
+            callback=callback,
+            full_output=True,
+            **given(options | {"start": begin}),
+        )
     source: Any = run.source
     carried = [(maps.apply_source_map(source, other, (height, width)), path) for other, path in others]
     image.write(output, made)
@@ -138,6 +136,8 @@ def synth(
             levels, alpha = run.statistics["levels"], run.statistics["options"]["alpha"]
             thresholds = "thresholds as given" if alpha is None else f"alpha {alpha}"
             click.echo(f"{thresholds}; candidates per level, coarse to fine: {candidates_per_level(levels)}")
+        if method == "pyramid":
+            click.echo(last_iteration(run.statistics))
     if accounting:
         render(run.statistics["accounting"], Console())
 

@@ -44,7 +44,7 @@ TIES = 2**20
 
 @dataclass(frozen=True)
 class Options:
-    """The options of the method ``pyramid``.
+    """The options of the method ``pyramid``. Its outputs always tile.
 
     Parameters
     ----------
@@ -66,8 +66,6 @@ class Options:
         How the sample continues beyond its border when it is analysed.
     color : {"decorrelate", "channels"}
         Match the decorrelated channels, or the channels as they are.
-    boundary : {"torus", "open"}
-        Whether the output's pyramid wraps around, so that it tiles, or continues as in a mirror.
     start : array, optional
         What to begin with in place of noise, of the output's shape, with the sample's channels.
     """
@@ -80,7 +78,6 @@ class Options:
     bins: int = 256
     edges: str = "reflect"
     color: str = "decorrelate"
-    boundary: str = "torus"
     start: ArrayLike | None = None
 
     def __post_init__(self) -> None:
@@ -93,7 +90,6 @@ class Options:
             raise ValueError(f"bins is {self.bins}; give 4096 or fewer")
         one_of("edges", self.edges, ("reflect", "wrap"))
         one_of("color", self.color, ("decorrelate", "channels"))
-        one_of("boundary", self.boundary, ("torus", "open"))
 
 
 def make_options(**given: Any) -> Options:
@@ -271,7 +267,7 @@ def synthesize_from(
     """A picture of a texture whose histograms are known, see `match_texture`."""
     within_32_bits(shape, max(VALUES, len(texture.histograms)))
     machine.require(prod(shape) * MEMORY)
-    pyramid = transform(machine, options, levels, options.boundary == "torus")
+    pyramid = transform(machine, options, levels, torus=True)
 
     def turn(picture: Array, wanted: list[Wanted], matcher: Matcher, tell: Callable[[float], None]) -> Array:
         synthesis_pyr = pyramid.make(picture.reshape((1, *shape)))  # Make-Pyramid(noise)

@@ -109,15 +109,15 @@ def synthesize(
         raise ValueError(f"a block of {size} is beyond 2**31 values; give a smaller size")
     machine.require(prod(shape) * MEMORY)
     levels, oriented = number_of_levels(options, *shape, *sample.shape[:2]), options.pyramid == "steerable"
-    wrap, torus = options.edges == "wrap", options.boundary == "torus"
+    wrap = options.edges == "wrap"
     flat = transform(machine, replace(options, pyramid="laplacian"), levels, wrap)
     steerable = [transform(machine, options, levels, wrap)] if oriented else []
     texture = analyse(machine, sample, options, flat, *steerable)
-    slices = transform(machine, options, levels, torus)
+    slices = transform(machine, options, levels, torus=True)
 
     def turn(block: Array, wanted: list[Wanted], matcher: Matcher, tell: Callable[[float], None]) -> Array:
         block, of_block, of_slices = block.reshape(shape), wanted[: levels + 1], wanted[levels + 1 :]
-        solids = [_matched_block(machine, block, of_block, matcher, torus)]
+        solids = [_matched_block(machine, block, of_block, matcher)]
         for number, (name, (axes, back)) in enumerate(FAMILIES.items() if oriented else ()):
             machine.sync()
             tell((1 + number) / (1 + len(FAMILIES)))
@@ -135,18 +135,18 @@ def synthesize(
     return volume, output
 
 
-def _matched_block(machine: Machine, block: Array, wanted: list[Wanted], matcher: Matcher, torus: bool) -> Array:
+def _matched_block(machine: Machine, block: Array, wanted: list[Wanted], matcher: Matcher) -> Array:
     """The 3-D Laplacian pyramid of a block, matched and collapsed."""
     gaussian = [block]
     while len(gaussian) < len(wanted):
-        gaussian.append(solid_reduce(machine, gaussian[-1], torus))
-    bands = [solid_band(machine, fine, coarse, torus) for fine, coarse in pairwise(gaussian)]
+        gaussian.append(solid_reduce(machine, gaussian[-1], True))
+    bands = [solid_band(machine, fine, coarse, True) for fine, coarse in pairwise(gaussian)]
     names = [*(f"solid level {level}" for level in range(len(bands))), "solid low"]
     synthesis_pyr = [band.reshape((1, 1, *band.shape)) for band in [*bands, gaussian[-1]]]
     matched = match_subbands(matcher, names, synthesis_pyr, wanted)
     *fine, collapsed = (band.reshape(band.shape[2:]) for band in matched)
     for band in reversed(fine):
-        collapsed = solid_collapse(machine, band, collapsed, torus)
+        collapsed = solid_collapse(machine, band, collapsed, True)
     return collapsed
 
 

@@ -1,0 +1,518 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Every figure of the pages on pyramid matching.
+
+    python benchmarks/pyramid_figures.py [--out docs/pyramid] [--device TEXT] [--only filters,colour] [--quick]
+
+Writes PNG files, the same bytes every time, and oblique.csv, and prints their names and the figures that the pages
+quote. ``--quick`` runs all of it on small sizes.
+"""
+
+import argparse
+import csv
+from functools import partial
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+import PIL.Image
+import samples
+from scipy.ndimage import map_coordinates
+from scipy.spatial import cKDTree
+from scipy.stats import wasserstein_distance
+from skimage import data
+from skimage.transform import resize
+
+import simdtex
+from simdtex.pyramids import decompose
+from simdtex.quality import seam
+from simdtex.report.plots import FAINT, INK, figure_png, new_figure, tidy
+from simdtex.report.sheet import contact_sheet, enlarged
+from simdtex.report.solid import view
+from simdtex.steerable_filters import ORIENTATIONS, filters
+
+COLOURS = ("#D55E00", "#0072B2", "#56B4E9", "#009E73", "#8A6D00", "#E69F00", "#CC79A7", "#000000")
+
+
+def reduced(picture, factor):
+    """A picture reduced, smoothed before."""
+    shape = [round(n / factor) for n in picture.shape[:2]]
+    return np.rint(resize(picture, shape, anti_aliasing=True, preserve_range=True)).astype(np.uint8)
+
+
+def stretched(picture):
+    """A grey picture over the whole range, but for one value in a thousand at each end."""
+    low, high = np.quantile(picture, (0.001, 0.999))
+    return np.rint(np.clip((picture - low) / (high - low), 0, 1) * 255).astype(np.uint8)
+
+
+def strong():
+    """Textures without structures beyond what histograms of subbands hold."""
+    return {
+        "gravel, reduced to 1/4": reduced(data.gravel(), 4),
+        "grass, reduced to 1/4": reduced(data.grass(), 4),
+        "the moon's ground, contrast raised": stretched(data.moon()[300:428, 20:148]),
+        "a lawn, contrast raised": stretched(data.camera()[415:485, 150:220]),
+        "fur": data.chelsea()[0:64, 170:234],
+        "tissue": samples.colour()["tissue"],
+    }
+
+
+def failures():
+    """Textures with structures beyond them, and of what kind they are."""
+    return {
+        "quasi-periodic: brick": data.brick()[:128, :128],
+        "a mosaic: gravel": data.gravel()[:128, :128],
+        "a mosaic: coins": data.coins()[60:188, 60:188],
+        "inhomogeneous: a lawn and a tripod": data.camera()[410:510, 150:260],
+        "inhomogeneous: a corner without tissue": data.immunohistochemistry()[400:496, 80:176],
+        "locally oriented: grass": data.grass()[:128, :128],
+        "locally oriented: wood": samples.colour()["wood"],
+        "locally oriented: hair": data.astronaut()[20:84, 190:254],
+    }
+
+
+class Making:
+    """Runs of the method on a machine, of a `part` of the full size.
+
+    Parameters
+    ----------
+    machine : simdtex.machine.Machine
+    part : int
+        What sides and numbers of iterations are divided by.
+    """
+
+    def __init__(self, machine, part):
+        self.machine, self.part = machine, part
+
+    def small(self, n):
+        """A side, or a number of iterations."""
+        return max(1, n // self.part)
+
+    def crop(self, sample):
+        return sample[: self.small(sample.shape[0]), : self.small(sample.shape[1])]
+
+    def given(self, sample):
+        return {"channel_axis": -1 if sample.ndim == 3 else None, "rng": 1, "device": self.machine, "full_output": True}
+
+    def run(self, sample, side, **options):
+        """An image and its statistics."""
+        shape = (self.small(side),) * 2
+        image, output = simdtex.synthesize(self.crop(sample), shape, method="pyramid", **self.given(sample) | options)
+        return image, output.statistics
+
+    def mix(self, inputs, side, **options):
+        shape = (self.small(side),) * 2
+        return simdtex.mix([self.crop(p) for p in inputs], shape, **self.given(inputs[0]) | options)[0]
+
+
+def moved(statistics, iteration=-1):
+    """Mean distance of an iteration's histograms."""
+    return float(np.mean(list(statistics["iterations"][iteration]["distances"].values())))
+
+
+def png(sheet):
+    """A sheet as a PNG: in shades of grey where it has no colours, else of 256 colours."""
+    picture = PIL.Image.fromarray(sheet)
+    if (sheet == sheet[..., :1]).all():
+        picture = picture.convert("L")
+    elif len(np.unique(sheet.reshape(-1, 3), axis=0)) > 256:
+        picture = picture.quantize(256, PIL.Image.Quantize.MEDIANCUT, dither=PIL.Image.Dither.NONE)
+    buffer = BytesIO()
+    picture.save(buffer, format="PNG", optimize=True)
+    return buffer.getvalue()
+
+
+# ---------------------------------------------------------------- the pyramid
+
+
+def filter_bank(making):
+    """The filters with four orientations, and their frequency responses."""
+    for orientations in ORIENTATIONS:
+        low, high = flatness(filters(orientations), 256 // making.part)
+        print(f"  {orientations} orientations: the response of a pyramid of one level is {low:.4f} to {high:.4f}")
+    taps = filters(4)
+    named = {"H0": taps.high, "L0": taps.low, "L1": taps.down} | {f"B_{i}": b for i, b in enumerate(taps.bands)}
+    figure = new_figure(9.2, 3.3)
+    figure.get_layout_engine().set(w_pad=0.02, h_pad=0.02)
+    for column, (name, tap) in enumerate(named.items()):
+        above, below = (figure.add_subplot(2, len(named), 1 + column + row * len(named)) for row in (0, 1))
+        limit = np.abs(tap).max()
+        above.imshow(tap, cmap="RdBu_r", vmin=-limit, vmax=limit)
+        size = f"{len(tap)} x {len(tap)}"
+        above.set_title(f"{name}, {size}" if name[0] == "B" else f"{name}\n{size}", fontsize=9, color=INK)
+        shown = below.imshow(np.fft.fftshift(np.abs(response(tap, 64))), cmap="gray", vmin=0, vmax=1)
+        for one in (above, below):
+            one.set_xticks([])
+            one.set_yticks([])
+    bar = figure.colorbar(shown, ax=figure.axes, fraction=0.015, pad=0.01)
+    bar.ax.tick_params(labelsize=8)
+    figure.axes[0].set_ylabel("taps", fontsize=9, color=INK)
+    figure.axes[1].set_ylabel("response", fontsize=9, color=INK)
+    return figure_png(figure)
+
+
+def response(tap, n):
+    spread = np.zeros((n, n))
+    reach = len(tap) // 2
+    for (a, b), value in np.ndenumerate(tap):
+        spread[(a - reach) % n, (b - reach) % n] += value
+    return np.fft.fft2(spread)
+
+
+def flatness(taps, n):
+    """What making and collapsing multiplies any frequency by, but for aliasing: least and most."""
+    high, low, down = (np.abs(response(tap, n)) ** 2 for tap in (taps.high, taps.low, taps.down))
+    total = high + low * (down + sum(np.abs(response(band, n)) ** 2 for band in taps.bands))
+    return total.min(), total.max()
+
+
+def subbands(making):
+    """A pyramid of gravel, level by level."""
+    sample = data.gravel()[: making.small(96), : making.small(96)]
+    levels = 3 if making.part == 1 else 1
+    pyramid = decompose(sample, levels=levels, boundary="torus", device=making.machine)
+    back = pyramid.collapse(device=making.machine)[..., 0]
+    error = np.sqrt(((back - sample) ** 2).mean()) / sample.std()
+    print(f"  gravel back from {levels} levels: an error of {error:.4f} standard deviations")
+    high, *bands, low = pyramid.subbands
+    pictures = [
+        ("sample", sample),
+        ("high", signed(high[0, 0])),
+        ("low", plain(low[0, 0] + pyramid.offset, sample)),
+        ("collapsed", plain(back, sample)),
+        ("error, 20 times", signed(20 * (back - sample), sample)),
+    ]
+    for level, own in enumerate(bands):
+        below = decompose(sample, levels=level, boundary="torus", device=making.machine)
+        pictures.append((f"low-pass, level {level}", plain(below.subbands[-1][0, 0] + below.offset, sample)))
+        pictures += [(f"level {level}, B_{i}", signed(band[0])) for i, band in enumerate(own)]
+    side = sample.shape
+    return png(contact_sheet([(n, enlarged(p, side, side[0] / len(p))) for n, p in pictures], columns=5))
+
+
+def plain(values, like):
+    return np.rint(np.clip(values, like.min(), like.max())).astype(np.uint8)
+
+
+def signed(values, like=None):
+    """Values around 0 as shades around grey, 3 standard deviations to each side."""
+    limit = 3 * (values if like is None else like).std()
+    return np.rint(np.clip(values / limit, -1, 1) * 127 + 128).astype(np.uint8)
+
+
+# ---------------------------------------------------------------- iterations
+
+
+def convergence(making):
+    """How far the histograms of each subband were from the sample's, iteration by iteration."""
+    chosen = {"gravel": data.gravel()[:128, :128], "fur": data.chelsea()[0:64, 170:234]}
+    figure = new_figure(9.2, 3.9)
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, (name, sample) in zip(panels, chosen.items(), strict=True):
+        _, statistics = making.run(sample, 256, iterations=making.small(30))
+        reports = statistics["iterations"]
+        iteration = [report["iteration"] for report in reports]
+        names = ["pixels", *(n for n in reports[0]["distances"] if n != "pixels")]
+        for colour, band in zip(COLOURS, names, strict=False):
+            ends = [report["distances"][band] for report in reports]
+            style = {"color": colour, "linewidth": 1.6, "linestyle": "--" if band == "pixels" else "-"}
+            axes.plot(iteration, ends, label=band, **style)
+        tidy(axes, name, "iteration", "distance, standard deviations" if name == "gravel" else "")
+        axes.set_yscale("log")
+        for k in (1, 2, 5, 10, 20, 30):
+            if k <= len(reports):
+                own = ", ".join(f"{n} {reports[k - 1]['distances'][n]:.3f}" for n in names)
+                print(f"  {name}, iteration {k:2}: mean {moved(statistics, k - 1):.4f}; {own}")
+    panels[1].legend(frameon=False, fontsize=8, labelcolor=INK, ncols=2)
+    return figure_png(figure)
+
+
+def iterations(making):
+    """What more iterations do."""
+    chosen = {"gravel": data.gravel()[:128, :128], "fur": data.chelsea()[0:64, 170:234]}
+    pictures = []
+    for name, sample in chosen.items():
+        for kind in ("steerable", "laplacian"):
+            for count in (1, 5, 20, 100):
+                image, statistics = making.run(sample, 144, pyramid=kind, iterations=making.small(count))
+                print(f"  {name}, {kind}, {count:3} iterations: mean distance {moved(statistics):.4f}")
+                pictures.append((f"{kind}, {count}", image))
+    return png(contact_sheet(pictures, columns=4))
+
+
+# ---------------------------------------------------------------- galleries
+
+
+def gallery(making, chosen):
+    pictures = []
+    for name, sample in chosen.items():
+        image, statistics = making.run(sample, 192)
+        print(f"  {name}: mean distance {moved(statistics):.3f}, seam {seam(image):.2f}")
+        kind, _, what = name.rpartition(": ")
+        pictures += [(what, making.crop(sample)), (kind, image)]
+    return png(contact_sheet(pictures, columns=4))
+
+
+def colour(making):
+    """Decorrelated channels against the channels as they are."""
+    grey = data.gravel()[:96, :96]
+    chosen = {
+        "tissue": data.immunohistochemistry()[330:410, 270:350],
+        "fur": data.chelsea()[0:64, 170:234],
+        "gravel as RGB": np.repeat(grey[..., None], 3, axis=2),
+    }
+    pictures = []
+    for name, sample in chosen.items():
+        pictures.append((name, making.crop(sample)))
+        known = cKDTree(np.unique(making.crop(sample).reshape(-1, 3), axis=0))
+        for option in ("decorrelate", "channels"):
+            image, _ = making.run(sample, 144, color=option)
+            away = known.query(image.reshape(-1, 3).astype(float))[0].mean()
+            print(f"  {name}, {option}: a pixel is {away:.2f} of 255 from the nearest colour of the sample", end="")
+            print(f"; channels differ by at most {np.ptp(image.astype(int), axis=-1).max()}")
+            pictures.append((f"color={option}", image))
+        if name == "gravel as RGB":
+            alone, made = making.run(grey, 144)[0], pictures[-2][1].astype(int)
+            print(
+                f"  gravel as RGB, decorrelated, differs from the grey output by {np.abs(made - alone[..., None]).max()}"
+            )
+    return png(contact_sheet(pictures, columns=3))
+
+
+def edges(making):
+    """The sample's border in its analysis: mirrored, or wrapped around."""
+    chosen = {"brick": data.brick()[:128, :128], "retina": reduced(data.retina(), 2)[330:426, 130:226]}
+    pictures = []
+    for name, sample in chosen.items():
+        pictures.append((name, making.crop(sample)))
+        found = {}
+        for option, boundary in (("reflect", "open"), ("wrap", "torus")):
+            image, _ = making.run(sample, 144, edges=option)
+            pictures.append((f"edges={option}", image))
+            axis = -1 if sample.ndim == 3 else None
+            own = decompose(making.crop(sample), levels=1, boundary=boundary, channel_axis=axis, device=making.machine)
+            found[option] = [band.std() for band in own.subbands[:2]]
+        more = [wrap / reflect for wrap, reflect in zip(found["wrap"], found["reflect"], strict=True)]
+        print(
+            f"  {name}: wrapped, the standard deviation of high is {more[0]:.3f} times, of level 0 {more[1]:.3f} times"
+        )
+    return png(contact_sheet(pictures, columns=3))
+
+
+def seams(making):
+    """Outputs laid side by side with themselves."""
+    pictures = []
+    for name, sample in strong().items():
+        found = {}
+        for boundary in ("torus", "open"):
+            images = [making.run(sample, 96, boundary=boundary, rng=seed)[0] for seed in range(1, 6)]
+            found[boundary] = [seam(image) for image in images]
+            if name.startswith(("gravel", "fur")):
+                tiled = np.tile(images[0], (2, 2, 1)[: images[0].ndim])
+                pictures.append((f"{boundary}: {found[boundary][0]:.2f}", tiled))
+        figures = "; ".join(f"{b} {np.mean(s):.3f} ({min(s):.3f} to {max(s):.3f})" for b, s in found.items())
+        print(f"  {name}: gradient across the seam over that inside, 5 seeds: {figures}")
+    return png(contact_sheet(pictures, columns=4))
+
+
+def match(making):
+    """The histogram of an output's pixels, by rank and by tables."""
+    sample = making.crop(data.gravel()[:128, :128])
+    own = np.bincount(sample.ravel(), minlength=256) / sample.size
+    figure = new_figure(8.4, 3.6)
+    axes = figure.subplots()
+    axes.fill_between(range(256), 100 * own, step="mid", color="#d9d7d0", label="sample")
+    for option, look in (("lookup", COLOURS[0]), ("rank", COLOURS[1])):
+        image, statistics = making.run(data.gravel()[:128, :128], 256, match=option)
+        made = np.bincount(image.ravel(), minlength=256) / image.size
+        axes.step(range(256), 100 * made, where="mid", color=look, linewidth=1.1, label=f"match={option}")
+        quantiles = np.abs(np.sort(image, axis=None).astype(int) - np.sort(sample, axis=None).repeat(4)).max()
+        apart = f"shares differ by at most {np.abs(made - own).max():.5f}, quantiles by at most {quantiles} grey levels"
+        apart += f", cdf by {np.abs(np.cumsum(made - own)).max():.5f}"
+        print(f"  {option}: {apart}; W1 {wasserstein_distance(image.ravel(), sample.ravel()):.3f} grey levels", end="")
+        print(f"; mean distance of the subbands {moved(statistics):.4f}; bin {np.ptp(sample) / 256:.2f} grey levels")
+    tidy(axes, "", "grey level", "pixels, %")
+    axes.legend(frameon=False, fontsize=9, labelcolor=INK)
+    axes.tick_params(colors=FAINT)
+    return figure_png(figure)
+
+
+def mixtures(making):
+    """Mixtures of two samples, and a picture to begin with."""
+    a, b = data.chelsea()[0:64, 170:234], samples.colour()["tissue"]
+    c, d = data.gravel()[:128, :128], reduced(data.grass(), 4)
+    names = "A B"
+    pictures = [("A: fur", making.crop(a)), ("B: tissue", making.crop(b))]
+    for palette, pattern in ((0, 1), (1, 0)):
+        made = making.mix([a, b], 128, palette=palette, pattern=pattern)
+        pictures.append((f"palette {names[2 * palette]}, pattern {names[2 * pattern]}", made))
+    pictures += [("C: gravel", making.crop(c)), ("D: grass, reduced", making.crop(d))]
+    for low, high in ((0, 1), (1, 0)):
+        made = making.mix([c, d], 128, low=low, high=high, split=2 if making.part == 1 else 1)
+        pictures.append((f"low {'CD'[low]}, high {'CD'[high]}, split 2", made))
+    for blend in ("histograms", "quantiles"):
+        for first, second in ((3, 1), (1, 1), (1, 3)):
+            made = making.mix([a, b], 128, average=[first, second], blend=blend)
+            pictures.append((f"{first} A + {second} B, {blend}", made))
+        if blend == "histograms":
+            made = making.mix([c, d], 128, low=0, high=1, split=3 if making.part == 1 else 0)
+            pictures.append(("low C, high D, split 3", made))
+    side = making.small(128)
+    start = resize(data.camera()[70:270, 120:320], (side, side), anti_aliasing=True)
+    made = simdtex.mix([making.crop(a)], (side, side), start=start, iterations=making.small(5), **making.given(a))[0]
+    pictures.append(("A, begun with a picture", made))
+    return png(contact_sheet(pictures, columns=4))
+
+
+# ---------------------------------------------------------------- solid textures
+
+
+def isotropic(making):
+    """Samples that look alike in every direction."""
+    chosen = {"gravel": reduced(data.gravel(), 4), "tissue": samples.colour()["tissue"]}
+    return {name: making.crop(sample) for name, sample in chosen.items()}
+
+
+def block(making, sample, side, **options):
+    shape = (making.small(side),) * 3
+    return simdtex.synthesize_solid(sample, shape, **making.given(sample) | options)
+
+
+def solid(making):
+    """Two blocks as one sees them."""
+    sheets = []
+    for name, sample in isotropic(making).items():
+        volume, output = block(making, sample, 96)
+        print(f"  {name}, {volume.shape}: mean distance {moved(output.statistics):.3f}")
+        sheets.append(view(volume, size=max(32, making.small(192))))
+    return png(np.concatenate(sheets))
+
+
+DIRECTIONS = {
+    "x-y": ((0, 1, 0), (0, 0, 1)),
+    "x-z": ((1, 0, 0), (0, 0, 1)),
+    "y-z": ((1, 0, 0), (0, 1, 0)),
+    "x-y, between slices": ((0, 1, 0), (0, 0, 1)),
+    "45° about x": ((1, 1, 0), (0, 0, 1)),
+    "45° about y": ((1, 0, 1), (0, 1, 0)),
+    "45° about z": ((1, 0, 0), (0, 1, 1)),
+    "across the diagonal": ((0, 1, -1), (2, -1, -1)),
+}
+"""Slices by name: where their rows and their columns go, (z, y, x)."""
+
+
+def plane(volume, name, depth):
+    """A square slice through a block that repeats, at some depth, by cubic splines where it misses the voxels."""
+    down, across = (np.array(way) / np.linalg.norm(way) for way in DIRECTIONS[name])
+    i, j = np.mgrid[: len(volume), : len(volume)]
+    where = np.multiply.outer(down, i) + np.multiply.outer(across, j)
+    where += (depth * np.abs(np.cross(down, across)))[:, None, None]
+    where += 0.5 if "between" in name else 0.0
+    planes = [
+        map_coordinates(one, where, output=np.float64, order=3, mode="grid-wrap")
+        for one in np.moveaxis(volume.reshape(*volume.shape[:3], -1), -1, 0)
+    ]
+    return np.squeeze(np.stack(planes, -1))
+
+
+def bands_of(making, picture):
+    """Values by statistic: pixels (channels, n) and each level's (bands, n), in the picture's unit."""
+    levels = 3 if making.part == 1 else 1
+    axis = -1 if picture.ndim == 3 else None
+    pyramid = decompose(picture, levels=levels, channel_axis=axis, device=making.machine)
+    pyramid.subbands[-1] += pyramid.offset
+    names = ["high", *(f"level {level}" for level in range(levels)), "low"]
+    found = {"pixels": np.moveaxis(picture.reshape(-1, 1 if axis is None else picture.shape[-1]), -1, 0)}
+    return found | {n: b.reshape(-1, b.shape[-2] * b.shape[-1]) for n, b in zip(names, pyramid.subbands, strict=True)}
+
+
+def apart(found, wanted):
+    """W1 of each statistic in the sample's standard deviations, the mean of its bands."""
+    return {
+        name: np.mean([wasserstein_distance(a, b) / b.std() for a, b in zip(found[name], own, strict=True)])
+        for name, own in wanted.items()
+    }
+
+
+def solid_options(making):
+    """The ways to make a block, and slices of each."""
+    sample = isotropic(making)["tissue"]
+    wanted, pictures = bands_of(making, sample), []
+    ways = [{"solids": solids, "slices": own} for solids in ("average", "turns") for own in ("each", "together")]
+    for options in [*ways, {"pyramid": "laplacian"}]:
+        volume, output = block(making, sample, 64, **options)
+        name = ", ".join(options.values())
+        for number, direction in enumerate(("x-y", "y-z", "45° about x")):
+            made = plane(volume, direction, len(volume) // 2)
+            w1 = np.mean(list(apart(bands_of(making, made), wanted).values()))
+            label = f"{name}: {moved(output.statistics):.3f}" if number == 0 else direction
+            pictures.append((label, np.rint(np.clip(made, 0, 255)).astype(np.uint8)))
+            print(f"  {name}, mean distance {moved(output.statistics):.3f}; {direction}: mean W1 {w1:.3f}")
+    return png(contact_sheet(pictures, columns=6))
+
+
+def oblique(making, out):
+    """How far slices along the axes, and others, are from the sample."""
+    lines = []
+    figure = new_figure(9.6, 4.4)
+    panels = figure.subplots(1, 2, sharey=True)
+    for axes, (name, sample) in zip(panels, isotropic(making).items(), strict=True):
+        volume, _ = block(making, sample, 64)
+        wanted, side = bands_of(making, sample), min(len(sample), len(volume))
+        corners = [sample[a, b] for a in (slice(side), slice(-side, None)) for b in (slice(side), slice(-side, None))]
+        kinds = {"the sample's corners": corners}
+        kinds |= {n: [plane(volume, n, k) for k in range(0, len(volume), len(volume) // 8)] for n in DIRECTIONS}
+        for number, (kind, pictures) in enumerate(kinds.items()):
+            each = [apart(bands_of(making, picture), wanted) for picture in pictures]
+            mean = {statistic: np.mean([one[statistic] for one in each]) for statistic in wanted}
+            means = [np.mean(list(one.values())) for one in each]
+            lines.append([name, kind, *(f"{v:.3f}" for v in (*mean.values(), np.mean(means), max(means)))])
+            print(" ", *lines[-1])
+            look = {"color": (*COLOURS, "#7A7A7A")[number], "linestyle": "-" if number < 4 else "--", "marker": "o"}
+            axes.plot(list(mean), list(mean.values()), label=kind, linewidth=1.3, markersize=4, **look)
+        tidy(axes, name, "", "W1, standard deviations" if name == "gravel" else "")
+    panels[1].set_ylim(bottom=0)
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9
+    )
+    with open(out / "oblique.csv", "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["sample", "slices", *wanted, "mean", "worst slice"])
+        writer.writerows(lines)
+    return figure_png(figure)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "docs" / "pyramid")
+    parser.add_argument("--device")
+    parser.add_argument("--only", default="", help="figures to make, by name, separated by commas")
+    parser.add_argument("--quick", action="store_true", help="small sizes")
+    options = parser.parse_args()
+    making = Making(simdtex.open_machine(options.device), 4 if options.quick else 1)
+    print(f"device: {making.machine.name}")
+    options.out.mkdir(parents=True, exist_ok=True)
+    made = {
+        "filters": filter_bank,
+        "subbands": subbands,
+        "convergence": convergence,
+        "iterations": iterations,
+        "gallery-strong": partial(gallery, chosen=strong()),
+        "gallery-failures": partial(gallery, chosen=failures()),
+        "colour": colour,
+        "edges": edges,
+        "seams": seams,
+        "match": match,
+        "mixtures": mixtures,
+        "solid": solid,
+        "solid-options": solid_options,
+        "oblique": partial(oblique, out=options.out),
+    }
+    for name in options.only.split(",") if options.only else made:
+        path = options.out / f"{name}.png"
+        path.write_bytes(made[name](making))
+        print(f"{path}  {path.stat().st_size / 1000:.0f} kB", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex mix``: a texture that is a bit like each of several."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from simdtex.cli.common import (
+    DEVICE,
+    QUIET,
+    SEED,
+    check_distinct,
+    given,
+    last_iteration,
+    numbers,
+    output_shape,
+    plainly,
+    pyramid_options,
+    stages_option,
+    watching,
+)
+
+CHOSEN = ("palette", "pattern", "low", "high")
+"""Options that name a sample."""
+
+
+@click.command()
+@click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Picture to write.")
+@click.option(
+    "--size",
+    metavar="WIDTHxHEIGHT",
+    help="Of the output, in pixels. Default: that of --start, else twice the first sample.",
+)
+@click.option("--palette", metavar="SAMPLE", help="Take the colours of this sample.  [those of the pattern]")
+@click.option("--pattern", metavar="SAMPLE", help="Take the pattern of this sample.  [the average of all]")
+@click.option("--average", metavar="W,W,...", help="Take the average of the patterns, a weight for each sample.")
+@click.option("--low", metavar="SAMPLE", help="Take the low frequencies of this sample, with --high.")
+@click.option("--high", metavar="SAMPLE", help="Take the high frequencies of this sample, with --low.")
+@click.option("--split", type=int, help="Levels that are high frequencies, with --low and --high.  [half of them]")
+@click.option("--blend", help="histograms or quantiles: what is averaged.  [histograms]")
+@click.option("--pixels", help="palette or pattern: whose pixels are matched under --palette.  [palette]")
+@pyramid_options("IMAGE: A picture")
+@SEED
+@DEVICE
+@stages_option("every iteration")
+@QUIET
+@plainly
+def mix(
+    samples: tuple[Path, ...],
+    output: Path,
+    size: str | None,
+    average: str | None,
+    start: Path | None,
+    seed: int | None,
+    device: str | None,
+    stages: Path | None,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Mix the textures SAMPLE...: a picture that looks a bit like each of them.
+
+    A sample is named in options by its path as it stands in the command, or by its number from 1. The method is Heeger
+    and Bergen's (1995).
+    """
+    from simdtex import image
+    from simdtex.mixtures import mix as mixed
+
+    chosen = {name: sample_number(name, options.pop(name), samples) for name in CHOSEN}
+    weights = None if average is None else numbers("--average", average)
+    pictures = [image.read(path) for path in samples]
+    channels = check_alike(samples, pictures)
+    arrays = [picture.pixels for picture in pictures]
+    begin = image.read(start).pixels if start else None
+    shape = output_shape(size, arrays[0], begin)
+    colour = any(picture.channel_axis is not None for picture in pictures)
+    image.check_writable(output, arrays[0].dtype, channels)
+    check_distinct([output, *([stages] if stages else [])], [*samples, *([start] if start else [])])
+
+    began = time.perf_counter()
+    limits = min(float(array.min()) for array in arrays), max(float(array.max()) for array in arrays)
+    with watching(quiet, stages, limits) as callback:
+        made, run = mixed(
+            arrays,
+            shape,
+            channel_axis=-1 if colour else None,
+            rng=seed,
+            device=device,
+            callback=callback,
+            full_output=True,
+            **given(options | chosen | {"average": weights, "start": begin}),
+        )
+    image.write(output, made)
+    if not quiet:
+        click.echo(
+            f"{output}: {shape[1]}x{shape[0]} from {len(arrays)} {'sample' if len(arrays) == 1 else 'samples'} "
+            f"in {time.perf_counter() - began:.1f} s on {run.statistics['device']}, seed {run.statistics['seed']}"
+        )
+        click.echo(last_iteration(run.statistics))
+
+
+def sample_number(name: str, text: str | None, samples: tuple[Path, ...]) -> int | None:
+    """Which sample an option means, from 0: its path as given, or its number from 1."""
+    if text is None:
+        return None
+    if Path(text) in samples:
+        return samples.index(Path(text))
+    if text.isdecimal() and 1 <= int(text) <= len(samples):
+        return int(text) - 1
+    raise ValueError(
+        f"--{name} {text} is none of the samples; give the path of one as it stands in the command, "
+        f"or its number, 1 to {len(samples)}"
+    )
+
+
+def check_alike(samples: tuple[Path, ...], pictures: list[Any]) -> int:
+    """The channels of the pictures, of which some may be grey; raises where they do not go together."""
+    counts = [1 if picture.channel_axis is None else picture.pixels.shape[-1] for picture in pictures]
+    most = counts.index(max(counts))
+    for path, picture, count in zip(samples, pictures, counts, strict=True):
+        if picture.pixels.dtype != pictures[0].pixels.dtype:
+            raise ValueError(
+                f"{path} is of {picture.pixels.dtype} and {samples[0]} of {pictures[0].pixels.dtype}; "
+                "convert them to one type"
+            )
+        if count not in (1, counts[most]):
+            raise ValueError(
+                f"{path} has {count} channels and {samples[most]} {counts[most]}; give all the same, or grey ones"
+            )
+    return counts[most]

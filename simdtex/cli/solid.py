@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex solid``: a block of a texture."""
+
+from __future__ import annotations
+
+import re
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from simdtex.cli.common import (
+    DEVICE,
+    QUIET,
+    SEED,
+    check_distinct,
+    given,
+    last_iteration,
+    plainly,
+    pyramid_options,
+    stages_option,
+    watching,
+)
+from simdtex.methods import solid as method
+
+DEFAULTS = method.Options()
+SIDE = 128
+"""Voxels a side, where no size is given."""
+
+
+@click.command()
+@click.argument("sample", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    "outputs",
+    multiple=True,
+    required=True,
+    type=click.Path(path_type=Path),
+    help="Block to write: .npz, .npy, .nrrd, .tif, or without suffix a folder of slices; may be repeated.",
+)
+@click.option(
+    "--size",
+    metavar="DEPTHxHEIGHTxWIDTH",
+    help="Slices x rows x columns of the block, the depth first; one number is a cube. "
+    f"Default: that of --start, else {SIDE}.",
+)
+@click.option(
+    "--view",
+    "picture",
+    type=click.Path(path_type=Path),
+    metavar="PNG",
+    help="Write a picture of it: a cube, a sphere and three slices.",
+)
+@click.option(
+    "--solids", help=f"turns or average: families of slices one after another, or a mean.  [{DEFAULTS.solids}]"
+)
+@click.option("--slices", help=f"together or each: whose histogram is matched.  [{DEFAULTS.slices}]")
+@pyramid_options("VOLUME: A block")
+@SEED
+@DEVICE
+@stages_option("the middle slice of every iteration")
+@QUIET
+@plainly
+def solid(
+    sample: Path,
+    outputs: tuple[Path, ...],
+    size: str | None,
+    picture: Path | None,
+    start: Path | None,
+    seed: int | None,
+    device: str | None,
+    stages: Path | None,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Make a solid of the texture SAMPLE: a block whose slices look like it.
+
+    The method is Heeger and Bergen's (1995), for textures that look alike in all directions.
+    """
+    from simdtex import image, volume
+    from simdtex.report.solid import view
+    from simdtex.synthesis import synthesize_solid
+
+    shape = block_shape(size) if size else (SIDE, SIDE, SIDE)
+    read = image.read(sample)
+    pixels = read.pixels
+    begin = volume.read(start) if start else None
+    if begin is not None and not size:
+        shape = begin.shape[0], begin.shape[1], begin.shape[2]
+    channels = 1 if read.channel_axis is None else pixels.shape[-1]
+    for output in outputs:
+        volume.check_writable(output, pixels.dtype, channels)
+    if picture:
+        image.check_writable(picture, suffixes=(".png",))
+    check_distinct([*outputs, *(p for p in (picture, stages) if p)], [sample, *([start] if start else [])])
+
+    began = time.perf_counter()
+    with watching(quiet, stages, (float(pixels.min()), float(pixels.max())), middle_slice) as callback:
+        block, run = synthesize_solid(
+            pixels,
+            shape,
+            channel_axis=read.channel_axis,
+            rng=seed,
+            device=device,
+            callback=callback,
+            full_output=True,
+            **given(options | {"start": begin}),
+        )
+    seconds = time.perf_counter() - began
+    for output in outputs:
+        volume.write(output, block, None if read.channel_axis is None else -1)
+    if picture:
+        view(np.asarray(block), picture)
+    if not quiet:
+        names = ", ".join(str(path) for path in (*outputs, *([picture] if picture else [])))
+        click.echo(
+            f"{names}: {'x'.join(str(side) for side in shape)} from {pixels.shape[1]}x{pixels.shape[0]} "
+            f"in {seconds:.1f} s on {run.statistics['device']}, seed {run.statistics['seed']}"
+        )
+        click.echo(last_iteration(run.statistics))
+
+
+def block_shape(text: str) -> tuple[int, int, int]:
+    """Depth, rows and columns of ``--size``."""
+    match = re.fullmatch(r"\s*([0-9]{1,8})(?:\s*[xX\u00d7]\s*([0-9]{1,8})\s*[xX\u00d7]\s*([0-9]{1,8}))?\s*", text)
+    sides = [int(side or match[1]) for side in match.groups()] if match else [0]
+    if 0 in sides:
+        raise ValueError(
+            f"size {text!r} is not DEPTHxHEIGHTxWIDTH: give slices x rows x columns of 1 or more, as 64x128x128, or "
+            "one number for a cube"
+        )
+    return sides[0], sides[1], sides[2]
+
+
+def middle_slice(progress: Any) -> Any:
+    """The progress of a block as that of its middle x-y slice."""
+
+    def read() -> Any:
+        block = progress.image()
+        return block[len(block) // 2]
+
+    return replace(progress, image=read)

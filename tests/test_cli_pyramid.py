@@ -1,0 +1,385 @@
+"""``simdtex synth --method pyramid``, ``simdtex solid`` and ``simdtex mix``, end to end."""
+
+import re
+
+import numpy as np
+import pytest
+from cases import texture
+from click.testing import CliRunner
+
+import simdtex
+from simdtex import image, volume
+from simdtex.cli import main
+from simdtex.cli.common import last_iteration
+from simdtex.cli.solid import block_shape
+from simdtex.report.solid import view
+
+GREY, COLOUR = texture((32, 28)), texture((32, 28), 3, seed=1)
+OTHER, START = texture((30, 34), 3, seed=2), texture((24, 40), seed=3)
+FILES = ["block.npy", "colour.png", "grey.png", "other.png", "start.png", "wide.png"]
+SAME = {"rng": 5, "device": "reference"}
+SEEDED = ["--seed", 5, "--device", "reference"]
+QUICK = ["--levels", 1, "--iterations", 2]
+EACH = {"levels": 1, "iterations": 2}
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder with samples, pictures and a block to begin with, and nothing else; the present one."""
+    pictures = {"grey": GREY, "colour": COLOUR, "other": OTHER, "start": START, "wide": texture((32, 28), 3, np.uint16)}
+    for name, picture in pictures.items():
+        image.write(tmp_path / f"{name}.png", picture)
+    np.save(tmp_path / "block.npy", block())
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def block(shape=(6, 10, 8)):
+    return texture((shape[0] * shape[1], shape[2]), seed=4).reshape(shape)
+
+
+def run(*args):
+    return CliRunner().invoke(main, [str(arg) for arg in args])
+
+
+def synth(*args, sample="grey.png"):
+    return run("synth", sample, "-o", "out.png", "--method", "pyramid", *SEEDED, *args)
+
+
+def solid(*args, sample="grey.png", output="out.npz"):
+    return run("solid", sample, "-o", output, *SEEDED, *args)
+
+
+def mix(*args, samples=("colour.png", "other.png")):
+    return run("mix", *samples, "-o", "out.png", *SEEDED, *args)
+
+
+def files(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+
+def picture(path="out.png"):
+    return image.read(path).pixels
+
+
+def assert_one_sentence(result, words, folder):
+    """The command has failed with these words in one line, and written nothing."""
+    assert result.exit_code == 2, result.output
+    assert words in result.output and result.output.count("\n") == 1, result.output
+    assert files(folder) == FILES
+
+
+# ---------------------------------------------------------------- synth
+
+OPTIONS = {
+    "plain": ([], {}),
+    "sharing options": (
+        ["--orientations", 2, "--levels", 2, "--boundary", "open", "--edges", "wrap", "--iterations", 1],
+        {"orientations": 2, "levels": 2, "boundary": "open", "edges": "wrap", "iterations": 1},
+    ),
+    "tables": (
+        ["--pyramid", "laplacian", "--match", "lookup", "--bins", 64, *QUICK],
+        {"pyramid": "laplacian", "match": "lookup", "bins": 64, **EACH},
+    ),
+    "no iterations": (["--iterations", 0], {"iterations": 0}),
+}
+
+
+@pytest.mark.parametrize("case", OPTIONS)
+def test_synth_is_what_python_makes(folder, case):
+    args, options = OPTIONS[case]
+    result = synth("--size", "44x40", *args)
+    assert result.exit_code == 0, result.output
+    expected, run = simdtex.synthesize(GREY, (40, 44), method="pyramid", full_output=True, **options, **SAME)
+    np.testing.assert_array_equal(picture(), expected)
+    first, second = result.output.splitlines()[-2:]
+    assert re.fullmatch(r"out\.png: 44x40 from 28x32 in [\d.]+ s on .+, seed 5", first)
+    assert second == last_iteration(run.statistics)
+    assert files(folder) == sorted([*FILES, "out.png"])
+
+
+def test_the_last_distance_is_that_of_the_subbands():
+    reports = [{"distances": {"high": 9.0, "pixels": 9.0}}, {"distances": {"high": 0.1, "low": 0.3, "pixels": 5.0}}]
+    line = last_iteration({"options": {"levels": 3}, "iterations": reports})
+    assert line == "levels 3, iterations 2, mean distance of the subbands in the last: 0.200 standard deviations"
+    assert last_iteration({"options": {"levels": 3}, "iterations": []}) == "levels 3, iterations 0"
+    flat = last_iteration({"options": {"levels": 3}, "iterations": [{"distances": {}}]})
+    assert flat == "levels 3, iterations 1"
+
+
+def test_synth_in_colour_begins_with_a_picture_and_takes_its_size(folder):
+    assert synth("--start", "start.png", "--color", "channels", "-q", *QUICK, sample="colour.png").output == ""
+    options = {"start": START, "color": "channels", "channel_axis": -1, **EACH}
+    expected = simdtex.synthesize(COLOUR, (24, 40), method="pyramid", **options, **SAME)
+    np.testing.assert_array_equal(picture(), expected)
+
+
+def test_a_constant_sample_has_no_distances(folder):
+    image.write("flat.png", np.full((16, 16), 7, np.uint8))
+    result = synth(*QUICK, sample="flat.png")
+    assert result.output.splitlines()[-1] == "levels 1, iterations 2"
+    np.testing.assert_array_equal(picture(), 7)
+
+
+def test_stages_of_synth_replace_those_of_an_earlier_run(folder):
+    (folder / "st").mkdir()
+    image.write("st/level3.png", GREY)
+    image.write("st/iteration09.png", GREY)
+    assert synth("--stages", "st", *QUICK).exit_code == 0
+    assert files(folder / "st") == ["animation.gif", "iteration01.png", "iteration02.png", "sheet.png"]
+    np.testing.assert_array_equal(np.sort(picture("st/iteration02.png"), None), np.sort(picture(), None))
+    (folder / "st" / "mine.txt").write_text("kept")
+    again = synth("--stages", "st", *QUICK)
+    assert again.exit_code == 2 and again.output.count("\n") == 1 and (folder / "st" / "mine.txt").exists()
+
+
+BAD_PYRAMID = {
+    "pyramid": (["--pyramid", "wavelet"], "choose one of: steerable, laplacian"),
+    "orientations": (["--orientations", 5], "orientations is 5"),
+    "iterations": (["--iterations", -1], "iterations is -1; give 0 or more"),
+    "match": (["--match", "mean"], "choose one of: rank, lookup"),
+    "few bins": (["--bins", 1], "bins is 1; give 2 or more"),
+    "many bins": (["--bins", 5000], "give 4096 or fewer"),
+    "edges": (["--edges", "whole"], "choose one of: reflect, wrap"),
+    "color": (["--color", "hue"], "choose one of: decorrelate, channels"),
+    "boundary": (["--boundary", "round"], "choose one of: torus, open"),
+    "levels": (["--levels", 9], "levels=9 is too many"),
+    "seed": (["--seed", -1], "seed"),
+    "device": (["--device", "no such device"], "no such device"),
+    "no start": (["--start", "none.png"], "none.png does not exist"),
+    "start of another size": (["--size", "40", "--start", "grey.png"], "start has shape (32, 28); give one of 40 x 40"),
+    "start in colour": (["--start", "colour.png"], "start has shape (32, 28, 3); give one of 32 x 28 pixels, grey"),
+    "size 0": (["--size", "0"], "size '0' is not WIDTHxHEIGHT"),
+    "suffix": (["-o", "out.xyz"], "end its name in"),
+    "overwritten sample": (["-o", "grey.png"], "grey.png is an input and would be overwritten"),
+    "overwritten start": (["--start", "start.png", "-o", "start.png"], "is an input and would be overwritten"),
+    "stages in the output's place": (["--stages", "out.png"], "out.png would be written twice"),
+}
+BAD_SYNTH = BAD_PYRAMID | {
+    "option of mrf": (["--order", 8], "unknown option 'order' of the method 'pyramid'"),
+    "accounting": (["--accounting"], "--accounting is of the method mrf"),
+    "source map": (["--source-map", "map.npz"], "takes no pixel from the sample; leave --source-map and --also out"),
+    "another map": (["--also", "colour.png=c.png"], "leave --source-map and --also out"),
+    "start of mrf": (["--method", "mrf", "--start", "start.png"], "unknown option 'start' of the method 'mrf'"),
+    "too large": (["--size", "60000x60000"], "give a smaller size"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_SYNTH)
+def test_bad_synth_gets_one_sentence_and_writes_nothing(folder, case):
+    args, words = BAD_SYNTH[case]
+    stages = [] if "--stages" in args else ["--stages", "st"]
+    assert_one_sentence(synth(*stages, *args), words, folder)
+
+
+# ---------------------------------------------------------------- solid
+
+
+def test_solid_is_what_python_makes(folder):
+    args = ["--solids", "average", "--slices", "each", "--orientations", 2, "--edges", "wrap", *QUICK]
+    result = solid("--size", "6x10x8", "-o", "out.nrrd", "-o", "out.tif", "-o", "slices", "--view", "v.png", *args)
+    assert result.exit_code == 0, result.output
+    options = {"solids": "average", "slices": "each", "orientations": 2, "edges": "wrap", **EACH}
+    expected, run = simdtex.synthesize_solid(GREY, (6, 10, 8), full_output=True, **options, **SAME)
+    for name in ("out.npz", "out.nrrd", "out.tif", "slices"):
+        np.testing.assert_array_equal(volume.read(name), expected)
+    np.testing.assert_array_equal(picture("v.png"), view(expected))
+    first, second = result.output.splitlines()[-2:]
+    names = r"out\.npz, out\.nrrd, out\.tif, slices, v\.png"
+    assert re.fullmatch(rf"{names}: 6x10x8 from 28x32 in [\d.]+ s on .+, seed 5", first)
+    assert second == last_iteration(run.statistics)
+
+
+def test_a_solid_in_colour_begins_with_a_block_and_takes_its_size(folder):
+    args = ["--pyramid", "laplacian", "--match", "lookup", "--bins", 32, "--color", "channels", "--boundary", "open"]
+    assert solid("--start", "block.npy", "-q", *args, *QUICK, sample="colour.png").output == ""
+    options = {"pyramid": "laplacian", "match": "lookup", "bins": 32, "color": "channels", "boundary": "open"}
+    options |= {"start": block(), "channel_axis": -1, **EACH}
+    expected = simdtex.synthesize_solid(COLOUR, (6, 10, 8), **options, **SAME)
+    np.testing.assert_array_equal(volume.read("out.npz"), expected)
+
+
+def test_stages_of_a_solid_are_its_middle_slice(folder):
+    (folder / "st").mkdir()
+    image.write("st/iteration09.png", GREY)
+    assert solid("--size", "5x12x9", "--stages", "st", *QUICK, sample="colour.png").exit_code == 0
+    assert files(folder / "st") == ["animation.gif", "iteration01.png", "iteration02.png", "sheet.png"]
+    made = volume.read("out.npz")
+    assert made.shape == (5, 12, 9, 3)
+    np.testing.assert_array_equal(picture("st/iteration02.png"), made[2])
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("128", (128, 128, 128)), ("4x5x6", (4, 5, 6)), (" 4X5 \u00d7 6 ", (4, 5, 6)), ("1", (1, 1, 1))],
+)
+def test_sizes_of_blocks(text, expected):
+    assert block_shape(text) == expected
+
+
+def test_the_default_size_is_128(folder, monkeypatch):
+    asked = []
+
+    def refuse(_sample, shape, **_options):
+        asked.append(shape)
+        raise ValueError("seen enough")
+
+    monkeypatch.setattr("simdtex.synthesis.synthesize_solid", refuse)
+    assert_one_sentence(solid(), "seen enough", folder)
+    assert asked == [(128, 128, 128)]
+
+
+def test_too_little_memory_is_one_sentence(folder, monkeypatch):
+    def fail(*_args, **_options):
+        raise MemoryError
+
+    monkeypatch.setattr("simdtex.synthesis.synthesize_solid", fail)
+    assert_one_sentence(solid("--size", 8), "the memory does not suffice for this; give a smaller size", folder)
+
+
+SOLID_SIZES = ["0", "4x5", "4x5x0", "4x5x6x7", "-3", "large", "1.5", "4,5,6"]
+PICTURES_ONLY = {"size 0", "suffix", "overwritten sample", "start in colour", "stages in the output's place"}
+BAD_SOLID = {name: case for name, case in BAD_PYRAMID.items() if name not in PICTURES_ONLY} | {
+    **{f"size {text}": (["--size", text], f"size '{text}' is not DEPTHxHEIGHTxWIDTH") for text in SOLID_SIZES},
+    "beyond 2**31": (["--size", "700"], "a block of 700 x 700 x 700 is beyond 2**31 values; give a smaller size"),
+    "solids": (["--solids", "sum"], "choose one of: turns, average"),
+    "slices": (["--slices", "some"], "choose one of: together, each"),
+    "suffix": (["-o", "out.xyz"], "end its name in one of .npy, .npz"),
+    "written twice": (["-o", "out.npz"], "out.npz would be written twice"),
+    "view and output": (["-o", "a.npy", "--view", "grey.png"], "grey.png is an input"),
+    "view suffix": (["--view", "v.npz"], "end its name in one of .png"),
+    "no folder": (["--view", "nowhere/v.png"], "the folder nowhere does not exist"),
+    "no start": (["--start", "none.npz"], "none.npz does not exist"),
+    "start is no block": (["--start", "grey.png"], "grey.png is of no kind that is known here"),
+    "start of another size": (["--size", "8", "--start", "block.npy"], "give one of 8 x 8 x 8 pixels"),
+    "overwritten start": (["--start", "block.npy", "-o", "block.npy"], "is an input and would be overwritten"),
+    "stages in the output's place": (["-o", "st"], "st would be written twice"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_SOLID)
+def test_bad_solids_get_one_sentence_and_write_nothing(folder, case):
+    args, words = BAD_SOLID[case]
+    size = [] if {"--size", "--start"} & set(args) else ["--size", "8"]
+    assert_one_sentence(solid(*size, "--stages", "st", *args), words, folder)
+
+
+def test_more_memory_than_the_device_has_is_one_sentence(folder, any_device):
+    result = run("solid", "grey.png", "-o", "out.npz", "--size", "640", "--device", any_device.index)
+    if any_device.memory > 640**3 * 160:
+        pytest.skip("this device has the memory")
+    assert_one_sentence(result, "give a smaller size", folder)
+
+
+# ---------------------------------------------------------------- mix
+
+MIXTURES = {
+    "average of all": ([], {}),
+    "palette by path, pattern by number": (["--palette", "other.png", "--pattern", 1], {"palette": 1, "pattern": 0}),
+    "pattern by path": (["--pattern", "./other.png"], {"pattern": 1}),
+    "weights": (["--average", "1,0.5", "--blend", "quantiles"], {"average": [1, 0.5], "blend": "quantiles"}),
+    "low and high": (["--low", 2, "--high", "colour.png", "--split", 1], {"low": 1, "high": 0, "split": 1}),
+    "pixels": (
+        ["--palette", 2, "--pixels", "pattern", "--color", "channels", "--edges", "wrap"],
+        {"palette": 1, "pixels": "pattern", "color": "channels", "edges": "wrap"},
+    ),
+    "tables": (
+        ["--pyramid", "laplacian", "--match", "lookup", "--bins", 32, "--boundary", "open", "--pattern", 2],
+        {"pyramid": "laplacian", "match": "lookup", "bins": 32, "boundary": "open", "pattern": 1},
+    ),
+}
+
+
+@pytest.mark.parametrize("case", MIXTURES)
+def test_mix_is_what_python_makes(folder, case):
+    args, options = MIXTURES[case]
+    result = mix("--size", "44x40", "--orientations", 2, *QUICK, *args)
+    assert result.exit_code == 0, result.output
+    options = {"orientations": 2, "channel_axis": -1, **EACH, **options}
+    expected, run = simdtex.mix([COLOUR, OTHER], (40, 44), full_output=True, **options, **SAME)
+    np.testing.assert_array_equal(picture(), expected)
+    first, second = result.output.splitlines()[-2:]
+    assert re.fullmatch(r"out\.png: 44x40 from 2 samples in [\d.]+ s on .+, seed 5", first)
+    assert second == last_iteration(run.statistics)
+
+
+def test_mix_of_grey_and_colour_begins_with_a_picture_and_takes_its_size(folder):
+    samples = ("grey.png", "other.png", "colour.png")
+    assert mix("--start", "start.png", "--average", "1,2,0", "-q", *QUICK, samples=samples).output == ""
+    options = {"start": START, "average": [1, 2, 0], "channel_axis": -1, **EACH}
+    expected = simdtex.mix([GREY, OTHER, COLOUR], (24, 40), **options, **SAME)
+    np.testing.assert_array_equal(picture(), expected)
+
+
+def test_mix_of_grey_alone_is_twice_the_first(folder):
+    result = mix(*QUICK, samples=("grey.png", "start.png"))
+    assert result.exit_code == 0, result.output
+    np.testing.assert_array_equal(picture(), simdtex.mix([GREY, START], (64, 56), **EACH, **SAME))
+
+
+def test_a_path_wins_over_a_number(folder):
+    image.write("1.png", GREY)
+    (folder / "1.png").rename("2")
+    assert mix("--pattern", "2", *QUICK, samples=("2", "start.png")).exit_code == 0
+    expected = simdtex.mix([GREY, START], (64, 56), pattern=0, **EACH, **SAME)
+    np.testing.assert_array_equal(picture(), expected)
+
+
+def test_stages_of_a_mixture(folder):
+    assert mix("--stages", "st", *QUICK).exit_code == 0
+    assert files(folder / "st") == ["animation.gif", "iteration01.png", "iteration02.png", "sheet.png"]
+    np.testing.assert_array_equal(picture("st/iteration02.png"), picture())
+
+
+P = "give the path of one as it stands in the command, or its number, 1 to 2"
+BAD_MIX = {k: v for k, v in BAD_PYRAMID.items() if k not in ("start in colour", "overwritten sample")} | {
+    "unknown palette": (["--palette", "grey.png"], f"--palette grey.png is none of the samples; {P}"),
+    "pattern 0": (["--pattern", 0], f"--pattern 0 is none of the samples; {P}"),
+    "pattern 3": (["--pattern", 3], P),
+    "negative": (["--low", -1, "--high", 1], f"--low -1 is none of the samples; {P}"),
+    "no number": (["--high", "1.0", "--low", 1], f"--high 1.0 is none of the samples; {P}"),
+    "low alone": (["--low", 1], "low and high go together; give both, or neither"),
+    "high alone": (["--high", 1], "low and high go together; give both, or neither"),
+    "two patterns": (["--pattern", 1, "--average", "1,1"], "a mixture has one pattern"),
+    "three patterns": (["--pattern", 1, "--low", 1, "--high", 2], "a mixture has one pattern"),
+    "weights in words": (["--average", "much,little"], "--average much,little must be numbers parted by commas"),
+    "a weight too many": (["--average", "1,2,3"], "average has 3 weights for 2 samples; give one for each"),
+    "negative weight": (["--average", "1,-1"], "give a number of at least 0"),
+    "no weight": (["--average", "0,0"], "give one above 0"),
+    "no finite weight": (["--average", "inf,1"], "give a number of at least 0"),
+    "split alone": (["--split", 1], "give these two, or leave split out"),
+    "many high levels": (["--low", 1, "--high", 2, "--split", 99], "split is 99"),
+    "negative split": (["--low", 1, "--high", 2, "--split", -1], "split is -1"),
+    "blend": (["--blend", "mean"], "choose one of: histograms, quantiles"),
+    "pixels": (["--pixels", "all"], "choose one of: palette, pattern"),
+    "overwritten sample": (["-o", "other.png"], "other.png is an input and would be overwritten"),
+    "a format for colour": (["-o", "out.pgm"], "end its name in .png"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_MIX)
+def test_bad_mixtures_get_one_sentence_and_write_nothing(folder, case):
+    args, words = BAD_MIX[case]
+    stages = [] if "--stages" in args else ["--stages", "st"]
+    assert_one_sentence(mix(*stages, *args), words, folder)
+
+
+@pytest.mark.parametrize(
+    ("samples", "words"),
+    [
+        (("grey.png", "none.png"), "none.png does not exist"),
+        (("grey.png", "."), ". is a folder"),
+        (("colour.png", "wide.png"), "wide.png is of uint16 and colour.png of uint8; convert them to one type"),
+        (("four.png", "colour.png"), "colour.png has 3 channels and four.png 4; give all the same, or grey ones"),
+    ],
+)
+def test_samples_that_do_not_mix(folder, samples, words, monkeypatch):
+    if "four.png" in samples:
+        pictures = {"four.png": texture((20, 20), 4), "colour.png": COLOUR}
+        monkeypatch.setattr(image, "read", lambda path: image.Image(pictures[str(path)], -1))
+    assert_one_sentence(mix(samples=samples), words, folder)
+
+
+def test_mix_needs_a_sample(folder):
+    assert mix(samples=()).exit_code == 2
+    assert files(folder) == FILES

@@ -1,0 +1,261 @@
+"""Solid textures go to a file and back without a value changed; what a format cannot hold is said before the work."""
+
+import os
+import re
+
+import nrrd
+import numpy as np
+import PIL.Image
+import pytest
+import tifffile
+
+from simdtex import image, volume
+
+WHOLE = ["uint8", "uint16", "uint32", "uint64", "int8", "int16", "int32", "int64"]
+HOLDS = {
+    ".npz": ([*WHOLE, "bool", "float16", "float32", "float64", ">i4"], [None, 1, 3, 5]),
+    ".NPY": ([*WHOLE, "bool", "float16", "float32", "float64", ">f8"], [None, 1, 3, 5]),
+    ".tif": ([*WHOLE, "float16", "float32", "float64", ">u2"], [None, 1, 2, 3, 4, 5]),
+    ".nrrd": ([*WHOLE, "float32", "float64", ">f4"], [None, 1, 2, 3, 4, 11]),
+    "": (["uint8", "uint16", ">u2"], [None, 1, 2, 3, 4]),
+}
+ROUND_TRIPS = [(s, dtype, c) for s, (types, channels) in HOLDS.items() for dtype in types for c in channels]
+
+
+def noise(shape, dtype="uint8", seed=0):
+    rng = np.random.default_rng(seed)
+    kind = np.dtype(dtype).newbyteorder("=")
+    if kind.kind == "b":
+        return rng.random(shape) < 0.5
+    if kind.kind == "f":
+        return rng.normal(size=shape).astype(dtype)
+    limits = np.iinfo(kind)
+    return rng.integers(limits.min, limits.max, shape, kind, endpoint=True).astype(dtype)
+
+
+@pytest.mark.parametrize(("suffix", "dtype", "channels"), ROUND_TRIPS)
+def test_values_and_types_survive_a_file(tmp_path, suffix, dtype, channels):
+    values = noise((4, 3, 5) if channels is None else (4, 3, 5, channels), dtype)
+    path = tmp_path / f"block{suffix}"
+    volume.check_writable(path, values.dtype, channels or 1)
+    volume.write(path, values)
+    back = volume.read(path)
+    if channels == 1 and suffix not in (".npz", ".NPY"):
+        values = values[..., 0]
+    assert back.dtype == values.dtype.newbyteorder("=")
+    assert back.dtype.isnative and back.flags.writeable and back.flags.c_contiguous
+    np.testing.assert_array_equal(back, values.astype(back.dtype), strict=True)
+    assert os.listdir(tmp_path) == [path.name]
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".npy", ".tiff", ".nrrd", ""])
+@pytest.mark.parametrize("shape", [(1, 1, 1), (1, 4, 3), (3, 1, 4), (2, 5, 1), (1, 2, 2, 3), (1001, 1, 1)])
+def test_every_shape_survives(tmp_path, suffix, shape):
+    values = noise(shape)
+    volume.write(tmp_path / f"block{suffix}", values)
+    np.testing.assert_array_equal(volume.read(tmp_path / f"block{suffix}"), values, strict=True)
+
+
+def test_values_that_are_no_numbers_survive_a_float_format(tmp_path):
+    values = np.array([[[np.nan, np.inf, -np.inf, -0.0, 1e-40]]], np.float32)
+    for suffix in (".npz", ".npy", ".tif", ".nrrd"):
+        volume.write(tmp_path / f"a{suffix}", values)
+        assert volume.read(tmp_path / f"a{suffix}").tobytes() == values.tobytes()
+
+
+def test_an_opaque_alpha_channel_is_kept(tmp_path):
+    values = noise((2, 3, 4, 4))
+    values[..., 3] = 255
+    for name in ("a.tif", "a"):
+        volume.write(tmp_path / name, values)
+        np.testing.assert_array_equal(volume.read(tmp_path / name), values, strict=True)
+
+
+def test_channels_may_stand_anywhere(tmp_path):
+    values = noise((2, 3, 4, 5))
+    for axis in (0, 1, -2, 3):
+        volume.write(tmp_path / "a.npy", np.moveaxis(values, -1, axis), axis)
+        np.testing.assert_array_equal(volume.read(tmp_path / "a.npy"), values, strict=True)
+
+
+# -- other programs -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("channels", [None, 3])
+def test_in_an_nrrd_x_runs_fastest_after_the_channels(tmp_path, channels):
+    values = noise((2, 3, 4) if channels is None else (2, 3, 4, 3), "uint16")
+    volume.write(tmp_path / "a.nrrd", values)
+    header, data = (tmp_path / "a.nrrd").read_bytes().split(b"\n\n", 1)
+    assert data == values.tobytes()
+    text = header.decode()
+    fields = dict(line.split(": ", 1) for line in text.splitlines()[1:] if not line.startswith("#"))
+    assert fields["sizes"] == ("4 3 2" if channels is None else "3 4 3 2")
+    assert fields["kinds"] == ("" if channels is None else "vector ") + "domain domain domain"
+    assert (fields["type"], fields["encoding"]) == ("uint16", "raw")
+    assert "space" not in text.replace("sourceforge", "")
+    in_fortran_order, _ = nrrd.read(str(tmp_path / "a.nrrd"))
+    np.testing.assert_array_equal(in_fortran_order, values.T)
+
+
+def test_a_compressed_nrrd_is_read(tmp_path):
+    values = noise((2, 3, 4), "int16")
+    nrrd.write(str(tmp_path / "a.nrrd"), values.T, {"space": "left-posterior-superior", "encoding": "gzip"})
+    np.testing.assert_array_equal(volume.read(tmp_path / "a.nrrd"), values, strict=True)
+
+
+def test_slices_are_pictures_and_pages(tmp_path):
+    values = noise((3, 4, 5, 3))
+    volume.write(tmp_path / "a.tif", values)
+    volume.write(tmp_path / "a", values)
+    assert sorted(os.listdir(tmp_path / "a")) == ["slice-000.png", "slice-001.png", "slice-002.png"]
+    with PIL.Image.open(tmp_path / "a.tif") as stack:
+        assert stack.n_frames == 3
+        for z in range(3):
+            stack.seek(z)
+            np.testing.assert_array_equal(np.asarray(stack), values[z])
+            with PIL.Image.open(tmp_path / "a" / f"slice-{z:03}.png") as picture:
+                np.testing.assert_array_equal(np.asarray(picture), values[z])
+
+
+def test_a_tiff_of_separate_channels_and_an_npz_of_another_name_are_read(tmp_path):
+    values = noise((2, 4, 5, 3))
+    with tifffile.TiffWriter(tmp_path / "a.tif") as file:
+        for page in values:
+            file.write(np.moveaxis(page, -1, 0), photometric="rgb", planarconfig="separate", metadata=None)
+    np.testing.assert_array_equal(volume.read(tmp_path / "a.tif"), values, strict=True)
+    np.savez(tmp_path / "a.npz", other=values)
+    np.testing.assert_array_equal(volume.read(tmp_path / "a.npz"), values, strict=True)
+
+
+# -- what cannot be -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "dtype", "channels", "remedy"),
+    [
+        ("a.tif", "bool", 1, ".npz"),
+        ("a.nrrd", "bool", 3, ".npz"),
+        ("a.nrrd", "float16", 1, ".tif"),
+        ("a.tiff", "longdouble", 1, ".npz"),
+        ("a", "bool", 1, ".npz"),
+        ("a", "float32", 3, ".nrrd"),
+        ("a", "uint8", 5, ".nrrd"),
+        ("a", "int16", None, ".nrrd"),
+    ],
+)
+def test_formats_that_cannot_hold_the_values(tmp_path, name, dtype, channels, remedy):
+    sentence = rf"cannot hold .*: end its name in \{remedy} instead$"
+    with pytest.raises(ValueError, match=sentence) as said:
+        volume.check_writable(tmp_path / name, dtype, channels)
+    assert np.dtype(dtype).name in str(said.value)
+    with pytest.raises(ValueError, match=sentence):
+        volume.write(tmp_path / name, np.zeros((2, 2, 2, channels or 1), dtype))
+    volume.check_writable(tmp_path / f"a{remedy}", dtype, channels)
+    assert os.listdir(tmp_path) == []
+
+
+def test_places_that_cannot_be_written(tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "notes.txt").touch()
+    for path, words in [
+        (tmp_path / "none" / "a.tif", "does not exist"),
+        (tmp_path / "none" / "a", "does not exist"),
+        (tmp_path / "a.vti", r"ends in \.vti: .* \.tiff, or give a name without suffix"),
+        (tmp_path / "file", "is a file"),
+        (tmp_path / "full", "other files in it"),
+        (tmp_path / "file" / "a", "is not a folder"),
+        (tmp_path / ("a" * 300), "cannot be written"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            volume.check_writable(path, np.uint8, 3)
+        with pytest.raises(ValueError, match=words):
+            volume.write(path, noise((1, 2, 2)))
+    (tmp_path / "slices").mkdir()
+    volume.check_writable(tmp_path / "slices")
+    monkeypatch.setattr(os, "access", lambda *_: False)  # root may write anywhere
+    for name in ("a.npz", "a", "slices"):
+        with pytest.raises(ValueError, match="not writable"):
+            volume.check_writable(tmp_path / name)
+
+
+def test_a_folder_of_slices_is_replaced_as_a_whole(tmp_path):
+    volume.write(tmp_path / "a", noise((5, 2, 2)))
+    values = noise((3, 2, 2), seed=1)
+    volume.write(tmp_path / "a", values)
+    np.testing.assert_array_equal(volume.read(tmp_path / "a"), values, strict=True)
+    assert os.listdir(tmp_path) == ["a"]
+
+
+@pytest.mark.parametrize("name", ["a.npz", "a.npy", "a.tif", "a.nrrd", "a"])
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError(28, "No space left on device")])
+def test_a_failure_leaves_what_was_there(tmp_path, monkeypatch, name, error):
+    old = noise((3, 2, 2))
+    volume.write(tmp_path / name, old)
+    encode = volume._ENCODERS[os.path.splitext(name)[1]]
+
+    def interrupted(path, values):
+        encode(path, values[:1])
+        raise error
+
+    monkeypatch.setitem(volume._ENCODERS, os.path.splitext(name)[1], interrupted)
+    with pytest.raises(KeyboardInterrupt if isinstance(error, KeyboardInterrupt) else ValueError):
+        volume.write(tmp_path / name, noise((3, 2, 2), seed=1))
+    np.testing.assert_array_equal(volume.read(tmp_path / name), old, strict=True)
+    assert os.listdir(tmp_path) == [name]
+
+
+def test_a_folder_that_cannot_be_renamed_leaves_the_old_one(tmp_path, monkeypatch):
+    old = noise((3, 2, 2))
+    volume.write(tmp_path / "a", old)
+    rename = type(tmp_path).rename
+
+    def refused(self, target):
+        if self.name != "a" and target.name == "a" and len(os.listdir(self)) == 1:
+            raise PermissionError(13, "Permission denied")
+        return rename(self, target)
+
+    monkeypatch.setattr(type(tmp_path), "rename", refused)
+    with pytest.raises(ValueError, match="could not be written"):
+        volume.write(tmp_path / "a", noise((1, 2, 2)))
+    np.testing.assert_array_equal(volume.read(tmp_path / "a"), old, strict=True)
+    assert os.listdir(tmp_path) == ["a"]
+
+
+def test_write_checks_its_array(tmp_path):
+    with pytest.raises(TypeError, match="real"):
+        volume.write(tmp_path / "a.npy", np.zeros((2, 2, 2), complex))
+    for shape in [(4, 4), (2, 2, 2, 2, 2), (0, 2, 2)]:
+        with pytest.raises(ValueError, match=re.escape(str(shape))):
+            volume.write(tmp_path / "a.npy", np.zeros(shape))
+    for shape, axis in [((2, 2, 2), -1), ((2, 2, 2, 2), 4)]:
+        with pytest.raises(ValueError, match="channel_axis"):
+            volume.write(tmp_path / "a.npy", np.zeros(shape), axis)
+    assert os.listdir(tmp_path) == []
+
+
+def test_reading_says_what_is_wrong(tmp_path):
+    (tmp_path / "plain").touch()
+    (tmp_path / "empty").mkdir()
+    for suffix in (".npz", ".npy", ".tif", ".nrrd"):
+        (tmp_path / f"bad{suffix}").write_bytes(b"no volume at all")
+    np.savez(tmp_path / "two.npz", a=np.zeros(3), b=np.zeros(3))
+    np.save(tmp_path / "flat.npy", np.zeros((3, 3)))
+    volume.write(tmp_path / "gap", noise((3, 2, 2)))
+    (tmp_path / "gap" / "slice-001.png").unlink()
+    volume.write(tmp_path / "odd", noise((2, 2, 2)))
+    image.write(tmp_path / "odd" / "slice-001.png", noise((3, 3)))
+    for name, words in [
+        ("none.tif", "does not exist"),
+        ("a" * 300, "does not exist"),
+        ("plain", "is of no kind that is known"),
+        ("empty", "no slices"),
+        ("gap", "without a gap"),
+        ("odd", "cannot be read as a volume"),
+        ("two.npz", "none called volume"),
+        ("flat.npy", r"the shape \(3, 3\)"),
+        *((f"bad{suffix}", "cannot be read") for suffix in (".npz", ".npy", ".tif", ".nrrd")),
+    ]:
+        with pytest.raises(ValueError, match=words) as said:
+            volume.read(tmp_path / name)
+        assert "\n" not in str(said.value)
