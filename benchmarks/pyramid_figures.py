@@ -3,12 +3,11 @@
 
     python benchmarks/pyramid_figures.py [--out docs/pyramid] [--device TEXT] [--only filters,colour] [--quick]
 
-Writes PNG files, the same bytes every time, and oblique.csv, and prints their names and the figures that the pages
-quote. ``--quick`` runs all of it on small sizes.
+Writes PNG files, the same bytes every time, and prints their names and the figures that the pages quote. Those of solid
+textures are made by pyramid_solids.py. ``--quick`` runs all of it on small sizes.
 """
 
 import argparse
-import csv
 from functools import partial
 from io import BytesIO
 from pathlib import Path
@@ -16,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import PIL.Image
 import samples
-from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
 from scipy.stats import wasserstein_distance
 from skimage import data
@@ -26,11 +24,12 @@ import simdtex
 from simdtex.pyramids import decompose
 from simdtex.quality import seam
 from simdtex.report.plots import FAINT, INK, figure_png, new_figure, tidy
-from simdtex.report.sheet import contact_sheet, enlarged
-from simdtex.report.solid import view
+from simdtex.report.sheet import LEAST_SIDE, contact_sheet, enlarged
 from simdtex.steerable_filters import ORIENTATIONS, filters
 
 COLOURS = ("#D55E00", "#0072B2", "#56B4E9", "#009E73", "#8A6D00", "#E69F00", "#CC79A7", "#000000")
+
+LOOKS = dict(zip(("pixels", "high", "low", *(f"level {level}" for level in range(5))), COLOURS, strict=True))
 
 
 def reduced(picture, factor):
@@ -51,9 +50,11 @@ def strong():
         "gravel, reduced to 1/4": reduced(data.gravel(), 4),
         "grass, reduced to 1/4": reduced(data.grass(), 4),
         "the moon's ground, contrast raised": stretched(data.moon()[300:428, 20:148]),
-        "a lawn, contrast raised": stretched(data.camera()[415:485, 150:220]),
+        "a lawn, contrast raised": stretched(data.camera()[415:485, 155:225]),
         "fur": data.chelsea()[0:64, 170:234],
-        "tissue": samples.colour()["tissue"],
+        "wood": samples.colour()["wood"],
+        "a blurred ground, contrast raised": stretched(data.cell()[300:428, 20:148]),
+        "retina, contrast raised": stretched(data.retina()[500:628, 850:978]),
     }
 
 
@@ -66,7 +67,7 @@ def failures():
         "inhomogeneous: a lawn and a tripod": data.camera()[410:510, 150:260],
         "inhomogeneous: a corner without tissue": data.immunohistochemistry()[400:496, 80:176],
         "locally oriented: grass": data.grass()[:128, :128],
-        "locally oriented: wood": samples.colour()["wood"],
+        "locally oriented: tissue": samples.colour()["tissue"],
         "locally oriented: hair": data.astronaut()[20:84, 190:254],
     }
 
@@ -79,10 +80,12 @@ class Making:
     machine : simdtex.machine.Machine
     part : int
         What sides and numbers of iterations are divided by.
+    out : Path
+        The folder of the results.
     """
 
-    def __init__(self, machine, part):
-        self.machine, self.part = machine, part
+    def __init__(self, machine, part, out):
+        self.machine, self.part, self.out = machine, part, out
 
     def small(self, n):
         """A side, or a number of iterations."""
@@ -120,6 +123,12 @@ def png(sheet):
     buffer = BytesIO()
     picture.save(buffer, format="PNG", optimize=True)
     return buffer.getvalue()
+
+
+def framed(picture):
+    """A picture with white beside it, so that a sheet does not enlarge it."""
+    space = [(0, max(0, LEAST_SIDE - n)) for n in picture.shape[:2]]
+    return np.pad(picture, [*space, (0, 0)][: picture.ndim], constant_values=255)
 
 
 # ---------------------------------------------------------------- the pyramid
@@ -213,9 +222,9 @@ def convergence(making):
         reports = statistics["iterations"]
         iteration = [report["iteration"] for report in reports]
         names = ["pixels", *(n for n in reports[0]["distances"] if n != "pixels")]
-        for colour, band in zip(COLOURS, names, strict=False):
+        for band in names:
             ends = [report["distances"][band] for report in reports]
-            style = {"color": colour, "linewidth": 1.6, "linestyle": "--" if band == "pixels" else "-"}
+            style = {"color": LOOKS[band], "linewidth": 1.6, "linestyle": "--" if band == "pixels" else "-"}
             axes.plot(iteration, ends, label=band, **style)
         tidy(axes, name, "iteration", "distance, standard deviations" if name == "gravel" else "")
         axes.set_yscale("log")
@@ -223,7 +232,7 @@ def convergence(making):
             if k <= len(reports):
                 own = ", ".join(f"{n} {reports[k - 1]['distances'][n]:.3f}" for n in names)
                 print(f"  {name}, iteration {k:2}: mean {moved(statistics, k - 1):.4f}; {own}")
-    panels[1].legend(frameon=False, fontsize=8, labelcolor=INK, ncols=2)
+    panels[0].legend(frameon=False, fontsize=8, labelcolor=INK, ncols=2)
     return figure_png(figure)
 
 
@@ -243,13 +252,13 @@ def iterations(making):
 # ---------------------------------------------------------------- galleries
 
 
-def gallery(making, chosen):
+def gallery(chosen, making):
     pictures = []
-    for name, sample in chosen.items():
+    for name, sample in chosen().items():
         image, statistics = making.run(sample, 192)
         print(f"  {name}: mean distance {moved(statistics):.3f}, seam {seam(image):.2f}")
         kind, _, what = name.rpartition(": ")
-        pictures += [(what, making.crop(sample)), (kind, image)]
+        pictures += [(what, framed(making.crop(sample))), (kind, image)]
     return png(contact_sheet(pictures, columns=4))
 
 
@@ -263,7 +272,7 @@ def colour(making):
     }
     pictures = []
     for name, sample in chosen.items():
-        pictures.append((name, making.crop(sample)))
+        pictures.append((name, framed(making.crop(sample))))
         known = cKDTree(np.unique(making.crop(sample).reshape(-1, 3), axis=0))
         for option in ("decorrelate", "channels"):
             image, _ = making.run(sample, 144, color=option)
@@ -272,10 +281,9 @@ def colour(making):
             print(f"; channels differ by at most {np.ptp(image.astype(int), axis=-1).max()}")
             pictures.append((f"color={option}", image))
         if name == "gravel as RGB":
-            alone, made = making.run(grey, 144)[0], pictures[-2][1].astype(int)
-            print(
-                f"  gravel as RGB, decorrelated, differs from the grey output by {np.abs(made - alone[..., None]).max()}"
-            )
+            alone = making.run(grey, 144)[0].astype(int)
+            by = np.abs(pictures[-2][1] - alone[..., None]).max()
+            print(f"  gravel as RGB, decorrelated, differs from the grey output by at most {by}")
     return png(contact_sheet(pictures, columns=3))
 
 
@@ -284,7 +292,7 @@ def edges(making):
     chosen = {"brick": data.brick()[:128, :128], "retina": reduced(data.retina(), 2)[330:426, 130:226]}
     pictures = []
     for name, sample in chosen.items():
-        pictures.append((name, making.crop(sample)))
+        pictures.append((name, framed(making.crop(sample))))
         found = {}
         for option, boundary in (("reflect", "open"), ("wrap", "torus")):
             image, _ = making.run(sample, 144, edges=option)
@@ -326,8 +334,9 @@ def match(making):
         image, statistics = making.run(data.gravel()[:128, :128], 256, match=option)
         made = np.bincount(image.ravel(), minlength=256) / image.size
         axes.step(range(256), 100 * made, where="mid", color=look, linewidth=1.1, label=f"match={option}")
-        quantiles = np.abs(np.sort(image, axis=None).astype(int) - np.sort(sample, axis=None).repeat(4)).max()
-        apart = f"shares differ by at most {np.abs(made - own).max():.5f}, quantiles by at most {quantiles} grey levels"
+        quantiles = np.abs(np.sort(image, axis=None).astype(int) - np.sort(sample, axis=None).repeat(4))
+        apart = f"shares differ by at most {np.abs(made - own).max():.5f}, quantiles by at most {quantiles.max()} grey levels"
+        apart += f" ({(quantiles > 1).mean():.3%} by more than 1)"
         apart += f", cdf by {np.abs(np.cumsum(made - own)).max():.5f}"
         print(f"  {option}: {apart}; W1 {wasserstein_distance(image.ravel(), sample.ravel()):.3f} grey levels", end="")
         print(f"; mean distance of the subbands {moved(statistics):.4f}; bin {np.ptp(sample) / 256:.2f} grey levels")
@@ -339,14 +348,14 @@ def match(making):
 
 def mixtures(making):
     """Mixtures of two samples, and a picture to begin with."""
-    a, b = data.chelsea()[0:64, 170:234], samples.colour()["tissue"]
+    a, b = samples.colour()["wood"], data.immunohistochemistry()[250:346, 160:256]
     c, d = data.gravel()[:128, :128], reduced(data.grass(), 4)
     names = "A B"
-    pictures = [("A: fur", making.crop(a)), ("B: tissue", making.crop(b))]
+    pictures = [("A: wood", framed(making.crop(a))), ("B: stroma", framed(making.crop(b)))]
     for palette, pattern in ((0, 1), (1, 0)):
         made = making.mix([a, b], 128, palette=palette, pattern=pattern)
         pictures.append((f"palette {names[2 * palette]}, pattern {names[2 * pattern]}", made))
-    pictures += [("C: gravel", making.crop(c)), ("D: grass, reduced", making.crop(d))]
+    pictures += [("C: gravel", framed(making.crop(c))), ("D: grass, reduced", framed(making.crop(d)))]
     for low, high in ((0, 1), (1, 0)):
         made = making.mix([c, d], 128, low=low, high=high, split=2 if making.part == 1 else 1)
         pictures.append((f"low {'CD'[low]}, high {'CD'[high]}, split 2", made))
@@ -364,150 +373,32 @@ def mixtures(making):
     return png(contact_sheet(pictures, columns=4))
 
 
-# ---------------------------------------------------------------- solid textures
-
-
-def isotropic(making):
-    """Samples that look alike in every direction."""
-    chosen = {"gravel": reduced(data.gravel(), 4), "tissue": samples.colour()["tissue"]}
-    return {name: making.crop(sample) for name, sample in chosen.items()}
-
-
-def block(making, sample, side, **options):
-    shape = (making.small(side),) * 3
-    return simdtex.synthesize_solid(sample, shape, **making.given(sample) | options)
-
-
-def solid(making):
-    """Two blocks as one sees them."""
-    sheets = []
-    for name, sample in isotropic(making).items():
-        volume, output = block(making, sample, 96)
-        print(f"  {name}, {volume.shape}: mean distance {moved(output.statistics):.3f}")
-        sheets.append(view(volume, size=max(32, making.small(192))))
-    return png(np.concatenate(sheets))
-
-
-DIRECTIONS = {
-    "x-y": ((0, 1, 0), (0, 0, 1)),
-    "x-z": ((1, 0, 0), (0, 0, 1)),
-    "y-z": ((1, 0, 0), (0, 1, 0)),
-    "x-y, between slices": ((0, 1, 0), (0, 0, 1)),
-    "45° about x": ((1, 1, 0), (0, 0, 1)),
-    "45° about y": ((1, 0, 1), (0, 1, 0)),
-    "45° about z": ((1, 0, 0), (0, 1, 1)),
-    "across the diagonal": ((0, 1, -1), (2, -1, -1)),
+MADE = {
+    "filters": filter_bank,
+    "subbands": subbands,
+    "convergence": convergence,
+    "iterations": iterations,
+    "gallery-strong": partial(gallery, strong),
+    "gallery-failures": partial(gallery, failures),
+    "colour": colour,
+    "edges": edges,
+    "seams": seams,
+    "match": match,
+    "mixtures": mixtures,
 }
-"""Slices by name: where their rows and their columns go, (z, y, x)."""
 
 
-def plane(volume, name, depth):
-    """A square slice through a block that repeats, at some depth, by cubic splines where it misses the voxels."""
-    down, across = (np.array(way) / np.linalg.norm(way) for way in DIRECTIONS[name])
-    i, j = np.mgrid[: len(volume), : len(volume)]
-    where = np.multiply.outer(down, i) + np.multiply.outer(across, j)
-    where += (depth * np.abs(np.cross(down, across)))[:, None, None]
-    where += 0.5 if "between" in name else 0.0
-    planes = [
-        map_coordinates(one, where, output=np.float64, order=3, mode="grid-wrap")
-        for one in np.moveaxis(volume.reshape(*volume.shape[:3], -1), -1, 0)
-    ]
-    return np.squeeze(np.stack(planes, -1))
-
-
-def bands_of(making, picture):
-    """Values by statistic: pixels (channels, n) and each level's (bands, n), in the picture's unit."""
-    levels = 3 if making.part == 1 else 1
-    axis = -1 if picture.ndim == 3 else None
-    pyramid = decompose(picture, levels=levels, channel_axis=axis, device=making.machine)
-    pyramid.subbands[-1] += pyramid.offset
-    names = ["high", *(f"level {level}" for level in range(levels)), "low"]
-    found = {"pixels": np.moveaxis(picture.reshape(-1, 1 if axis is None else picture.shape[-1]), -1, 0)}
-    return found | {n: b.reshape(-1, b.shape[-2] * b.shape[-1]) for n, b in zip(names, pyramid.subbands, strict=True)}
-
-
-def apart(found, wanted):
-    """W1 of each statistic in the sample's standard deviations, the mean of its bands."""
-    return {
-        name: np.mean([wasserstein_distance(a, b) / b.std() for a, b in zip(found[name], own, strict=True)])
-        for name, own in wanted.items()
-    }
-
-
-def solid_options(making):
-    """The ways to make a block, and slices of each."""
-    sample = isotropic(making)["tissue"]
-    wanted, pictures = bands_of(making, sample), []
-    ways = [{"solids": solids, "slices": own} for solids in ("average", "turns") for own in ("each", "together")]
-    for options in [*ways, {"pyramid": "laplacian"}]:
-        volume, output = block(making, sample, 64, **options)
-        name = ", ".join(options.values())
-        for number, direction in enumerate(("x-y", "y-z", "45° about x")):
-            made = plane(volume, direction, len(volume) // 2)
-            w1 = np.mean(list(apart(bands_of(making, made), wanted).values()))
-            label = f"{name}: {moved(output.statistics):.3f}" if number == 0 else direction
-            pictures.append((label, np.rint(np.clip(made, 0, 255)).astype(np.uint8)))
-            print(f"  {name}, mean distance {moved(output.statistics):.3f}; {direction}: mean W1 {w1:.3f}")
-    return png(contact_sheet(pictures, columns=6))
-
-
-def oblique(making, out):
-    """How far slices along the axes, and others, are from the sample."""
-    lines = []
-    figure = new_figure(9.6, 4.4)
-    panels = figure.subplots(1, 2, sharey=True)
-    for axes, (name, sample) in zip(panels, isotropic(making).items(), strict=True):
-        volume, _ = block(making, sample, 64)
-        wanted, side = bands_of(making, sample), min(len(sample), len(volume))
-        corners = [sample[a, b] for a in (slice(side), slice(-side, None)) for b in (slice(side), slice(-side, None))]
-        kinds = {"the sample's corners": corners}
-        kinds |= {n: [plane(volume, n, k) for k in range(0, len(volume), len(volume) // 8)] for n in DIRECTIONS}
-        for number, (kind, pictures) in enumerate(kinds.items()):
-            each = [apart(bands_of(making, picture), wanted) for picture in pictures]
-            mean = {statistic: np.mean([one[statistic] for one in each]) for statistic in wanted}
-            means = [np.mean(list(one.values())) for one in each]
-            lines.append([name, kind, *(f"{v:.3f}" for v in (*mean.values(), np.mean(means), max(means)))])
-            print(" ", *lines[-1])
-            look = {"color": (*COLOURS, "#7A7A7A")[number], "linestyle": "-" if number < 4 else "--", "marker": "o"}
-            axes.plot(list(mean), list(mean.values()), label=kind, linewidth=1.3, markersize=4, **look)
-        tidy(axes, name, "", "W1, standard deviations" if name == "gravel" else "")
-    panels[1].set_ylim(bottom=0)
-    figure.legend(
-        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9
-    )
-    with open(out / "oblique.csv", "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["sample", "slices", *wanted, "mean", "worst slice"])
-        writer.writerows(lines)
-    return figure_png(figure)
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def main(made, about):
+    """Make figures by name: functions of a `Making` that return a PNG."""
+    parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "docs" / "pyramid")
     parser.add_argument("--device")
     parser.add_argument("--only", default="", help="figures to make, by name, separated by commas")
     parser.add_argument("--quick", action="store_true", help="small sizes")
     options = parser.parse_args()
-    making = Making(simdtex.open_machine(options.device), 4 if options.quick else 1)
-    print(f"device: {making.machine.name}")
     options.out.mkdir(parents=True, exist_ok=True)
-    made = {
-        "filters": filter_bank,
-        "subbands": subbands,
-        "convergence": convergence,
-        "iterations": iterations,
-        "gallery-strong": partial(gallery, chosen=strong()),
-        "gallery-failures": partial(gallery, chosen=failures()),
-        "colour": colour,
-        "edges": edges,
-        "seams": seams,
-        "match": match,
-        "mixtures": mixtures,
-        "solid": solid,
-        "solid-options": solid_options,
-        "oblique": partial(oblique, out=options.out),
-    }
+    making = Making(simdtex.open_machine(options.device), 4 if options.quick else 1, options.out)
+    print(f"device: {making.machine.name}")
     for name in options.only.split(",") if options.only else made:
         path = options.out / f"{name}.png"
         path.write_bytes(made[name](making))
@@ -515,4 +406,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    main(MADE, __doc__.splitlines()[0])

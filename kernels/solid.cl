@@ -4,7 +4,8 @@
 // Solid textures, Heeger and Bergen section 5: the Laplacian pyramid of a block in whole numbers, the block turned so
 // that its slices lie the other way, and the mean of several blocks. The Gaussian is (1, 4, 6, 4, 1) / 16 in each
 // direction. Every level is rounded, so a band and what it was taken from add up exactly.
-// Blocks are (depth, rows, cols). A launch is of the slices from `first` on: work-items (pixels of a slice, slices).
+// Around a torus an odd number of slices, rows or columns is folded as in fold.cl: every second one goes around twice and
+// meets each once, so that no seam is squeezed. Blocks are (depth, rows, cols). A launch is of the slices from `first` on: work-items (pixels of a slice, slices).
 // Two directions are summed in 32 bits, the third in 64: right up to |fine| < 2^23 and |coarse| < 2^25.
 
 // Index i, most often one of 0 .. n-1 already: a comparison is cheaper than a division.
@@ -13,13 +14,19 @@ inline int inside(const int i, const int n, const int torus)
     return i >= 0 && i < n ? i : within(i, n, torus);
 }
 
-// G_{i+1} = 2down(G_i * g) in three directions: `coarse` has half as many slices, rows and columns, rounded up.
+// How many slices, rows or columns the level above n of them has.
+inline int above(const int n, const int torus)
+{
+    return torus && n % 2 ? n : (n + 1) / 2;
+}
+
+// G_{i+1} = 2down(G_i * g) in three directions.
 __kernel void solid_reduce(__global const int *restrict fine, const int first, const int depth, const int rows,
                            const int cols, const int torus, __global int *restrict coarse)
 {
-    const int half_rows = (rows + 1) / 2, half_cols = (cols + 1) / 2;
+    const int half_rows = above(rows, torus), half_cols = above(cols, torus);
     const int s = get_global_id(0), slice = first + (int)get_global_id(1);
-    if (s >= half_rows * half_cols || slice >= (depth + 1) / 2)
+    if (s >= half_rows * half_cols || slice >= above(depth, torus))
         return;
     const int i = 2 * (s / half_cols), j = 2 * (s % half_cols);
     int row[5], col[5];
@@ -104,6 +111,42 @@ __kernel void solid_collapse(__global const int *restrict band, __global const i
                              __global int *restrict fine)
 {
     add_expanded(band, coarse, first, depth, rows, cols, torus, 1, fine);
+}
+
+// The voxels of the level above, and their weights in 2^-`bits`, that slice, row or column i of n takes on a torus.
+inline int taken(const int i, const int n, int *from, int *weight, int *bits)
+{
+    const int gauss[5] = {1, 4, 6, 4, 1}, child[2][3] = {{1, 6, 1}, {0, 4, 4}};
+    const int odd = n % 2, count = odd ? 5 : 3;
+    for (int a = 0; a < count; ++a) {
+        const int k = within(i + a - 2, n, 1);
+        from[a] = odd ? (k % 2 ? (k + n) / 2 : k / 2) : within(i / 2 + a - 1, n / 2, 1);
+        weight[a] = odd ? gauss[a] : child[i % 2][a];
+    }
+    *bits += odd ? 4 : 3;
+    return count;
+}
+
+// out = in + sign * 2up(coarse) on a torus of which some side is odd: one work-item per voxel of `in` and `out`.
+__kernel void solid_folded(__global const int *restrict in, __global const int *restrict coarse, const int first,
+                           const int depth, const int rows, const int cols, const int sign, __global int *restrict out)
+{
+    const int s = get_global_id(0), slice = first + (int)get_global_id(1);
+    if (s >= rows * cols || slice >= depth)
+        return;
+    int z[5], y[5], x[5], u[5], v[5], w[5], bits = 0;
+    const int zs = taken(slice, depth, z, u, &bits), ys = taken(s / cols, rows, y, v, &bits);
+    const int xs = taken(s % cols, cols, x, w, &bits);
+    const int up_rows = above(rows, 1), up_cols = above(cols, 1);
+    long sum = 0;
+    for (int a = 0; a < zs; ++a)
+        for (int b = 0; b < ys; ++b) {
+            __global const int *p = coarse + ((size_t)z[a] * up_rows + y[b]) * up_cols;
+            for (int c = 0; c < xs; ++c)
+                sum += (long)(u[a] * v[b] * w[c]) * p[x[c]];
+        }
+    const size_t voxel = (size_t)slice * rows * cols + s;
+    out[voxel] = in[voxel] + sign * (int)((sum + (1 << (bits - 1))) >> bits);
 }
 
 // The block with its axes in another order: voxel (slice, i, j) of `turned`, which has rows x cols pixels in each of

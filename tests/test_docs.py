@@ -94,7 +94,7 @@ def test_python_runs(any_device, code, page):
 @pytest.mark.parametrize("line", commands(README))
 def test_readme_command_runs(any_device, material, line):
     words = shlex.split(small(line))
-    words += ["--order", "8"] if "synth" in words and "multires" not in words else []  # quicker
+    words += ["--order", "8"] if "synth" in words and "--method" not in words else []  # quicker
     words += ["--order", "4", "--seeds", "1"] if "schedules" in words else []
     words += ["--sweeps", "20", "--burn-in", "10"] if "ising" in words[1:2] else []
     environment = os.environ | {"SIMDTEX_DEVICE": str(any_device.index)}

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Blocks of solid textures: their Laplacian pyramid in whole numbers, their slices the other ways, their mean.
 
-Blocks are (depth, rows, cols) int32. A level has half the slices, rows and columns of the one below it, rounded up.
+Blocks are (depth, rows, cols) int32. A level has half the slices, rows and columns of the one below it, rounded up;
+around a torus an odd number of them is folded instead, see `simdtex.ops.fold`.
 Results are right where what is reduced is below 2**23 and what is expanded below 2**25, positive or negative.
 """
 
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.ops.fold import folded
 from simdtex.ops.laplacian import within
 from simdtex.ops.operation import Array, Operation
 
@@ -26,9 +28,9 @@ MOST_BLOCKS = 4
 """Blocks that `solid_mean` takes."""
 
 
-def half(shape: tuple[int, ...]) -> tuple[int, ...]:
+def above(shape: tuple[int, ...], torus: bool) -> tuple[int, ...]:
     """The shape of the level above one of this shape."""
-    return tuple(-(-n // 2) for n in shape)
+    return tuple(n if torus and n % 2 else -(-n // 2) for n in shape)
 
 
 def _weighted(near: list[NDArray[np.int64]], weights: Sequence[int]) -> NDArray[np.int64]:
@@ -39,20 +41,27 @@ def _reduce(fine: NDArray[np.int32], torus: bool) -> NDArray[np.int32]:
     g = fine.astype(np.int64)
     for axis in range(3):
         n = g.shape[axis]
-        near = [g.take(within(np.arange(0, n, 2) + a, n, torus), axis) for a in range(-2, 3)]
+        center = 2 * np.arange(above((n,), torus)[0])
+        near = [g.take(within(center + a, n, torus), axis) for a in range(-2, 3)]
         g = _weighted(near, (1, 4, 6, 4, 1))
     return ((g + 2**11) >> 12).astype(np.int32)
 
 
 def _expanded(coarse: NDArray[np.int32], shape: tuple[int, ...], torus: bool) -> NDArray[np.int64]:
     """2up(G_{i+1}) at a level of this shape."""
-    g = coarse.astype(np.int64)
+    g, bits = coarse.astype(np.int64), 0
     for axis in range(3):
         n = g.shape[axis]
+        bits += 4 if torus and shape[axis] % 2 else 3
+        if torus and shape[axis] % 2:
+            whole = np.empty_like(g)
+            whole[(slice(None),) * axis + (folded(n),)] = g  # back where they were
+            g = _weighted([np.roll(whole, -a, axis) for a in range(-2, 3)], (1, 4, 6, 4, 1))
+            continue
         near = [g.take(within(np.arange(n) + a, n, torus), axis) for a in (-1, 0, 1)]
         children = np.stack([_weighted(near, (1, 6, 1)), _weighted(near, (0, 4, 4))], axis + 1)
         g = children.reshape(*g.shape[:axis], 2 * n, *g.shape[axis + 1 :]).take(range(shape[axis]), axis)
-    return (g + 2**8) >> 9
+    return (g + (1 << bits - 1)) >> bits
 
 
 def _band(fine: NDArray[np.int32], coarse: NDArray[np.int32], torus: bool) -> NDArray[np.int32]:
@@ -91,7 +100,7 @@ def _parts(slices: int, pixels: int) -> Iterator[tuple[np.int32, tuple[int, int]
 
 
 def _launch_reduce(machine: OpenCL, fine: Array, torus: bool) -> Array:
-    depth, rows, cols = half(fine.shape)
+    depth, rows, cols = above(fine.shape, torus)
     coarse = machine.empty((depth, rows, cols), np.int32)
     kernel = machine.kernel("solid", "solid_reduce")
     for first, size in _parts(depth, rows * cols):
@@ -100,8 +109,15 @@ def _launch_reduce(machine: OpenCL, fine: Array, torus: bool) -> Array:
 
 
 def _launch_expanded(machine: OpenCL, function: str, known: Array, coarse: Array, torus: bool) -> Array:
-    depth, rows, cols = coarse.shape
     result = machine.empty(known.shape, np.int32)
+    if torus and any(n % 2 for n in known.shape):
+        sign = 1 if function == "solid_collapse" else -1
+        depth, rows, cols = known.shape
+        for first, size in _parts(depth, rows * cols):
+            arguments = (known, coarse, first, *_sizes(*known.shape, sign), result)
+            machine.launch(machine.kernel("solid", "solid_folded"), size, *arguments)
+        return result
+    depth, rows, cols = coarse.shape
     kernel = machine.kernel("solid", function)
     for first, size in _parts(depth, rows * cols):
         machine.launch(kernel, size, known, coarse, first, *_sizes(*known.shape, torus), result)
@@ -136,7 +152,7 @@ def _launch_mean(machine: OpenCL, blocks: Sequence[Array]) -> Array:
 
 
 solid_reduce = Operation("solid", _reduce, _launch_reduce)
-"""``solid_reduce(machine, fine, torus)``: G_{i+1} of the block G_i, half as large. Cost: 125 multiply-adds a voxel."""
+"""``solid_reduce(machine, fine, torus)``: G_{i+1} of the block G_i. Cost: 125 multiply-adds a voxel."""
 
 solid_band = Operation("solid", _band, _launch_band)
 """``solid_band(machine, fine, coarse, torus)``: L_i of G_i and G_{i+1}. Cost: 12 multiply-adds a voxel of L_i."""
