@@ -335,8 +335,8 @@ def match(making):
         made = np.bincount(image.ravel(), minlength=256) / image.size
         axes.step(range(256), 100 * made, where="mid", color=look, linewidth=1.1, label=f"match={option}")
         quantiles = np.abs(np.sort(image, axis=None).astype(int) - np.sort(sample, axis=None).repeat(4))
-        apart = f"shares differ by at most {np.abs(made - own).max():.5f}, quantiles by at most {quantiles.max()} grey levels"
-        apart += f" ({(quantiles > 1).mean():.3%} by more than 1)"
+        apart = f"shares differ by at most {np.abs(made - own).max():.5f}, quantiles by at most {quantiles.max()}"
+        apart += f" grey levels ({(quantiles > 1).mean():.3%} by more than 1)"
         apart += f", cdf by {np.abs(np.cumsum(made - own)).max():.5f}"
         print(f"  {option}: {apart}; W1 {wasserstein_distance(image.ravel(), sample.ravel()):.3f} grey levels", end="")
         print(f"; mean distance of the subbands {moved(statistics):.4f}; bin {np.ptp(sample) / 256:.2f} grey levels")

@@ -205,13 +205,14 @@ def test_the_shape_of_a_launch_and_launches_in_parts_change_no_bit(cl_device, mo
     assert_same_bits(turned, solid_turn(REFERENCE, g, (2, 0, 1)))
 
 
+@pytest.mark.parametrize("torus", [True, False])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_nothing_overflows_at_the_limits(machine, sign):
+def test_nothing_overflows_at_the_limits(machine, sign, torus):
     """What is promised: 2**23 exclusive for what is reduced, 2**25 exclusive for what is expanded."""
     g = np.full((3, 4, 5), sign * (2**23 - 1), np.int32)
-    coarse, band, _ = steps(machine, g, True)
+    coarse, band, _ = steps(machine, g, torus)
     assert (coarse == g.flat[0]).all()
     assert not band.any()
-    most = np.full((2, 2, 3), sign * (2**25 - 1), np.int32)
+    most = np.full(above(g.shape, torus), sign * (2**25 - 1), np.int32)
     arrays = [machine.put(a) for a in (np.zeros_like(g), most)]
-    assert (np.asarray(machine.get(solid_collapse(machine, *arrays, True))) == most.flat[0]).all()
+    assert (np.asarray(machine.get(solid_collapse(machine, *arrays, torus))) == most.flat[0]).all()
