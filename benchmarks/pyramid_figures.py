@@ -54,7 +54,7 @@ def strong():
         "fur": data.chelsea()[0:64, 170:234],
         "wood": samples.colour()["wood"],
         "a blurred ground, contrast raised": stretched(data.cell()[300:428, 20:148]),
-        "retina, contrast raised": stretched(data.retina()[500:628, 850:978]),
+        "wood in the light": data.coffee()[310:374, 10:74],
     }
 
 
@@ -308,17 +308,22 @@ def edges(making):
 
 
 def seams(making):
-    """Outputs laid side by side with themselves."""
+    """Outputs laid side by side with themselves, beside the sample."""
     pictures = []
-    for name, sample in strong().items():
+    for name, sample in (strong() | failures()).items():
         found = {}
-        for boundary in ("torus", "open"):
-            images = [making.run(sample, 96, boundary=boundary, rng=seed)[0] for seed in range(1, 6)]
-            found[boundary] = [seam(image) for image in images]
-            if name.startswith(("gravel", "fur")):
-                tiled = np.tile(images[0], (2, 2, 1)[: images[0].ndim])
-                pictures.append((f"{boundary}: {found[boundary][0]:.2f}", tiled))
-        figures = "; ".join(f"{b} {np.mean(s):.3f} ({min(s):.3f} to {max(s):.3f})" for b, s in found.items())
+        for side in (96, 91):
+            images = [making.run(sample, side, rng=seed)[0] for seed in range(1, 6)]
+            found[f"side {side}"] = [seam(image) for image in images]
+            elsewhere = range(1, making.small(side), max(1, making.small(12)))
+            moved_in = [np.roll(image, (k, k), (0, 1)) for image in images for k in elsewhere]
+            found[f"lines inside, side {side}"] = [seam(image) for image in moved_in]
+            if side == 91 and name.startswith(("gravel", "fur")):
+                own = making.crop(sample)[: making.small(96), : making.small(96)]
+                for label, picture in (("sample", own), ("output", images[0])):
+                    tiled = np.tile(picture, (2, 2, 1)[: sample.ndim])
+                    pictures.append((f"{label}, tiled: {seam(picture):.2f}", framed(tiled)))
+        figures = "; ".join(f"{n} {np.mean(s):.3f} ({min(s):.3f} to {max(s):.3f})" for n, s in found.items())
         print(f"  {name}: gradient across the seam over that inside, 5 seeds: {figures}")
     return png(contact_sheet(pictures, columns=4))
 

@@ -2,10 +2,12 @@
 """What the options of a method do to a texture, by figures and for the eye.
 
     python benchmarks/study.py [--method mrf] [--out docs/study] [--seeds N] [--only brick,grass] [--device TEXT]
+                               [--quick]
 
 Writes a table (mean over the seeds) and one sheet of pictures per sample, and prints each line as it is made:
-table.csv and NAME.png for `mrf`, multires.csv and multires-NAME.png for `multires`, whose first line is `mrf` with its
-defaults. Outputs are twice the sample in each direction.
+table.csv and NAME.png for `mrf`, multires.csv and multires-NAME.png for `multires`, pyramid.csv and pyramid-NAME.png
+for `pyramid`. The first lines of the latter two are other methods with their defaults. Outputs are twice the sample in
+each direction. ``--quick`` takes half of each sample's sides.
 """
 
 import argparse
@@ -17,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 import samples
+from pyramid_figures import png
 
 import simdtex
 from simdtex.quality import measure
@@ -66,6 +69,26 @@ MULTIRES = {
     "features=channels": {"features": "channels"},
     "boundary=open": {"boundary": "open"},
 }
+PYRAMID = {
+    "default": {},
+    "iterations=1": {"iterations": 1},
+    "iterations=2": {"iterations": 2},
+    "iterations=10": {"iterations": 10},
+    "iterations=20": {"iterations": 20},
+    "iterations=100": {"iterations": 100},
+    "pyramid=laplacian": {"pyramid": "laplacian"},
+    "orientations=1": {"orientations": 1},
+    "orientations=2": {"orientations": 2},
+    "orientations=6": {"orientations": 6},
+    "levels=1": {"levels": 1},
+    "levels=2": {"levels": 2},
+    "levels=3": {"levels": 3},
+    "levels=5": {"levels": 5},
+    "match=lookup": {"match": "lookup"},
+    "match=lookup, bins=32": {"match": "lookup", "bins": 32},
+    "edges=wrap": {"edges": "wrap"},
+    "color=channels": {"color": "channels"},
+}
 UNSEEN = {  # not on the sheets, where they look like others
     "alpha=auto, target=1.2",
     "alpha=auto, beta=1",
@@ -73,6 +96,12 @@ UNSEEN = {  # not on the sheets, where they look like others
     "orientations=8",
     "sigma=0.5",
     "sigma=1",
+    "iterations=2",
+    "iterations=10",
+    "levels=3",
+    "levels=5",
+    "match=lookup, bins=32",
+    "edges=wrap",
 }
 FIGURES = ("plausibility", "coverage", "copying", "histogram_distance", "seam")
 
@@ -113,6 +142,14 @@ STUDIES = {
         table="multires.csv",
         prefix="multires-",
     ),
+    "pyramid": Study(
+        settings=PYRAMID,
+        skipped={"colour": [], "grey": ["color=channels"]},
+        figures=(*FIGURES, "repetition"),
+        seeds=3,
+        table="pyramid.csv",
+        prefix="pyramid-",
+    ),
 }
 
 
@@ -120,6 +157,8 @@ def tried(method):
     """The settings to try in turn: label, options, seeds (None: as many as asked for)."""
     if method != "mrf":
         yield "mrf", {"method": "mrf"}, 1
+    if method == "pyramid":
+        yield "multires", {"method": "multires"}, 1
     for label, given in STUDIES[method].settings.items():
         yield label, {"method": method, **given}, None
 
@@ -128,9 +167,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--method", choices=STUDIES, default="mrf")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "docs" / "study")
-    parser.add_argument("--seeds", type=int, help="1 with mrf and 3 with multires unless given")
+    parser.add_argument("--seeds", type=int, help="1 with mrf and 3 with others unless given")
     parser.add_argument("--only", default="")
     parser.add_argument("--device")
+    parser.add_argument("--quick", action="store_true", help="small samples")
     options = parser.parse_args()
     study = STUDIES[options.method]
     machine = simdtex.open_machine(options.device)
@@ -141,6 +181,8 @@ def main():
     rows = []
     for name in chosen:
         sample = known[name]
+        if options.quick:
+            sample = sample[: len(sample) // 2, : len(sample) // 2]
         in_colour = sample.ndim == 3
         pictures = [(name, sample)]
         for label, given, fixed in tried(options.method):
@@ -169,7 +211,7 @@ def main():
             print(f"{name:8}{setting:32}", *rows[-1][2:], f"{np.mean(seconds):.1f} s", flush=True)
             if label not in UNSEEN:
                 pictures.append((setting, made))
-        contact_sheet(pictures, options.out / f"{study.prefix}{name}.png", columns=4)
+        (options.out / f"{study.prefix}{name}.png").write_bytes(png(contact_sheet(pictures, columns=4)))
     with open(options.out / study.table, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(["sample", "setting", *(figure.replace("_", " ") for figure in study.figures)])

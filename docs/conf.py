@@ -26,7 +26,11 @@ numpydoc_show_class_members = False
 
 # The page of the study shows each method's table and all the pictures that benchmarks/study.py has written:
 # name of the result -> table, beginning of the pictures' names.
-STUDIES = {"study": ("table.csv", ""), "study-multires": ("multires.csv", "multires-")}
+STUDIES = {
+    "study": ("table.csv", ""),
+    "study-multires": ("multires.csv", "multires-"),
+    "study-pyramid": ("pyramid.csv", "pyramid-"),
+}
 (HERE / "generated").mkdir(exist_ok=True)
 for result, (figures, prefix) in STUDIES.items():
     others = tuple(other for _, other in STUDIES.values() if len(other) > len(prefix))

@@ -52,13 +52,16 @@ class Palette:
     def restored(self, channels: NDArray[np.float64]) -> NDArray[np.int32]:
         """Stretched planes (C, ...) of channels of unit variance: M^-1 y + mean.
 
-        Sums are taken in the order of the channels, so that no library of linear algebra changes a bit.
+        Flat axes have no part in it, so that grey stays grey to the bit. Sums are taken in the order of the channels,
+        so that no library of linear algebra changes a bit.
         """
-        back = np.rint(np.linalg.inv(self.axes / FINE) * INVERSE) / INVERSE
+        used = self.deviations > 0
+        along = self.axes[used] / FINE
+        back = np.rint(along.T @ np.linalg.inv(along @ along.T) * INVERSE) / INVERSE
         planes = np.empty(channels.shape, np.int32)
         for plane, row, mean in zip(planes, back, self.mean, strict=True):
             total = np.zeros(plane.shape)
-            for weight, deviation, channel in zip(row, self.deviations, channels, strict=True):
+            for weight, deviation, channel in zip(row, self.deviations[used], channels[used], strict=True):
                 total += weight * (deviation / FINE) * channel
             plane[...] = np.clip(np.rint(total + mean), -(2**30), 2**30)
         return planes

@@ -215,7 +215,7 @@ class Pyramid:
         """
         machine = open_machine(device)
         levels = len(self.subbands) - (2 if self.kind == "steerable" else 1)
-        whole_numbers = [np.rint(band / self.unit).astype(np.int32) for band in self.subbands]
+        whole_numbers = [_whole(band / self.unit) for band in self.subbands]
         if self.boundary == "torus":
             orders = _orders(self.subbands[0].shape[2:], levels, self.kind)
             whole_numbers = [band[..., r[:, None], c] for band, (r, c) in zip(whole_numbers, orders, strict=True)]
@@ -274,6 +274,7 @@ def decompose(
     >>> [band.shape for band in pyramid.subbands]
     [(1, 1, 64, 64), (4, 1, 64, 64), (4, 1, 32, 32), (1, 1, 16, 16)]
     """
+    whole("levels", levels, 0)
     check_kind(kind, levels, orientations)
     one_of("boundary", boundary, ("open", "torus"))
     pixels = check_sample(image, channel_axis)
@@ -289,6 +290,12 @@ def decompose(
         subbands = [band[..., rows, cols] for band, (rows, cols) in zip(subbands, natural, strict=True)]
     offset = float(pixels.min())
     return Pyramid([band * picture.unit for band in subbands], kind, orientations, boundary, offset, picture.unit)
+
+
+def _whole(values: NDArray[np.float64]) -> NDArray[np.int32]:
+    if not (np.abs(values) < 2**26).all():  # sums of some of them fit 32 bits
+        raise ValueError("a subband has a value that is NaN, infinite or beyond 64 times the picture's range")
+    return np.asarray(np.rint(values), np.int32)
 
 
 def _orders(shape: tuple[int, ...], levels: int, kind: str) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:

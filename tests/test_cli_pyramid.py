@@ -74,8 +74,8 @@ def assert_one_sentence(result, words, folder):
 OPTIONS = {
     "plain": ([], {}),
     "sharing options": (
-        ["--orientations", 2, "--levels", 2, "--boundary", "open", "--edges", "wrap", "--iterations", 1],
-        {"orientations": 2, "levels": 2, "boundary": "open", "edges": "wrap", "iterations": 1},
+        ["--orientations", 2, "--levels", 2, "--edges", "wrap", "--iterations", 1],
+        {"orientations": 2, "levels": 2, "edges": "wrap", "iterations": 1},
     ),
     "tables": (
         ["--pyramid", "laplacian", "--match", "lookup", "--bins", 64, *QUICK],
@@ -142,7 +142,6 @@ BAD_PYRAMID = {
     "many bins": (["--bins", 5000], "give 4096 or fewer"),
     "edges": (["--edges", "whole"], "choose one of: reflect, wrap"),
     "color": (["--color", "hue"], "choose one of: decorrelate, channels"),
-    "boundary": (["--boundary", "round"], "choose one of: torus, open"),
     "levels": (["--levels", 9], "levels=9 is too many"),
     "seed": (["--seed", -1], "seed"),
     "device": (["--device", "no such device"], "no such device"),
@@ -156,6 +155,7 @@ BAD_PYRAMID = {
     "stages in the output's place": (["--stages", "out.png"], "out.png would be written twice"),
 }
 BAD_SYNTH = BAD_PYRAMID | {
+    "boundary": (["--boundary", "open"], "unknown option 'boundary' of the method 'pyramid'"),
     "option of mrf": (["--order", 8], "unknown option 'order' of the method 'pyramid'"),
     "accounting": (["--accounting"], "--accounting is of the method mrf"),
     "source map": (["--source-map", "map.npz"], "takes no pixel from the sample; leave --source-map and --also out"),
@@ -191,9 +191,9 @@ def test_solid_is_what_python_makes(folder):
 
 
 def test_a_solid_in_colour_begins_with_a_block_and_takes_its_size(folder):
-    args = ["--pyramid", "laplacian", "--match", "lookup", "--bins", 32, "--color", "channels", "--boundary", "open"]
+    args = ["--pyramid", "laplacian", "--match", "lookup", "--bins", 32, "--color", "channels"]
     assert solid("--start", "block.npy", "-q", *args, *QUICK, sample="colour.png").output == ""
-    options = {"pyramid": "laplacian", "match": "lookup", "bins": 32, "color": "channels", "boundary": "open"}
+    options = {"pyramid": "laplacian", "match": "lookup", "bins": 32, "color": "channels"}
     options |= {"start": block(), "channel_axis": -1, **EACH}
     expected = simdtex.synthesize_solid(COLOUR, (6, 10, 8), **options, **SAME)
     np.testing.assert_array_equal(volume.read("out.npz"), expected)
@@ -284,8 +284,8 @@ MIXTURES = {
         {"palette": 1, "pixels": "pattern", "color": "channels", "edges": "wrap"},
     ),
     "tables": (
-        ["--pyramid", "laplacian", "--match", "lookup", "--bins", 32, "--boundary", "open", "--pattern", 2],
-        {"pyramid": "laplacian", "match": "lookup", "bins": 32, "boundary": "open", "pattern": 1},
+        ["--pyramid", "laplacian", "--match", "lookup", "--bins", 32, "--pattern", 2],
+        {"pyramid": "laplacian", "match": "lookup", "bins": 32, "pattern": 1},
     ),
 }
 

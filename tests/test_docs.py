@@ -61,6 +61,7 @@ def small(code):
         .replace("block[:, 20]", "block[:, 2]")
         .replace("--size 64", "--size 8")
     )
+    code = code.replace("data.camera()", "data.camera()[:64, :64]")
     return code.replace("(256, 256)", "(40, 40)").replace("(192, 192)", "(40, 40)").replace("256x256", "40x40")
 
 

@@ -177,7 +177,6 @@ def pyramid_options(start: str) -> Callable[[Command], Command]:
         click.option("--levels", type=int, help="Of the pyramids.  [as many as leave 8 pixels a side]"),
         click.option("--orientations", type=int, help=_ORIENTATIONS["pyramid"]),
         click.option("--edges", help=_EDGES["pyramid"]),
-        BOUNDARY,
     )
 
 

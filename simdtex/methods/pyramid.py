@@ -38,6 +38,9 @@ VALUES = 8
 MEMORY = 160
 """Bytes for each pixel of an output on the device, at most (measured by benchmarks/pyramid_cost.py)."""
 
+MATCHING = 200
+"""What a value's sort and match cost, about, in multiply-adds: when to wait for the device."""
+
 TIES = 2**20
 """Where a level stands in the counter of random numbers: the order in which equal values come."""
 
@@ -151,6 +154,7 @@ class Matcher:
         else:
             matched = match_lookup(self._machine, segments, wanted.table)
         moved = distance(self._machine, segments, matched)
+        self._machine.sync(MATCHING * bands * planes * prod(shape))
         self._moved.append((name, moved, wanted.deviations * planes * prod(shape)))
         return matched.reshape(values.shape)
 

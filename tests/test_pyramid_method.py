@@ -1,0 +1,364 @@
+"""The method ``pyramid``: against a plain float64 Match-texture, and what Heeger and Bergen's method promises."""
+
+from math import prod
+
+import numpy as np
+import plain_pyramid as plain
+import pytest
+from cases import REFERENCE, assert_same_bits, texture
+from skimage import data
+from tolerances import HALVES, KEPT, LOOKUP, PLAIN_TEXTURE, SEAM, SPREAD
+
+import simdtex
+from simdtex.ops.noise import noise
+from simdtex.quality import histogram_distance, seam
+
+TYPES = [np.bool_, np.uint8, np.int8, np.uint16, np.int64, np.float16, np.float32, np.float64]
+
+
+def synthesize(sample, shape, **options):
+    return simdtex.synthesize(sample, shape, **({"method": "pyramid", "rng": 1, "device": REFERENCE} | options))
+
+
+def gravel(side=64):
+    return data.gravel()[100 : 100 + side, 100 : 100 + side]
+
+
+def first_noise(shape, seed, channel=0):
+    """What a channel begins with."""
+    return noise(REFERENCE, 1, prod(shape), seed, channel).reshape(shape).astype(float)
+
+
+# -- match-texture --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shape", [(64, 64), (48, 72), (60, 84)], ids=str)
+@pytest.mark.parametrize(("kind", "orientations"), [("steerable", 4), ("steerable", 2), ("laplacian", 4)])
+def test_it_is_match_texture_of_the_paper(kind, orientations, shape):
+    """Pixel by pixel, but where a rounding changes the order of two values: the more iterations, the more often."""
+    sample, seed = gravel(), 7
+    begun, mean = first_noise(shape, seed), sample.mean()
+    for iterations, share in PLAIN_TEXTURE.items():
+        theirs = plain.match_texture(begun, sample - mean, kind, 2, orientations, iterations) + mean
+        options = {"pyramid": kind, "levels": 2, "orientations": orientations, "iterations": iterations}
+        ours = synthesize(sample, shape, rng=seed, **options)
+        assert (np.sort(ours, axis=None) == np.rint(np.sort(theirs, axis=None))).all()
+        assert (ours == np.rint(theirs)).mean() >= share
+        assert np.corrcoef(ours.ravel(), theirs.ravel())[0, 1] > 0.999
+
+
+@pytest.mark.parametrize("kind", ["steerable", "laplacian"])
+def test_colours_are_matched_as_decorrelated_channels(kind):
+    sample = data.immunohistochemistry()[100:148, 100:148]
+    begun = [first_noise((40, 48), 7, channel) for channel in range(3)]
+    for iterations, share in PLAIN_TEXTURE.items():
+        theirs = plain.match_color_texture(begun, sample, kind, 2, 4, iterations)
+        options = {"pyramid": kind, "levels": 2, "iterations": iterations, "channel_axis": -1}
+        ours = synthesize(sample, (40, 48), rng=7, **options)
+        assert (ours == np.clip(np.rint(theirs), 0, 255)).mean() >= share
+
+
+def test_noise_is_matched_to_the_pixels_before_the_loop():
+    sample = texture((12, 11))
+    begun = first_noise((9, 10), 5)
+    assert (synthesize(sample, (9, 10), rng=5, iterations=0) == plain.match_histogram(begun, sample)).all()
+
+
+# -- histograms -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", TYPES)
+@pytest.mark.parametrize("options", [{}, {"pyramid": "laplacian"}, {"iterations": 0}], ids=str)
+def test_a_multiple_of_the_sample_has_exactly_its_pixels(dtype, options):
+    sample = texture((12, 10), None, dtype)
+    made = synthesize(sample, (24, 30), **options)
+    assert made.dtype == sample.dtype
+    assert_same_bits(np.sort(made, axis=None), np.sort(np.tile(sample, (2, 3)), axis=None))
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float64])
+@pytest.mark.parametrize("shape", [(9, 9), (17, 13), (1, 7), (1, 1)], ids=str)
+def test_another_size_has_the_samples_quantiles(shape, dtype):
+    sample = texture((12, 10), None, dtype)
+    made = synthesize(sample, shape)
+    assert_same_bits(np.sort(made, axis=None), plain.quantiles(sample, prod(shape)))
+
+
+@pytest.mark.parametrize("bins", [256, 64])
+def test_by_lookup_it_has_the_samples_pixels_to_about_a_bin(bins):
+    sample = data.gravel()[:128, :128].astype(float)
+    made = synthesize(sample, (128, 128), match="lookup", bins=bins, levels=3)
+    off = abs(np.sort(made, axis=None) - np.sort(sample, axis=None)) / (np.ptp(sample) / bins)
+    inner = off[off.size // bins : -off.size // bins]  # beyond, a table has one entry
+    assert off.mean() < 0.5
+    assert np.quantile(inner, 0.99) <= LOOKUP
+
+
+@pytest.mark.parametrize("kind", ["steerable", "laplacian"])
+@pytest.mark.parametrize("match", ["rank", "lookup"])
+def test_histograms_come_closer_from_iteration_to_iteration(kind, match):
+    for seed in (1, 2):
+        _, output = synthesize(gravel(96), (96, 96), rng=seed, pyramid=kind, match=match, full_output=True)
+        reports = output.statistics["iterations"]
+        assert [report["iteration"] for report in reports] == [1, 2, 3, 4, 5]
+        means = [np.mean(list(report["distances"].values())) for report in reports]
+        assert means[1] < 0.4 * means[0]
+        assert means[4] < means[1]
+        names = [*(["high"] if kind == "steerable" else []), "level 0", "level 1", "level 2", "low", "pixels"]
+        assert list(reports[0]["distances"]) == names
+
+
+# -- seams, and other properties of the picture ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shape", [(96, 96), (97, 95), (98, 74)], ids=str)
+@pytest.mark.parametrize("kind", ["steerable", "laplacian"])
+def test_a_torus_has_no_seam(kind, shape):
+    """The gradient across the seam is that inside: the mean of some pictures, as a seam is short."""
+    for sample in (data.gravel()[:96, :96], data.grass()[:96, :96]):
+        ratios = [seam(synthesize(sample, shape, rng=seed, pyramid=kind, iterations=3)) for seed in range(6)]
+        assert abs(np.mean(ratios) - 1) <= SEAM
+
+
+def test_a_flat_start_gives_no_gradient():
+    """Equal values come in a random order, not in that of the rows."""
+    sample, shape = gravel(), (64, 64)
+    made = [synthesize(sample, shape, rng=seed, start=np.full(shape, 3.0)).astype(float) for seed in range(4)]
+    for half, other in (((slice(None, 32),), (slice(32, None),)), ((..., slice(None, 32)), (..., slice(32, None)))):
+        differences = [(m[half].mean() - m[other].mean()) / sample.std() for m in made]
+        assert abs(np.mean(differences)) <= HALVES
+    assert len({m.tobytes() for m in made}) == 4
+
+
+def test_the_sample_as_start_is_nearly_kept():
+    sample = gravel()
+    made, output = synthesize(sample, sample.shape, start=sample, edges="wrap", full_output=True)
+    assert np.corrcoef(made.ravel(), sample.ravel())[0, 1] >= KEPT
+    assert max(output.statistics["iterations"][0]["distances"].values()) < 0.05
+    assert (synthesize(sample, sample.shape, start=sample, iterations=0) == sample).all()
+
+
+def test_a_start_shows_in_the_result_and_its_contrast_does_not():
+    sample = gravel()
+    stripes = np.indices((64, 64))[1] // 16 % 2
+    made = synthesize(sample, (64, 64), start=stripes, iterations=1)
+    assert np.corrcoef(made.ravel(), stripes.ravel())[0, 1] > 0.3
+    for same in (stripes.astype(np.uint8) * 255, stripes[..., None] * 1e-200, stripes * -1e9 * -1 + 7):
+        assert_same_bits(synthesize(sample, (64, 64), start=same, iterations=1), made)
+
+
+def test_a_start_may_be_grey_or_have_the_samples_channels():
+    sample, grey = texture((16, 16), 3), texture((10, 12), seed=4)
+    colour = np.repeat(grey[..., None], 3, -1)
+    made = synthesize(sample, (10, 12), start=colour, channel_axis=-1)
+    assert made.shape == (10, 12, 3)
+    first = np.moveaxis(sample, -1, 0)
+    ours = synthesize(first, (10, 12), start=np.moveaxis(colour, -1, 0), channel_axis=0)
+    assert_same_bits(np.moveaxis(ours, 0, -1).copy(), made)
+    assert synthesize(first, (10, 12), start=grey, channel_axis=0).shape == (3, 10, 12)
+
+
+@pytest.mark.parametrize(
+    ("start", "error", "words"),
+    [
+        (np.zeros((3, 3)), ValueError, r"start has shape \(3, 3\); give one of 8 x 9 pixels"),
+        (np.zeros((9, 8)), ValueError, r"start has shape \(9, 8\); give one of 8 x 9 pixels"),
+        (np.zeros((8, 9, 2)), ValueError, r"start has shape \(8, 9, 2\); give one of 8 x 9 pixels"),
+        ("noise", (TypeError, ValueError), "start"),
+        (np.full((8, 9), np.nan), ValueError, "start|finite"),
+        (np.zeros((8, 9), complex), TypeError, "start|real"),
+        ([[1, 2], [3]], (TypeError, ValueError), "start"),
+    ],
+    ids=["small", "turned", "channels", "text", "nan", "complex", "ragged"],
+)
+def test_a_wrong_start_is_one_sentence(start, error, words):
+    with pytest.raises(error, match=words) as found:
+        synthesize(texture((9, 9)), (8, 9), start=start)
+    assert "\n" not in str(found.value)
+
+
+# -- colour ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32, np.float64])
+def test_grey_stored_as_colour_stays_grey(dtype):
+    grey = texture((16, 16), None, dtype)
+    made = synthesize(np.repeat(grey[..., None], 3, -1), (20, 18), channel_axis=-1)
+    assert (made == made[..., :1]).all()
+    if dtype == np.uint8:
+        assert_same_bits(made[..., 0].copy(), synthesize(grey, (20, 18)))
+
+
+@pytest.mark.parametrize("color", ["decorrelate", "channels"])
+@pytest.mark.parametrize("dtype", [np.uint8, np.float64])
+def test_a_flat_channel_stays_flat(color, dtype):
+    sample = texture((16, 16), 3, dtype)
+    sample[..., 1] = 1
+    made = synthesize(sample, (20, 18), channel_axis=-1, color=color)
+    assert np.ptp(made[..., 1]) == 0
+    assert made[0, 0, 1] == pytest.approx(1, abs=1e-5)
+    assert np.ptp(made[..., 0]) > 0
+
+
+@pytest.mark.parametrize("sample", [np.full((8, 8), 7, np.uint8), np.full((8, 8), 7.25), np.zeros((1, 1), bool)])
+@pytest.mark.parametrize("options", [{}, {"match": "lookup"}, {"pyramid": "laplacian"}, {"iterations": 0}], ids=str)
+def test_a_constant_gives_the_constant(sample, options):
+    assert_same_bits(synthesize(sample, (5, 6), **options), np.full((5, 6), sample[0, 0]))
+
+
+def test_a_constant_colour_gives_the_colour():
+    made = synthesize(np.full((8, 8, 3), [3, 200, 9], np.uint8), (5, 6), channel_axis=-1)
+    assert (made == np.array([3, 200, 9])).all()
+
+
+@pytest.mark.parametrize("channels", [1, 2, 3, 5])
+@pytest.mark.parametrize("color", ["decorrelate", "channels"])
+def test_any_number_of_channels_keeps_means_and_covariance(channels, color):
+    sample = texture((32, 32), channels, np.float64)
+    made = synthesize(sample, (32, 32), channel_axis=-1, color=color)
+    flat, own = made.reshape(-1, channels), sample.reshape(-1, channels)
+    assert flat.mean(0) == pytest.approx(own.mean(0), abs=0.02 * own.std())
+    assert flat.std(0) == pytest.approx(own.std(0), rel=SPREAD[color])
+
+
+# -- any input ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scale", [1e300, 1e-300, 5e-324 * 2**30])
+def test_a_huge_or_a_tiny_range_makes_no_difference(scale):
+    sample = np.rint(texture((12, 12), None, np.float64) * 1000)
+    ours, theirs = synthesize(sample * scale, (15, 14)), synthesize(sample, (15, 14))
+    assert_same_bits(ours, theirs * scale)
+    colour = texture((12, 12), 3, np.float64) * scale
+    made = synthesize(colour, (15, 14), channel_axis=-1)
+    assert np.isfinite(made).all()
+    assert colour.min() <= made.min() < made.max() <= colour.max()
+
+
+def test_whole_numbers_of_64_bits_keep_their_range():
+    ends = np.iinfo(np.int64)
+    sample = np.array([[ends.min, ends.max, 0, 5]] * 4, np.int64)
+    assert set(np.unique(synthesize(sample, (8, 8)))) == {ends.min, ends.max, 0, 5}
+
+
+@pytest.mark.parametrize("sample", [(1, 1), (2, 2), (1, 7), (7, 1), (5, 3)], ids=str)
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (8, 1), (6, 7)], ids=str)
+@pytest.mark.parametrize("kind", ["steerable", "laplacian"])
+def test_tiny_samples_and_outputs_work(kind, shape, sample):
+    pixels = texture(sample)
+    for options in ({}, {"match": "lookup", "edges": "wrap"}):
+        made = synthesize(pixels, shape, pyramid=kind, **options)
+        assert made.shape == shape
+        assert pixels.min() <= made.min() <= made.max() <= pixels.max()
+
+
+def test_an_output_smaller_than_the_sample_and_no_levels_at_all():
+    assert synthesize(gravel(), (9, 11)).shape == (9, 11)
+    for kind in ("steerable", "laplacian"):
+        sample = texture((16, 16))
+        made = synthesize(sample, (16, 16), levels=0, pyramid=kind)
+        assert (np.sort(made, axis=None) == np.sort(sample, axis=None)).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"pyramid": "wavelet"}, ValueError, "unknown pyramid 'wavelet'; choose one of: steerable, laplacian"),
+        ({"levels": -1}, ValueError, "levels is -1; give 0 or more"),
+        ({"levels": 1.5}, TypeError, "levels must be a whole number, not 1.5"),
+        ({"levels": 4}, ValueError, "levels=4 is too many for a side of 8 pixels; give at most 3"),
+        ({"orientations": 3}, ValueError, "orientations is 3; the steerable filters have one of: 1, 2, 4, 6"),
+        ({"orientations": "4"}, TypeError, "orientations must be a whole number"),
+        ({"iterations": -1}, ValueError, "iterations is -1; give 0 or more"),
+        ({"iterations": 2.0}, TypeError, "iterations must be a whole number"),
+        ({"match": "sort"}, ValueError, "unknown match 'sort'; choose one of: rank, lookup"),
+        ({"bins": 1}, ValueError, "bins is 1; give 2 or more"),
+        ({"bins": 4097}, ValueError, "bins is 4097; give 4096 or fewer"),
+        ({"bins": 9.5}, TypeError, "bins must be a whole number"),
+        ({"edges": "zero"}, ValueError, "unknown edges 'zero'; choose one of: reflect, wrap"),
+        ({"color": "rgb"}, ValueError, "unknown color 'rgb'; choose one of: decorrelate, channels"),
+        ({"boundary": "open"}, TypeError, "unknown option 'boundary' of the method 'pyramid'"),
+        ({"slices": "each"}, TypeError, "unknown option 'slices' of the method 'pyramid'; choose from: pyramid, levels"),
+        ({"alpha": 1}, TypeError, "unknown option 'alpha'"),
+    ],
+    ids=lambda value: str(value) if isinstance(value, dict) else "",
+)
+def test_a_wrong_option_is_one_sentence(options, error, words):
+    with pytest.raises(error, match=words):
+        synthesize(texture((12, 11)), (8, 9), **options)
+
+
+# -- what a callback sees -------------------------------------------------------------------------------------
+
+
+def test_a_callback_sees_every_channel_of_every_iteration():
+    seen = []
+
+    def callback(progress):
+        seen.append((progress.iteration, progress.iterations, progress.fraction, progress.end_of_iteration))
+        assert progress.image().shape == (3, 10, 9)
+        assert progress.image().dtype == np.uint8
+        assert progress.stage == (f"iteration{progress.iteration:02d}" if progress.end_of_iteration else None)
+        pictures.append(progress.image())
+
+    pictures = []
+    sample = np.moveaxis(texture((12, 11), 3), -1, 0)
+    made = synthesize(sample, (10, 9), channel_axis=0, iterations=2, callback=callback)
+    assert [(i, n, end) for i, n, _, end in seen] == [(i, 2, c == 2) for i in (1, 2) for c in range(3)]
+    assert [f for _, _, f, _ in seen] == pytest.approx([k / 6 for k in range(1, 7)])
+    assert_same_bits(pictures[-1], made)
+    alone = synthesize(sample, (10, 9), channel_axis=0, iterations=1)
+    assert_same_bits(pictures[2], alone)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
+def test_what_a_callback_raises_passes_through(error):
+    def callback(progress):
+        raise error
+
+    with pytest.raises(error):
+        synthesize(texture((12, 11)), (10, 9), callback=callback)
+
+
+def test_statistics_say_what_was_done():
+    _, output = synthesize(texture((24, 20)), (16, 17), full_output=True, rng=9, start=np.zeros((16, 17)))
+    said = output.statistics
+    assert (said["device"], said["seed"], said["device_seconds"]) == (REFERENCE.name, 9, None)
+    assert said["options"] == {
+        **{"pyramid": "steerable", "levels": 1, "orientations": 4, "iterations": 5, "match": "rank", "bins": 256},
+        **{"edges": "reflect", "color": "decorrelate"},
+    }
+    assert said["seconds"] >= sum(report["seconds"] for report in said["iterations"]) > 0
+    assert output.source is None
+    assert output.stages == []
+
+
+def test_a_distance_is_that_of_two_histograms():
+    """With a Laplacian pyramid of no levels, the residue's distance is that of the pixels before."""
+    sample = texture((16, 16), None, np.float64)
+    begun = np.exp(np.linspace(0, 3, 256)).reshape(16, 16)
+    states = []
+    _, output = synthesize(
+        sample,
+        (16, 16),
+        start=begun,
+        pyramid="laplacian",
+        levels=1,
+        iterations=2,
+        full_output=True,
+        callback=lambda progress: states.append(progress.image()),
+    )
+    matched = plain.match_histogram(begun, sample)
+    bands, own = (plain.Laplacian(p, 1, 1, torus).subbands for p, torus in ((matched, True), (sample, False)))
+    for name, known in ((0, "level 0"), ("low", "low")):
+        moved = abs(np.sort(bands[name], axis=None) - np.sort(own[name], axis=None)).mean() / own[name].std()
+        assert output.statistics["iterations"][0]["distances"][known] == pytest.approx(moved, rel=1e-4)
+    assert histogram_distance(sample, states[0]) == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.parametrize("match", ["rank", "lookup"])
+def test_seeds_differ_and_repeat(match):
+    sample = texture((12, 12))
+    made = [synthesize(sample, (12, 12), rng=seed, match=match) for seed in (0, 1, 1, 2**63)]
+    assert (made[1] == made[2]).all()
+    assert len({m.tobytes() for m in made}) == 3

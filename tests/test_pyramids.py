@@ -1,0 +1,223 @@
+"""Pyramids of pictures in their own unit: `simdtex.pyramids.decompose`, and the transform that methods use."""
+
+import numpy as np
+import plain_pyramid as plain
+import pytest
+from cases import REFERENCE, assert_same_bits, texture
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pyrtools.pyramids import SteerablePyramidSpace
+from tolerances import HALF, MIRRORED, PARSEVAL, PYRTOOLS, RECONSTRUCTION
+
+from simdtex.pyramids import Pyramid, Transform, decompose, most_levels
+
+KINDS = pytest.mark.parametrize("kind", ["steerable", "laplacian"])
+BORDERS = pytest.mark.parametrize("boundary", ["open", "torus"])
+BANKS = pytest.mark.parametrize("orientations", [1, 2, 4, 6])
+
+
+def white(shape, seed=0):
+    return np.random.default_rng(seed).normal(100, 5, shape)
+
+
+def made(picture, **options):
+    return decompose(picture, device=REFERENCE, **options)
+
+
+def lost(picture, pyramid):
+    """rms of what is lost, relative to the picture's standard deviation."""
+    return np.sqrt(np.mean((pyramid.collapse(device=REFERENCE)[..., 0] - picture) ** 2)) / picture.std()
+
+
+# -- there and back -------------------------------------------------------------------------------------------
+
+
+@given(
+    st.tuples(st.integers(1, 13), st.integers(1, 13)),
+    st.sampled_from(["open", "torus"]),
+    st.sampled_from([np.uint8, np.float64, np.bool_, np.uint16]),
+    st.integers(0, 20),
+)
+@settings(max_examples=60)
+def test_a_laplacian_pyramid_is_exact_to_half_a_unit(shape, boundary, dtype, levels):
+    """But on a torus with an odd side, where every level is rounded twice."""
+    picture, levels = texture(shape, None, dtype), min(levels, most_levels(*shape))
+    pyramid = made(picture, kind="laplacian", boundary=boundary, levels=levels)
+    back = pyramid.collapse(device=REFERENCE)
+    assert back.shape == (*shape, 1)
+    odd = sum(any(n % 2 for n in band.shape[2:]) for band in pyramid.subbands[:-1])
+    assert abs(back[..., 0] - picture.astype(float)).max() <= (HALF + (boundary == "torus") * odd) * pyramid.unit
+
+
+@pytest.mark.parametrize("shape", [(64, 64), (65, 97), (70, 50), (33, 64)])
+@BANKS
+def test_a_steerable_pyramid_loses_little_on_a_torus_of_any_size(orientations, shape):
+    """Whatever the mean: half as many rows of an odd number would leave a seam, which a mean makes worse."""
+    for levels in (1, 3):
+        picture = white(shape, levels)
+        pyramid = made(picture, orientations=orientations, levels=levels, boundary="torus")
+        assert lost(picture, pyramid) <= RECONSTRUCTION[orientations]
+
+
+@BANKS
+def test_with_mirrored_borders_it_loses_more_near_them(orientations):
+    picture = white((96, 96))
+    pyramid = made(picture, orientations=orientations, levels=3)
+    assert lost(picture, pyramid) <= MIRRORED
+    error = (pyramid.collapse(device=REFERENCE)[..., 0] - picture)[40:-40, 40:-40]
+    assert np.sqrt(np.mean(error**2)) / picture.std() <= 1.5 * RECONSTRUCTION[orientations], "the mean of few pixels"
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (7, 1), (5, 3), (2, 2)])
+@KINDS
+@BORDERS
+def test_tiny_pictures_have_a_pyramid_of_every_height(shape, kind, boundary):
+    picture = texture(shape, None, np.float64)
+    for levels in range(most_levels(*shape) + 1):
+        pyramid = made(picture, kind=kind, levels=levels, boundary=boundary)
+        assert len(pyramid.subbands) == levels + (2 if kind == "steerable" else 1)
+        back = pyramid.collapse(device=REFERENCE)
+        assert np.isfinite(back).all()
+        assert pyramid.subbands[0].shape == (1, 1, *shape)
+
+
+# -- what it is ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("boundary", ["open", "torus"])
+@BANKS
+def test_a_steerable_pyramid_is_that_of_pyrtools_in_the_pictures_unit(orientations, boundary):
+    picture = white((72, 96))
+    pyramid = made(picture, orientations=orientations, levels=3, boundary=boundary)
+    edges = {"open": "reflect1", "torus": "circular"}[boundary]
+    theirs = SteerablePyramidSpace(picture, height=3, order=orientations - 1, edge_type=edges).pyr_coeffs
+    # What is left of a constant: bands have none, and the residue has that of what was taken away.
+    high, *bands, low = pyramid.subbands
+    low = 8 * low[0, 0]
+    known = theirs["residual_lowpass"]
+    constant = (known - low).mean() / pyramid.offset
+    assert constant == pytest.approx(8, rel=1e-3)
+    close = [(high[0, 0], theirs["residual_highpass"]), (low + constant * pyramid.offset, known)]
+    close += [(2.0**level * own[i, 0], theirs[level, i]) for level, own in enumerate(bands) for i in range(orientations)]
+    for found, band in close:
+        assert found.shape == band.shape
+        assert abs(found - band).max() <= PYRTOOLS * max(abs(band).max(), np.ptp(picture))
+
+
+@pytest.mark.parametrize("shape", [(24, 20), (23, 17)])
+def test_a_laplacian_pyramid_is_that_of_the_plain_sums(shape):
+    picture = white(shape)
+    pyramid = made(picture, kind="laplacian", levels=3)
+    theirs = list(plain.Laplacian(picture - pyramid.offset, 3, 1, False).subbands.values())
+    for found, band in zip(pyramid.subbands, theirs, strict=True):
+        assert abs(found[0, 0] - band).max() <= 4 * pyramid.unit, "rounded once a level"
+
+
+@BANKS
+def test_a_steerable_pyramid_keeps_the_sum_of_squares(orientations):
+    picture = white((64, 96))
+    picture -= picture.mean()
+    high, *bands, low = made(picture, orientations=orientations, levels=3, boundary="torus").subbands
+    low = low + made(picture, levels=0).offset
+    squares = (high**2).sum() + 4**3 * (low**2).sum()
+    squares += sum(4**level * (own**2).sum() for level, own in enumerate(bands))
+    assert squares == pytest.approx((picture**2).sum(), rel=PARSEVAL[orientations])
+
+
+@KINDS
+def test_a_constant_is_all_offset(kind):
+    pyramid = made(np.full((9, 9), 7.5), kind=kind, levels=2)
+    assert not any(band.any() for band in pyramid.subbands)
+    assert pyramid.offset == 7.5
+    assert (pyramid.collapse(device=REFERENCE) == 7.5).all()
+
+
+@pytest.mark.parametrize("scale", [1e300, 1e-300, -3.0, 2.0**-40])
+@KINDS
+def test_a_pyramid_is_in_the_pictures_unit(kind, scale):
+    picture = texture((16, 12), None, np.float64)
+    ours, theirs = made(picture * scale, kind=kind, levels=2), made(picture, kind=kind, levels=2)
+    assert ours.unit == pytest.approx(abs(scale) * theirs.unit, rel=1e-9)
+    for own, band in zip(ours.subbands[:-1], theirs.subbands[:-1], strict=True):
+        assert abs(own / scale - band).max() <= 4 * theirs.unit
+    low = (ours.subbands[-1] + ours.offset) / scale - (theirs.subbands[-1] + theirs.offset)
+    assert abs(low).max() <= 4 * theirs.unit + 1e-3 * abs(theirs.offset), "the low-pass filters keep a mean so well"
+
+
+@KINDS
+def test_channels_are_decomposed_alone_on_one_scale(kind):
+    picture = texture((16, 13), 3, np.float64)
+    whole = made(picture, kind=kind, levels=2, channel_axis=-1)
+    assert_same_bits(whole.subbands, made(np.moveaxis(picture, -1, 0), kind=kind, levels=2, channel_axis=0).subbands)
+    assert [band.shape[1] for band in whole.subbands] == [3] * len(whole.subbands)
+    for c in range(3):
+        alone = made(picture[..., c], kind=kind, levels=2)
+        for own, band in zip(whole.subbands[:-1], alone.subbands[:-1], strict=True):
+            assert abs(own[:, c] - band[:, 0]).max() <= 4 * whole.unit
+    assert whole.collapse(device=REFERENCE).shape == picture.shape
+
+
+def test_subbands_may_be_changed():
+    picture = texture((16, 16), None, np.float64)
+    pyramid = made(picture, kind="laplacian", levels=2)
+    for band in pyramid.subbands[:-1]:
+        band[:] = 0
+    smooth = pyramid.collapse(device=REFERENCE)[..., 0]
+    assert smooth.std() < 0.5 * picture.std()
+    assert smooth.mean() == pytest.approx(picture.mean(), abs=0.1 * picture.std())
+
+
+@KINDS
+@BORDERS
+def test_a_device_has_the_references_bits(machine, kind, boundary):
+    for shape in ((37, 41), (18, 64)):
+        picture = white(shape)
+        ours = decompose(picture, kind=kind, levels=2, boundary=boundary, device=machine)
+        theirs = made(picture, kind=kind, levels=2, boundary=boundary)
+        assert_same_bits(ours.subbands, theirs.subbands)
+        assert_same_bits(ours.collapse(device=machine), theirs.collapse(device=REFERENCE))
+
+
+@KINDS
+def test_names_are_as_many_as_subbands(kind):
+    transform = Transform(REFERENCE, kind, 2, 4, True)
+    made_of = transform.make(np.zeros((1, 9, 8), np.int32))
+    assert len(transform.names) == len(made_of)
+    assert transform.names[-3:] == ["level 0", "level 1", "low"]
+
+
+# -- what is wrong -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"kind": "gabor"}, ValueError, "unknown pyramid 'gabor'; choose one of: steerable, laplacian"),
+        ({"levels": 4}, ValueError, "levels=4 is too many for this picture; give at most 3"),
+        ({"levels": -1}, ValueError, "levels is -1; give 0 or more"),
+        ({"levels": 1.5}, TypeError, "levels must be a whole number"),
+        ({"levels": None}, TypeError, "levels must be a whole number"),
+        ({"orientations": 3}, ValueError, "orientations is 3; the steerable filters have one of: 1, 2, 4, 6"),
+        ({"orientations": True}, TypeError, "orientations must be a whole number"),
+        ({"boundary": "mirror"}, ValueError, "unknown boundary 'mirror'"),
+    ],
+)
+def test_a_wrong_option_is_one_sentence(options, error, words):
+    with pytest.raises(error, match=words):
+        decompose(texture((9, 12)), device=REFERENCE, **options)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
+def test_a_subband_that_fits_no_whole_number_is_refused(value):
+    pyramid = made(texture((9, 12)), levels=1)
+    subbands = [band.copy() for band in pyramid.subbands]
+    subbands[1][0, 0, 3, 3] = value
+    spoilt = Pyramid(subbands, "steerable", 4, "open", pyramid.offset, pyramid.unit)
+    with pytest.raises(ValueError, match="subband"):
+        spoilt.collapse(device=REFERENCE)
+
+
+@pytest.mark.parametrize("picture", [np.full((4, 4), np.nan), np.zeros((0, 4)), np.zeros((4, 4, 3)), "brick"])
+def test_a_picture_that_is_none_is_refused(picture):
+    with pytest.raises((TypeError, ValueError)):
+        decompose(picture, levels=0, device=REFERENCE)
