@@ -65,7 +65,7 @@ def failures():
         "a mosaic: gravel": data.gravel()[:128, :128],
         "a mosaic: coins": data.coins()[60:188, 60:188],
         "inhomogeneous: a lawn and a tripod": data.camera()[410:510, 150:260],
-        "inhomogeneous: a corner without tissue": data.immunohistochemistry()[400:496, 80:176],
+        "inhomogeneous: a margin without tissue": data.immunohistochemistry()[400:496, 80:176],
         "locally oriented: grass": data.grass()[:128, :128],
         "locally oriented: tissue": samples.colour()["tissue"],
         "locally oriented: hair": data.astronaut()[20:84, 190:254],

@@ -199,8 +199,9 @@ def _high_subbands(split: int | None, levels: int, kind: str) -> int:
 
 def _checked(samples: Sequence[ArrayLike], channel_axis: int | None) -> list[NDArray[Any]]:
     """The samples as (rows, cols, channels), grey ones with as many channels as the others."""
-    if isinstance(samples, np.ndarray) and samples.dtype != object:
-        raise TypeError("samples is a single array; give a list of samples")
+    if not isinstance(samples, Sequence):
+        what = "a single array" if isinstance(samples, np.ndarray) else f"of {type(samples).__name__}"
+        raise TypeError(f"samples is {what}; give a list of samples")
     pictures = [check_sample(sample, None if np.ndim(sample) == 2 else channel_axis) for sample in samples]
     if not pictures:
         raise ValueError("there is no sample; give one or more")
@@ -239,6 +240,8 @@ def _weights(
         _check_number(name, number, count)
     if chosen:
         return [float(i in [number for _, number in chosen]) for i in range(count)]
+    if average is not None and not isinstance(average, (Sequence, np.ndarray)):
+        raise TypeError(f"average is {average!r}; give a list of weights, one for each sample")
     weights = [1.0] * count if average is None else list(average)
     if len(weights) != count:
         raise ValueError(f"average has {len(weights)} weights for {count} samples; give one for each")

@@ -9,6 +9,9 @@ from math import isfinite
 from numbers import Integral, Real
 from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 T = TypeVar("T")
 
 
@@ -50,6 +53,19 @@ def real(name: str, value: Any, least: float, *, above: bool = False) -> None:
         raise TypeError(f"{name} must be a number, not {value!r}")
     if not _finite(value) or value < least or (above and value == least):
         raise ValueError(f"{name} is {value}; give a number {'above' if above else 'of at least'} {least}")
+
+
+def real_array(name: str, value: Any) -> NDArray[Any]:
+    """The value as an array of finite real numbers; raises where it is none."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise ValueError(f"{name} is ragged; give rows of equal length") from None
+    if array.dtype.kind not in "buif":
+        raise TypeError(f"{name} holds {array.dtype} values; convert it to integers or real floats")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} has values that are NaN or infinite; fill them first")
+    return array
 
 
 def _finite(value: Real) -> bool:

@@ -53,6 +53,10 @@ class Progress:
     def caption(self) -> str:  # noqa: D102
         return f"level {self.level}"
 
+    def picture(self) -> NDArray[Any]:
+        """What is shown of it as a stage: the image."""
+        return self.image()
+
     def maps(self) -> dict[str, NDArray[np.float64]]:
         """What the stage has beside its picture: arrays (rows, cols), 0 to 1, by name."""
         return {}
@@ -137,11 +141,14 @@ class Iterating(Progress):
         The present one, from 1, and their number.
     end_of_iteration : bool
         Whether the iteration ends here.
+    solid : bool
+        Whether the image is a block.
     """
 
     iteration: int
     iterations: int
     end_of_iteration: bool
+    solid: bool = False
 
     @property
     def doing(self) -> str:  # noqa: D102
@@ -154,6 +161,11 @@ class Iterating(Progress):
     @property
     def caption(self) -> str:  # noqa: D102
         return f"iteration {self.iteration}"
+
+    def picture(self) -> NDArray[Any]:
+        """The image; of a block the middle x-y slice."""
+        image = self.image()
+        return image[len(image) // 2] if self.solid else image
 
 
 Callback = Callable[[Any], Any]

@@ -19,7 +19,7 @@ from simdtex.methods import mrf, multires, pyramid, solid
 from simdtex.ops import lcpdf as parzen
 from simdtex.ops.histogram import histogram
 from simdtex.ops.neighbourhood import Field, neighbourhood
-from simdtex.options import one_of, real, whole
+from simdtex.options import one_of, real, real_array, whole
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 from simdtex.sample import Sample
@@ -151,7 +151,7 @@ def synthesize_solid(
         Return statistics too.
     **options
         ``pyramid``, ``levels``, ``orientations``, ``iterations``, ``match``, ``bins``, ``edges``, ``color``,
-        ``start``, ``solids``, ``slices``; see `simdtex.methods.solid.Options`. With
+        ``start`` (a block, channels last), ``solids``, ``slices``; see `simdtex.methods.solid.Options`. With
         ``pyramid="steerable"`` the 3-D Laplacian pyramid and the steerable pyramids of all x-y, x-z and y-z slices are
         matched; ``"laplacian"`` is the first alone.
 
@@ -182,7 +182,7 @@ def synthesize_solid(
     """
     pixels = check_sample(sample, channel_axis)
     size = _check_block(shape)
-    chosen = solid.make_options(**with_channels_last(options, channel_axis))
+    chosen = solid.make_options(**options)
     seen = seeing(callback, None if channel_axis is None else -1)
     volume, output = solid.synthesize(open_machine(device), pixels, size, chosen, as_seed(rng), seen)
     volume = restored(volume, None if channel_axis is None else -1)
@@ -369,7 +369,7 @@ def seeing(callback: Callback | None, channel_axis: int | None) -> Callback | No
 def with_channels_last(options: dict[str, Any], channel_axis: int | None) -> dict[str, Any]:
     """The options, where a picture to start from has its channels last."""
     start = options.get("start")
-    if start is None or channel_axis is None or np.ndim(start) < 3:
+    if start is None or channel_axis is None or real_array("start", start).ndim < 3:
         return options
     return options | {"start": np.moveaxis(np.asarray(start), channel_axis, -1)}
 

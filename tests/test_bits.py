@@ -19,6 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 REQUIRED = bool(os.environ.get("SIMDTEX_REQUIRE_OPENCL"))
 
 MULTIRES = {"method": "multires"}
+PYRAMID = {"method": "pyramid", "iterations": 2}
 
 # sample shape, channels, type, output shape, options
 RUNS = {
@@ -96,6 +97,29 @@ RUNS = {
     "multires-a-row": ((9, 8), None, np.uint8, (1, 17), MULTIRES),
     "multires-of-a-row": ((1, 17), None, np.uint8, (3, 40), MULTIRES | {"alpha": 1, "boundary": "open"}),
     "multires-all-candidates": ((8, 9), None, np.float32, (10, 13), MULTIRES | {"alpha": np.inf}),
+    "pyramid": ((34, 36), None, np.uint8, (32, 40), {"method": "pyramid"}),
+    "pyramid-colour": ((20, 17), 3, np.uint8, (19, 23), PYRAMID),
+    "pyramid-lookup": ((20, 17), None, np.uint16, (19, 23), PYRAMID | {"match": "lookup", "orientations": 1}),
+    "pyramid-six": ((17, 20), None, np.float64, (18, 16), PYRAMID | {"orientations": 6, "edges": "wrap", "levels": 2}),
+    "pyramid-laplacian": ((20, 17), 2, np.float32, (19, 23), PYRAMID | {"pyramid": "laplacian", "color": "channels"}),
+    "pyramid-laplacian-lookup": (
+        (17, 20),
+        None,
+        np.bool_,
+        (18, 16),
+        PYRAMID | {"pyramid": "laplacian", "match": "lookup", "bins": 16, "levels": 3},
+    ),
+    "pyramid-a-row": ((9, 8), None, np.uint8, (1, 17), PYRAMID | {"orientations": 2}),
+    "pyramid-no-levels": ((9, 8), None, np.uint8, (8, 9), PYRAMID | {"levels": 0, "orientations": 2}),
+    "solid": ((17, 20), None, np.uint8, (10, 8, 9), {"iterations": 1, "levels": 1, "orientations": 2}),
+    "solid-average": (
+        (17, 20),
+        3,
+        np.uint8,
+        (8, 9, 7),
+        {"iterations": 1, "levels": 1, "solids": "average", "slices": "each", "orientations": 2},
+    ),
+    "mix": ((17, 20), 3, np.uint8, (16, 18), {"palette": 0, "average": [1, 2], "iterations": 1}),
 }
 SOME = ("defaults", "colour-gibbs-density")
 
@@ -117,14 +141,20 @@ def synthesis(name, device):
     """Everything that a run gives but its times: the image, source map, temperatures, stages and counts."""
     sample_shape, channels, dtype, shape, options = RUNS[name]
     sample = texture(sample_shape, channels, dtype, 5)
+    make = simdtex.synthesize
+    if name == "mix":
+        make, sample = simdtex.mix, [sample, texture(sample_shape[::-1], channels, dtype, 6)]
+    elif name.startswith("solid"):
+        make = simdtex.synthesize_solid
     axis = None if channels is None else -1
-    image, output = simdtex.synthesize(
-        sample, shape, channel_axis=axis, rng=2**40 + 3, device=device, full_output=True, **options
-    )
-    counts = [{k: v for k, v in level.items() if k != "seconds"} for level in output.statistics["levels"]]
+    image, output = make(sample, shape, channel_axis=axis, rng=2**40 + 3, device=device, full_output=True, **options)
+    reports = output.statistics.get("levels") or output.statistics["iterations"]
+    counts = [{k: v for k, v in report.items() if k != "seconds"} for report in reports]
     stages = [array for stage in output.stages for array in (stage.image, stage.source, stage.candidates)]
     arrays = [image, output.source, output.temperature, *stages]
-    assert sum(array is None for array in arrays) == (1 if "method" in options else 2 * len(output.stages))
+    missing_arrays = {"mrf": 2 * len(output.stages), "multires": 1, "pyramid": 2}
+    method = options.get("method", "pyramid" if make is not simdtex.synthesize else "mrf")
+    assert sum(array is None for array in arrays) == missing_arrays[method]
     return [array for array in arrays if array is not None], [counts, output.statistics["options"].get("alpha")]
 
 
@@ -168,6 +198,12 @@ def test_small_scratch_memory_makes_many_pieces(cl_device):
 def test_the_work_group_changes_no_bit_of_multires(cl_device):
     """It has no other form: its launches keep no distances."""
     check("multires-colour", opencl(cl_device, work_group=3))
+
+
+def test_the_form_of_a_launch_changes_no_bit_of_a_pyramid(cl_device):
+    machine = opencl(cl_device, work_group=3, vector=4, scratch=5_000)
+    for name in ("pyramid-colour", "pyramid-laplacian-lookup"):
+        check(name, machine)
 
 
 def test_the_references_pieces_change_no_bit():
@@ -300,6 +336,8 @@ runs = [
     (grey, None, {"order": 1, "levels": 1, "schedule": "block:2x3", "array": "2x2"}),
     (grey, None, {"method": "multires", "alpha": 0.6}),
     (colour, -1, {"method": "multires", "boundary": "open", "phase": "free", "features": "channels", "alpha": 0.5}),
+    (grey, None, {"method": "pyramid", "iterations": 1, "levels": 1, "orientations": 2}),
+    (grey, None, {"method": "pyramid", "iterations": 1, "pyramid": "laplacian", "match": "lookup", "bins": 8}),
 ]
 machines = [OpenCL(info, work_group=group, vector=vector) for group, vector in ((None, 16), (3, 4), (4, 1))]
 for number, (sample, axis, options) in enumerate(runs):
@@ -315,6 +353,8 @@ for schedule in ("block:2x2", "raster", "synchronous"):
     options = {"seeds": 3, "sweeps": 2, "burn_in": 1}
     chains = [ising(m, (4, 5), [2.0, 3.0], schedule, **options) for m in (machines[0], REFERENCE)]
     assert_same_bits(*(one.spins for one in chains))
+options = {"iterations": 1, "levels": 1, "orientations": 2, "rng": 1}
+assert_same_bits(*(simdtex.synthesize_solid(grey, (3, 4, 2), device=m, **options) for m in (machines[0], REFERENCE)))
 print("same bits throughout")
 """
 

@@ -243,7 +243,7 @@ BAD_SOLID = {name: case for name, case in BAD_PYRAMID.items() if name not in PIC
     **{f"size {text}": (["--size", text], f"size '{text}' is not DEPTHxHEIGHTxWIDTH") for text in SOLID_SIZES},
     "beyond 2**31": (["--size", "700"], "a block of 700 x 700 x 700 is beyond 2**31 values; give a smaller size"),
     "solids": (["--solids", "sum"], "choose one of: turns, average"),
-    "slices": (["--slices", "some"], "choose one of: together, each"),
+    "slices": (["--slices", "some"], "choose one of: each, together"),
     "suffix": (["-o", "out.xyz"], "end its name in one of .npy, .npz"),
     "written twice": (["-o", "out.npz"], "out.npz would be written twice"),
     "view and output": (["-o", "a.npy", "--view", "grey.png"], "grey.png is an input"),

@@ -31,7 +31,9 @@ def near_a_step(parts, weights, m):
     """Whether some quantile falls exactly on a step of the cdf, which float64 may round to either side."""
     total, steps = sum(weights), {Fraction(0)}
     for value in np.unique(np.concatenate(parts)):
-        steps.add(sum(Fraction(int(w) * int((p <= value).sum()), p.size * total) for p, w in zip(parts, weights, strict=True)))
+        steps.add(
+            sum(Fraction(int(w) * int((p <= value).sum()), p.size * total) for p, w in zip(parts, weights, strict=True))
+        )
     return any(Fraction(2 * k + 1, 2 * m) in steps for k in range(m))
 
 

@@ -134,7 +134,9 @@ def test_several_pictures_are_one_with_each_its_share(seed, weights):
     shares = np.array(weights) / sum(weights)
     flat = [p.reshape(3, -1).astype(float) for p in pictures]
     mean = sum(s * f.mean(1) for s, f in zip(shares, flat, strict=True))
-    covariance = sum(s * (f - mean[:, None]) @ (f - mean[:, None]).T / f.shape[1] for s, f in zip(shares, flat, strict=True))
+    covariance = sum(
+        s * (f - mean[:, None]) @ (f - mean[:, None]).T / f.shape[1] for s, f in zip(shares, flat, strict=True)
+    )
     own = palette(pictures, weights)
     assert abs(own.mean - mean).max() <= 0.5 + 1e-6
     axes = own.axes / 2**14

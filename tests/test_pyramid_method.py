@@ -278,7 +278,11 @@ def test_an_output_smaller_than_the_sample_and_no_levels_at_all():
         ({"edges": "zero"}, ValueError, "unknown edges 'zero'; choose one of: reflect, wrap"),
         ({"color": "rgb"}, ValueError, "unknown color 'rgb'; choose one of: decorrelate, channels"),
         ({"boundary": "open"}, TypeError, "unknown option 'boundary' of the method 'pyramid'"),
-        ({"slices": "each"}, TypeError, "unknown option 'slices' of the method 'pyramid'; choose from: pyramid, levels"),
+        (
+            {"slices": "each"},
+            TypeError,
+            "unknown option 'slices' of the method 'pyramid'; choose from: pyramid, levels",
+        ),
         ({"alpha": 1}, TypeError, "unknown option 'alpha'"),
     ],
     ids=lambda value: str(value) if isinstance(value, dict) else "",

@@ -98,7 +98,9 @@ def test_a_steerable_pyramid_is_that_of_pyrtools_in_the_pictures_unit(orientatio
     constant = (known - low).mean() / pyramid.offset
     assert constant == pytest.approx(8, rel=1e-3)
     close = [(high[0, 0], theirs["residual_highpass"]), (low + constant * pyramid.offset, known)]
-    close += [(2.0**level * own[i, 0], theirs[level, i]) for level, own in enumerate(bands) for i in range(orientations)]
+    close += [
+        (2.0**level * own[i, 0], theirs[level, i]) for level, own in enumerate(bands) for i in range(orientations)
+    ]
     for found, band in close:
         assert found.shape == band.shape
         assert abs(found - band).max() <= PYRTOOLS * max(abs(band).max(), np.ptp(picture))

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import simdtex.run
-from simdtex.run import Progress, Relaxing, Sampling, paced
+from simdtex.run import Iterating, Progress, Relaxing, Sampling, paced
 
 
 @pytest.fixture
@@ -60,3 +60,9 @@ def test_what_progress_says_of_itself():
     np.testing.assert_array_equal(sampling[0].maps()["candidates"], [[0, 0.5, 1]])
     alone = Sampling(end_of_level=True, candidates=lambda: np.ones((2, 2), np.int32), **where)
     assert not alone.maps()["candidates"].any()
+
+    iterating = [Iterating(iteration=3, iterations=5, end_of_iteration=end, **where) for end in (False, True)]
+    assert iterating[0].doing == "iteration 3 of 5"
+    assert [one.stage for one in iterating] == [None, "iteration03"]
+    assert (iterating[0].caption, relaxing[0].caption, plain.caption) == ("iteration 3", "level 2", "level 2")
+    assert iterating[1].maps() == {}

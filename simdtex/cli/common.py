@@ -297,11 +297,10 @@ def watching(
     quiet: bool,
     stages: Path | None,
     limits: tuple[float, float],
-    shown: Callable[[Any], Any] = lambda progress: progress,
 ) -> Iterator[Callable[[Any], None]]:
     """A callback that moves a progress bar and, where there is a folder for them, writes the stages.
 
-    `limits` are black and white in their pictures, and `shown` turns the progress into that of a picture.
+    `limits` are black and white in their pictures.
     """
     from simdtex.report.stages import StageWriter
 
@@ -312,7 +311,7 @@ def watching(
             def callback(progress: Any) -> None:
                 show(progress.fraction, progress.doing, "")
                 if writer:
-                    writer(shown(progress))
+                    writer(progress)
 
             yield callback
     finally:

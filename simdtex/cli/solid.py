@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import re
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +57,7 @@ SIDE = 128
 @click.option(
     "--solids", help=f"turns or average: families of slices one after another, or a mean.  [{DEFAULTS.solids}]"
 )
-@click.option("--slices", help=f"together or each: whose histogram is matched.  [{DEFAULTS.slices}]")
+@click.option("--slices", help=f"each or together: whose histogram is matched.  [{DEFAULTS.slices}]")
 @pyramid_options("VOLUME: A block")
 @SEED
 @DEVICE
@@ -99,7 +98,7 @@ def solid(
     check_distinct([*outputs, *(p for p in (picture, stages) if p)], [sample, *([start] if start else [])])
 
     began = time.perf_counter()
-    with watching(quiet, stages, (float(pixels.min()), float(pixels.max())), middle_slice) as callback:
+    with watching(quiet, stages, (float(pixels.min()), float(pixels.max()))) as callback:
         block, run = synthesize_solid(
             pixels,
             shape,
@@ -134,13 +133,3 @@ def block_shape(text: str) -> tuple[int, int, int]:
             "one number for a cube"
         )
     return sides[0], sides[1], sides[2]
-
-
-def middle_slice(progress: Any) -> Any:
-    """The progress of a block as that of its middle x-y slice."""
-
-    def read() -> Any:
-        block = progress.image()
-        return block[len(block) // 2]
-
-    return replace(progress, image=read)

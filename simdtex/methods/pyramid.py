@@ -23,7 +23,7 @@ from simdtex.ops.matching import distance, inverse_cdf, match_lookup, match_rank
 from simdtex.ops.noise import noise
 from simdtex.ops.operation import Array
 from simdtex.ops.sort import sort
-from simdtex.options import build, one_of, whole, within_32_bits
+from simdtex.options import build, one_of, real_array, whole, within_32_bits
 from simdtex.palette import Decorrelated, Palette, decorrelated, palette
 from simdtex.pyramids import Transform, check_kind, most_levels
 from simdtex.run import Callback, Iterating, Output, device_seconds
@@ -93,6 +93,8 @@ class Options:
             raise ValueError(f"bins is {self.bins}; give 4096 or fewer")
         one_of("edges", self.edges, ("reflect", "wrap"))
         one_of("color", self.color, ("decorrelate", "channels"))
+        if self.start is not None:
+            real_array("start", self.start)
 
 
 def make_options(**given: Any) -> Options:
@@ -345,7 +347,7 @@ def match_texture(
             for c, own in enumerate(texture.histograms)
         ]
 
-    record = _Record(options.iterations, len(busy), lambda: texture.image(read()), callback)
+    record = _Record(options.iterations, len(busy), lambda: texture.image(read()), len(shape) == 3, callback)
     matcher.distances()  # forget those of the noise
     for iteration in range(1, options.iterations + 1):  # Loop for several iterations do
         for c in busy:
@@ -354,6 +356,7 @@ def match_texture(
             machine.sync()
             record.turn(c == busy[-1])
         record.end(iteration, matcher.distances())
+    record.nothing_to_do()
     if texture.own is not None and busy:  # grey: the k-th smallest pixel becomes the k-th smallest of the sample
         ranks = machine.put(np.arange(texture.own.size, dtype=np.int32)[None])
         order = matcher.order(pictures[0].reshape((1, prod(shape))))
@@ -401,11 +404,17 @@ class _Record:
     """What a run reports of its iterations, and what its callback is told."""
 
     def __init__(
-        self, iterations: int, channels: int, image: Callable[[], NDArray[Any]], callback: Callback | None
+        self,
+        iterations: int,
+        channels: int,
+        image: Callable[[], NDArray[Any]],
+        solid: bool,
+        callback: Callback | None,
     ) -> None:
         self.reports: list[dict[str, Any]] = []
-        self._iterations, self._channels, self._image, self._callback = iterations, max(1, channels), image, callback
-        self._turns, self._began = 0.0, perf_counter()
+        self._iterations, self._channels, self._turns = iterations, channels, 0
+        self._image, self._solid, self._callback = image, solid, callback
+        self._began = perf_counter()
 
     def part(self, share: float) -> None:
         """A share of the present channel's turn is done."""
@@ -421,10 +430,19 @@ class _Record:
         seconds, self._began = perf_counter() - self._began, perf_counter()
         self.reports.append({"iteration": iteration, "seconds": seconds, "distances": distances})
 
+    def nothing_to_do(self) -> None:
+        """Where there was no turn at all, be it that nothing varies or that no iteration was asked for, say so once."""
+        if self._callback and not self._turns:
+            self._call(1.0, self._iterations, ended=False)
+
     def _tell(self, share: float, ended: bool) -> None:
         if self._callback:
             done = self._turns + share
             iteration = min(self._iterations, int(done / self._channels) + (not ended))
-            now: dict[str, Any] = {"level": 0, "levels": 1, "fraction": done / (self._iterations * self._channels)}
-            now |= {"iteration": iteration, "iterations": self._iterations, "end_of_iteration": ended}
-            self._callback(Iterating(image=self._image, **now))
+            self._call(done / (self._iterations * self._channels), iteration, ended)
+
+    def _call(self, fraction: float, iteration: int, ended: bool) -> None:
+        now: dict[str, Any] = {"level": 0, "levels": 1, "fraction": fraction, "image": self._image}
+        now |= {"iteration": iteration, "iterations": self._iterations, "end_of_iteration": ended}
+        if self._callback:
+            self._callback(Iterating(solid=self._solid, **now))

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from simdtex.machine import Machine
 from simdtex.methods import pyramid
 from simdtex.methods.pyramid import (
-    MEMORY,
     VALUES,
     Matcher,
     Wanted,
@@ -39,6 +38,10 @@ FAMILIES = {"x-y": ((0, 1, 2), (0, 1, 2)), "x-z": ((1, 0, 2), (1, 0, 2)), "y-z":
 """Slices by name: the axes in the order slice, row, column, and the order that turns them back."""
 
 
+MEMORY = 200
+"""Bytes for each voxel on the device, at most (measured by benchmarks/pyramid_cost.py)."""
+
+
 @dataclass(frozen=True)
 class Options(pyramid.Options):
     """The options of solid textures: those of the method ``pyramid``, and two more.
@@ -49,8 +52,8 @@ class Options(pyramid.Options):
         With ``pyramid="steerable"``: match the Laplacian pyramid of the block and then the steerable pyramids of each
         family of slices in turn, each of what the one before has made; or, as the paper does, all four of the same
         block, and average the four solids.
-    slices : {"together", "each"}
-        Match the histograms of a family's slices taken together, or, as the paper does, of every slice.
+    slices : {"each", "together"}
+        Match the histograms of every slice, or of a family's slices taken together.
 
     Notes
     -----
@@ -59,13 +62,13 @@ class Options(pyramid.Options):
     """
 
     solids: str = "turns"
-    slices: str = "together"
+    slices: str = "each"
 
     def __post_init__(self) -> None:
         """Check every value."""
         super().__post_init__()
         one_of("solids", self.solids, ("turns", "average"))
-        one_of("slices", self.slices, ("together", "each"))
+        one_of("slices", self.slices, ("each", "together"))
 
 
 def make_options(**given: Any) -> Options:

@@ -39,9 +39,9 @@ class StageWriter:
     Of ``mrf`` it writes ``level{l}-sweep{k}.png`` and ``temperature-level{l}-sweep{k}.png`` at the
     end of each sweep; of ``multires``, ``level{l}.png`` and ``candidates-level{l}.png`` at the end
     of each level, brighter where a pixel had more candidates, on a logarithmic scale from 1; of
-    ``pyramid``, ``iteration{k}.png``. On `finish` it writes ``sheet.png``, the last picture of each
-    level or iteration at one size, and
-    ``animation.gif``. Pictures are 8-bit previews; each file is written whole or not at all.
+    ``pyramid``, ``iteration{k}.png``, of a block its middle slice. On `finish` it writes
+    ``sheet.png``, the last picture of each level or iteration at one size, and ``animation.gif``.
+    Pictures are 8-bit previews; each file is written whole or not at all.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class StageWriter:
         if name is None:
             return
         self._start()
-        values = progress.image()
+        values = progress.picture()
         if self._limits is None and values.dtype.kind != "b":
             self._limits = float(values.min()), float(values.max())
         picture = to_display(values, self._limits)
