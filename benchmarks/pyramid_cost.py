@@ -21,6 +21,7 @@ from skimage import data
 
 import simdtex
 from simdtex.methods.pyramid import MEMORY, TIES
+from simdtex.methods.solid import MEMORY as MEMORY_OF_BLOCKS
 from simdtex.ops.noise import noise
 from simdtex.ops.sort import sort
 from simdtex.pyramids import Transform
@@ -90,6 +91,8 @@ def jobs(machine, repeats, part):
         "laplacian, match=lookup": (1, fine, side, {"pyramid": "laplacian", "match": "lookup"}),
         "20 iterations": (1, fine, side, {"iterations": 20}),
         "colour": (3, fine, side, {}),
+        "odd sides": (1, fine, side - 1, {}),
+        "odd sides, laplacian": (1, fine, side - 1, {"pyramid": "laplacian"}),
         "larger": (1, 2 * fine, 4 * side, {}),
         "larger, laplacian": (1, 2 * fine, 4 * side, {"pyramid": "laplacian"}),
         "larger, colour": (3, 2 * fine, 4 * side, {}),
@@ -211,7 +214,7 @@ def memory(device, part):
             what = f"{'voxel' if solid else 'pixel'}, {channels} channel{'s' * (channels > 1)}"
             figures = f"{each:5.0f} of the process, {used:5.0f} in arrays at a time, {pool:5.0f} taken by the pool"
             print(f"bytes per {what:17}: {figures}", flush=True)
-    print(f"MEMORY in simdtex/methods/pyramid.py is {MEMORY}")
+    print(f"limits asked of a device: {MEMORY} per pixel, {MEMORY_OF_BLOCKS} per voxel")
 
 
 # ---------------------------------------------------------------- beside other ways

@@ -38,7 +38,7 @@ FAMILIES = {"x-y": ((0, 1, 2), (0, 1, 2)), "x-z": ((1, 0, 2), (1, 0, 2)), "y-z":
 """Slices by name: the axes in the order slice, row, column, and the order that turns them back."""
 
 
-MEMORY = 200
+MEMORY = 240
 """Bytes for each voxel on the device, at most (measured by benchmarks/pyramid_cost.py)."""
 
 
