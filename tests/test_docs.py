@@ -123,6 +123,7 @@ def test_documented_command_parses(page, line):
     )
     known = method.Options.__dataclass_fields__
     valid = {name: value for name, value in given(context.params).items() if name in known}
+    valid.pop("start", None)  # a file here, an array there
     method.make_options(**valid)
     assert context.params.get("preset") in (None, *PRESETS)
 
