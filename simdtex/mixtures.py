@@ -147,6 +147,7 @@ class _Blender:
     ) -> None:
         self._weights = weights
         self._used = [i for i, weight in enumerate(weights) if weight]
+        machine.require(max(p.shape[0] * p.shape[1] for p in pictures) * pyramid.MEMORY)
         together = np.concatenate([p.reshape(-1, 1, p.shape[-1]) for p in pictures])
         self._stretched = Stretched(together)
         planes = _parted(self._stretched.planes, pictures)

@@ -36,7 +36,7 @@ VALUES = 8
 """Values for each pixel of an output that kernels number at most: six oriented bands of a level, and more to spare."""
 
 MEMORY = 160
-"""Bytes for each pixel of an output on the device, at most (measured by benchmarks/pyramid_cost.py)."""
+"""Bytes for each pixel of a picture on the device, at most (measured by benchmarks/pyramid_cost.py)."""
 
 MATCHING = 200
 """What a value's sort and match cost, about, in multiply-adds: when to wait for the device."""
@@ -233,6 +233,7 @@ def number_of_levels(options: Options, *sides: int) -> int:
 
 def analyse(machine: Machine, sample: NDArray[Any], options: Options, *pyramids: Transform) -> Texture:
     """The histograms of a sample (rows, cols, channels): analysis-pyr of every decorrelated channel."""
+    machine.require(prod(sample.shape[:2]) * MEMORY)
     stretched = Stretched(sample)
     colours = palette([stretched.planes], [1.0], options.color == "decorrelate")
     scale = decorrelated([stretched.planes], [colours])
@@ -363,7 +364,7 @@ def match_texture(
         image = texture.own[machine.get(match_ranks(machine, order, ranks)).reshape(*shape, 1)]
     else:
         image = texture.image(read())
-    kept = {f.name: getattr(options, f.name) for f in fields(Options) if f.name != "start"}
+    kept = {f.name: getattr(options, f.name) for f in fields(options) if f.name != "start"}
     statistics = {
         "device": machine.name,
         "seed": seed,
