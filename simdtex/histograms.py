@@ -87,15 +87,13 @@ def averaged(textures: Sequence[Histograms], weights: Sequence[float], blend: st
     )
 
 
-def spliced(low: Histograms, high: Histograms, split: int, pixels: Sorted) -> Histograms:
-    """The low frequencies of one texture with the high ones of another.
+def spliced(low: Histograms, high: Histograms, split: int) -> Histograms:
+    """The low frequencies of one texture, and its pixels, with the high frequencies of another.
 
     Parameters
     ----------
     low, high : Histograms
     split : int
         Subbands that are taken from `high`, from the finest on.
-    pixels : (1, m) int32 array
-        Sorted.
     """
-    return Histograms(pixels, [*high.subbands[:split], *low.subbands[split:]])
+    return Histograms(low.pixels, [*high.subbands[:split], *low.subbands[split:]])

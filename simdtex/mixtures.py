@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.histograms import Histograms, Sorted, averaged, histograms, spliced
-from simdtex.histograms import average as average_of
 from simdtex.image import check_sample
 from simdtex.machine import Machine, open_machine
 from simdtex.methods import pyramid
@@ -119,7 +118,7 @@ def mix(
     blender = _Blender(machine, pictures, weights, palette, chosen, levels)
     if low is not None and high is not None:
         finest = _high_subbands(split, levels, chosen.pyramid)
-        found = blender.spliced(low, high, finest, blend)
+        found = blender.spliced(low, high, finest)
     else:
         found = blender.averaged(blend)
     texture = blender.texture(found, palette if pixels == "palette" else None)
@@ -169,10 +168,9 @@ class _Blender:
         weights = [self._weights[i] for i in self._used]
         return [averaged(channel, weights, blend) for channel in zip(*self._found.values(), strict=True)]
 
-    def spliced(self, low: int, high: int, finest: int, blend: str) -> list[Histograms]:
-        """The finest subbands of `high`, the others of `low`; the pixels of both."""
-        pairs = zip(self._found[low], self._found[high], strict=True)
-        return [spliced(a, b, finest, average_of([a.pixels, b.pixels], [1, 1], blend)) for a, b in pairs]
+    def spliced(self, low: int, high: int, finest: int) -> list[Histograms]:
+        """The finest subbands of `high`, the others of `low`, and with them its pixels."""
+        return [spliced(a, b, finest) for a, b in zip(self._found[low], self._found[high], strict=True)]
 
     def texture(self, found: list[Histograms], pixels_of: int | None) -> pyramid.Texture:
         """What is to be matched; with the pixels of the palette where it is to give them."""

@@ -57,7 +57,7 @@ SIDE = 128
 @click.option(
     "--solids", help=f"turns or average: families of slices one after another, or a mean.  [{DEFAULTS.solids}]"
 )
-@click.option("--slices", help=f"each or together: whose histogram is matched.  [{DEFAULTS.slices}]")
+@click.option("--slices", help=f"together or each: whose histogram is matched.  [{DEFAULTS.slices}]")
 @pyramid_options("VOLUME: A block")
 @SEED
 @DEVICE

@@ -52,8 +52,8 @@ class Options(pyramid.Options):
         With ``pyramid="steerable"``: match the Laplacian pyramid of the block and then the steerable pyramids of each
         family of slices in turn, each of what the one before has made; or, as the paper does, all four of the same
         block, and average the four solids.
-    slices : {"each", "together"}
-        Match the histograms of every slice, or of a family's slices taken together.
+    slices : {"together", "each"}
+        Match the histograms of a family's slices taken together, or, as the paper does, of every slice.
 
     Notes
     -----
@@ -62,7 +62,7 @@ class Options(pyramid.Options):
     """
 
     solids: str = "turns"
-    slices: str = "each"
+    slices: str = "together"
 
     def __post_init__(self) -> None:
         """Check every value."""
