@@ -117,10 +117,10 @@ __kernel void solid_collapse(__global const int *restrict band, __global const i
 inline int taken(const int i, const int n, int *from, int *weight, int *bits)
 {
     const int gauss[5] = {1, 4, 6, 4, 1}, child[2][3] = {{1, 6, 1}, {0, 4, 4}};
-    const int odd = n % 2, count = odd ? 5 : 3;
+    const int odd = n % 2, count = odd ? 5 : 3, halved = max(1, n / 2); // some divide in a branch not taken
     for (int a = 0; a < count; ++a) {
         const int k = within(i + a - 2, n, 1);
-        from[a] = odd ? (k % 2 ? (k + n) / 2 : k / 2) : within(i / 2 + a - 1, n / 2, 1);
+        from[a] = odd ? (k % 2 ? (k + n) / 2 : k / 2) : within(i / 2 + a - 1, halved, 1);
         weight[a] = odd ? gauss[a] : child[i % 2][a];
     }
     *bits += odd ? 4 : 3;
