@@ -4,12 +4,12 @@
 
 // The steerable pyramid of Simoncelli and Freeman in whole numbers: pictures are split into bands by small filters, and
 // joined from bands by the same filters turned by 180 degrees. A sum is made in float32, over terms, bands, tap rows
-// and tap columns in this order, with each product and each sum rounded; the end result is rounded to a whole number.
+// and tap columns in this order, each step an fma; the end result is rounded to a whole number. Taps are multiples of
+// 2^-24, which the twin relies on.
 //
 // Pictures are (planes, rows, cols). They are filtered in pieces: rows first_row .. of planes first .., which
 // steerable_pad lays out in float32 with what lies beyond the border, so that the filters need no rule for it.
 // One work-item makes V adjacent columns of ROWS rows (-D V, -D ROWS), of one plane.
-#pragma OPENCL FP_CONTRACT OFF
 
 #if V == 1
 #define TO_INT(x) convert_int_rte(x)
@@ -105,7 +105,7 @@ __kernel void steerable_split(__global const float *restrict padded, const int p
                 const vec value = LOAD(x + r * APART * line);
                 #pragma unroll
                 for (int f = 0; f < BANDS; ++f)
-                    sum[f][r] += taps[(f * side + a) * side + b] * value;
+                    sum[f][r] = fma((vec)(taps[(f * side + a) * side + b]), value, sum[f][r]);
             }
         }
     #pragma unroll
@@ -144,10 +144,10 @@ __kernel void steerable_join(__global const float *restrict padded, const int pl
     const int reach = side / 2;
     for (int a = skip == 1 ? 0 : (first_row + i + reach) & 1; a < side; a += skip)
         for (int b = 0; b < side; ++b) {
-            const float tap = taps[((band + 1) * side - 1 - a) * side + side - 1 - b];
+            const vec tap = (vec)(taps[((band + 1) * side - 1 - a) * side + side - 1 - b]);
             #pragma unroll
             for (int r = 0; r < ROWS; ++r)
-                sum[r] += tap * LOAD(from + (a + r * skip) * pitch + b);
+                sum[r] = fma(tap, LOAD(from + (a + r * skip) * pitch + b), sum[r]);
         }
     __global int *to = picture + ((size_t)(first + plane) * rows + first_row + i) * cols + j;
     #pragma unroll

@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 ORIENTATIONS = (1, 2, 4, 6)
 """How many there may be."""
 
+UNIT = 2**24
+"""Taps are rounded to whole multiples of 2**-24, see `simdtex.ops.steerable`."""
+
 
 @dataclass(frozen=True)
 class Filters:
@@ -64,7 +67,7 @@ def filters(orientations: int) -> Filters:
             first.append(-first[1].T)
         upright = first + [np.rot90(band) for band in first]
     taps = [_even(high), _even(low), _even(down) / 2, np.array(upright)]
-    single = [np.ascontiguousarray(a, dtype=np.float32) for a in taps]
+    single = [np.ascontiguousarray(np.rint(a * UNIT) / UNIT, dtype=np.float32) for a in taps]
     for a in single:
         a.flags.writeable = False
     return Filters(*single)

@@ -3,7 +3,8 @@
 
 Pictures are (planes, rows, cols) int32, bands (bands, planes, rows, cols) int32, and taps (bands, side, side) float32
 with an odd side, from `simdtex.steerable_filters`. Sums are float32, over terms, bands, tap rows and tap columns in
-this order, each product and each sum rounded. They are rounded to whole numbers in the end, and must fit 32 bits.
+this order, each step an fma. They are rounded to whole numbers in the end, and must fit 32 bits. Taps are multiples of
+2**-24, so the twin has each step exactly in double precision, as long as sums stay below 2**28.
 """
 
 from __future__ import annotations
@@ -27,10 +28,16 @@ ROWS = {1: 4, 2: 4, 4: 2, 6: 2}
 """Rows of a work-item by how many bands it makes: what is kept in registers."""
 
 
-def _around(picture: NDArray[np.int32], reach: int, torus: bool) -> NDArray[np.float32]:
-    """The pictures in float32 with so many pixels of what lies beyond the border on each side."""
+def _around(picture: NDArray[np.int32], reach: int, torus: bool) -> NDArray[np.float64]:
+    """The pictures, rounded to float32, with so many pixels of what lies beyond the border on each side."""
     row, col = (within(np.arange(-reach, n + reach), n, torus) for n in picture.shape[1:])
-    return picture[:, row[:, None], col].astype(np.float32)
+    return picture[:, row[:, None], col].astype(np.float32).astype(np.float64)
+
+
+def _fma(tap: np.float32, x: NDArray[np.float64], total: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A product and a sum, exact in double precision, rounded once."""
+    result: NDArray[np.float32] = (np.float64(tap) * x + total).astype(np.float32)
+    return result
 
 
 def _split(picture: NDArray[np.int32], taps: NDArray[np.float32], torus: bool, step: int) -> NDArray[np.int32]:
@@ -40,7 +47,7 @@ def _split(picture: NDArray[np.int32], taps: NDArray[np.float32], torus: bool, s
     for f in taps:
         total = np.zeros(picture[:, ::step, ::step].shape, np.float32)
         for a, b in np.ndindex(f.shape):
-            total += f[a, b] * around[:, a : a + rows : step, b : b + cols : step]
+            total = _fma(f[a, b], around[:, a : a + rows : step, b : b + cols : step], total)
         bands.append(np.rint(total))
     return np.array(bands).astype(np.int32)
 
@@ -56,7 +63,7 @@ def _join(
             spread[:, ::step, ::step] = band
             around = _around(spread, taps.shape[1] // 2, torus)
             for a, b in np.ndindex(f.shape):
-                total += f[a, b] * around[:, a : a + rows, b : b + cols]
+                total = _fma(f[a, b], around[:, a : a + rows, b : b + cols], total)
     return np.rint(total).astype(np.int32)
 
 
