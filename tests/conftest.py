@@ -1,4 +1,4 @@
-"""Fixtures that run a test on every usable OpenCL device, and say in the end which ones did."""
+"""Fixtures that run a test on usable OpenCL devices, and say in the end which ones did."""
 
 import os
 
@@ -14,6 +14,8 @@ from simdtex import device as device_module
 from simdtex.device import DeviceInfo
 
 REQUIRE = "SIMDTEX_REQUIRE_OPENCL"
+WHOLE_RUNS = ("test_bits",)
+"""Tests on every device; others take one of each platform, whose devices share a compiler, and compiling takes long."""
 RAN = pytest.StashKey[dict[str, int]]()
 
 # The same examples on every machine and every run; a first build on a device may take seconds.
@@ -43,6 +45,9 @@ def pytest_generate_tests(metafunc):
     if "cl_device" not in metafunc.fixturenames:
         return
     found = usable_devices()
+    if metafunc.module.__name__ not in WHOLE_RUNS:
+        first = {info.platform: info for info in reversed(found)}  # the best of each
+        found = tuple(info for info in found if first[info.platform] is info)
     names = [info.name for info in found]
     params = [
         pytest.param(
@@ -67,13 +72,13 @@ def _take(info: DeviceInfo | None) -> DeviceInfo:
 
 @pytest.fixture(scope="session")
 def cl_device(request) -> DeviceInfo:
-    """Every usable OpenCL device in turn."""
+    """A usable OpenCL device of every platform in turn; every device in whole runs."""
     return _take(request.param)
 
 
 @pytest.fixture(scope="session")
 def machine(cl_device):
-    """An OpenCL machine on every usable device in turn; its programs are built once a session."""
+    """An OpenCL machine on each of these devices; its programs are built once a session."""
     from cases import opencl
 
     return opencl(cl_device)

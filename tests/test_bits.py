@@ -122,6 +122,8 @@ RUNS = {
     "mix": ((17, 20), 3, np.uint8, (16, 18), {"palette": 0, "average": [1, 2], "iterations": 1}),
 }
 SOME = ("defaults", "colour-gibbs-density")
+LONG = ("pyramid-six", "pyramid-laplacian-lookup", "pyramid-a-row", "pyramid-no-levels", "solid-average")
+"""Not that they compute long: their kernels are to be compiled for sizes that no other has."""
 
 # Forms of a launch: work-group size, vector width, candidates in registers, bytes of scratch memory.
 FORMS = [
@@ -170,7 +172,7 @@ def check(name, device):
     assert counts == their_counts
 
 
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in RUNS])
 def test_every_device_has_the_references_bits(machine, name):
     check(name, machine)
 

@@ -111,7 +111,7 @@ def test_histograms_come_closer_from_iteration_to_iteration(kind, match):
 # -- seams, and other properties of the picture ---------------------------------------------------------------
 
 
-@pytest.mark.parametrize("shape", [(96, 96), (97, 95), (98, 74)], ids=str)
+@pytest.mark.parametrize("shape", [(96, 96), (97, 74)], ids=str)
 @pytest.mark.parametrize("kind", ["steerable", "laplacian"])
 def test_a_torus_has_no_seam(kind, shape):
     """The gradient across the seam is that inside: the mean of some pictures, as a seam is short."""

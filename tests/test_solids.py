@@ -133,7 +133,7 @@ def oblique(volume, count=20, side=40):
 
 
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("name", ["gravel", "grass"])
+@pytest.mark.parametrize("name", ["gravel", pytest.param("grass", marks=pytest.mark.slow)])
 def test_slices_have_the_samples_statistics(blocks, name, way):
     sample, block = sample_of(name), blocks(name, way)
     for family in FAMILIES:
@@ -145,7 +145,7 @@ def test_slices_have_the_samples_statistics(blocks, name, way):
 
 
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize("name", ["gravel", "grass"])
+@pytest.mark.parametrize("name", ["gravel", pytest.param("grass", marks=pytest.mark.slow)])
 def test_oblique_slices_have_the_samples_statistics(blocks, name, way):
     sample, planes = sample_of(name), oblique(blocks(name, way))
     each = [moved(sample, one) for one in planes]

@@ -10,7 +10,7 @@ this order, each step an fma. They are rounded to whole numbers in the end, and 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,22 +34,19 @@ def _around(picture: NDArray[np.int32], reach: int, torus: bool) -> NDArray[np.f
     return picture[:, row[:, None], col].astype(np.float32).astype(np.float64)
 
 
-def _fma(tap: np.float32, x: NDArray[np.float64], total: NDArray[np.float32]) -> NDArray[np.float32]:
+def _fma(tap: Any, x: NDArray[np.float64], total: NDArray[np.float32]) -> NDArray[np.float32]:
     """A product and a sum, exact in double precision, rounded once."""
-    result: NDArray[np.float32] = (np.float64(tap) * x + total).astype(np.float32)
+    result: NDArray[np.float32] = (tap.astype(np.float64) * x + total).astype(np.float32)
     return result
 
 
 def _split(picture: NDArray[np.int32], taps: NDArray[np.float32], torus: bool, step: int) -> NDArray[np.int32]:
     _, rows, cols = picture.shape
     around = _around(picture, taps.shape[1] // 2, torus)
-    bands = []
-    for f in taps:
-        total = np.zeros(picture[:, ::step, ::step].shape, np.float32)
-        for a, b in np.ndindex(f.shape):
-            total = _fma(f[a, b], around[:, a : a + rows : step, b : b + cols : step], total)
-        bands.append(np.rint(total))
-    return np.array(bands).astype(np.int32)
+    total = np.zeros((len(taps), *picture[:, ::step, ::step].shape), np.float32)
+    for a, b in np.ndindex(taps.shape[1:]):
+        total = _fma(taps[:, a, b, None, None, None], around[:, a : a + rows : step, b : b + cols : step], total)
+    return np.rint(total).astype(np.int32)
 
 
 def _join(
