@@ -50,15 +50,16 @@ class Transform:
 
     def __init__(self, machine: Machine, kind: str, levels: int, orientations: int, torus: bool) -> None:
         self._machine, self._steerable, self._levels, self._torus = machine, kind == "steerable", levels, torus
-        self._sources: dict[tuple[int, ...], Array] = {}
-        self._binomial = {gain: machine.put(np.float32(gain) * BINOMIAL[None]) for gain in (-4, -2, -1, 1, 2, 4)}
-        self._itself = machine.put(np.ones((1, 1, 1), np.float32))
         if self._steerable:
             taps = filters(orientations)
             self._high, self._low = machine.put(taps.high[None]), machine.put(taps.low[None])
             self._bands = machine.put(taps.bands)
             self._down = machine.put(taps.down[None])
             self._up = {gain: machine.put(np.float32(gain) * taps.down[None]) for gain in (1, 2, 4)}
+        else:
+            self._sources: dict[tuple[int, ...], Array] = {}
+            self._binomial = {gain: machine.put(np.float32(gain) * BINOMIAL[None]) for gain in (-4, -2, -1, 1, 2, 4)}
+            self._itself = machine.put(np.ones((1, 1, 1), np.float32))
 
     @property
     def names(self) -> list[str]:

@@ -104,7 +104,7 @@ def synthesize(
 
     Notes
     -----
-    Cost: 5000 multiply-adds and 30 sorted values for every voxel, channel and iteration, with four orientations.
+    Cost: 5000 multiply-adds and 25 sorted values for every voxel, channel and iteration, with four orientations.
     """
     began, worked = perf_counter(), machine.seconds
     if prod(shape) * max(VALUES, sample.shape[-1]) >= 2**31:
