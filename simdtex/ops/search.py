@@ -64,7 +64,7 @@ class Rule(NamedTuple):
     """How a site relaxes.
 
     ``favour`` 1 / (1 + coherence); ``xi`` of equation (13) in 1/1024; ``window`` of equation (7); ``gibbs`` whether it
-    draws or takes the mode; ``noisy`` whether a draw also spreads over grey levels; ``seed`` and ``level`` key the draws.
+    draws or takes the mode; ``noisy`` whether a draw also spreads over grey levels; ``seed`` and ``level`` its keys.
     """
 
     favour: np.float32

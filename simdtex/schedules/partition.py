@@ -94,10 +94,9 @@ class Partition:
         sites = state.pixel if wanted.all() else state.pixel[wanted]
         bounds = np.concatenate([[0], np.cumsum(wanted)])[state.starts]
         parts = [sites[bounds[g] : bounds[g + 1]] for g in turn.tolist() if bounds[g + 1] > bounds[g]]
-        ends = (
-            np.cumsum([part.size for part in parts]) if parts else np.zeros(1, np.int64)
-        )  # an empty sweep is one empty group
-        return state._replace(sweep=sweep, sites=np.concatenate(parts) if parts else sites, ends=ends, done=0)
+        parts = parts or [sites]  # an empty sweep is one empty group
+        ends = np.cumsum([part.size for part in parts])
+        return state._replace(sweep=sweep, sites=np.concatenate(parts), ends=ends, done=0)
 
 
 class Coloring(Partition):
