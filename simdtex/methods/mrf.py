@@ -149,6 +149,16 @@ class Options:
         one_of("edges", self.edges, ("auto", "reflect", "whole"))
         one_of("coarsest", self.coarsest, ("gibbs", "same"))
         one_of("boundary", self.boundary, ("torus", "open"))
+        one_of("search", self.search, ("exact", "coherent"))
+        whole("suggesting", self.suggesting, 1)
+        whole("similar", self.similar, 0)
+        whole("chance", self.chance, 0)
+        whole("exhaustive", self.exhaustive, 0)
+        if (self.search, self.relaxation, self.pixel) == ("coherent", "icm", "density"):
+            raise ValueError(
+                'search="coherent" finds no mode of a density; '
+                'give search="exact", pixel="source" or relaxation="gibbs"'
+            )
         schedules.get(self.schedule)
         true_or_false("check_schedule", self.check_schedule)
         parse_array(self.array or "1x1", self.mapping)
