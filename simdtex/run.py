@@ -213,7 +213,8 @@ class Output:
 
     Notes
     -----
-    A level of ``mrf`` has ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation (12)), and ``equilibrium``: the
+    A level of ``mrf`` has ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation (12)), ``skipped`` (those of
+    them that a bound made needless; docs/concepts/skipping.rst), and ``equilibrium``: the
     ``sweeps``, ``steps`` and ``relaxations`` until no temperature was left, free sweeps not counted. Its statistics
     also have ``accounting``, what the run costs on a processor array, or, where none was given, packed on a full MP-1:
     ``array``, ``mapping``, ``emulated``; ``layers``, virtual layers; ``shifts``, X-Net shifts of a word that bring
@@ -315,8 +316,9 @@ class Meter:
         total = sum(sum(work) for work in self._expected.values())
         self._fraction = max(self._fraction, min(1.0, (self._ended + done) / total))
 
-    def end(self) -> None:
-        """End the level."""
+    def end(self, skipped: int) -> None:
+        """End the level, of whose fma so many were skipped."""
+        self.reports[-1]["skipped"] = skipped
         self.reports[-1]["seconds"] = time.perf_counter() - self._level_began
         self._ended += sum(self._expected[self.reports[-1]["level"]])
 

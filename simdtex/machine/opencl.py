@@ -22,6 +22,7 @@ from simdtex.device import DeviceError, DeviceInfo
 from simdtex.lattice import Grid
 from simdtex.machine.array import ProcessorArray
 from simdtex.machine.log import Log
+from simdtex.machine.tally import Tally
 from simdtex.ops.operation import Array, Operation, P, R
 from simdtex.sample import BLOCK
 
@@ -55,6 +56,10 @@ class OpenCL:
         Sites side by side in a work-item (1, 4, 8 or 16); changes no bit of any result.
     step : int, optional
         Candidates kept in registers together, a divisor of 64; changes no bit of any result.
+    split : int, optional
+        Work-items that share a site's candidates; changes no bit of any result.
+    skip : bool
+        Whether candidates that are proved to lose are skipped; changes no bit of any result.
     profile : bool
         Whether to measure how long the device works.
     """
@@ -67,6 +72,8 @@ class OpenCL:
         scratch: int | None = None,
         vector: int | None = None,
         step: int | None = None,
+        split: int | None = None,
+        skip: bool = True,
         profile: bool = False,
     ) -> None:
         self.info = info
@@ -84,6 +91,11 @@ class OpenCL:
         if BLOCK % self.step:
             raise ValueError(f"step is {self.step}; give a divisor of {BLOCK}")
         self.tile = (64, 1) if on_gpu else (1, 8)
+        self.skip = skip
+        self.tally = Tally(self)
+        self._split = split
+        self._crowd = info.compute_units * (2048 if on_gpu else 64)  # work-items that keep the device busy
+        self._abreast = 64 if on_gpu else 1  # of a site: neighbours in a row of the sample
         self.array: ProcessorArray | None = None
         self._lane: Array | None = None
         self._pool = cl_tools.MemoryPool(cl_tools.ImmediateAllocator(self.queue))
@@ -143,10 +155,15 @@ class OpenCL:
         self.sync()
         return self.log.seconds
 
+    @property
+    def spared(self) -> int:
+        """Fma of distances that a bound has spared so far."""
+        return self.tally.spared
+
     def emulate(self, array: ProcessorArray) -> OpenCL:
         """The same device as a processor array: every launch has one work-item per PE."""
         emulated = copy(self)
-        emulated.array, emulated.vector = array, 1
+        emulated.array, emulated.vector, emulated._split = array, 1, 1
         return emulated
 
     def pieces(self, sites: NDArray[np.int32], grid: Grid, most: int) -> Iterator[tuple[OpenCL, NDArray[np.int32]]]:
@@ -187,10 +204,17 @@ class OpenCL:
                 f"{self.name} ran out of memory; give a smaller size or sample, or another --device"
             ) from error
 
-    def chunk(self, candidates: int, neighbours: int, channels: int) -> int:
+    def split(self, items: int, most: int) -> int:
+        """How many work-items are to share each of so many: enough to keep the device busy, up to `most`."""
+        wanted = self._split or -(-self._crowd // (items * self._abreast)) * self._abreast
+        return max(1, min(wanted, most))
+
+    def chunk(self, candidates: int, neighbours: int, channels: int, stored: bool = True) -> int:
         """Whole vectors of sites: bounded by scratch memory, and by 4e9 fma so that no launch is long."""
         padded = -(-candidates // BLOCK) * BLOCK
         per_site = 4 * (padded + padded // BLOCK + neighbours * (1 + channels))
+        if not stored:
+            per_site = 4 * (12 * self.split(1, padded) + neighbours * (4 + 3 * channels))
         fit = min(self.scratch // per_site, int(4e9) // (2 * padded * neighbours * channels))
         return max(1, fit // self.vector) * self.vector
 

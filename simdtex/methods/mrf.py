@@ -23,6 +23,7 @@ from simdtex.machine.array import parse_array
 from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
 from simdtex.ops.commit import commit
+from simdtex.ops.nearest import nearest
 from simdtex.ops.neighbourhood import Field, neighbourhood
 from simdtex.ops.operation import Array
 from simdtex.ops.snapshot import snapshot
@@ -210,7 +211,7 @@ def synthesize(
     Notes
     -----
     Cost: sweeps x sites x candidates x |N| x channels x 2 fma, about 7 sweeps a level. Memory on the device, in bytes:
-    14 + 2 channels per output pixel (20 + 4 channels with the schedule ``block``), 8 channels + 8 per pixel of the
+    14 + 2 channels per output pixel (20 + 4 channels with the schedule ``block``), 12 channels + 8 per pixel of the
     sample with its margin, and the machine's scratch memory or, if that is more, 65 per candidate. On the host: about
     50 per output pixel.
     """
@@ -235,7 +236,7 @@ def synthesize(
     everywhere = machine.put(sample.positions(np.zeros((1, 2), np.int32), 1))
     field = start(machine, planes, everywhere, Grid(*shape), seed)  # 2, 5
     for number in reversed(range(levels)):  # 6
-        level = _level(run, number)  # 3, 4, 6.1
+        level, spared = _level(run, number), machine.spared  # 3, 4, 6.1
         meter.begin(number, level.grid, level.candidates.size)
         words = sample.channels + 1 + bool(options.coherence)  # of a neighbour: pixel, temperature, source
         account.begin(level.grid, offsets, level.candidates.size, sample.channels, words)
@@ -245,7 +246,7 @@ def synthesize(
         for _ in range(options.free_sweeps):
             field, state = _sweep(run, level, field, state, temperatures, "free", meter)
         stages.append(Stage(number, _picture(run, level, field)))
-        meter.end()
+        meter.end(machine.spared - spared)
 
     values, source, temperatures = (Grid(*shape).view(machine.get(plane)) for plane in field)
     image = sample.picture(values, source)
@@ -295,7 +296,7 @@ def _sweep(
     sweep = meter.sweep(phase, left)
     wanted, relaxed = int((temperatures > 0).sum()) if phase == "relax" else everywhere.size, 0
     neighbours, channels = len(run.offsets), run.sample.channels
-    size = machine.chunk(level.candidates.size, neighbours, channels)
+    size = machine.chunk(level.candidates.size, neighbours, channels, _stores(run.options, level))
     old = False
     while True:
         state, info = schedule.step(state, active)  # 6.2.1
@@ -327,23 +328,29 @@ def _relax(
     options = run.options
     number, _, offsets, candidates, window, relaxation = level
     here = machine.put(sites)
-    near = neighbourhood(machine, here, field, offsets, grid)  # 6.2.2.1
-    distances = lcpdf.distance(machine, near, candidates)
-    if options.coherence:
-        favour = np.float32(1 / (1 + options.coherence))
-        distances = coherence(machine, distances, candidates, here, field, offsets, grid, favour)
-    density = options.pixel == "density"
-    if relaxation == "gibbs":  # 6.2.2.2
-        relaxed = lcpdf.draw(machine, distances, candidates, here, window, density, run.seed, number, turn)
-    elif not density:
-        relaxed = lcpdf.best(machine, distances, candidates)
-    elif run.sample.channels == 1 and window.top == 255:
-        relaxed = lcpdf.mode(machine, distances, candidates, window)
+    favour = np.float32(1 / (1 + options.coherence))
+    if not _stores(options, level):
+        relaxed = nearest(machine, here, field, offsets, grid, candidates, favour)
     else:
-        relaxed = lcpdf.mode_vector(machine, distances, candidates, window)
+        near = neighbourhood(machine, here, field, offsets, grid)  # 6.2.2.1
+        distances = lcpdf.distance(machine, near, candidates)
+        if options.coherence:
+            distances = coherence(machine, distances, candidates, here, field, offsets, grid, favour)
+        density = options.pixel == "density"
+        if relaxation == "gibbs":  # 6.2.2.2
+            relaxed = lcpdf.draw(machine, distances, candidates, here, window, density, run.seed, number, turn)
+        elif run.sample.channels == 1 and window.top == 255:
+            relaxed = lcpdf.mode(machine, distances, candidates, window)
+        else:
+            relaxed = lcpdf.mode_vector(machine, distances, candidates, window)
     xi = min(-1, round(options.xi * 1024))
     cooled = temperature(machine, here, field, offsets, grid, xi)  # 6.2.2.3
     return here, relaxed, cooled
+
+
+def _stores(options: Options, level: _Level) -> bool:
+    """Whether a step takes more of its distances than the least."""
+    return level.relaxation == "gibbs" or options.pixel == "density"
 
 
 def _tell(run: _Run, level: _Level, field: Field, meter: Meter, where: dict[str, Any], last: bool) -> None:
@@ -425,4 +432,4 @@ def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], copi
     pixels, channels = shape[0] * shape[1], sample.channels
     within_32_bits(shape, channels * copies)
     field = copies * (6 + 2 * channels)
-    machine.require(pixels * (8 + field) + sample.rows * sample.cols * (8 * channels + 73))
+    machine.require(pixels * (8 + field) + sample.rows * sample.cols * (12 * channels + 73))
