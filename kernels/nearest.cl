@@ -62,7 +62,7 @@ inline float canonical(__global const float *site, __global const float *y, cons
 // count    (S,)                      out: terms, a multiple of CHECK
 // least    (S,), where (S,)          out: the least d' of these candidates and its place in the list
 // One work-item per site.
-__kernel void nearest_begin(__global const int *restrict sites, const int S, __global const ushort *restrict values,
+__kernel __attribute__((vec_type_hint(float4))) void nearest_begin(__global const int *restrict sites, const int S, __global const ushort *restrict values,
                             __global const int *restrict source, __global const ushort *restrict temperature,
                             const int pixels, __global const int2 *restrict offsets, GRID,
                             __global const int *restrict index_of, const int sample_rows, const int sample_cols,
@@ -164,7 +164,7 @@ typedef int16 ivec16;
 // found, at  (split, S)   out: the least d' so far and its place
 // work   (split, S)       out: terms weighed
 // `split` work-items to a site, side by side, take its blocks in turn.
-__kernel void nearest_scan(const int S, __global const float *restrict terms, __global const int *restrict count,
+__kernel __attribute__((vec_type_hint(vec))) void nearest_scan(const int S, __global const float *restrict terms, __global const int *restrict count,
                            __global const float *restrict near, __global const float *restrict least,
                            __global const int *restrict where, __global const float *restrict strip, const int size,
                            const int first, const int pitch, const int rows, const int cols,
