@@ -98,5 +98,8 @@ def open_machine(device: str | Machine | None = None, *, profile: bool = False, 
 
         return Reference()
     from simdtex.machine.opencl import OpenCL
+    from simdtex.machine.tuner import tune
 
-    return OpenCL(info, profile=profile, skip=skip)
+    machine = OpenCL(info, profile=profile, skip=skip)
+    tune(machine)
+    return machine

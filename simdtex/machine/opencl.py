@@ -20,11 +20,15 @@ from numpy.typing import NDArray
 
 from simdtex.device import DeviceError, DeviceInfo
 from simdtex.lattice import Grid
+from simdtex.machine import tuner
 from simdtex.machine.array import ProcessorArray
 from simdtex.machine.log import Log
 from simdtex.machine.tally import Tally
 from simdtex.ops.operation import Array, Operation, P, R
 from simdtex.sample import BLOCK
+
+LITTLE = 2**16
+"""Bytes that are copied to a device without waiting."""
 
 OUT_OF_MEMORY = (
     cl.status_code.MEM_OBJECT_ALLOCATION_FAILURE,
@@ -84,13 +88,11 @@ class OpenCL:
         self.log = Log(profile)
         on_gpu = info.kind == "gpu"
         self.forced = work_group is not None
-        self.group = work_group or (64 if on_gpu else 16)  # a fixed size: PoCL compiles once per size
         self.scratch = scratch or (2**28 if on_gpu else 2**24)
-        self.vector = vector or (1 if on_gpu else 16)
-        self.step = step or 4
+        form = tuner.default(info)  # a fixed group size: PoCL compiles once per size
+        self.take(tuner.Form(vector or form.vector, step or form.step, work_group or form.group))
         if BLOCK % self.step:
             raise ValueError(f"step is {self.step}; give a divisor of {BLOCK}")
-        self.tile = (64, 1) if on_gpu else (1, 8)
         self.skip = skip
         self.tally = Tally(self)
         self._split = split
@@ -104,6 +106,11 @@ class OpenCL:
         self._programs: dict[tuple[str, str], Any] = {}
         self._kernels: dict[tuple[str, str, str], Any] = {}
 
+    def take(self, form: tuner.Form) -> None:
+        """Take this form of the inner loop."""
+        self.vector, self.step, self.group = form
+        self.tile = (self.group, 1) if self.info.kind == "gpu" else (1, 8)
+
     def run(self, operation: Operation[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Launch the operation's kernels."""
         with self._memory_errors():
@@ -111,8 +118,10 @@ class OpenCL:
 
     def put(self, array: Any) -> Array:
         """Copy to the device."""
-        with self._memory_errors():
-            return cl_array.to_device(self.queue, np.ascontiguousarray(array))
+        array = np.array(array, order="C")
+        with self._memory_errors():  # little comes in turn, and is not waited for: its event keeps the copy
+            later = array.nbytes <= LITTLE
+            return cl_array.to_device(self.queue, array, allocator=self._pool if later else None, async_=later)
 
     def get(self, array: Array) -> Any:
         """Copy from the device."""
@@ -228,12 +237,16 @@ class OpenCL:
             self._kernels[key] = cl.Kernel(self._programs[key[::2]], function)
         return self._kernels[key]
 
+    @property
+    def include(self) -> list[str]:
+        """The compiler option that finds the kernels' headers."""
+        return ["-I", str(kernel_folder())]
+
     def _build(self, file: str, options: str) -> Any:
-        folder = kernel_folder()
-        source = (folder / f"{file}.cl").read_text(encoding="utf-8")
+        source = (kernel_folder() / f"{file}.cl").read_text(encoding="utf-8")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", cl.CompilerWarning)
-            return cl.Program(self.context, source).build([*options.split(), "-I", str(folder)])
+            return cl.Program(self.context, source).build([*options.split(), *self.include])
 
     def launch_sites(
         self,
