@@ -46,7 +46,7 @@ __kernel void tune(__global const float *x, __global const float *y, const int r
             const vec u = LOAD(x + k * V), xu = LOAD(x + (60 + k) * V);
 #pragma unroll
             for (int q = 0; q < STEP; ++q) {
-                const vec e = fma((vec)(-y[k + q]), u, xu);
+                const vec e = fma((vec)(-y[k + q + (n & 63)]), u, xu);
                 d[q] = fma(e, e, d[q]);
             }
         }
@@ -85,7 +85,7 @@ def rate(machine: OpenCL, form: Form) -> float:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", cl.CompilerWarning)
         kernel = cl.Kernel(cl.Program(machine.context, SOURCE).build(options), "tune")
-    x, y = (machine.put(np.linspace(0, 1, n, dtype=np.float32)) for n in (120 * form.vector, 60 + form.step))
+    x, y = (machine.put(np.linspace(0, 1, n, dtype=np.float32)) for n in (120 * form.vector, 128 + form.step))
     out = machine.empty((items * form.vector,), np.float32)
 
     def seconds(rounds: int) -> float:
