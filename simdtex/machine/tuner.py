@@ -39,6 +39,7 @@ SOURCE = """
 __kernel void tune(__global const float *x, __global const float *y, const int rounds, __global float *out)
 {
     vec d[STEP];
+    x += get_global_id(0) % 16; // each has its own, else a compiler would do one for all
     for (int q = 0; q < STEP; ++q)
         d[q] = 0.0f;
     for (int n = 0; n < rounds; ++n)
@@ -85,7 +86,7 @@ def rate(machine: OpenCL, form: Form) -> float:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", cl.CompilerWarning)
         kernel = cl.Kernel(cl.Program(machine.context, SOURCE).build(options), "tune")
-    x, y = (machine.put(np.linspace(0, 1, n, dtype=np.float32)) for n in (120 * form.vector, 128 + form.step))
+    x, y = (machine.put(np.linspace(0, 1, n, dtype=np.float32)) for n in (120 * form.vector + 16, 128 + form.step))
     out = machine.empty((items * form.vector,), np.float32)
 
     def seconds(rounds: int) -> float:
