@@ -243,7 +243,7 @@ __kernel __attribute__((vec_type_hint(vec))) void nearest_scan(const int S, __gl
 // confidence (N, P), weighted (N, C, P)   from neighbourhood.cl
 // found, at  (split, P)                   out: the least d and its place
 // One work-item per (V sites, part of the blocks of BLOCK candidates).
-__kernel void nearest_plain(__global const float *restrict confidence, __global const float *restrict weighted,
+__kernel __attribute__((vec_type_hint(vec))) void nearest_plain(__global const float *restrict confidence, __global const float *restrict weighted,
                             const int P, __global const float *restrict sample, const int plane,
                             __global const int *restrict candidates, const int count,
                             __global const int *restrict reach, const int blocks, const int split,

@@ -13,6 +13,7 @@ import os
 import tempfile
 import time
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -36,7 +37,8 @@ MARGIN = 1.1
 SOURCE = """
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/vector.h"
-__kernel void tune(__global const float *x, __global const float *y, const int rounds, __global float *out)
+__kernel __attribute__((vec_type_hint(vec))) void tune(__global const float *x, __global const float *y,
+                                                       const int rounds, __global float *out)
 {
     vec d[STEP];
     x += get_global_id(0) % 16; // each has its own, else a compiler would do one for all
@@ -79,8 +81,8 @@ def others(info: DeviceInfo) -> list[Form]:
     return [Form(8, 4, 16), Form(16, 2, 16), Form(8, 8, 16), Form(4, 4, 16), Form(1, 8, 16)]
 
 
-def rate(machine: OpenCL, form: Form) -> float:
-    """Fma per second of the loop in this form, the best of three launches of some 5 ms."""
+def probe(machine: OpenCL, form: Form) -> Callable[[], float]:
+    """The loop in this form, compiled: a function that gives its fma per second, the best of three launches."""
     items = form.group * machine.info.compute_units * (16 if machine.info.kind == "gpu" else 4)
     options = ["-D", f"V={form.vector}", "-D", f"STEP={form.step}", *machine.include]
     with warnings.catch_warnings():
@@ -97,24 +99,26 @@ def rate(machine: OpenCL, form: Form) -> float:
 
     seconds(1)
     rounds = 1
-    while (taken := seconds(rounds)) < 2e-3 and rounds < 2**20:
+    while seconds(rounds) < 1e-3 and rounds < 2**20:
         rounds *= 4
-    best = min(taken, seconds(rounds), seconds(rounds))
-    return 2.0 * 60 * rounds * items * form.vector * form.step / best
+    fma = 2.0 * 60 * rounds * items * form.vector * form.step
+    return lambda: fma / min(seconds(rounds) for _ in range(3))
 
 
 def choose(machine: OpenCL) -> Form:
-    """The fastest form, as far as `BUDGET` allows to tell."""
+    """The fastest form, as far as `BUDGET` allows to tell; each is timed beside the default."""
     began = time.perf_counter()
     form = default(machine.info)
-    best, longest = rate(machine, form) * MARGIN, 0.0
+    usual, best, longest = probe(machine, form), MARGIN, 0.0
     for other in others(machine.info):
         started = time.perf_counter()
-        if started - began + longest > BUDGET or other.group > machine.info.handle.max_work_group_size:  # type: ignore[union-attr]
+        most = machine.info.handle.max_work_group_size if machine.info.handle else 1
+        if started - began + longest > BUDGET or other.group > most:
             break
-        found = rate(machine, other)
-        if found > best:
-            form, best = other, found
+        rate = probe(machine, other)
+        gain = rate() / usual()
+        if gain > best:
+            form, best = other, gain
         longest = max(longest, time.perf_counter() - started)
     return form
 
