@@ -213,7 +213,8 @@ class Output:
 
     Notes
     -----
-    A level of ``mrf`` has ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation (12)), and ``equilibrium``: the
+    A level of ``mrf`` has ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation (12)), ``skipped`` (those of
+    them that a bound made needless; docs/concepts/skipping.rst), and ``equilibrium``: the
     ``sweeps``, ``steps`` and ``relaxations`` until no temperature was left, free sweeps not counted. Its statistics
     also have ``accounting``, what the run costs on a processor array, or, where none was given, packed on a full MP-1:
     ``array``, ``mapping``, ``emulated``; ``layers``, virtual layers; ``shifts``, X-Net shifts of a word that bring
@@ -316,11 +317,12 @@ class Meter:
         total = sum(sum(work) for work in self._expected.values())
         self._fraction = max(self._fraction, min(1.0, (self._ended + done) / total))
 
-    def end(self, weighed: int | None = None, fma: int = 0) -> None:
-        """End the level; with coherent search say how many candidates were weighed, and the fma of each."""
+    def end(self, skipped: int, weighed: tuple[int, int] | None = None) -> None:
+        """End the level: so many fma were skipped, or so many candidates weighed at so many fma."""
         if weighed is not None:
-            self.reports[-1]["weighed"] = weighed / self.reports[-1]["relaxations"]
-            self.reports[-1]["fma"] += weighed * fma
+            self.reports[-1]["weighed"] = weighed[0] / self.reports[-1]["relaxations"]
+            self.reports[-1]["fma"] += weighed[0] * weighed[1]
+        self.reports[-1]["skipped"] = skipped
         self.reports[-1]["seconds"] = time.perf_counter() - self._level_began
         self._ended += sum(self._expected[self.reports[-1]["level"]])
 

@@ -24,6 +24,7 @@ from simdtex.machine.array import parse_array
 from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
 from simdtex.ops.commit import commit
+from simdtex.ops.nearest import nearest
 from simdtex.ops.neighbourhood import Field, neighbourhood
 from simdtex.ops.operation import Array
 from simdtex.ops.search import Rule, Table, search, search_apart, table
@@ -249,7 +250,7 @@ def synthesize(
     Notes
     -----
     Cost: sweeps x sites x candidates x |N| x channels x 2 fma, about 7 sweeps a level. Memory on the device, in bytes:
-    14 + 2 channels per output pixel (20 + 4 channels with the schedule ``block``), 8 channels + 8 per pixel of the
+    14 + 2 channels per output pixel (20 + 4 channels with the schedule ``block``), 12 channels + 8 per pixel of the
     sample with its margin, and the machine's scratch memory or, if that is more, 65 per candidate. On the host: about
     50 per output pixel.
     """
@@ -274,7 +275,7 @@ def synthesize(
     everywhere = machine.put(sample.positions(np.zeros((1, 2), np.int32), 1))
     field = start(machine, planes, everywhere, Grid(*shape), seed)  # 2, 5
     for number in reversed(range(levels)):  # 6
-        level = _level(run, number)  # 3, 4, 6.1
+        level, spared = _level(run, number), machine.spared  # 3, 4, 6.1
         meter.begin(number, level.grid, level.candidates.size, level.weighed)
         words = sample.channels + 1 + bool(options.coherence)  # of a neighbour: pixel, temperature, source
         account.begin(level.grid, offsets, level.weighed, sample.channels, words)
@@ -284,11 +285,7 @@ def synthesize(
         for _ in range(options.free_sweeps):
             field, state = _sweep(run, level, field, state, temperatures, "free", meter)
         stages.append(Stage(number, _picture(run, level, field)))
-        if level.coherent:
-            weighed = int(level.grid.view(machine.get(level.coherent.weighed)).sum(dtype=np.int64))
-            meter.end(weighed, 2 * len(offsets) * sample.channels)
-        else:
-            meter.end()
+        meter.end(machine.spared - spared, _weighed(run, level))
 
     values, source, temperatures = (Grid(*shape).view(machine.get(plane)) for plane in field)
     image = sample.picture(values, source)
@@ -344,6 +341,14 @@ def _xi(options: Options) -> int:
     return min(-1, round(options.xi * 1024))
 
 
+def _weighed(run: _Run, level: _Level) -> tuple[int, int] | None:
+    """Candidates that a level's relaxations have weighed, and the fma of each; None where they have weighed all."""
+    if not level.coherent:
+        return None
+    weighed = level.grid.view(run.machine.get(level.coherent.weighed))
+    return int(weighed.sum(dtype=np.int64)), 2 * len(run.offsets) * run.sample.channels
+
+
 def _sweep(
     run: _Run,
     level: _Level,
@@ -365,7 +370,8 @@ def _sweep(
     wanted, relaxed = int((temperatures > 0).sum()) if phase == "relax" else everywhere.size, 0
     neighbours, channels = len(run.offsets), run.sample.channels
     weighed = level.weighed
-    size = machine.chunk(weighed, neighbours, channels)
+    stores = not level.coherent and _stores(run.options, level)
+    size = machine.chunk(weighed, neighbours, channels, stores)
     where = {"level": level.number, "sweep": sweep, "phase": phase, "temperature_left": left}
     if level.coherent and level.coherent.ahead:
         return _sweep_ahead(run, level, field, state, active(), meter, where)
@@ -426,21 +432,27 @@ def _relax(
     if coherent:
         table, rule, weighed, _ = coherent
         return here, *search_apart(machine, here, field, weighed, table, offsets, grid, rule, turn)
-    near = neighbourhood(machine, here, field, offsets, grid)  # 6.2.2.1
-    distances = lcpdf.distance(machine, near, candidates)
-    if options.coherence:
-        distances = coherence(machine, distances, candidates, here, field, offsets, grid, _favour(options))
-    density = options.pixel == "density"
-    if relaxation == "gibbs":  # 6.2.2.2
-        relaxed = lcpdf.draw(machine, distances, candidates, here, window, density, run.seed, number, turn)
-    elif not density:
-        relaxed = lcpdf.best(machine, distances, candidates)
-    elif run.sample.channels == 1 and window.top == 255:
-        relaxed = lcpdf.mode(machine, distances, candidates, window)
+    if not _stores(options, level):
+        relaxed = nearest(machine, here, field, offsets, grid, candidates, _favour(options))
     else:
-        relaxed = lcpdf.mode_vector(machine, distances, candidates, window)
+        near = neighbourhood(machine, here, field, offsets, grid)  # 6.2.2.1
+        distances = lcpdf.distance(machine, near, candidates)
+        if options.coherence:
+            distances = coherence(machine, distances, candidates, here, field, offsets, grid, _favour(options))
+        density = options.pixel == "density"
+        if relaxation == "gibbs":  # 6.2.2.2
+            relaxed = lcpdf.draw(machine, distances, candidates, here, window, density, run.seed, number, turn)
+        elif run.sample.channels == 1 and window.top == 255:
+            relaxed = lcpdf.mode(machine, distances, candidates, window)
+        else:
+            relaxed = lcpdf.mode_vector(machine, distances, candidates, window)
     cooled = temperature(machine, here, field, offsets, grid, _xi(options))  # 6.2.2.3
     return here, relaxed, cooled
+
+
+def _stores(options: Options, level: _Level) -> bool:
+    """Whether a step takes more of its distances than the least."""
+    return level.relaxation == "gibbs" or options.pixel == "density"
 
 
 def _tell(run: _Run, level: _Level, field: Field, meter: Meter, where: dict[str, Any], last: bool) -> None:
@@ -524,4 +536,4 @@ def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], copi
     pixels, channels = shape[0] * shape[1], sample.channels
     within_32_bits(shape, channels * copies)
     field = copies * (6 + 2 * channels)
-    machine.require(pixels * (8 + field) + sample.rows * sample.cols * (8 * channels + 73))
+    machine.require(pixels * (8 + field) + sample.rows * sample.cols * (12 * channels + 73))
