@@ -130,6 +130,7 @@ def synthesize(
     sample with its margin, and the machine's scratch memory or, if that is more, 65 per candidate. On the host: about
     50 per output pixel.
     """
+    options = options.resolved()
     offsets = neighbourhood_offsets(options.order)
     levels = _number_of_levels(pixels.shape[:2], offsets, shape, options)  # 1
     margin = int(offsets.max()) * 2 ** (levels - 1) if options.edges != "whole" else 0
@@ -210,7 +211,7 @@ def _coherent(run: _Run, level: _Level) -> _Coherent | None:
 
 
 def _favour(options: Options) -> np.float32:
-    return np.float32(1 / (1 + options.coherence))
+    return np.float32(1 / (1 + (options.coherence or 0)))
 
 
 def _xi(options: Options) -> int:
@@ -364,7 +365,7 @@ def _expected_work(run: _Run) -> dict[int, tuple[float, float]]:
         sweeps = min(1024, 1 - 0.6 * len(run.offsets) / options.xi) if coarsest else 6 * 0.75
         candidates = run.sample.positions(run.offsets, grid.spacing, options.phases, options.edges).size
         if options.search == "coherent" and not coarsest:
-            candidates = min(candidates, options.suggesting + 1 + options.chance)
+            candidates = min(candidates, (options.suggesting + 1) * (1 + options.similar) + max(1, options.chance))
         sites = grid.rows * grid.cols * candidates
         work[number] = (sites * sweeps, float(sites * options.free_sweeps))
     return work

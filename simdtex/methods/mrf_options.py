@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Any
 
@@ -24,9 +24,14 @@ PRESETS: dict[str, dict[str, Any]] = {
         "phases": "decimated",
         "edges": "whole",
         "coarsest": "same",
+        "search": "exact",
     },
 }
 """``paper`` keeps the 1998 rules to the letter."""
+
+
+COHERENCE_OF_A_LIST = 0.2
+"""The default of ``coherence`` with coherent search: a list holds little else to weigh against continuing."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +49,9 @@ class Options:
         Take the LCPDF's mode, or draw from it.
     bandwidth : float
         h in units of h_opt, equation (8).
-    coherence : float
-        The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence.
+    coherence : float, optional
+        The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence. None: 1
+        where all candidates are weighed, 0.2 with coherent search.
     xi : float
         xi < 0 of equation (13): the further below 0, the fewer sweeps.
     free_sweeps : int
@@ -73,9 +79,10 @@ class Options:
         active sites instead.
     mapping : {"cut-and-stack", "hierarchical"}
         How a picture larger than the array lies on it.
-    search : {"exact", "coherent"}
+    search : {"auto", "exact", "coherent"}
         Whether a site weighs all candidates of a level, or, at all but the coarsest level, only a few: those that
-        continue the source of a neighbour, its own source, and some more.
+        continue the source of a neighbour, its own source, and some more. ``auto`` is ``coherent`` for
+        ``relaxation="icm"`` with ``pixel="source"``, and ``exact`` where a site draws or takes the mode of a density.
     suggesting : int
         ``coherent``: nearest neighbours whose sources suggest a candidate each.
     similar : int
@@ -93,7 +100,7 @@ class Options:
     levels: int | None = None
     relaxation: str = "icm"
     bandwidth: float = 0.15
-    coherence: float = 1.0
+    coherence: float | None = None
     xi: float = -1.0
     free_sweeps: int = 2
     pixel: str = "source"
@@ -105,7 +112,7 @@ class Options:
     boundary: str = "torus"
     array: str | None = None
     mapping: str = "cut-and-stack"
-    search: str = "exact"
+    search: str = "auto"
     suggesting: int = 24
     similar: int = 0
     chance: int = 4
@@ -119,7 +126,8 @@ class Options:
             whole("levels", self.levels, 1)
         one_of("relaxation", self.relaxation, ("icm", "gibbs"))
         real("bandwidth", self.bandwidth, 0, above=True)
-        real("coherence", self.coherence, 0)
+        if self.coherence is not None:
+            real("coherence", self.coherence, 0)
         real("xi", self.xi, -inf)
         if self.xi >= 0:
             raise ValueError(f"xi is {self.xi}; give a number below 0")
@@ -129,7 +137,7 @@ class Options:
         one_of("edges", self.edges, ("auto", "reflect", "whole"))
         one_of("coarsest", self.coarsest, ("gibbs", "same"))
         one_of("boundary", self.boundary, ("torus", "open"))
-        one_of("search", self.search, ("exact", "coherent"))
+        one_of("search", self.search, ("auto", "exact", "coherent"))
         whole("suggesting", self.suggesting, 1)
         whole("similar", self.similar, 0)
         whole("chance", self.chance, 0)
@@ -143,6 +151,13 @@ class Options:
         true_or_false("check_schedule", self.check_schedule)
         parse_array(self.array or "1x1", self.mapping)
         true_or_false("emulate", self.emulate)
+
+    def resolved(self) -> Options:
+        """The same with what ``search="auto"`` and ``coherence=None`` stand for."""
+        nearest = (self.relaxation, self.pixel) == ("icm", "source")
+        search = ("coherent" if nearest else "exact") if self.search == "auto" else self.search
+        usual = COHERENCE_OF_A_LIST if search == "coherent" else 1.0
+        return replace(self, search=search, coherence=usual if self.coherence is None else self.coherence)
 
 
 def make_options(preset: str = "default", **given: Any) -> Options:
