@@ -290,8 +290,8 @@ def compare(
     emulate : bool
         Whether they are executed as on that array too, which takes longer and gives the same pictures.
     **options
-        Of the method ``mrf``, see `simdtex.methods.mrf.Options`; ``preset`` too. ``search`` is ``"exact"`` unless given:
-        a schedule is judged by the model, not by a list of candidates.
+        Of the method ``mrf``, see `simdtex.methods.mrf.Options`; ``preset`` too. ``search`` is ``"exact"`` unless
+        given: a schedule is judged by the model, not by a list of candidates.
 
     Returns
     -------
