@@ -125,12 +125,14 @@ def _launch(
     seed: int,
 ) -> Sampled:
     levels, features = structure.threshold.shape
-    above = (np.int32(level), np.int32(levels - 1), np.int32(match))
-    pyramids = (structure.lattice, structure.features, structure.threshold, sampled.lattice)
-    pixels = (np.int32(first), np.int32(end), sampled.source, sampled.counts)
-    for name, key in (("candidates_count", ()), ("candidates_draw", (np.uint64(seed),))):
-        kernel = machine.kernel("candidates", name, FEATURES=features)
-        machine.launch(kernel, (end - first,), *key, *above, *pyramids, *pixels)
+    items = -(-(end - first) // 4)  # one for four siblings; where these are fewer, an item takes several
+    machine.launch(
+        machine.kernel("candidates", "candidates", FEATURES=features),
+        (items,),
+        *(np.uint64(seed), np.int32(level), np.int32(levels - 1), np.int32(match)),
+        *(structure.lattice, structure.features, structure.threshold, sampled.lattice),
+        *(np.int32(first), np.int32(end), np.int32(items), sampled.source, sampled.counts),
+    )
     return sampled
 
 
