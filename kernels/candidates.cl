@@ -36,65 +36,82 @@ typedef struct {
 
 typedef struct {
     int level, row, col;
-} Node;
+    uchar left[MOST]; // of each level, which of the siblings here pass and are still to be visited, a bit for each
+} Place;
 
-// Whether some component of a stretch of the features differs by more than its threshold.
-#define DIFFERS(WIDTH, from)                                                                                           \
-    any(abs_diff(vload##WIDTH(0, u + (from)), vload##WIDTH(0, v + (from))) > vload##WIDTH(0, most + (from)))
-
-// Equations (9) to (11) for the features of one level: no component differs by more than its threshold.
-inline bool similar(const Parents *own, const Node at)
+// Equations (9) to (11) for the features of one level: no component differs by more than its threshold. Of four nodes
+// at a time, a bit for each, to the end: that is quicker than a branch for each feature.
+inline uint similar(const Parents *own, const int level, const int4 node)
 {
-    const int4 lattice = own->analysis[at.level];
-    __global const int *u = own->features + (lattice.z + at.row * lattice.y + at.col) * FEATURES;
-    __global const int *v = own->features + own->own[at.level] * FEATURES;
-    __global const uint *most = own->threshold + at.level * FEATURES;
-#if FEATURES >= 8
-    for (int m = 0; m < FEATURES - 8; m += 8)
-        if (DIFFERS(8, m))
-            return false;
-    return !DIFFERS(8, FEATURES - 8); // with some of the stretch before
-#else
+    __global const int *a = own->features + node.x * FEATURES, *b = own->features + node.y * FEATURES;
+    __global const int *c = own->features + node.z * FEATURES, *d = own->features + node.w * FEATURES;
+    __global const int *v = own->features + own->own[level] * FEATURES;
+    __global const uint *most = own->threshold + level * FEATURES;
+    uint fails = 0;
     for (int m = 0; m < FEATURES; ++m)
-        if (abs_diff(u[m], v[m]) > most[m])
-            return false;
-    return true;
-#endif
+        fails |= (abs_diff(a[m], v[m]) > most[m]) | (abs_diff(b[m], v[m]) > most[m]) << 1 |
+                 (abs_diff(c[m], v[m]) > most[m]) << 2 | (abs_diff(d[m], v[m]) > most[m]) << 3;
+    return ~fails & 15;
 }
 
-// On to the next sibling, or to that of the nearest ancestor that has one; false at the end. All nodes of the top are
-// siblings.
-inline bool on(const Parents *own, Node *at)
+// Which of the siblings at a place pass, row by row.
+inline uint siblings(const Parents *own, const int level, const int row, const int col, int *compared)
 {
-    for (; at->level < own->top; ++at->level, at->row /= 2, at->col /= 2) {
-        const int4 lattice = own->analysis[at->level];
-        const bool next_col = !(at->col & 1) && at->col + 1 < lattice.y;
-        if (next_col || (!(at->row & 1) && at->row + 1 < lattice.x)) {
-            at->row += !next_col;
-            at->col = next_col ? at->col + 1 : at->col & ~1;
-            return true;
-        }
-    }
-    const int4 lattice = own->analysis[own->top];
-    if (++at->col == lattice.y) {
-        at->col = 0;
-        ++at->row;
-    }
-    return at->row < lattice.x;
+    const int4 lattice = own->analysis[level];
+    const int first = lattice.z + (row & ~1) * lattice.y + (col & ~1);
+    const int right = (col | 1) < lattice.y, below = (row | 1) < lattice.x; // else there is none, and a bit is dropped
+    const int4 node = first + (int4)(0, right, below * lattice.y, below * lattice.y + right);
+    *compared += (1 + right) * (1 + below);
+    return similar(own, level, node) & (right ? 15 : 5) & (below ? 15 : 3);
 }
 
-// From a node on, to one that passes where the scan stops, and false if there is none. Goes through the nodes from the
+// From a place on to the next node that passes where the scan stops, and false if there is none. The scan goes from the
 // top down. Parents are compared before their children, so one that fails rejects all that is below it.
-inline bool passing(const Parents *own, Node *at, int *compared)
+inline bool next(const Parents *own, Place *at, int *compared)
 {
-    do {
-        for (++*compared; similar(own, *at); ++*compared) {
-            if (at->level == own->stop)
-                return true;
-            *at = (Node){at->level - 1, 2 * at->row, 2 * at->col}; // the first child
+    for (;;) {
+        if (at->level == own->top) { // whose nodes are siblings
+            const int4 lattice = own->analysis[own->top];
+            if (++at->col == lattice.y) {
+                at->col = 0;
+                ++at->row;
+            }
+            if (at->row == lattice.x)
+                return false;
+            ++*compared;
+            if (!similar(own, at->level, (int4)(lattice.z + at->row * lattice.y + at->col)))
+                continue;
+        } else {
+            const uint left = at->left[at->level];
+            if (!left) { // back to the parent
+                ++at->level;
+                at->row /= 2;
+                at->col /= 2;
+                continue;
+            }
+            const int child = popcount((left & -left) - 1); // the first
+            at->left[at->level] = left & (left - 1);
+            at->row = (at->row & ~1) + child / 2;
+            at->col = (at->col & ~1) + child % 2;
         }
-    } while (on(own, at));
-    return false;
+        if (at->level == own->stop)
+            return true;
+        --at->level; // on to the children
+        at->row *= 2;
+        at->col *= 2;
+        at->left[at->level] = siblings(own, at->level, at->row, at->col, compared);
+    }
+}
+
+// To a node where the scan stops, as if it had come there from the beginning.
+inline void resume(const Parents *own, Place *at, const int2 node)
+{
+    int ignored;
+    at->level = own->stop;
+    at->row = node.x;
+    at->col = node.y;
+    for (int k = own->stop, r = node.x, c = node.y; k < own->top; ++k, r /= 2, c /= 2)
+        at->left[k] = siblings(own, k, r, c, &ignored) & (14 << 2 * (r & 1) + (c & 1));
 }
 
 // How many of a level's rows, or columns, are `down` levels below number k.
@@ -159,10 +176,10 @@ __kernel void candidates(const ulong seed, const int level, const int top, const
         const int i = a / parents.x * tile.x + a % parents.x * 2, j = b / parents.y * tile.y + b % parents.y * 2;
         find_parents(&own, synthesis, source, match, i, j);
 
-        Node at = {top, 0, 0}, noted[NOTES];
+        Place at = {top, 0, -1};
+        int2 noted[NOTES];
         int before[NOTES], notes = 0, stride = 1, seen = 0, count = 0, compared = 0;
-        for (bool more = passing(&own, &at, &compared); more;
-             more = on(&own, &at) && passing(&own, &at, &compared)) {
+        while (next(&own, &at, &compared)) {
             for (int k = level + 1; k < own.stop; ++k)
                 compared += beneath(at.row, own.stop - k, analysis[k].x) * beneath(at.col, own.stop - k, analysis[k].y);
             const int found = candidates_below(&own, at.row, at.col, own.down);
@@ -176,7 +193,7 @@ __kernel void candidates(const ulong seed, const int level, const int top, const
                     }
                     stride *= 2;
                 }
-                noted[notes] = at;
+                noted[notes] = (int2)(at.row, at.col);
                 before[notes++] = count;
             }
             count += found;
@@ -195,19 +212,21 @@ __kernel void candidates(const ulong seed, const int level, const int top, const
             }
             while (before[note] > wanted)
                 --note;
-            at = noted[note];
+            int row = noted[note].x, col = noted[note].y, found = candidates_below(&own, row, col, own.down);
             wanted -= before[note];
-            for (int found = candidates_below(&own, at.row, at.col, own.down); wanted >= found;
-                 found = candidates_below(&own, at.row, at.col, own.down)) {
+            if (wanted >= found)
+                resume(&own, &at, noted[note]);
+            while (wanted >= found) {
                 wanted -= found;
-                on(&own, &at);
-                passing(&own, &at, &ignored);
+                next(&own, &at, &ignored);
+                row = at.row;
+                col = at.col;
+                found = candidates_below(&own, row, col, own.down);
             }
-            int row = at.row, col = at.col;
             for (int above = own.down - 1; above >= 0; --above) // on to the leaf
                 for (int child = 0;; ++child) {
                     const int r = 2 * row + child / 2, c = 2 * col + child % 2;
-                    const int found = candidates_below(&own, r, c, above);
+                    found = candidates_below(&own, r, c, above);
                     if (wanted < found) {
                         row = r;
                         col = c;

@@ -8,9 +8,9 @@
 inline uint4 philox(uint4 counter, uint2 key)
 {
     for (int round = 0; round < 10; ++round) {
-        const uint hi0 = mul_hi(0xD2511F53u, counter.x), lo0 = 0xD2511F53u * counter.x;
-        const uint hi1 = mul_hi(0xCD9E8D57u, counter.z), lo1 = 0xCD9E8D57u * counter.z;
-        counter = (uint4)(hi1 ^ counter.y ^ key.x, lo1, hi0 ^ counter.w ^ key.y, lo0);
+        const ulong even = 0xD2511F53ul * counter.x, odd = 0xCD9E8D57ul * counter.z; // PoCL's mul_hi is in halves
+        counter = (uint4)((uint)(odd >> 32) ^ counter.y ^ key.x, (uint)odd, (uint)(even >> 32) ^ counter.w ^ key.y,
+                          (uint)even);
         key += (uint2)(0x9E3779B9u, 0xBB67AE85u);
     }
     return counter;
