@@ -3,12 +3,13 @@
 // Histogram matching by rank in one launch: what sort.cl and matching_ranks do, one work-item per segment. The values of
 // a segment, less the smallest, are sorted by 11 bits in each of one to three passes, lowest first, as many as their
 // range asks for. All passes are stable, so equal values come in the order `first`. In the last pass a value's place is
-// its rank k, and it becomes the target's of rank (2 k + 1) m / (2 n), rounded down.
+// its rank k, and it becomes the target's of rank (2 k + 1) m / (2 n), rounded down: k m / n where m divides n.
 //
 // values, out (segments, n); first (n,); targets (T, m) sorted, `each` segments in a row with the same one
 // pairs (2, pieces, n) (key, index in the segment); counts (pieces, 3, 2048); moved (segments,) sums of |value - out|
 // A piece is one of the segments from `begin` on that are worked on in this launch.
 #define BITS 11
+#define INDEX (32 - BITS) // bits
 #define DIGITS (1 << BITS)
 
 __kernel void ranking(__global const int *restrict values, const int begin, __global const int *restrict first,
@@ -47,27 +48,42 @@ __kernel void ranking(__global const int *restrict values, const int begin, __gl
             sum += own;
         }
 
-    const int times = n % m ? 0 : n / m; // (2 k + 1) m / (2 n) is then k / times
-    long sum = 0;
-    for (int pass = 0; pass < passes; ++pass) {
-        __global uint *place = count + pass * DIGITS;
-        __global const uint2 *from = pairs + ((size_t)(pass & 1) * pieces + piece) * n;
-        __global uint2 *into = pairs + ((size_t)(1 - (pass & 1)) * pieces + piece) * n;
-        const int shift = pass * BITS, last = pass == passes - 1;
+    const int times = n % m ? 0 : n / m;
+#define RANKED(k) target[times ? (k) / (uint)max(1, times) : (uint)((2ul * (k) + 1) * m / (2ul * n))]
+    if (passes < 3 && n <= 1 << INDEX) { // what is left of a key after the first pass, and the index, in one word
+        __global uint *words = (__global uint *)(pairs + (size_t)piece * n);
         for (int i = 0; i < n; ++i) {
-            uint2 pair;
-            if (pass)
-                pair = from[i];
-            else
-                pair = (uint2)((uint)v[first[i]] - (uint)low, first[i]);
-            const uint k = place[(pair.x >> shift) % DIGITS]++;
-            if (last) {
-                const int after = target[times ? k / (uint)max(1, times) : (uint)((2ul * k + 1) * m / (2ul * n))];
-                to[pair.y] = after;
-                sum += abs_diff(after, (int)(pair.x + (uint)low));
-            } else
-                into[k] = pair;
+            const uint index = first[i], key = (uint)v[index] - (uint)low;
+            words[count[key % DIGITS]++] = key >> BITS << INDEX | index;
+        }
+        if (passes == 1)
+            count[DIGITS] = 0; // all are left in one bin
+        for (int i = 0; i < n; ++i) {
+            const uint k = count[DIGITS + (words[i] >> INDEX)]++;
+            to[words[i] % (1 << INDEX)] = RANKED(k);
+        }
+    } else {
+        for (int pass = 0; pass < passes; ++pass) {
+            __global uint *place = count + pass * DIGITS;
+            __global const uint2 *from = pairs + ((size_t)(pass & 1) * pieces + piece) * n;
+            __global uint2 *into = pairs + ((size_t)(1 - (pass & 1)) * pieces + piece) * n;
+            const int shift = pass * BITS, last = pass == passes - 1;
+            for (int i = 0; i < n; ++i) {
+                uint2 pair;
+                if (pass)
+                    pair = from[i];
+                else
+                    pair = (uint2)((uint)v[first[i]] - (uint)low, first[i]);
+                const uint k = place[(pair.x >> shift) % DIGITS]++;
+                if (last)
+                    to[pair.y] = RANKED(k);
+                else
+                    into[k] = pair;
+            }
         }
     }
+    long sum = 0;
+    for (int i = 0; i < n; ++i)
+        sum += abs_diff(v[i], to[i]);
     moved[segment] = sum;
 }

@@ -186,7 +186,9 @@ def suggest_alpha(machine: Machine, analysis: Analysis, options: Options) -> flo
     -----
     Cost: eight or nine scans of at most 4096 pixels of each of these levels.
     """
-    itself = _sampled(machine, analysis.shapes, [np.arange(pixels([shape]), dtype=np.int32) for shape in analysis.shapes])
+    itself = _sampled(
+        machine, analysis.shapes, [np.arange(pixels([shape]), dtype=np.int32) for shape in analysis.shapes]
+    )
     low, high = 0, MOST * STEPS
     while high - low > 1:  # candidates only grow with alpha
         middle = (low + high) // 2
@@ -195,9 +197,7 @@ def suggest_alpha(machine: Machine, analysis: Analysis, options: Options) -> flo
     return high / STEPS
 
 
-def _mean_candidates(
-    machine: Machine, analysis: Analysis, itself: Sampled, options: Options, alpha: float
-) -> float:
+def _mean_candidates(machine: Machine, analysis: Analysis, itself: Sampled, options: Options, alpha: float) -> float:
     structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
     means = []
     for level in range((analysis.levels - 1) // 2, analysis.levels - 1):

@@ -15,8 +15,8 @@ from simdtex.ops.sort import SCRATCH, local, sort
 if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
 
-DIGITS = 3 * 2**11
-"""Counters of a segment: of 11 bits in each of three passes."""
+COUNTERS = 3 * 2**11
+"""Of a segment: for 11 bits in each of three passes."""
 
 SHORT, LONG = 2**15, 2**22
 """Values of a segment that one work-item sorts where there are few of them, and where there are many."""
@@ -45,8 +45,8 @@ def _launch(machine: OpenCL, values: Array, first: Array, targets: Array) -> tup
         matched = match_ranks.launch(machine, sort.launch(machine, values, first), targets)
         return matched, distance.launch(machine, values, matched)
     each, m = each_of(segments, targets.shape[0]), targets.shape[1]
-    most = min(segments, max(1, SCRATCH // max(n, DIGITS)))
-    pairs, counts = machine.empty((2, most, n, 2), np.uint32), machine.empty((most, DIGITS), np.uint32)
+    most = min(segments, max(1, SCRATCH // max(n, COUNTERS // 2)))
+    pairs, counts = machine.empty((2, most, n, 2), np.uint32), machine.empty((most, COUNTERS), np.uint32)
     matched, moved = machine.empty((segments, n), np.int32), machine.empty((segments,), np.int64)
     kernel = machine.kernel("ranking", "ranking")
     for begin in range(0, segments, most):
