@@ -146,10 +146,11 @@ def _launch(
 
 
 candidates = Operation("candidates", _reference, _launch)
-"""``candidates(machine, structure, sampled, level, first, end, match, seed, draw=True)``: pixels first .. end-1 of a level.
+"""``candidates(machine, structure, sampled, level, first, end, match, seed, draw=True)``: pixels first .. end-1.
 
-``sampled`` is changed in place; without ``draw`` only its counts. With ``match`` a candidate stands where the pixel does among its siblings, in an even
-or odd row and column, and below a node that stands for as many pixels of the sample as the pixel's parent does, which
-those at its edge may not; else any child of a node that passes is one. Cost: at most nodes x M comparisons for four pixels,
-and half a dozen times fewer for each to draw it where there are more than 32 candidates; 12 bytes of memory a pixel.
+``sampled`` is changed in place; without ``draw`` only its counts. With ``match`` a candidate stands where the pixel
+does among its siblings, in an even or odd row and column, and below a node that stands for as many pixels of the sample
+as the pixel's parent does, which those at its edge may not; else any child of a node that passes is one. Cost: at most
+nodes x M comparisons for four pixels, and about a sixteenth of that more for each that is drawn from many candidates;
+12 bytes of memory a pixel.
 """
