@@ -55,7 +55,7 @@ def inverse_cdf(sorted_values: NDArray[np.int32], bins: int = BINS) -> NDArray[n
     return np.array(table, np.int32)
 
 
-def _each(segments: int, targets: int) -> int:
+def each_of(segments: int, targets: int) -> int:
     """Segments that share a target."""
     if segments % targets:
         raise ValueError(f"{segments} segments cannot share {targets} targets evenly")
@@ -72,13 +72,13 @@ def _ranks(order: NDArray[np.int32], targets: NDArray[np.int32]) -> NDArray[np.i
     (segments, n), m = order.shape, targets.shape[1]
     rank = (2 * np.arange(n, dtype=np.int64) + 1) * m // (2 * n)
     values = np.empty_like(order)
-    np.put_along_axis(values, order, targets[:, rank].repeat(_each(segments, len(targets)), 0), 1)
+    np.put_along_axis(values, order, targets[:, rank].repeat(each_of(segments, len(targets)), 0), 1)
     return values
 
 
 def _launch_ranks(machine: OpenCL, order: Array, targets: Array) -> Array:
     (segments, n), m = order.shape, targets.shape[1]
-    each = _each(segments, targets.shape[0])
+    each = each_of(segments, targets.shape[0])
     values = machine.empty(order.shape, np.int32)
     machine.launch(
         machine.kernel("matching", "matching_ranks"),
@@ -90,7 +90,7 @@ def _launch_ranks(machine: OpenCL, order: Array, targets: Array) -> Array:
 
 def _lookup(values: NDArray[np.int32], tables: NDArray[np.int32]) -> NDArray[np.int32]:
     (segments, n), bins = values.shape, tables.shape[1] - 1
-    each = _each(segments, len(tables))
+    each = each_of(segments, len(tables))
     result = np.empty_like(values)
     for segment, own in enumerate(values.astype(np.int64)):
         table = tables[segment // each].astype(np.int64)
@@ -109,7 +109,7 @@ def _lookup(values: NDArray[np.int32], tables: NDArray[np.int32]) -> NDArray[np.
 
 def _launch_lookup(machine: OpenCL, values: Array, tables: Array) -> Array:
     (segments, n), bins = values.shape, tables.shape[1] - 1
-    each = _each(segments, tables.shape[0])
+    each = each_of(segments, tables.shape[0])
     runs, shape = _runs(machine, segments, n, bins)
     ranges, spans = machine.empty((segments, runs, 2), np.int32), machine.empty((segments, 2), np.int32)
     counts, cdf = machine.empty((segments, runs, bins), np.uint32), machine.empty((segments, bins + 1), np.uint32)

@@ -24,7 +24,7 @@ def _launch(machine: OpenCL, planes: int, n: int, seed: int, level: int) -> Arra
     values = machine.empty((planes, n), np.int32)
     machine.launch(
         machine.kernel("noise", "noise"),
-        (n, -(-planes // 4)),
+        (-(-n // 8), -(-planes // 4)),
         *(np.uint64(seed), np.int32(level), np.int32(planes), np.int32(n), values),
     )
     return values
