@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.ops.laplacian import within
-from simdtex.ops.operation import Array, Operation
+from simdtex.ops.operation import Array, Operation, Work
 
 if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
@@ -105,12 +105,16 @@ def _launch_split(machine: OpenCL, picture: Array, taps: Array, torus: bool, ste
             pad,
             (height * step * pitch // v, together),
             *(picture, *_sizes(*size, torus, side // 2, first, step * first_row, together, height, pitch), padded),
+            work=Work(None, 8.0 * together * height * step * pitch),
         )
         machine.launch(
             split,
             (_up(some, unit) // unit * across // v, together),
             *(padded, *_sizes(together, height, pitch), taps, *_sizes(side, planes, rows, cols)),
             *(*_sizes(first, first_row, some), bands),
+            work=Work(
+                together * some * cols * taps.size, 4.0 * together * (height * step * pitch + some * cols * count)
+            ),
         )
     return bands
 
@@ -142,6 +146,7 @@ def _launch_join(
                 (height * pitch // v, together),
                 *(bands, *_sizes(rows, cols, torus, own // 2, f * planes + first, first_row, together, height, pitch)),
                 padded,
+                work=Work(None, 4.0 * together * height * pitch * (1 + 1 / step**2)),
             )
             machine.launch(
                 join,
@@ -149,6 +154,7 @@ def _launch_join(
                 *(padded, *_sizes(together, height, pitch), taps, *_sizes(f, own, skip)),
                 *_sizes((number, f) == order[0], (number, f) == order[-1]),
                 *(total, *_sizes(rows, cols, first, first_row, some), picture),
+                work=Work(together * some * cols * own**2 / skip, 4.0 * together * (height * pitch + some * across)),
             )
     return picture
 
