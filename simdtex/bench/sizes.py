@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Which jobs a benchmark runs, and how large they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+from simdtex.bench.cases import Case, searches
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """The cases of a benchmark; the option ``search`` of ``mrf`` is filled in where the method has it.
+
+    Parameters
+    ----------
+    name : str
+    repeats : int
+        Timed runs of each case, the fastest of which counts.
+    seconds : float
+        How long about each limit is measured, at each vector width.
+    jobs : tuple of Case
+        Whole jobs, on the devices; of ``mrf`` their steps too.
+    library : tuple of Case
+        Those of them that the machine of library code does.
+    reference : tuple of Case
+        Jobs of sizes that the NumPy reference can do; the devices do them too.
+    growth : dict
+        What grows, with its unit -> cases in which nothing else does.
+    """
+
+    name: str
+    repeats: int
+    seconds: float
+    jobs: tuple[Case, ...]
+    library: tuple[Case, ...]
+    reference: tuple[Case, ...]
+    growth: dict[str, tuple[Case, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check that what the library does is among the jobs."""
+        if not set(self.library) <= {*self.jobs, *self.reference}:
+            raise ValueError("a case of the library is no job of the devices")
+
+    @property
+    def cases(self) -> list[Case]:
+        """Every case that a device does, once, for every search."""
+        every = [*self.jobs, *self.reference, *(case for cases in self.growth.values() for case in cases)]
+        return list(dict.fromkeys(with_searches(every)))
+
+
+def with_searches(cases: list[Case] | tuple[Case, ...]) -> list[Case]:
+    """The same cases, those of ``mrf`` once for every value of the option ``search``."""
+    return [
+        replace(case, search=search) if case.method == "mrf" else case
+        for case in cases
+        for search in (searches() if case.method == "mrf" else ("",))
+    ]
+
+
+def _growing(methods: str, **cases: tuple[Case, ...]) -> dict[str, tuple[Case, ...]]:
+    return {f"{methods}: {what.replace('_', ' ')}": own for what, own in cases.items()}
+
+
+def _growth(
+    order: int, sample: int, outputs: tuple[int, ...], samples: tuple[int, ...], orders: tuple[int, ...], large: int
+) -> dict[str, tuple[Case, ...]]:
+    """Growth of ``mrf`` with output, sample and order, and of the others with the output, `large` times as large."""
+    others = {
+        f"{method}: output pixels": tuple(Case(method, sample, large * n) for n in outputs)
+        for method in ("multires", "pyramid")
+    }
+    return _growing(
+        "mrf",
+        output_pixels=tuple(Case("mrf", sample, n, order) for n in outputs),
+        sample_pixels=tuple(Case("mrf", n, outputs[0], order) for n in samples),
+        neighbours=tuple(Case("mrf", sample, outputs[0], n) for n in orders),
+    ) | {**others, "solid: voxels": tuple(Case("solid", sample, n // 2) for n in outputs)}
+
+
+_QUICK_JOBS = (
+    *(Case("mrf", 64, 64, order) for order in (8, 18, 32)),
+    Case("multires", 64, 128),
+    Case("pyramid", 64, 128),
+    Case("solid", 64, 32),
+)
+
+QUICK = Sizes(
+    "quick",
+    repeats=2,
+    seconds=0.15,
+    jobs=_QUICK_JOBS,
+    library=_QUICK_JOBS,
+    reference=(Case("mrf", 32, 32, 8), Case("multires", 32, 64), Case("pyramid", 64, 64), Case("solid", 32, 16)),
+    growth=_growth(8, 64, (32, 48, 64), (32, 48, 64), (8, 18, 32), 2),
+)
+
+_FULL_JOBS = (
+    *(Case("mrf", 128, 256, order) for order in (8, 18, 32)),
+    Case("multires", 256, 1024),
+    Case("pyramid", 256, 1024),
+    Case("solid", 128, 64),
+)
+
+FULL = Sizes(
+    "full",
+    repeats=3,
+    seconds=0.5,
+    jobs=_FULL_JOBS,
+    library=_FULL_JOBS,
+    reference=(
+        *(Case("mrf", 32, 32, order) for order in (8, 18)),
+        Case("multires", 64, 128),
+        Case("pyramid", 128, 256),
+        Case("solid", 64, 32),
+    ),
+    growth=_growth(8, 128, (64, 128, 256), (48, 64, 96, 128), (2, 8, 18, 32), 4),
+)
