@@ -76,8 +76,8 @@ def picture(side: int) -> NDArray[np.uint8]:
     """The sample."""
     from skimage import data
 
-    whole: NDArray[np.uint8] = data.gravel()
-    return np.ascontiguousarray(whole[:side, :side])
+    read: Any = data.gravel
+    return np.ascontiguousarray(read()[:side, :side])
 
 
 def brute_force(case: Case, relaxations: list[int]) -> list[float]:
@@ -135,7 +135,8 @@ def once(machine: Machine, case: Case) -> dict[str, Any]:
     all temperatures are 0: dicts with ``seconds``, ``busy`` (of kernels, 0 where not measured), ``relaxations`` and
     ``brute_force``, the multiply-adds that weighing every candidate takes.
     """
-    sample, given = picture(case.sample), {"rng": 1, "device": machine, "full_output": True}
+    sample = picture(case.sample)
+    given: dict[str, Any] = {"rng": 1, "device": machine, "full_output": True}
     if case.method == "solid":
         return dict(synthesize_solid(sample, (case.output,) * 3, **given)[1].statistics)
     sweeps = _Sweeps(machine) if case.method == "mrf" else None
@@ -170,8 +171,8 @@ def measure(machine: Machine, case: Case, repeats: int = 1, budget: float = 3.0)
     machine : Machine
     case : Case
     repeats : int
-        Timed runs at most, beside one with profiling before them, which compiles the kernels; where the machine times
-        no kernels there is nothing to warm up.
+        Timed runs at most. Where the machine times kernels, a profiled run comes before them and compiles the kernels;
+        elsewhere there is nothing to warm up.
     budget : float
         Seconds after which no other run begins.
 
@@ -182,24 +183,21 @@ def measure(machine: Machine, case: Case, repeats: int = 1, budget: float = 3.0)
         `simdtex.machine.log.Log.take`, of the profiled one (None where not measured); ``fma``, what the run says it
         did; ``brute_force`` and ``phases``, see `once`.
     """
-    profiled = machine.seconds is not None
-    found: dict[str, Any] = once(machine, case)
-    seconds = [] if profiled else [found["seconds"]]
-    phases = found.get("phases")
+    profiled = once(machine, case) if machine.seconds is not None else {}
+    runs: list[dict[str, Any]] = []
     began = perf_counter()
     with untimed(machine):
-        while not seconds or (profiled and len(seconds) < repeats and perf_counter() - began < budget):
-            run = once(machine, case)
-            if not seconds or run["seconds"] < min(seconds):
-                for name in phases or ():
-                    phases[name]["seconds"] = run["phases"][name]["seconds"]
-            seconds.append(run["seconds"])
-    levels = found.get("levels", [])
+        while len(runs) < max(1, repeats) and (not runs or perf_counter() - began < budget):
+            runs.append(once(machine, case))
+    best = min(runs, key=lambda run: float(run["seconds"]))
+    phases = best.get("phases")
+    for name, phase in (phases or {}).items():
+        phase["busy"] = profiled["phases"][name]["busy"] if profiled else None
     return case.as_dict() | {
-        "seconds": min(seconds),
-        "busy": found["device_seconds"],
-        "kernels": found.get("kernels"),
-        "fma": float(sum(level["fma"] for level in levels)) if case.method == "mrf" else None,
-        "brute_force": found.get("brute_force"),
+        "seconds": best["seconds"],
+        "busy": profiled.get("device_seconds"),
+        "kernels": profiled.get("kernels"),
+        "fma": float(sum(level["fma"] for level in best["levels"])) if case.method == "mrf" else None,
+        "brute_force": best.get("brute_force"),
         "phases": phases,
     }

@@ -93,12 +93,11 @@ class Library(Reference):
         rounding. K is N C + N + 1; where all confidences are 1, the last sum is made once and K is N C + 2.
         """
         confidence, weighted, sites = near
-        neighbours, channels, _count = weighted.shape
         middle = np.float32(np.ptp(candidates.pixels) / 2)
         u = confidence[:, :sites]
         xu = weighted[:, :, :sites] - middle * u[:, None]
         cold = bool((u == 1).all())
-        own = np.float32((xu * xu).sum((0, 1)))
+        own: NDArray[np.float32] = (xu * xu).sum((0, 1))
         squares = np.ones((1, sites), np.float32) if cold else u * u
         left = np.concatenate([(xu * u[:, None] * np.float32(-2)).reshape(-1, sites), squares, own[None]])
         left = np.ascontiguousarray(left.T)
@@ -225,12 +224,13 @@ class Library(Reference):
     def split(self, picture: NDArray[np.int32], taps: NDArray[np.float32], torus: bool, step: int) -> NDArray[np.int32]:
         """The bands of a steerable pyramid by FFT."""
         found = self._correlated(picture, taps, torus)[..., ::step, ::step]
-        return np.rint(found).astype(np.int32)
+        return np.asarray(np.rint(found), np.int32)
 
     def join(self, terms: Any, shape: tuple[int, int], torus: bool) -> NDArray[np.int32]:
         """Their sum by FFT; of mirrored pictures, which no synthesis joins, by the twin."""
         if not torus:
-            return steerable_join.reference(terms, shape, torus)
+            whole: NDArray[np.int32] = steerable_join.reference(terms, shape, torus)
+            return whole
         total: Any = np.complex64(0)
         for bands, taps, step in terms:
             responses = self._response(taps, shape)
@@ -238,7 +238,7 @@ class Library(Reference):
                 spread = np.zeros((len(band), *shape), np.float32)
                 spread[:, ::step, ::step] = band
                 total = total + scipy.fft.rfft2(spread, workers=self.threads) * np.conj(response)
-        return np.rint(scipy.fft.irfft2(total, s=shape, workers=self.threads)).astype(np.int32)
+        return np.asarray(np.rint(scipy.fft.irfft2(total, s=shape, workers=self.threads)), np.int32)
 
     def _correlated(self, picture: NDArray[Any], taps: NDArray[Any], torus: bool) -> NDArray[np.float32]:
         """A picture (planes, rows, cols) correlated with each of the taps, (count, planes, rows, cols)."""
@@ -268,4 +268,4 @@ class Library(Reference):
 
     def sort(self, values: NDArray[np.int32], first: NDArray[np.int32]) -> NDArray[np.int32]:
         """NumPy's fastest sort; equal values come in any order."""
-        return np.argsort(values, axis=1).astype(np.int32)
+        return np.asarray(np.argsort(values, axis=1), np.int32)

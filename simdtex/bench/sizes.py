@@ -26,7 +26,7 @@ class Sizes:
     reference : tuple of Case
         Jobs of sizes that the NumPy reference can do; the devices do them too.
     growth : dict
-        What grows, with its unit -> cases in which nothing else does.
+        Method and what grows, ``"mrf: output pixels"`` -> cases in which nothing else does.
     """
 
     name: str
@@ -58,24 +58,18 @@ def with_searches(cases: list[Case] | tuple[Case, ...]) -> list[Case]:
     ]
 
 
-def _growing(methods: str, **cases: tuple[Case, ...]) -> dict[str, tuple[Case, ...]]:
-    return {f"{methods}: {what.replace('_', ' ')}": own for what, own in cases.items()}
-
-
 def _growth(
     order: int, sample: int, outputs: tuple[int, ...], samples: tuple[int, ...], orders: tuple[int, ...], large: int
 ) -> dict[str, tuple[Case, ...]]:
     """Growth of ``mrf`` with output, sample and order, and of the others with the output, `large` times as large."""
-    others = {
-        f"{method}: output pixels": tuple(Case(method, sample, large * n) for n in outputs)
-        for method in ("multires", "pyramid")
+    return {
+        "mrf: output pixels": tuple(Case("mrf", sample, n, order) for n in outputs),
+        "mrf: sample pixels": tuple(Case("mrf", n, outputs[0], order) for n in samples),
+        "mrf: neighbours": tuple(Case("mrf", sample, outputs[0], n) for n in orders),
+        "multires: output pixels": tuple(Case("multires", sample, large * n) for n in outputs),
+        "pyramid: output pixels": tuple(Case("pyramid", sample, large * n) for n in outputs),
+        "solid: voxels": tuple(Case("solid", sample, n // 2) for n in outputs),
     }
-    return _growing(
-        "mrf",
-        output_pixels=tuple(Case("mrf", sample, n, order) for n in outputs),
-        sample_pixels=tuple(Case("mrf", n, outputs[0], order) for n in samples),
-        neighbours=tuple(Case("mrf", sample, outputs[0], n) for n in orders),
-    ) | {**others, "solid: voxels": tuple(Case("solid", sample, n // 2) for n in outputs)}
 
 
 _QUICK_JOBS = (
