@@ -50,6 +50,11 @@ class Case:
         return f"{kind}{order}, {self.sample} -> {self.output}{'^3' if self.method == 'solid' else ''}"
 
     @property
+    def cost(self) -> float:
+        """Roughly how much there is to do, to put the small before the large."""
+        return float(self.sample**2 * self.output**2 * max(1, self.order))
+
+    @property
     def options(self) -> dict[str, Any]:
         """What the method is given."""
         chosen: dict[str, Any] = {"order": self.order} if self.order else {}
@@ -163,6 +168,11 @@ def once(machine: Machine, case: Case) -> dict[str, Any]:
     return statistics
 
 
+def _done(levels: list[dict[str, Any]]) -> float:
+    """Multiply-adds of the distances that were done in a run; ``skipped`` ones were proved to be needless."""
+    return float(sum(level["fma"] - level.get("skipped", 0) for level in levels))
+
+
 def measure(machine: Machine, case: Case, repeats: int = 1, budget: float = 3.0) -> dict[str, Any]:
     """Time a case.
 
@@ -174,18 +184,18 @@ def measure(machine: Machine, case: Case, repeats: int = 1, budget: float = 3.0)
         Timed runs at most. Where the machine times kernels, a profiled run comes before them and compiles the kernels;
         elsewhere there is nothing to warm up.
     budget : float
-        Seconds after which no other run begins.
+        Seconds after which no other run begins. A profiled run that took longer is the only one.
 
     Returns
     -------
     dict
         The `Case`, and ``seconds``, of the fastest run; ``busy``, seconds in kernels, and ``kernels`` of
         `simdtex.machine.log.Log.take`, of the profiled one (None where not measured); ``fma``, what the run says it
-        did; ``brute_force`` and ``phases``, see `once`.
+        did, of ``mrf``; ``brute_force`` and ``phases``, see `once`.
     """
     profiled = once(machine, case) if machine.seconds is not None else {}
-    runs: list[dict[str, Any]] = []
-    began = perf_counter()
+    runs = [profiled] if profiled and profiled["seconds"] > budget else []
+    began = perf_counter() - sum(run["seconds"] for run in runs)
     with untimed(machine):
         while len(runs) < max(1, repeats) and (not runs or perf_counter() - began < budget):
             runs.append(once(machine, case))
@@ -197,7 +207,7 @@ def measure(machine: Machine, case: Case, repeats: int = 1, budget: float = 3.0)
         "seconds": best["seconds"],
         "busy": profiled.get("device_seconds"),
         "kernels": profiled.get("kernels"),
-        "fma": float(sum(level["fma"] for level in best["levels"])) if case.method == "mrf" else None,
+        "fma": _done(best["levels"]) if case.method == "mrf" else None,
         "brute_force": best.get("brute_force"),
         "phases": phases,
     }

@@ -40,7 +40,7 @@ def measure_elsewhere(machine: str, threads: int, cases: Sequence[Case]) -> list
 
     Raises
     ------
-    RuntimeError
+    ChildProcessError
         The process failed; with what it said last.
     """
     if not cases:
@@ -59,7 +59,7 @@ def measure_elsewhere(machine: str, threads: int, cases: Sequence[Case]) -> list
     )
     if done.returncode:
         said = done.stderr.strip().splitlines() or ["nothing"]
-        raise RuntimeError(f"the process of the {machine} ended with code {done.returncode}; it said: {said[-1]}")
+        raise ChildProcessError(f"the process of the {machine} ended with code {done.returncode}; it said: {said[-1]}")
     found: list[dict[str, Any]] = json.loads(done.stdout)
     return found
 

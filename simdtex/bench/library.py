@@ -22,7 +22,7 @@ from simdtex.ops import lcpdf
 from simdtex.ops.candidates import Sampled, Structure, candidates
 from simdtex.ops.coherence import coherence
 from simdtex.ops.filters import filters
-from simdtex.ops.neighbourhood import Field, Neighbourhoods
+from simdtex.ops.neighbourhood import Field, Neighbourhoods, neighbourhood
 from simdtex.ops.operation import Operation, P, R
 from simdtex.ops.sort import sort
 from simdtex.ops.steerable import steerable_join, steerable_split
@@ -69,10 +69,11 @@ class Library(Reference):
             steerable_join: self.join,
             sort: self.sort,
         }
+        self._named: dict[str, Any] = {"nearest": self.nearest}
 
     def run(self, operation: Operation[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Run the library's way of it, or the twin."""
-        own = self._by.get(operation)
+        own = self._by.get(operation) or self._named.get(operation.name)
         if own is None:
             return super().run(operation, *args, **kwargs)
         self.launches += 1
@@ -80,7 +81,7 @@ class Library(Reference):
         result: R = own(*args, **kwargs)
         return result
 
-    def chunk(self, candidates: int, neighbours: int, channels: int) -> int:
+    def chunk(self, candidates: int, neighbours: int, channels: int, stored: bool = True) -> int:
         """Sites whose distances and neighbourhoods fit the scratch memory."""
         return max(1, self.scratch // (4 * (candidates + 3 * neighbours * (1 + channels))))
 
@@ -144,6 +145,20 @@ class Library(Reference):
         k, s = np.nonzero(inside & relaxed & (p >= 0))
         distances.distance[p[k, s], s] *= favour  # one that is proposed twice is written twice, with the same value
         return distances
+
+    def nearest(
+        self,
+        sites: NDArray[np.int32],
+        field: Field,
+        offsets: NDArray[np.int32],
+        grid: Grid,
+        candidates: Candidates,
+        favour: np.float32,
+    ) -> lcpdf.Relaxed:
+        """A step of ICM over sample positions as one operation: the nearest candidate of every site."""
+        near = neighbourhood.reference(sites, field, offsets, grid)
+        found = self.coherence(self.distance(near, candidates), candidates, sites, field, offsets, grid, favour)
+        return lcpdf.best.reference(found, candidates)
 
     # -- multires -------------------------------------------------------------------------------------------
 

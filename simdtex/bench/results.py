@@ -65,6 +65,24 @@ def _against(results: dict[str, Any], entry: dict[str, Any], case: dict[str, Any
     ]
 
 
+def _shown(entry: dict[str, Any]) -> list[dict[str, Any]]:
+    """The cases of a device that are jobs, in the order in which they were asked for."""
+    by_name = {case["name"]: case for case in entry["cases"]}
+    return [by_name[name] for name in entry["jobs"]]
+
+
+def stated(kernels: list[dict[str, Any]] | None, what: str) -> float | None:
+    """``"fma"`` or ``"bytes"`` a second of kernels that state them, over the time of all kernels.
+
+    None where those that do not state them took half of the time or more: then the rate would say little.
+    """
+    own = [kernel for kernel in kernels or [] if kernel[what] is not None]
+    total = sum(kernel["seconds"] for kernel in kernels or [])
+    if 2 * sum(kernel["seconds"] for kernel in own) <= total:
+        return None
+    return ratio(sum(kernel[what] for kernel in own), total)
+
+
 def jobs(results: dict[str, Any], entry: dict[str, Any]) -> list[dict[str, Any]]:
     """Whole jobs on one device, one of ``results["devices"]``.
 
@@ -72,16 +90,15 @@ def jobs(results: dict[str, Any], entry: dict[str, Any]) -> list[dict[str, Any]]
     -------
     list of dict
         ``case``, its name; ``seconds``; ``busy``, the share of them in kernels; ``fma_rate``, multiply-adds a second in
-        kernels, as far as launches state them; ``of_peak``, that over the device's peak; ``of_copy``, bytes a second
+        kernels, see `stated`; ``of_peak``, that over the device's peak; ``of_copy``, bytes a second
         over those of a copy; ``effective``, the multiply-adds of weighing every candidate over the wall time over the
         peak; ``reference`` and ``library``, how many times longer these took. None is what is not known.
     """
     peak, copied = entry["peak"]["fma"], entry["copy"]["bytes"]
     found = []
-    for case in entry["cases"]:
-        kernels = case["kernels"] or []
-        fma = case["fma"] or sum(kernel["fma"] or 0.0 for kernel in kernels)
-        rate, moved = ratio(fma, case["busy"]), ratio(sum(k["bytes"] or 0.0 for k in kernels), case["busy"])
+    for case in _shown(entry):
+        rate = ratio(case["fma"], case["busy"]) if case["fma"] else stated(case["kernels"], "fma")
+        moved = stated(case["kernels"], "bytes")
         row = {
             "case": case["name"],
             "seconds": case["seconds"],
@@ -107,7 +124,7 @@ def steps(results: dict[str, Any], entry: dict[str, Any]) -> list[dict[str, Any]
         ``reference`` and ``library``, how many times longer they took for a relaxation in this phase.
     """
     peak, found = entry["peak"]["fma"], []
-    for case in entry["cases"]:
+    for case in _shown(entry):
         for phase, own in (case["phases"] or {}).items():
             rate = ratio(own["brute_force"], own["busy"])
             row = {

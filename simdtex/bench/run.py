@@ -89,12 +89,12 @@ def run(sizes: Sizes, infos: Sequence[DeviceInfo], tell: Callable[[str], None] =
     dict
         ``format``, ``simdtex`` (version), ``sizes`` (name), ``date``, ``seconds``, ``host``; ``devices``, for each a
         dict with ``device`` (what it calls itself), ``peak`` and ``copy`` (see `simdtex.bench.limits`), ``cases`` (see
-        `simdtex.bench.cases.measure`) and ``growth`` (what grows -> cases); and ``hosts``, dicts with ``machine``
-        (``"reference"`` or ``"library"``), ``threads`` and ``cases``.
+        `simdtex.bench.cases.measure`), ``jobs`` (names of cases) and ``growth`` (what grows -> cases); and ``hosts``,
+        dicts with ``machine`` (``"reference"`` or ``"library"``), ``threads`` and ``cases``.
 
     Raises
     ------
-    RuntimeError
+    ChildProcessError
         A process of the hosts failed.
     """
     began = perf_counter()
@@ -128,7 +128,7 @@ def _device(sizes: Sizes, info: DeviceInfo, tell: Callable[[str], None]) -> dict
     cases = []
     for case in sizes.cases:
         tell(f"{machine.name}: {case.name}")
-        cases.append(measure(machine, case, sizes.repeats))
+        cases.append(measure(machine, case, sizes.repeats, sizes.budget))
     after = measure_peak(machine, sizes.seconds)  # the peak is what the device can at its best
     machine.profile()
     return {
@@ -144,5 +144,6 @@ def _device(sizes: Sizes, info: DeviceInfo, tell: Callable[[str], None]) -> dict
         "peak": max(peak, after, key=lambda one: float(one["fma"])),
         "copy": copied,
         "cases": cases,
+        "jobs": [case.name for case in with_searches([*sizes.jobs, *sizes.reference])],
         "growth": {name: [case.as_dict() for case in with_searches(own)] for name, own in sizes.growth.items()},
     }

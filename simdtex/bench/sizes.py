@@ -17,6 +17,8 @@ class Sizes:
     name : str
     repeats : int
         Timed runs of each case, the fastest of which counts.
+    budget : float
+        Seconds of a case after which no other run begins.
     seconds : float
         How long about each limit is measured, at each vector width.
     jobs : tuple of Case
@@ -31,6 +33,7 @@ class Sizes:
 
     name: str
     repeats: int
+    budget: float
     seconds: float
     jobs: tuple[Case, ...]
     library: tuple[Case, ...]
@@ -44,9 +47,9 @@ class Sizes:
 
     @property
     def cases(self) -> list[Case]:
-        """Every case that a device does, once, for every search."""
+        """Every case that a device does, once, for every search; the small ones first, so that they compile."""
         every = [*self.jobs, *self.reference, *(case for cases in self.growth.values() for case in cases)]
-        return list(dict.fromkeys(with_searches(every)))
+        return sorted(dict.fromkeys(with_searches(every)), key=lambda case: case.cost)
 
 
 def with_searches(cases: list[Case] | tuple[Case, ...]) -> list[Case]:
@@ -82,11 +85,12 @@ _QUICK_JOBS = (
 QUICK = Sizes(
     "quick",
     repeats=2,
+    budget=0.5,
     seconds=0.15,
     jobs=_QUICK_JOBS,
     library=_QUICK_JOBS,
     reference=(Case("mrf", 32, 32, 8), Case("multires", 32, 64), Case("pyramid", 64, 64), Case("solid", 32, 16)),
-    growth=_growth(8, 64, (32, 48, 64), (32, 48, 64), (8, 18, 32), 2),
+    growth=_growth(8, 64, (32, 48, 64), (32, 48, 64), (2, 8, 18), 2),
 )
 
 _FULL_JOBS = (
@@ -99,6 +103,7 @@ _FULL_JOBS = (
 FULL = Sizes(
     "full",
     repeats=3,
+    budget=2.0,
     seconds=0.5,
     jobs=_FULL_JOBS,
     library=_FULL_JOBS,

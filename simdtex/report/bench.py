@@ -62,8 +62,8 @@ def _table(title: str, left: int, *columns: str) -> Table:
 
 
 def _steps(rows: list[dict[str, Any]]) -> Table:
-    columns = ("job", "phase", "relaxations", "time", "fma/s", "of peak", "wall, of peak", "vs reference", "vs library")
-    table = _table("LCPDF step at the finest level: every candidate weighed, over time in kernels", 2, *columns)
+    columns = ("job", "phase", "relaxations", "time", "fma/s", "of peak", "by wall time", "vs reference", "vs library")
+    table = _table("LCPDF step at the finest level: fma of weighing every candidate, over time in kernels", 2, *columns)
     for row in rows:
         table.add_row(
             row["case"],
@@ -81,7 +81,7 @@ def _steps(rows: list[dict[str, Any]]) -> Table:
 
 def _jobs(rows: list[dict[str, Any]]) -> Table:
     columns = (
-        *("job", "time", "in kernels", "fma/s", "of peak", "bytes, of copy"),
+        *("job", "time", "in kernels", "fma/s done", "of peak", "bytes, of copy"),
         *("effective, of peak", "vs reference", "vs library"),
     )
     table = _table("Whole jobs", 1, *columns)
@@ -104,15 +104,9 @@ def _growth(curves: list[dict[str, Any]]) -> Table:
     table = _table("Growth of the time", 2, "method", "with", "from", "to", "exponent")
     for curve in curves:
         fitted = DASH if curve["exponent"] is None else f"{curve['exponent']:.2f}"
-        ends = [
-            f"{size:,.0f}: {seconds_text(curve['seconds'][i])}" for i, size in zip((0, -1), _ends(curve), strict=True)
-        ]
+        ends = [f"{curve['sizes'][i]:,.0f}: {seconds_text(curve['seconds'][i])}" for i in (0, -1)]
         table.add_row(curve["name"], curve["what"], *ends, fitted)
     return table
-
-
-def _ends(curve: dict[str, Any]) -> tuple[float, float]:
-    return curve["sizes"][0], curve["sizes"][-1]
 
 
 # -- pictures -------------------------------------------------------------------------------------------------
@@ -152,7 +146,7 @@ def _roofline(entry: dict[str, Any], path: Path) -> None:
     axes.loglog(x, np.minimum(peak, copied * x), color="black")
     axes.annotate(f"peak, {rate_text(peak)} fma/s", (x[-1], peak), (-4, 4), textcoords="offset points", ha="right")
     axes.annotate(
-        f"copy, {rate_text(copied)} bytes/s", (x[0], copied * x[0]), (4, 14), textcoords="offset points", ha="left"
+        f"copy, {rate_text(copied)} bytes/s", (x[60], copied * x[60]), (6, -14), textcoords="offset points", ha="left"
     )
     for number, method in enumerate(dict.fromkeys(point["method"] for point in points)):
         own = [point for point in points if point["method"] == method]
