@@ -181,10 +181,10 @@ def measure(machine: Machine, case: Case, repeats: int = 1, budget: float = 3.0)
     machine : Machine
     case : Case
     repeats : int
-        Timed runs at most. Where the machine times kernels, a profiled run comes before them and compiles the kernels;
-        elsewhere there is nothing to warm up.
+        Timed runs at most, beside a profiled one before them where the machine times kernels.
     budget : float
-        Seconds after which no other run begins. A profiled run that took longer is the only one.
+        Seconds after which no other run begins. A profiled run that took longer is the only one: what profiling costs,
+        some microseconds a launch, is then too little to matter.
 
     Returns
     -------

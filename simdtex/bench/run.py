@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 
 import simdtex
-from simdtex.bench.cases import measure
+from simdtex.bench.cases import measure, once
 from simdtex.bench.elsewhere import measure_elsewhere
 from simdtex.bench.limits import measure_copy, measure_peak
 from simdtex.bench.results import FORMAT
@@ -125,6 +125,8 @@ def _device(sizes: Sizes, info: DeviceInfo, tell: Callable[[str], None]) -> dict
     tell(f"{machine.name}: limits")
     peak, copied = measure_peak(machine, sizes.seconds), measure_copy(machine, sizes.seconds)
     machine.profile()  # forget these
+    for case in sizes.tiny:  # programs are built
+        once(machine, case)
     cases = []
     for case in sizes.cases:
         tell(f"{machine.name}: {case.name}")

@@ -47,9 +47,18 @@ class Sizes:
 
     @property
     def cases(self) -> list[Case]:
-        """Every case that a device does, once, for every search; the small ones first, so that they compile."""
+        """Every case that a device does, once, for every search; the small ones first."""
         every = [*self.jobs, *self.reference, *(case for cases in self.growth.values() for case in cases)]
         return sorted(dict.fromkeys(with_searches(every)), key=lambda case: case.cost)
+
+    @property
+    def tiny(self) -> list[Case]:
+        """The smallest job of every method and search: it builds the programs, which is not to be timed."""
+        kinds = dict.fromkeys((case.method, case.search) for case in self.cases)
+        return [
+            Case(method, 16, 8 if method == "solid" else 16, 2 if method == "mrf" else 0, search)
+            for method, search in kinds
+        ]
 
 
 def with_searches(cases: list[Case] | tuple[Case, ...]) -> list[Case]:
