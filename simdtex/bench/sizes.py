@@ -99,7 +99,7 @@ QUICK = Sizes(
     jobs=_QUICK_JOBS,
     library=_QUICK_JOBS,
     reference=(Case("mrf", 32, 32, 8), Case("multires", 32, 64), Case("pyramid", 64, 64), Case("solid", 32, 16)),
-    growth=_growth(8, 64, (32, 48, 64), (32, 48, 64), (2, 8, 18), 2),
+    growth=_growth(8, 64, (32, 48, 64), (32, 48, 64), (2, 4, 8), 2),
 )
 
 _FULL_JOBS = (
