@@ -112,6 +112,7 @@ def test_limits_are_the_most_of_all_widths(any_device, monkeypatch):
     for limit, what in ((measure_peak(machine, 0.0), "fma"), (measure_copy(machine, 0.0), "bytes")):
         assert set(limit["by_width"]) == {"1", "4", "8", "16"}
         assert limit[what] == max(limit["by_width"].values()) == limit["by_width"][str(limit["width"])] > 0
+    assert set(measure_peak(machine, 0.0, [4])["by_width"]) == {"4"}
 
 
 def test_a_process_that_fails_is_told_in_one_sentence():
@@ -158,6 +159,7 @@ def test_results_are_json_with_all_entries(found):
     assert {case["name"] for case in entry["cases"]} == {case.name for case in TINY.cases}
     for case in entry["cases"]:
         assert case["seconds"] > 0 and case["busy"] > 0 and case["kernels"]
+        assert (case["peak"] is None) == (case["name"] not in entry["jobs"])
     assert [(host["machine"], len(host["cases"])) for host in found["hosts"]] == [("reference", 2), ("library", 1)]
     assert found["hosts"][1]["threads"] == entry["device"]["threads"]
 
@@ -230,10 +232,16 @@ def kernel(name, seconds, fma, moved):
 def made_up():
     """Results with round numbers."""
     phases = {"cold": {"seconds": 2.0, "busy": 1.0, "relaxations": 100, "brute_force": 80.0}}
-    job = Case("mrf", 16, 16, 2).as_dict() | {"seconds": 4.0, "busy": 3.0, "fma": 150.0, "brute_force": 200.0}
+    job = Case("mrf", 16, 16, 2).as_dict() | {
+        "seconds": 4.0,
+        "busy": 3.0,
+        "fma": 150.0,
+        "brute_force": 200.0,
+        "peak": 100.0,
+    }
     job |= {"phases": phases, "kernels": [kernel("k", 3.0, 150.0, 30.0)]}
     other = Case("pyramid", 16, 16).as_dict() | {"seconds": 2.0, "busy": 1.0, "fma": None, "brute_force": None}
-    other |= {"phases": None, "kernels": [kernel("s", 0.75, 15.0, 30.0), kernel("t", 0.25, None, 10.0)]}
+    other |= {"phases": None, "peak": 50.0, "kernels": [kernel("s", 0.75, 15.0, 30.0), kernel("t", 0.25, None, 10.0)]}
     slow = copy.deepcopy(job) | {"seconds": 40.0, "busy": None, "kernels": None}
     slow["phases"]["cold"] |= {"seconds": 6.0, "relaxations": 50}
     return {
@@ -263,7 +271,7 @@ def test_jobs_are_put_in_ratios():
         **{"of_copy": 0.2, "effective": 0.5, "reference": 15.0, "library": 10.0},
     }
     assert other == {
-        **{"case": "pyramid, 16 -> 16", "seconds": 2.0, "busy": 0.5, "fma_rate": 15.0, "of_peak": 0.15},
+        **{"case": "pyramid, 16 -> 16", "seconds": 2.0, "busy": 0.5, "fma_rate": 15.0, "of_peak": 0.3},
         **{"of_copy": 0.8, "effective": None, "reference": None, "library": None},
     }
 

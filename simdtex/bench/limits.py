@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import Any
 
@@ -16,14 +16,16 @@ CACHES = 2**28
 """Bytes of each of the two arrays of a copy, at most: far more than caches hold."""
 
 
-def measure_peak(machine: OpenCL, seconds: float = 0.4) -> dict[str, Any]:
-    """Multiply-adds a second in independent chains, for every vector width.
+def measure_peak(machine: OpenCL, seconds: float = 0.4, widths: Sequence[int] = WIDTHS) -> dict[str, Any]:
+    """Multiply-adds a second in independent chains, for every vector width or some.
 
     Parameters
     ----------
     machine : OpenCL
     seconds : float
         How long about each width is tried.
+    widths : sequence of int
+        Of `simdtex.ops.limits.WIDTHS`.
 
     Returns
     -------
@@ -32,7 +34,7 @@ def measure_peak(machine: OpenCL, seconds: float = 0.4) -> dict[str, Any]:
     """
     items = _items(machine)
     rates = {}
-    for width in WIDTHS:
+    for width in widths:
         values = machine.put(np.linspace(0, 1, items * width, dtype=np.float32))
         rounds = 64
         peak(machine, values, rounds, width)  # compiled

@@ -90,13 +90,13 @@ def jobs(results: dict[str, Any], entry: dict[str, Any]) -> list[dict[str, Any]]
     -------
     list of dict
         ``case``, its name; ``seconds``; ``busy``, the share of them in kernels; ``fma_rate``, multiply-adds a second in
-        kernels, see `stated`; ``of_peak``, that over the device's peak; ``of_copy``, bytes a second
-        over those of a copy; ``effective``, the multiply-adds of weighing every candidate over the wall time over the
-        peak; ``reference`` and ``library``, how many times longer these took. None is what is not known.
+        kernels, see `stated`; ``of_peak``, that over the device's peak as measured next to the job; ``of_copy``, bytes
+        a second over those of a copy; ``effective``, the multiply-adds of weighing every candidate over the wall time
+        over the peak; ``reference`` and ``library``, how many times longer these took. None is what is not known.
     """
-    peak, copied = entry["peak"]["fma"], entry["copy"]["bytes"]
-    found = []
+    copied, found = entry["copy"]["bytes"], []
     for case in _shown(entry):
+        peak = case["peak"]
         rate = ratio(case["fma"], case["busy"]) if case["fma"] else stated(case["kernels"], "fma")
         moved = stated(case["kernels"], "bytes")
         row = {
@@ -123,8 +123,9 @@ def steps(results: dict[str, Any], entry: dict[str, Any]) -> list[dict[str, Any]
         over the time in kernels; ``of_peak``, that over the peak; ``effective``, the same over the wall time;
         ``reference`` and ``library``, how many times longer they took for a relaxation in this phase.
     """
-    peak, found = entry["peak"]["fma"], []
+    found = []
     for case in _shown(entry):
+        peak = case["peak"]
         for phase, own in (case["phases"] or {}).items():
             rate = ratio(own["brute_force"], own["busy"])
             row = {

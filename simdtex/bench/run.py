@@ -89,8 +89,9 @@ def run(sizes: Sizes, infos: Sequence[DeviceInfo], tell: Callable[[str], None] =
     dict
         ``format``, ``simdtex`` (version), ``sizes`` (name), ``date``, ``seconds``, ``host``; ``devices``, for each a
         dict with ``device`` (what it calls itself), ``peak`` and ``copy`` (see `simdtex.bench.limits`), ``cases`` (see
-        `simdtex.bench.cases.measure`), ``jobs`` (names of cases) and ``growth`` (what grows -> cases); and ``hosts``,
-        dicts with ``machine`` (``"reference"`` or ``"library"``), ``threads`` and ``cases``.
+        `simdtex.bench.cases.measure`; with ``peak``, measured just before and just after a job), ``jobs`` (names of
+        cases) and ``growth`` (what grows -> cases); and ``hosts``, dicts with ``machine`` (``"reference"`` or
+        ``"library"``), ``threads`` and ``cases``.
 
     Raises
     ------
@@ -127,11 +128,14 @@ def _device(sizes: Sizes, info: DeviceInfo, tell: Callable[[str], None]) -> dict
     machine.profile()  # forget these
     for case in sizes.tiny:  # programs are built
         once(machine, case)
-    cases = []
+    cases, jobs = [], with_searches([*sizes.jobs, *sizes.reference])
     for case in sizes.cases:
         tell(f"{machine.name}: {case.name}")
+        near = [measure_peak(machine, sizes.seconds / 2, [peak["width"]])] if case in jobs else []
         cases.append(measure(machine, case, sizes.repeats, sizes.budget))
-    after = measure_peak(machine, sizes.seconds)  # the peak is what the device can at its best
+        near += [measure_peak(machine, sizes.seconds / 2, [peak["width"]]) for _ in near]
+        cases[-1]["peak"] = max((one["fma"] for one in near), default=None)
+    after = measure_peak(machine, sizes.seconds)
     machine.profile()
     return {
         "device": {
@@ -146,6 +150,6 @@ def _device(sizes: Sizes, info: DeviceInfo, tell: Callable[[str], None]) -> dict
         "peak": max(peak, after, key=lambda one: float(one["fma"])),
         "copy": copied,
         "cases": cases,
-        "jobs": [case.name for case in with_searches([*sizes.jobs, *sizes.reference])],
+        "jobs": [case.name for case in jobs],
         "growth": {name: [case.as_dict() for case in with_searches(own)] for name, own in sizes.growth.items()},
     }
