@@ -4,6 +4,7 @@ import copy
 import runpy
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from click.testing import CliRunner
 from simdtex.bench import limits, sizes
 from simdtex.bench import results as worked_out
 from simdtex.bench import run as benchmark
-from simdtex.bench.cases import Case, brute_force, case_of, measure, once, searches
+from simdtex.bench.cases import Case, Sweeps, brute_force, case_of, measure, once, searches
 from simdtex.bench.elsewhere import measure_elsewhere
 from simdtex.bench.limits import measure_copy, measure_peak
 from simdtex.bench.sizes import FULL, QUICK, Sizes, with_searches
@@ -93,6 +94,33 @@ def test_a_case_counts_what_weighing_every_candidate_takes():
     assert run["brute_force"] == sum(level["fma"] for level in run["levels"])
     assert brute_force(MRF, [0, 10])[1] == 2 * 10 * 8 * finest["candidates"]
     assert 0 < phases["cold"]["seconds"] < run["seconds"]
+
+
+def test_sweeps_are_told_by_phase(monkeypatch):
+    clock = iter([0.0, 1.0, 3.0, 7.0, 15.0])
+    monkeypatch.setattr("simdtex.bench.cases.perf_counter", lambda: next(clock))
+    machine = SimpleNamespace(sync=lambda: None, seconds=None)
+    sweeps = Sweeps(machine)
+    for level, phase, ended in (
+        (1, "free", True),
+        (0, "relax", False),
+        (0, "relax", True),
+        (0, "free", True),
+        (0, "free", True),
+    ):
+        sweeps(SimpleNamespace(level=level, phase=phase, end_of_sweep=ended))
+    assert sweeps.seconds == {"relax": 2.0, "free": 12.0}
+    assert sweeps.busy == {"relax": 0.0, "free": 0.0}
+
+
+def test_phases_are_those_of_the_sweeps(monkeypatch):
+    class Told(Sweeps):
+        def __call__(self, progress):
+            self.seconds, self.busy = {"relax": 5.0, "free": 7.0}, {"relax": 1.0, "free": 2.0}
+
+    monkeypatch.setattr("simdtex.bench.cases.Sweeps", Told)
+    phases = once(Reference(), MRF)["phases"]
+    assert [(phases[name]["seconds"], phases[name]["busy"]) for name in ("warm", "cold")] == [(5.0, 1.0), (7.0, 2.0)]
 
 
 def test_a_device_is_timed_with_and_without_a_profile(any_device):

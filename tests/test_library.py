@@ -93,9 +93,11 @@ def test_sorting_sorts():
 
 
 class Beside(Library):
-    """Looks up every pixel's candidates by the twin, too."""
+    """Looks up every pixel's candidates by the twin, too; with so few values that many lie on a threshold."""
 
     def candidates(self, structure, sampled, level, first, end, match, seed):
+        coarse = int(structure.features.max()) // 8 + 1
+        structure = structure._replace(features=structure.features // coarse, threshold=structure.threshold // coarse)
         twin = sampled._replace(source=sampled.source.copy(), counts=sampled.counts.copy())
         twin = candidates.reference(structure, twin, level, first, end, match, seed)
         found = super().candidates(structure, sampled, level, first, end, match, seed)

@@ -11,6 +11,7 @@ import simdtex
 from simdtex.cli import main
 from simdtex.image import write
 from simdtex.lattice import neighbourhood_offsets
+from simdtex.machine.array import parse_array
 from simdtex.machine.log import KEPT, PENDING, Log, Times
 from simdtex.machine.opencl import OpenCL
 from simdtex.machine.reference import Reference
@@ -116,14 +117,18 @@ def test_a_processor_array_states_the_work_once(any_device):
     for array in (None, "4x4"):
         machine = OpenCL(any_device, profile=True)
         options = {"order": 2, "levels": 1, "xi": -100.0, "free_sweeps": 1, "array": array, "relaxation": "gibbs"}
-        run = simdtex.synthesize(texture((12, 12)), (8, 8), rng=1, device=machine, full_output=True, **options)[1]
+        run = simdtex.synthesize(texture((12, 12)), (10, 10), rng=1, device=machine, full_output=True, **options)[1]
         found = {entry["name"]: entry for entry in run.statistics["kernels"]}
         own = found["lcpdf_distance"]
         totals.append(own["fma"])
         assert own["fma"] == run.statistics["levels"][0]["fma"]
         assert own["bytes"] > 0
         assert sum(entry["seconds"] for entry in found.values()) == pytest.approx(run.statistics["device_seconds"])
-    assert totals[0] == totals[1] > len(neighbourhood_offsets(2)) * 64
+    assert totals[0] == totals[1] > len(neighbourhood_offsets(2)) * 100
+    machine = OpenCL(any_device, profile=True).emulate(parse_array("4x4"))
+    values = noise(machine, 1, 100, 1, 0)
+    (only,) = machine.profile()["kernels"]
+    assert (only["calls"], only["bytes"]) == (7, values.nbytes)
 
 
 def test_statistics_have_kernels_only_where_they_are_measured(any_device):

@@ -110,7 +110,7 @@ def untimed(machine: Machine) -> Iterator[None]:
         yield
 
 
-class _Sweeps:
+class Sweeps:
     """A callback that notes when the sweeps of the finest level of ``mrf`` end."""
 
     def __init__(self, machine: Machine) -> None:
@@ -124,6 +124,7 @@ class _Sweeps:
         return perf_counter(), self._machine.seconds or 0.0
 
     def __call__(self, progress: Any) -> None:
+        """Take what `simdtex.run.Relaxing` tells."""
         if not progress.end_of_sweep:
             return
         now = self._now()
@@ -144,7 +145,7 @@ def once(machine: Machine, case: Case) -> dict[str, Any]:
     given: dict[str, Any] = {"rng": 1, "device": machine, "full_output": True}
     if case.method == "solid":
         return dict(synthesize_solid(sample, (case.output,) * 3, **given)[1].statistics)
-    sweeps = _Sweeps(machine) if case.method == "mrf" else None
+    sweeps = Sweeps(machine) if case.method == "mrf" else None
     options = case.options | given | {"method": case.method, "callback": sweeps}
     began = perf_counter()
     statistics = dict(synthesize(sample, (case.output, case.output), **options)[1].statistics)
