@@ -3,10 +3,11 @@
 
     python benchmarks/cost.py [--device TEXT] [--order 18]
 
-Prints the device's fma peak (independent chains of vector fma), the rate of the LCPDF step on a state from the middle
-of a run, and, from a process of its own, the whole job 128x128 -> 256x256: seconds, seconds to the first piece of
-progress from the start of the process (kernels compiled before), and peak memory. Last, the growth of memory with the
-output, from two outputs of a tiny sample.
+Prints, each from a process of its own, the whole job 128x128 -> 256x256 with skipping and without: seconds, its fma
+over these and over the device's fma peak (independent chains of vector fma), seconds to the first piece of progress
+from the start of the process (kernels compiled before), and peak memory. Then, for states from the middle of runs, a
+warm sweep and a free one, the rates of the distances alone and of the whole LCPDF step, over the peak. Last, the growth
+of memory with the output, from two outputs of a tiny sample.
 """
 
 import argparse
@@ -20,13 +21,10 @@ import pyopencl as cl
 import samples
 
 import simdtex
-from simdtex.lattice import Grid, neighbourhood_offsets
+from simdtex.methods import mrf
 from simdtex.ops import lcpdf
-from simdtex.ops.coherence import coherence
 from simdtex.ops.commit import commit
 from simdtex.ops.neighbourhood import Field, neighbourhood
-from simdtex.ops.temperature import temperature
-from simdtex.sample import Sample
 
 PEAK = """
 __kernel void peak(__global float16 *out)
@@ -55,9 +53,11 @@ first = []
 def callback(progress):
     first or first.append(time.time() - began)
 start = time.time()
-simdtex.synthesize(samples.grey()[sys.argv[2]], (256, 256), rng=1, order=int(sys.argv[3]), device=sys.argv[4] or None,
-                   callback=callback)
-print(json.dumps([time.time() - start, first[0], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
+machine = simdtex.open_machine(sys.argv[4] or None, skip=sys.argv[5] == "True")
+_, output = simdtex.synthesize(samples.grey()[sys.argv[2]], (256, 256), rng=1, order=int(sys.argv[3]), device=machine,
+                               callback=callback, full_output=True)
+fma = sum(level["fma"] for level in output.statistics["levels"])
+print(json.dumps([time.time() - start, fma, first[0], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
 """
 
 MEMORY = """
@@ -96,37 +96,64 @@ def peak(machine):
     return items * 20000 * 10 * 16 / best_of(lambda: kernel(machine.queue, (items,), (8,), buffer), machine)
 
 
-def step(machine, order):
-    """Fma per second of equation (12) in the distance kernel alone, and in the whole LCPDF step."""
-    pixels = samples.grey()["brick"][..., None]
-    offsets = neighbourhood_offsets(order)
-    sample, grid = Sample(pixels, len(offsets)), Grid(256, 256)
-    candidates = sample.candidates(machine, offsets, 1)
+def states(machine, pixels, order):
+    """Arguments of relaxations at the finest level: of its third sweep, which is warm, and of its first free one."""
+    found, begun, relax, sweep = {}, [], mrf._relax, mrf._sweep
+
+    def noted(run, level, field, state, temperatures, phase, meter):
+        begun[:] = [*begun, phase] if level.number == 0 else []
+        return sweep(run, level, field, state, temperatures, phase, meter)
+
+    def copied(run, there, level, grid, field, sites, turn):
+        phase = begun[-1] if len(begun) > 2 else None
+        if phase and phase not in found:
+            found[phase] = (run, there, level, grid, Field(*(there.put(there.get(array)) for array in field)))
+        return relax(run, there, level, grid, field, sites, turn)
+
+    mrf._relax, mrf._sweep = copied, noted
+    axis = -1 if pixels.ndim == 3 else None
+    try:
+        simdtex.synthesize(pixels, (256, 256), rng=1, order=order, device=machine, channel_axis=axis)
+    finally:
+        mrf._relax, mrf._sweep = relax, sweep
     rng = np.random.default_rng(1)
-    source = rng.integers(0, sample.rows * sample.cols, (256, 256), dtype=np.int32)
-    warm = rng.choice(np.array([0, 100, 300, 1024], np.uint16), (256, 256))
-    field = Field(*(machine.put(a) for a in (sample.working[:, source], source, warm)))
-    device_offsets = machine.put(offsets)
-    sites = np.arange(0, 256 * 256, 20, dtype=np.int32)  # 3277, as many as a colour of order 18 has
-    size = machine.chunk(candidates.size, len(offsets), 1)
-    pieces = [machine.put(sites[i : i + size]) for i in range(0, len(sites), size)]
-    near = [neighbourhood(machine, piece, field, device_offsets, grid) for piece in pieces]
+    for phase, arguments in found.items():
+        warm = machine.get(arguments[4].temperature).ravel() > 0
+        sites = np.flatnonzero(warm) if phase == "relax" else np.arange(warm.size)
+        some = np.sort(rng.choice(sites, min(len(sites), 3264), replace=False)).astype(np.int32)
+        found[phase] = (*arguments, some, 1)
+    return found
+
+
+def steps(machine, arguments):
+    """Fma per second in the distances alone, in the step without skipping and with it; and the share that is skipped.
+
+    A step that skips is given the fma of one that does not.
+    """
+    run, _, level, grid, field, sites, turn = arguments
+    candidates, neighbours, channels = level.candidates, len(run.offsets), run.sample.channels
+    fma = 2 * len(sites) * candidates.size * neighbours * channels
+
+    def pieces(stored):
+        size = machine.chunk(candidates.size, neighbours, channels, stored)
+        return [sites[i : i + size] for i in range(0, len(sites), size)]
+
+    near = [neighbourhood(machine, machine.put(some), field, level.offsets, grid) for some in pieces(True)]
 
     def distances():
         for some in near:
             lcpdf.distance(machine, some, candidates)
 
-    def whole():
-        for piece in pieces:
-            some = neighbourhood(machine, piece, field, device_offsets, grid)
-            d = lcpdf.distance(machine, some, candidates)
-            d = coherence(machine, d, candidates, piece, field, device_offsets, grid, np.float32(0.5))
-            relaxed = lcpdf.best(machine, d, candidates)
-            cooled = temperature(machine, piece, field, device_offsets, grid, -1024)
-            commit(machine, field, piece, relaxed, cooled)
+    def whole():  # what it commits goes into copies, so that every repeat finds the same state
+        for some in pieces(False):
+            commit(machine, after, *mrf._relax(run, machine, level, grid, field, some, turn))
 
-    fma = 2 * len(sites) * candidates.size * len(offsets)
-    return fma / best_of(distances, machine), fma / best_of(whole, machine)
+    after = Field(*(machine.put(machine.get(array)) for array in field))
+    rates = [fma / best_of(distances, machine, 3)]
+    for machine.skip in (False, True):
+        spared = machine.spared
+        rates.append(fma / best_of(whole, machine))
+    return rates, (machine.spared - spared) / (8 * fma)
 
 
 def main():
@@ -136,17 +163,23 @@ def main():
     options = parser.parse_args()
     machine = simdtex.open_machine(options.device)
     print(f"device: {machine.name}, {machine.info.compute_units} compute units")
-    before = peak(machine)
-    alone, whole = step(machine, options.order)
-    most = max(before, peak(machine))
-    print(f"peak          {most / 1e9:8.0f} GFMA/s")
-    print(f"distances     {alone / 1e9:8.0f} GFMA/s  {alone / most:.2f} of the peak")
-    print(f"LCPDF step    {whole / 1e9:8.0f} GFMA/s  {whole / most:.2f} of the peak")
     for name in samples.grey():
-        printed = output_of(JOB, sys.path[0], name, str(options.order), options.device or "")
-        seconds, first, memory = json.loads(printed)
-        job = f"{name:8} 128x128 -> 256x256, order {options.order}"
-        print(f"{job}: {seconds:5.1f} s, first progress after {first:.1f} s, peak memory {memory:.0f} MiB")
+        for skip in (True, False):
+            printed = output_of(JOB, sys.path[0], name, str(options.order), options.device or "", str(skip))
+            seconds, fma, first, memory = json.loads(printed)
+            most = peak(machine)
+            job = f"{name:8} 128x128 -> 256x256, order {options.order}, {'skipping' if skip else 'plain   '}"
+            rate = f"{fma / seconds / most:.2f} of the peak of {most / 1e9:.0f} GFMA/s"
+            print(f"{job}: {seconds:5.1f} s, {rate}, first progress after {first:.1f} s, peak memory {memory:.0f} MiB")
+    for name, pixels in (samples.grey() | samples.colour()).items():
+        for phase, arguments in states(machine, pixels, options.order).items():
+            most = peak(machine)
+            rates, skipped = steps(machine, arguments)
+            shares = ", ".join(
+                f"{what} {rate / most:.2f}"
+                for what, rate in zip(("distances", "plain", "skipping"), rates, strict=True)
+            )
+            print(f"{name:8} {phase:5} of the peak of {most / 1e9:3.0f} GFMA/s: {shares}; skipped {skipped:.3f}")
     small, large = (int(output_of(MEMORY, str(side), options.device or "")) for side in (1024, 3072))
     print(f"memory of the process per output pixel: {(large - small) / (3072**2 - 1024**2):.0f} bytes")
 

@@ -4,17 +4,13 @@
 //
 //   P(x) ~ sum_p w_p exp(-|x - y_p|^2 / 2h^2),   w_p = exp(-d_p / 2h^2),   d_p = sum_r ((x_r - y_r)(1 - t_r))^2
 //
-// Weights are whole numbers: W_p = floor(2^40 w_p / w_max). Whole numbers add up to the same sum in any order, so
-// no work-group size, chunking or reduction can change a draw. A weight below 2^-40 of the largest is zero by this definition.
+// Weights are whole numbers, zero below 2^-40 of the largest: common/parzen.h.
 #pragma OPENCL FP_CONTRACT OFF
-#include "common/exp.h"
 #include "common/lanes.h"
+#include "common/parzen.h"
 #include "common/philox.h"
 #include "common/vector.h"
 
-#ifndef C
-#define C 1 // channels of a pixel
-#endif
 #ifndef BLOCK
 #define BLOCK 64 // candidates to a block, each with its smallest distance
 #endif
@@ -77,15 +73,6 @@ __kernel void lcpdf_distance(__global const float *restrict confidence, __global
 
 // Distances that coherence has divided carry the sign bit as a mark.
 #define DISTANCE(p) fabs(distance[(p) * P + s])
-#define NO_WEIGHT 28.0f // exp(-28) 2^40 < 1
-
-// W_p: Gaussian of equation (7) relative to the best candidate.
-inline ulong weight(const float d, const float smallest, const float scale)
-{
-    const float a = (d - smallest) * scale;
-    return a < NO_WEIGHT ? (ulong)(exp32(-a) * 0x1p40f) : 0ul;
-}
-
 inline float smallest_of(__global const float *nearest, const int blocks, const int P, const int s)
 {
     float least = INFINITY;
@@ -99,29 +86,6 @@ inline float smallest_of(__global const float *nearest, const int blocks, const 
     for (int b_ = 0; b_ < blocks; ++b_)                                                                                \
         if ((nearest[b_ * P + s] - smallest) * scale < NO_WEIGHT)                                                      \
             for (int p = b_ * BLOCK; p < (b_ + 1) * BLOCK; ++p)
-
-// The kernel of equation (7) around grey level y, cut off at the legal levels 0..top: `noise` holds cumulative
-// probabilities of the steps -radius..radius, so the legal steps span noise values low .. low + mass.
-inline uint legal_low(__global const uint *noise, const int radius, const int y)
-{
-    return radius > y ? noise[radius - y - 1] : 0u;
-}
-
-inline uint legal_mass(__global const uint *noise, const int radius, const int y, const int top)
-{
-    return noise[min(2 * radius, radius + top - y)] - legal_low(noise, radius, y);
-}
-
-// W_p times the share of the kernel around y_p that is legal: the mass of candidate p in the mixture over legal
-// levels. Dozens of saturated channels do not make it 0.
-inline ulong mass_of(const float d, const float smallest, const float scale, __global const float *sample,
-                     const int plane, const int from, __global const uint *noise, const int radius, const int top)
-{
-    ulong w = weight(d, smallest, scale);
-    for (int c = 0; c < C && w && radius >= 0; ++c)
-        w = max(mul_hi(w, (ulong)legal_mass(noise, radius, (int)sample[c * plane + from], top) << 32), 1ul);
-    return w;
-}
 
 // The Gibbs sampler: a candidate drawn with probability proportional to its mass, then each channel's grey level
 // from the kernel around the candidate's, cut off at the legal levels.
@@ -162,19 +126,8 @@ __kernel void lcpdf_draw(__global const float *restrict distance, __global const
     choice[s] = from;
     for (int c = 0; c < C; ++c) {
         int x = (int)sample[c * plane + from];
-        if (radius >= 0) {
-            const uint random = draw4(seed, level, turn, sites[s], PURPOSE_DRAW, 1 + c).x;
-            const uint u = legal_low(noise, radius, x) + mul_hi(random, legal_mass(noise, radius, x, top));
-            int lo = 0, hi = 2 * radius; // the first step whose cumulative probability exceeds u
-            while (lo < hi) {
-                const int mid = (lo + hi) / 2;
-                if (noise[mid] > u)
-                    hi = mid;
-                else
-                    lo = mid + 1;
-            }
-            x += lo - radius;
-        }
+        if (radius >= 0)
+            x += step_from(noise, radius, x, top, draw4(seed, level, turn, sites[s], PURPOSE_DRAW, 1 + c).x);
         values[c * S + s] = (ushort)x;
     }
 }

@@ -18,13 +18,34 @@ ENOUGH_WHOLE = 0.75
 """Share of positions that must have a whole neighbourhood for ``edges="auto"`` not to reflect."""
 
 
+TAIL = 1024
+"""Values after a strip that may be read where the candidates' rows end; nothing comes of them."""
+
+
+class Strip(NamedTuple):
+    """The sample's pixels that the candidates of a level and their neighbours are, row by row.
+
+    ``pixels`` (C, size) float32, the last `TAIL` of them 0; candidate (i, j) of ``rows`` x ``cols``, in the order of
+    the list, is pixel ``first`` + i ``pitch`` + j; ``reach`` (N,) int32 pixel offset of each neighbour; ``offsets``
+    the bytes of the neighbourhood's own.
+    """
+
+    pixels: Array
+    first: int
+    pitch: int
+    rows: int
+    cols: int
+    reach: Array
+    offsets: bytes
+
+
 class Candidates(NamedTuple):
     """The sample positions p that a site may be taken from, at one level.
 
     ``pixels`` (C, rows * cols) float32 working grey levels, margin and all; ``positions`` (n rounded up to
     blocks,) int32 pixel index of each p, row by row; ``size`` n; ``reach`` (N,) int32 pixel offset of each
     neighbour; ``index_of`` (rows * cols,) int32 place of a pixel in ``positions`` or -1; ``rows``, ``cols`` of the
-    sample with its margin.
+    sample with its margin; ``strip`` the same laid out for a search along rows.
     """
 
     pixels: Array
@@ -34,6 +55,7 @@ class Candidates(NamedTuple):
     index_of: Array
     rows: int
     cols: int
+    strip: Strip
 
 
 class Sample:
@@ -161,7 +183,20 @@ class Sample:
             machine.put(index_of),
             self.rows,
             self.cols,
+            self._strip(machine, positions, offsets, spacing, spacing if phases == "decimated" else 1),
         )
+
+    def _strip(
+        self, machine: Any, positions: NDArray[np.int32], offsets: NDArray[np.int32], spacing: int, step: int
+    ) -> Strip:
+        row, col = (int(n) for n in divmod(positions[0], self.cols))
+        planes = self.working.reshape(self.channels, self.rows, self.cols)[:, row % step :: step, col % step :: step]
+        pitch = planes.shape[2]
+        pixels = np.pad(planes.reshape(self.channels, -1).astype(np.float32), ((0, 0), (0, TAIL)))
+        reach = (offsets[:, 0] * np.int32(pitch) + offsets[:, 1]) * np.int32(spacing // step)
+        wide = int(np.searchsorted(positions, (row + 1) * self.cols))
+        first, reaches = row // step * pitch + col // step, machine.put(reach.astype(np.int32))
+        return Strip(machine.put(pixels), first, pitch, positions.size // wide, wide, reaches, offsets.tobytes())
 
     def place(self, source: NDArray[np.int32]) -> NDArray[np.int32]:
         """(row, column) in the user's sample of pixel indices, on a last axis."""

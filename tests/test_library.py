@@ -9,6 +9,7 @@ from tolerances import FFT, MATRIX_PRODUCT, SIGNIFICANCE
 import simdtex
 from simdtex.analysis import analyse
 from simdtex.bench import library as module
+from simdtex.bench.cases import Case, searches
 from simdtex.bench.library import Library
 from simdtex.methods import multires
 from simdtex.ops import lcpdf
@@ -140,7 +141,7 @@ def test_candidates_are_drawn_one_like_the_other(monkeypatch):
 )
 def test_jobs_use_the_libraries(method, needs):
     machine, sample = Library(), texture((24, 24))
-    options = {"order": 2} if method == "mrf" else {}
+    options = Case("mrf", 24, 20, 2, searches()[0]).options if method == "mrf" else {}
     made = simdtex.synthesize(sample, (20, 28), method=method, rng=1, device=machine, **options)
     assert made.shape == (20, 28)
     assert method == "multires" or np.isin(made, sample).all()

@@ -163,7 +163,7 @@ def test_the_table_and_the_sentence():
 @pytest.mark.parametrize(
     ("command", "kernels"),
     [
-        (("synth", "--order", "1"), "commit"),
+        (("synth", "--order", "1"), "start"),
         (("synth", "--method", "multires"), "candidates_draw"),
         (("solid", "--iterations", "1"), "solid_turn"),
         (("mix", "--iterations", "1"), "sort_scatter"),

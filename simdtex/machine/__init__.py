@@ -29,6 +29,11 @@ class Machine(Protocol):
         """Seconds the device has worked so far; None where that is not measured."""
         ...
 
+    @property
+    def spared(self) -> int:
+        """Fma of equation (12) that a bound has spared so far, where the machine skips what it proves to lose."""
+        ...
+
     def run(self, operation: Operation[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Run one operation on arrays of this machine."""
         ...
@@ -61,12 +66,15 @@ class Machine(Protocol):
         """Raise DeviceError where this many bytes are more than there is."""
         ...
 
-    def chunk(self, candidates: int, neighbours: int, channels: int) -> int:
-        """How many sites to relax in one go, for a neighbourhood of so many neighbours and channels."""
+    def chunk(self, candidates: int, neighbours: int, channels: int, stored: bool = True) -> int:
+        """How many sites to relax in one go, for a neighbourhood of so many neighbours and channels.
+
+        `stored` says whether their distances are kept.
+        """
         ...
 
 
-def open_machine(device: str | Machine | None = None, *, profile: bool = False) -> Machine:
+def open_machine(device: str | Machine | None = None, *, profile: bool = False, skip: bool = True) -> Machine:
     """The machine for a device text.
 
     Parameters
@@ -76,6 +84,8 @@ def open_machine(device: str | Machine | None = None, *, profile: bool = False) 
         SIMDTEX_DEVICE, else a GPU, else a CPU. A machine is returned as it is.
     profile : bool
         Whether an OpenCL machine measures how long its device works.
+    skip : bool
+        Whether an OpenCL machine skips candidates that it proves to lose. It changes no bit of any result.
 
     Raises
     ------
@@ -92,5 +102,8 @@ def open_machine(device: str | Machine | None = None, *, profile: bool = False) 
 
         return Reference()
     from simdtex.machine.opencl import OpenCL
+    from simdtex.machine.tuner import tune
 
-    return OpenCL(info, profile=profile)
+    machine = OpenCL(info, profile=profile, skip=skip)
+    tune(machine)
+    return machine

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
+from itertools import pairwise
 from math import gcd, prod
 from pathlib import Path
 from typing import Any
@@ -20,10 +21,15 @@ from numpy.typing import NDArray
 
 from simdtex.device import DeviceError, DeviceInfo
 from simdtex.lattice import Grid
+from simdtex.machine import tuner
 from simdtex.machine.array import ProcessorArray
 from simdtex.machine.log import Log
+from simdtex.machine.tally import Tally
 from simdtex.ops.operation import Array, Operation, P, R, Work
 from simdtex.sample import BLOCK
+
+LITTLE = 2**16
+"""Bytes that are copied to a device without waiting."""
 
 OUT_OF_MEMORY = (
     cl.status_code.MEM_OBJECT_ALLOCATION_FAILURE,
@@ -31,6 +37,9 @@ OUT_OF_MEMORY = (
     cl.status_code.OUT_OF_HOST_MEMORY,
     cl.status_code.INVALID_BUFFER_SIZE,
 )
+
+LONGEST = 2**17
+"""Work-items of a launch over a group: a multiple of every work-group size, and no long launch."""
 
 
 def kernel_folder() -> Path:
@@ -55,6 +64,10 @@ class OpenCL:
         Sites side by side in a work-item (1, 4, 8 or 16); changes no bit of any result.
     step : int, optional
         Candidates kept in registers together, a divisor of 64; changes no bit of any result.
+    split : int, optional
+        Work-items that share a site's candidates; changes no bit of any result.
+    skip : bool
+        Whether candidates that are proved to lose are skipped; changes no bit of any result.
     profile : bool
         Whether to measure how long the device works.
     """
@@ -67,6 +80,8 @@ class OpenCL:
         scratch: int | None = None,
         vector: int | None = None,
         step: int | None = None,
+        split: int | None = None,
+        skip: bool = True,
         profile: bool = False,
     ) -> None:
         self.info = info
@@ -77,13 +92,16 @@ class OpenCL:
         self.log = Log(profile)
         on_gpu = info.kind == "gpu"
         self.forced = work_group is not None
-        self.group = work_group or (64 if on_gpu else 16)  # a fixed size: PoCL compiles once per size
         self.scratch = scratch or (2**28 if on_gpu else 2**24)
-        self.vector = vector or (1 if on_gpu else 16)
-        self.step = step or 4
+        form = tuner.default(info)  # a fixed group size: PoCL compiles once per size
+        self.take(tuner.Form(vector or form.vector, step or form.step, work_group or form.group))
         if BLOCK % self.step:
             raise ValueError(f"step is {self.step}; give a divisor of {BLOCK}")
-        self.tile = (64, 1) if on_gpu else (1, 8)
+        self.skip = skip
+        self.tally = Tally(self)
+        self._split = split
+        self._crowd = info.compute_units * (2048 if on_gpu else 64)  # work-items that keep the device busy
+        self._abreast = 64 if on_gpu else 1  # of a site: neighbours in a row of the sample
         self.array: ProcessorArray | None = None
         self._lane: Array | None = None
         self._pool = cl_tools.MemoryPool(cl_tools.ImmediateAllocator(self.queue))
@@ -92,6 +110,11 @@ class OpenCL:
         self._programs: dict[tuple[str, str], Any] = {}
         self._kernels: dict[tuple[str, str, str], Any] = {}
 
+    def take(self, form: tuner.Form) -> None:
+        """Take this form of the inner loop."""
+        self.vector, self.step, self.group = form
+        self.tile = (self.group, 1) if self.info.kind == "gpu" else (1, 8)
+
     def run(self, operation: Operation[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Launch the operation's kernels."""
         with self._memory_errors():
@@ -99,8 +122,10 @@ class OpenCL:
 
     def put(self, array: Any) -> Array:
         """Copy to the device."""
-        with self._memory_errors():
-            return cl_array.to_device(self.queue, np.ascontiguousarray(array))
+        array = np.array(array, order="C")
+        with self._memory_errors():  # little comes in turn, and is not waited for: its event keeps the copy
+            later = array.nbytes <= LITTLE
+            return cl_array.to_device(self.queue, array, allocator=self._pool if later else None, async_=later)
 
     def get(self, array: Array) -> Any:
         """Copy from the device."""
@@ -148,10 +173,15 @@ class OpenCL:
         self.sync()
         return self.log.take()
 
+    @property
+    def spared(self) -> int:
+        """Fma of distances that a bound has spared so far."""
+        return self.tally.spared
+
     def emulate(self, array: ProcessorArray) -> OpenCL:
         """The same device as a processor array: every launch has one work-item per PE."""
         emulated = copy(self)
-        emulated.array, emulated.vector = array, 1
+        emulated.array, emulated.vector, emulated._split = array, 1, 1
         return emulated
 
     def pieces(self, sites: NDArray[np.int32], grid: Grid, most: int) -> Iterator[tuple[OpenCL, NDArray[np.int32]]]:
@@ -192,10 +222,17 @@ class OpenCL:
                 f"{self.name} ran out of memory; give a smaller size or sample, or another --device"
             ) from error
 
-    def chunk(self, candidates: int, neighbours: int, channels: int) -> int:
+    def split(self, items: int, most: int) -> int:
+        """How many work-items are to share each of so many: enough to keep the device busy, up to `most`."""
+        wanted = self._split or -(-self._crowd // (items * self._abreast)) * self._abreast
+        return max(1, min(wanted, most))
+
+    def chunk(self, candidates: int, neighbours: int, channels: int, stored: bool = True) -> int:
         """Whole vectors of sites: bounded by scratch memory, and by 4e9 fma so that no launch is long."""
         padded = -(-candidates // BLOCK) * BLOCK
         per_site = 4 * (padded + padded // BLOCK + neighbours * (1 + channels))
+        if not stored:
+            per_site = 4 * (12 * self.split(1, padded) + neighbours * (4 + 3 * channels))
         fit = min(self.scratch // per_site, int(4e9) // (2 * padded * neighbours * channels))
         return max(1, fit // self.vector) * self.vector
 
@@ -209,12 +246,16 @@ class OpenCL:
             self._kernels[key] = cl.Kernel(self._programs[key[::2]], function)
         return self._kernels[key]
 
+    @property
+    def include(self) -> list[str]:
+        """The compiler option that finds the kernels' headers."""
+        return ["-I", str(kernel_folder())]
+
     def _build(self, file: str, options: str) -> Any:
-        folder = kernel_folder()
-        source = (folder / f"{file}.cl").read_text(encoding="utf-8")
+        source = (kernel_folder() / f"{file}.cl").read_text(encoding="utf-8")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", cl.CompilerWarning)
-            return cl.Program(self.context, source).build([*options.split(), "-I", str(folder)])
+            return cl.Program(self.context, source).build([*options.split(), *self.include])
 
     def launch_sites(
         self,
@@ -253,6 +294,20 @@ class OpenCL:
         local = local if local and not self.forced else one_dimensional
         size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
         self._enqueue(kernel, size, *args, local=local, work=work)
+
+    def launch_groups(self, kernel: Any, bounds: NDArray[np.int64], *args: Any) -> None:
+        """Enqueue a kernel over groups of work-items one after another, from ``bounds[g]`` up to ``bounds[g + 1]``.
+
+        The kernel's second argument is the end of the group that it is launched for. The others are set once, so that a
+        launch costs a few microseconds.
+        """
+        kernel.set_args(*(a.data if isinstance(a, cl_array.Array) else a for a in args))
+        for begin, end in pairwise(bounds.tolist()):
+            kernel.set_arg(1, np.int32(end))
+            for first in range(begin, end, LONGEST):
+                size = -(-min(end - first, LONGEST) // self.group) * self.group
+                event = cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (self.group,), (first,))
+                self.log.add(size, event, kernel)
 
     def _enqueue(
         self,

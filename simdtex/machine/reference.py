@@ -29,6 +29,7 @@ class Reference:
         self.scratch = scratch
         self.launches = 0
         self.seconds = None
+        self.spared = 0
 
     def run(self, operation: Operation[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Run the twin."""
@@ -60,6 +61,6 @@ class Reference:
     def require(self, size: int) -> None:
         """Nothing is known of the memory here."""
 
-    def chunk(self, candidates: int, neighbours: int, channels: int) -> int:
+    def chunk(self, candidates: int, neighbours: int, channels: int, stored: bool = True) -> int:
         """Sites whose distances and neighbourhoods fit the scratch memory."""
         return max(1, self.scratch // (8 * (candidates + neighbours * (1 + channels))))

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The Gaussian of equation (7), as weights of candidates and as a kernel over whole grey levels.
+//
+// Weights are whole numbers: W_p = floor(2^40 w_p / w_max). Whole numbers add up to the same sum in any order, so
+// no work-group size, chunking or reduction can change a draw. A weight below 2^-40 of the largest is zero by this definition.
+#ifndef SIMDTEX_PARZEN_H
+#define SIMDTEX_PARZEN_H
+#pragma OPENCL FP_CONTRACT OFF
+#include "common/exp.h"
+
+#ifndef C
+#define C 1 // channels of a pixel
+#endif
+#ifndef LEVEL
+#define LEVEL float // in which a sample's working grey levels are stored
+#endif
+#define NO_WEIGHT 28.0f // exp(-28) 2^40 < 1
+
+// W_p: Gaussian of equation (7) relative to the best candidate.
+inline ulong weight(const float d, const float smallest, const float scale)
+{
+    const float a = (d - smallest) * scale;
+    return a < NO_WEIGHT ? (ulong)(exp32(-a) * 0x1p40f) : 0ul;
+}
+
+// The kernel of equation (7) around grey level y, cut off at the legal levels 0..top: `noise` holds cumulative
+// probabilities of the steps -radius..radius, so the legal steps span noise values low .. low + mass.
+inline uint legal_low(__global const uint *noise, const int radius, const int y)
+{
+    return radius > y ? noise[radius - y - 1] : 0u;
+}
+
+inline uint legal_mass(__global const uint *noise, const int radius, const int y, const int top)
+{
+    return noise[min(2 * radius, radius + top - y)] - legal_low(noise, radius, y);
+}
+
+// W_p times the share of the kernel around y_p that is legal: the mass of candidate p in the mixture over legal
+// levels. Dozens of saturated channels do not make it 0.
+inline ulong mass_of(const float d, const float smallest, const float scale, __global const LEVEL *sample,
+                     const int plane, const int from, __global const uint *noise, const int radius, const int top)
+{
+    ulong w = weight(d, smallest, scale);
+    for (int c = 0; c < C && w && radius >= 0; ++c)
+        w = max(mul_hi(w, (ulong)legal_mass(noise, radius, (int)sample[c * plane + from], top) << 32), 1ul);
+    return w;
+}
+
+// The step that 32 random bits choose from the kernel around grey level y, cut off at the legal levels: the first whose
+// cumulative probability exceeds them.
+inline int step_from(__global const uint *noise, const int radius, const int y, const int top, const uint random)
+{
+    const uint u = legal_low(noise, radius, y) + mul_hi(random, legal_mass(noise, radius, y, top));
+    int lo = 0, hi = 2 * radius;
+    while (lo < hi) {
+        const int mid = (lo + hi) / 2;
+        if (noise[mid] > u)
+            hi = mid;
+        else
+            lo = mid + 1;
+    }
+    return lo - radius;
+}
+
+#endif

@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// ICM over sample positions without keeping a distance: for each site the candidate of the least squared distance of
+// equation (12), divided where it continues a neighbour's source, and of several the first.
+//
+//   d_p = sum_r ((x_r - y_r)(1 - t_r))^2,   d'_p = favour d_p for coherent p
+//
+// Whoever is proved to lie beyond the best so far is skipped. Two facts make that exact: partial sums never fall, and a
+// sum in another order differs by less than SLACK. What survives is weighed again in the canonical order.
+#pragma OPENCL FP_CONTRACT OFF
+#include "common/lanes.h"
+#include "common/lattice.h"
+#include "common/vector.h"
+
+#ifndef C
+#define C 1 // channels of a pixel
+#endif
+#ifndef STEP
+#define STEP 2 // vectors of candidates that are weighed together
+#endif
+#ifndef CHECK
+#define CHECK 4 // neighbours between two looks at the bound
+#endif
+#ifndef N
+#define N 60 // neighbours
+#endif
+#ifndef BLOCK
+#define BLOCK 64
+#endif
+#define WORDS (2 + C) // of a term: offset, u, x u
+#define BUCKETS 8     // of confidence
+#if V == 1
+typedef int ivec;
+#define ANY(x) (x)
+#define BITS(x) as_int(x)
+#else
+typedef JOIN(int, V) ivec;
+#define ANY(x) any(x)
+#define BITS(x) JOIN(as_int, V)(x)
+#endif
+
+// d_p of one candidate, neighbours in canonical order. `site` holds u and then x u of each neighbour.
+inline float canonical(__global const float *site, __global const float *y, const int plane, __global const int *reach)
+{
+    float d = 0.0f;
+    for (int k = 0; k < N; ++k) {
+        const float u = site[k * (1 + C)];
+#pragma unroll
+        for (int c = 0; c < C; ++c) {
+            const float e = fma(-y[c * plane + reach[k]], u, site[k * (1 + C) + 1 + c]);
+            d = fma(e, e, d);
+        }
+    }
+    return d;
+}
+
+// The neighbourhood of a site, and the first bound: the candidates that continue a neighbour's source, and its own
+// source.
+//
+// spread   (N,)                      order in which neighbours are best looked at: far from one another
+// near     (S, N * (1 + C))          out: u and x u in canonical order
+// terms    (S, N * (2 + C))         out: offset in the strip, u, x u; the most certain first, those with u = 0 left out
+// count    (S,)                      out: terms, a multiple of CHECK
+// least    (S,), where (S,)          out: the least d' of these candidates and its place in the list
+// One work-item per site.
+__kernel __attribute__((vec_type_hint(float4))) void nearest_begin(__global const int *restrict sites, const int S, __global const ushort *restrict values,
+                            __global const int *restrict source, __global const ushort *restrict temperature,
+                            const int pixels, __global const int2 *restrict offsets, GRID,
+                            __global const int *restrict index_of, const int sample_rows, const int sample_cols,
+                            __global const float *restrict sample, __global const int *restrict positions,
+                            __global const int *restrict reach, __global const int *restrict strip_reach,
+                            __global const int *restrict spread, const float favour, __global float *restrict near,
+                            __global float *restrict terms, __global int *restrict count,
+                            __global float *restrict least, __global int *restrict where LANES_ARG)
+{
+    const int s = LANE;
+    if (IDLE(s))
+        return;
+    const int i = ROW_OF(sites[s]), j = COL_OF(sites[s]);
+    const int plane = sample_rows * sample_cols;
+    __global float *here = near + s * (N * (1 + C));
+    int proposed[N];
+    int held[BUCKETS + 1];
+    for (int b = 0; b <= BUCKETS; ++b)
+        held[b] = 0;
+    for (int k = 0; k < N; ++k) {
+        const int2 o = offsets[k];
+        const int r = neighbour(i, j, o.x, o.y, HERE);
+        const int t = r < 0 ? 1024 : temperature[r];
+        const float u = (float)(1024 - t) * 0x1p-10f;
+        here[k * (1 + C)] = u;
+        for (int c = 0; c < C; ++c)
+            here[k * (1 + C) + 1 + c] = t < 1024 ? (float)values[c * pixels + r] * u : 0.0f;
+        proposed[k] = -1;
+        if (t >= 1024)
+            continue;
+        ++held[BUCKETS - 1 - ((1024 - t) * BUCKETS - 1) / 1024 + 1];
+        const int row = source[r] / sample_cols - o.x * spacing;
+        const int col = source[r] % sample_cols - o.y * spacing;
+        if (row >= 0 && row < sample_rows && col >= 0 && col < sample_cols)
+            proposed[k] = index_of[row * sample_cols + col];
+    }
+    // Terms by confidence, sorted by counting.
+    for (int b = 1; b <= BUCKETS; ++b)
+        held[b] += held[b - 1];
+    __global float *list = terms + s * (N * WORDS);
+    const int m = held[BUCKETS], end = (m + CHECK - 1) / CHECK * CHECK;
+    for (int n = 0; n < N; ++n) {
+        const int k = spread[n];
+        const float u = here[k * (1 + C)];
+        if (u == 0.0f)
+            continue;
+        const int b = BUCKETS - 1 - ((int)(u * 1024.0f) * BUCKETS - 1) / 1024;
+        __global float *term = list + held[b]++ * WORDS;
+        term[0] = as_float(strip_reach[k]);
+        term[1] = u;
+        for (int c = 0; c < C; ++c)
+            term[2 + c] = here[k * (1 + C) + 1 + c];
+    }
+    for (int n = m * WORDS; n < end * WORDS; ++n)
+        list[n] = 0.0f;
+    count[s] = end;
+    // The bound.
+    const int own = index_of[source[sites[s]]];
+    float best = INFINITY;
+    int at = 0x7fffffff;
+    if (own >= 0) {
+        best = canonical(here, sample + positions[own], plane, reach);
+        at = own;
+    }
+    int last = -1, before = -1;
+    for (int k = 0; k < N; ++k) {
+        const int p = proposed[k];
+        if (p < 0 || p == last || p == before)
+            continue;
+        before = last;
+        last = p;
+        const float d = canonical(here, sample + positions[p], plane, reach) * favour;
+        if (d < best || (d == best && p < at)) {
+            best = d;
+            at = p;
+        }
+    }
+    least[s] = best;
+    where[s] = at;
+}
+
+#if V == 1
+#define ANY(x) (x)
+#else
+#define ANY(x) any(x)
+#define BITS(x) JOIN(as_int, V)(x)
+#endif
+#define INTS JOIN(ivec, V)
+typedef int ivec1;
+typedef int4 ivec4;
+typedef int8 ivec8;
+typedef int16 ivec16;
+
+// All candidates against the bound, in blocks of STEP vectors of neighbours in a row of the sample.
+//
+// strip  (C, size)        the sample's pixels of this level, row by row, from which candidates and neighbours are read
+// first, pitch            of the candidates' own pixels in the strip; rows x cols candidates
+// slack                   what a sum in another order may exceed this one by, as a factor
+// found, at  (split, S)   out: the least d' so far and its place
+// work   (split, S)       out: terms weighed
+// `split` work-items to a site, side by side, take its blocks in turn.
+__kernel __attribute__((vec_type_hint(vec))) void nearest_scan(const int S, __global const float *restrict terms, __global const int *restrict count,
+                           __global const float *restrict near, __global const float *restrict least,
+                           __global const int *restrict where, __global const float *restrict strip, const int size,
+                           const int first, const int pitch, const int rows, const int cols,
+                           __global const int *restrict strip_reach, const float slack, const int split,
+                           __global float *restrict found, __global int *restrict at,
+                           __global uint *restrict work LANES_ARG)
+{
+#ifdef LANES
+    const int s = LANE, turn = 0;
+#else
+    const int s = get_global_id(0) / split, turn = get_global_id(0) % split;
+#endif
+    if (IDLE(s))
+        return;
+    const int wide = (cols + V * STEP - 1) / (V * STEP), m = count[s];
+    __global const float *list = terms + s * (N * WORDS);
+    float best = least[s];
+    int best_at = where[s];
+    int limit = as_int(best * slack) + 1; // bits of the least sum that is too far; equals have a chance
+    uint done = 0;
+    for (int b = turn; b < rows * wide; b += split) {
+        const int i = b / wide, j = b % wide * (V * STEP);
+        __global const float *y = strip + first + i * pitch + j;
+        vec d[STEP];
+#pragma unroll
+        for (int q = 0; q < STEP; ++q)
+            d[q] = 0.0f;
+        int k = 0, alive = 1;
+        while (alive && k < m) {
+#pragma unroll
+            for (int n = 0; n < CHECK; ++n) {
+                __global const float *term = list + (k + n) * WORDS;
+                const int o = as_int(term[0]);
+                const vec u = term[1];
+#pragma unroll
+                for (int c = 0; c < C; ++c) {
+                    const vec xu = term[2 + c];
+#pragma unroll
+                    for (int q = 0; q < STEP; ++q) {
+                        const vec e = fma(-LOAD(y + c * size + o + q * V), u, xu);
+                        d[q] = fma(e, e, d[q]);
+                    }
+                }
+            }
+            k += CHECK;
+            vec low = d[0];
+#pragma unroll
+            for (int q = 1; q < STEP; ++q)
+                low = fmin(low, d[q]);
+            alive = ANY(BITS(low) < limit);
+        }
+        done += k * min(cols - j, V * STEP);
+        for (int q = 0; alive && q < STEP; ++q) {
+            float one[V];
+            STORE(d[q], one);
+            for (int v = 0; v < V; ++v) {
+                const int col = j + q * V + v, p = i * cols + col;
+                if (col >= cols || as_int(one[v]) >= limit)
+                    continue;
+                const float exact = canonical(near + s * (N * (1 + C)), y + q * V + v, size, strip_reach);
+                if (exact < best || (exact == best && p < best_at)) {
+                    best = exact;
+                    best_at = p;
+                    limit = as_int(best * slack) + (best > 0.0f); // what follows must be nearer
+                }
+            }
+        }
+    }
+    found[turn * S + s] = best;
+    at[turn * S + s] = best_at;
+    work[turn * S + s] = done;
+}
+
+// The same without a bound, V sites side by side: every term of every candidate, in the canonical order.
+//
+// confidence (N, P), weighted (N, C, P)   from neighbourhood.cl
+// found, at  (split, P)                   out: the least d and its place
+// One work-item per (V sites, part of the blocks of BLOCK candidates).
+__kernel __attribute__((vec_type_hint(vec))) void nearest_plain(__global const float *restrict confidence, __global const float *restrict weighted,
+                            const int P, __global const float *restrict sample, const int plane,
+                            __global const int *restrict candidates, const int count,
+                            __global const int *restrict reach, const int blocks, const int split,
+                            __global float *restrict found, __global int *restrict at LANES_ARG)
+{
+    const int s = LANE * V;
+    if (s < 0 || s >= P)
+        return;
+    ALONG(turn, split)
+    {
+        vec least = INFINITY;
+        ivec where = 0;
+        const int end = (int)((long)blocks * (turn + 1) / split) * BLOCK;
+        for (int p = (int)((long)blocks * turn / split) * BLOCK; p < end; p += STEP) {
+            __global const float *y[STEP];
+            vec d[STEP];
+#pragma unroll
+            for (int q = 0; q < STEP; ++q) {
+                y[q] = sample + candidates[p + q];
+                d[q] = 0.0f;
+            }
+            for (int k = 0; k < N; ++k) {
+                const int o = reach[k];
+                const vec u = LOAD(confidence + k * P + s);
+#pragma unroll
+                for (int c = 0; c < C; ++c) {
+                    const vec xu = LOAD(weighted + (k * C + c) * P + s);
+#pragma unroll
+                    for (int q = 0; q < STEP; ++q) {
+                        const vec e = fma((vec)(-y[q][c * plane + o]), u, xu);
+                        d[q] = fma(e, e, d[q]);
+                    }
+                }
+            }
+#pragma unroll
+            for (int q = 0; q < STEP; ++q) {
+                const ivec nearer = (d[q] < least) & (ivec)(p + q < count ? -1 : 0);
+                least = select(least, d[q], nearer);
+                where = select(where, (ivec)(p + q), nearer);
+            }
+        }
+        STORE(least, found + turn * P + s);
+        STORE(where, at + turn * P + s);
+    }
+}
+
+// The nearest of all: the first bound's, and those of every part.
+//
+// found, at (split, P)   from nearest_scan, P = S, or nearest_plain
+// work  (split, S)       from nearest_scan; not read where tallied = 0
+// tally (S,)             in and out: fma done so far for the site of this number
+// One work-item per site.
+__kernel void nearest_end(const int S, const int P, __global const float *restrict least,
+                          __global const int *restrict where, const int split, __global const float *restrict found,
+                          __global const int *restrict at, const int tallied, __global const uint *restrict work,
+                          __global const float *restrict sample, const int plane,
+                          __global const int *restrict positions, __global ulong *restrict tally,
+                          __global int *restrict choice, __global ushort *restrict values LANES_ARG)
+{
+    const int s = LANE;
+    if (IDLE(s))
+        return;
+    float best = least[s];
+    int p = where[s];
+    for (int n = 0; n < split; ++n) {
+        const float d = found[n * P + s];
+        const int here = at[n * P + s];
+        if (d < best || (d == best && here < p)) {
+            best = d;
+            p = here;
+        }
+        if (tallied)
+            tally[s] += (ulong)work[n * S + s] * (2 * C);
+    }
+    const int from = positions[p];
+    choice[s] = from;
+    for (int c = 0; c < C; ++c)
+        values[c * S + s] = (ushort)sample[c * plane + from];
+}

@@ -1,0 +1,138 @@
+"""The nearest candidate of each site: whatever is skipped, the reference's, which skips nothing."""
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, host, opencl, problem, problems
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from simdtex.lattice import neighbourhood_offsets
+from simdtex.ops import nearest as module
+from simdtex.ops.nearest import nearest
+
+strengths = st.sampled_from([0.0, 0.5, 1.0, 7.0])
+FORMS = [
+    {"vector": 1, "step": 1, "split": 64},  # a GPU's
+    {"vector": 1, "split": 7},
+    {"vector": 4, "step": 2, "split": 3},
+    {"vector": 8, "step": 1},
+    {"step": 8, "work_group": 3},
+    {"split": 1000},
+    {"skip": False},
+    {"skip": False, "vector": 1, "split": 5},
+    {"skip": False, "vector": 4, "step": 2, "split": 1000},
+]
+
+
+def run(machine, p, strength=1.0):
+    sites, field, offsets = p.on(machine)
+    favour = np.float32(1 / (1 + strength))
+    return host(machine, nearest(machine, sites, field, offsets, p.grid, p.candidates(machine), favour))
+
+
+@given(problems(max_order=5), strengths)
+@settings(max_examples=20)
+def test_the_reference_is_the_nearest_of_the_rule_the_first_of_several(p, strength):
+    choice, values = run(REFERENCE, p, strength)
+    found, candidates = p.distances(REFERENCE, strength)
+    for s in range(p.sites.size):
+        column = found.distance[:, s].tolist()
+        assert choice[s] == candidates.positions[column.index(min(column))]
+    assert np.array_equal(values, p.sample.working[:, choice])
+
+
+@given(p=problems(max_order=18), strength=strengths)
+@settings(max_examples=30)
+def test_a_device_has_the_references_bits(machine, p, strength):
+    assert_same_bits(run(machine, p, strength), run(REFERENCE, p, strength))
+
+
+@pytest.mark.parametrize("options", FORMS, ids=lambda options: "-".join(f"{k}-{v}" for k, v in options.items()))
+def test_the_form_of_a_launch_changes_no_bit(cl_device, options):
+    for seed, temperatures in enumerate(("mixed", "zero", "one")):
+        p = problem(seed, order=8, sample_shape=(26, 41), shape=(11, 9), temperatures=temperatures, count=37)
+        assert_same_bits(run(opencl(cl_device, **options), p), run(REFERENCE, p))
+
+
+@pytest.mark.parametrize(("channels", "dtype"), [(3, np.uint8), (2, np.uint16), (4, np.float32)])
+def test_vectors_and_large_orders_have_the_references_bits(machine, channels, dtype):
+    p = problem(2, order=50, channels=channels, dtype=dtype, sample_shape=(33, 31), shape=(20, 17), count=40)
+    assert_same_bits(run(machine, p), run(REFERENCE, p))
+
+
+@pytest.mark.parametrize("phases", ["all", "decimated"])
+@pytest.mark.parametrize("edges", ["whole", "reflect"])
+def test_coarse_levels_have_the_references_bits(machine, phases, edges):
+    p = problem(3, order=5, shape=(12, 13), spacing=2, edges=edges, phases=phases, sample_shape=(23, 22))
+    assert_same_bits(run(machine, p), run(REFERENCE, p))
+
+
+def flat(p, levels):
+    """The problem with only so many grey levels, so that most distances have equals."""
+    few = (p.sample.levels // (256 // levels)).astype(np.uint16)
+    p.sample._lay(few, p.sample.margin)
+    return p._replace(field=p.field._replace(values=p.sample.working[:, p.field.source]))
+
+
+@pytest.mark.parametrize("levels", [1, 2, 3])
+@pytest.mark.parametrize("temperatures", ["mixed", "zero", "one"])
+def test_of_equals_it_is_the_first(machine, cl_device, levels, temperatures):
+    p = flat(problem(4, order=2, sample_shape=(19, 24), shape=(10, 9), temperatures=temperatures), levels)
+    for strength in (0.0, 1.0):
+        theirs = run(REFERENCE, p, strength)
+        assert_same_bits(run(machine, p, strength), theirs)
+        assert_same_bits(run(opencl(cl_device, vector=1, split=7), p, strength), theirs)
+
+
+def test_what_is_skipped_is_counted(cl_device):
+    p = problem(5, order=8, sample_shape=(40, 48), shape=(16, 16), temperatures="zero")
+    machine = opencl(cl_device)
+    before = machine.spared
+    run(machine, p)
+    candidates = p.candidates(REFERENCE).size
+    fma = 2 * p.sites.size * candidates * len(p.offsets)
+    spared = machine.spared - before
+    assert fma // 4 < spared < fma
+    assert spared % 8 == 0, "it is terms of two fma, and they are looked at by fours"
+    plain_ = opencl(cl_device, skip=False)
+    run(plain_, p)
+    assert plain_.spared == 0
+    assert REFERENCE.spared == 0
+
+
+def test_nothing_is_skipped_where_nothing_is_known(cl_device):
+    """Without a bound the first block is weighed whole."""
+    p = problem(6, order=4, sample_shape=(9, 9), temperatures="one", edges="whole")
+    p = p._replace(field=p.field._replace(source=np.zeros_like(p.field.source)))  # no candidate
+    machine = opencl(cl_device, split=1)
+    assert_same_bits(run(machine, p), run(REFERENCE, p))
+
+
+@pytest.mark.parametrize("order", [1, 8, 18, 50])
+def test_the_order_in_which_neighbours_are_looked_at(order):
+    offsets = neighbourhood_offsets(order)
+    assert len(offsets) % module.CHECK == 0
+    spread = module._spread(offsets.tobytes())
+    assert sorted(spread) == list(range(len(offsets)))
+    if order >= 8:
+        first = offsets[spread[:4]]
+        gaps = [abs(a - b).sum() for i, a in enumerate(first) for b in first[:i]]
+        assert min(gaps) >= offsets.max(), "the first are far apart"
+
+
+def fma_sum(e):
+    total = np.zeros(len(e), np.float32)
+    for column in e.T.astype(np.float64):
+        total = (column * column + total).astype(np.float32)
+    return total
+
+
+def test_a_sum_in_another_order_keeps_within_the_slack():
+    rng = np.random.default_rng(1)
+    for terms in (4, 60, 640):
+        e = rng.integers(-255 * 1024, 255 * 1024, (200, terms)).astype(np.float32) / np.float32(1024)
+        sums = [fma_sum(e[:, order]) for order in (np.arange(terms), rng.permutation(terms), np.argsort(e[0]))]
+        for a in sums:
+            for b in sums:
+                assert (a <= b * module.slack(terms)).all()
+    assert module.slack(60) < 1 + 2.0**-15
