@@ -53,12 +53,9 @@ class Sizes:
 
     @property
     def tiny(self) -> list[Case]:
-        """The smallest job of every method and search: it builds the programs, which is not to be timed."""
-        kinds = dict.fromkeys((case.method, case.search) for case in self.cases)
-        return [
-            Case(method, 16, 8 if method == "solid" else 16, 2 if method == "mrf" else 0, search)
-            for method, search in kinds
-        ]
+        """The smallest job of every method, search and order: it builds the programs, which is not to be timed."""
+        kinds = dict.fromkeys((case.method, case.order, case.search) for case in self.cases)
+        return [Case(method, 16, 8 if method == "solid" else 16, order, search) for method, order, search in kinds]
 
 
 def with_searches(cases: list[Case] | tuple[Case, ...]) -> list[Case]:
