@@ -102,22 +102,14 @@ def jobs(machine, repeats):
 
 
 def by_kernel(device):
-    """Device seconds of each kernel, told apart by waiting for every launch."""
+    """Device seconds of each kernel."""
     machine = simdtex.open_machine(device, profile=True)
-    launch, spent = machine.launch, {}
-
-    def timed(kernel, *args, **kwargs):
-        before = machine.seconds
-        launch(kernel, *args, **kwargs)
-        spent[kernel.function_name] = spent.get(kernel.function_name, 0.0) + machine.seconds - before
-
-    machine.launch = timed
     run(machine, picture("gravel", 256), 1024, alpha=0.3)
-    spent.clear()
-    seconds = run(machine, picture("gravel", 256), 1024, alpha=0.3)["seconds"]
-    print(f"by kernel, gravel 256 -> 1024, {seconds:.3f} s")
-    for name, busy in sorted(spent.items(), key=lambda item: -item[1]):
-        print(f"{name:18} {busy:7.3f} s, {busy / seconds:.1%}")
+    statistics = run(machine, picture("gravel", 256), 1024, alpha=0.3)
+    print(f"by kernel, gravel 256 -> 1024, {statistics['seconds']:.3f} s")
+    for kernel in statistics["kernels"]:
+        busy = kernel["seconds"]
+        print(f"{kernel['name']:18} {busy:7.3f} s, {busy / statistics['seconds']:.1%}")
 
 
 def goal(machine, repeats):

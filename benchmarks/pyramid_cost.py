@@ -110,17 +110,8 @@ def jobs(machine, repeats, part):
 
 
 def by_kernel(device, part):
-    """Device seconds of each kernel, told apart by waiting for every launch."""
+    """Device seconds of each kernel."""
     machine = simdtex.open_machine(device, profile=True)
-    launch, spent, count = machine.launch, {}, {}
-
-    def timed(kernel, *args, **kwargs):
-        before, name = machine.seconds, kernel.function_name
-        launch(kernel, *args, **kwargs)
-        spent[name] = spent.get(name, 0.0) + machine.seconds - before
-        count[name] = count.get(name, 0) + 1
-
-    machine.launch = timed
     for name, shape, options in (
         ("128 -> 256", (256 // part,) * 2, {}),
         ("256 -> 1024", (1024 // part,) * 2, {}),
@@ -128,13 +119,14 @@ def by_kernel(device, part):
     ):
         sample = sample_of((256 if shape[0] > 256 else 128) // part)
         run(machine, sample, shape, **options)
-        spent.clear()
-        count.clear()
-        seconds = run(machine, sample, shape, **options)["seconds"]
-        print(f"by kernel, grey {name}, {seconds:.3f} s with a wait after every launch")
-        for kernel, busy in sorted(spent.items(), key=lambda item: -item[1]):
-            print(f"  {kernel:20} {busy:7.4f} s, {busy / seconds:6.1%}, {count[kernel]} launches")
-        print(f"  all of them          {sum(spent.values()):7.4f} s, {sum(spent.values()) / seconds:6.1%}", flush=True)
+        statistics = run(machine, sample, shape, **options)
+        seconds, kernels = statistics["seconds"], statistics["kernels"]
+        print(f"by kernel, grey {name}, {seconds:.3f} s")
+        for kernel in kernels:
+            busy = kernel["seconds"]
+            print(f"  {kernel['name']:20} {busy:7.4f} s, {busy / seconds:6.1%}, {kernel['calls']} launches")
+        total = sum(kernel["seconds"] for kernel in kernels)
+        print(f"  all of them          {total:7.4f} s, {total / seconds:6.1%}", flush=True)
 
 
 def reference(machine, repeats, part):

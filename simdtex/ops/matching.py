@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.ops.operation import Array, Operation
+from simdtex.ops.operation import Array, Operation, touching
 from simdtex.ops.sort import local, run_length
 
 if TYPE_CHECKING:
@@ -84,6 +84,7 @@ def _launch_ranks(machine: OpenCL, order: Array, targets: Array) -> Array:
         machine.kernel("matching", "matching_ranks"),
         (n, segments),
         *(order, np.int32(segments), np.int32(n), targets, np.int32(each), np.int32(m), values),
+        work=touching(order, targets, values),
     )
     return values
 
@@ -125,6 +126,7 @@ def _launch_lookup(machine: OpenCL, values: Array, tables: Array) -> Array:
         machine.kernel("matching", "matching_lookup"),
         (n, segments),
         *(values, s, np.int32(n), spans, b, cdf, tables, np.int32(each), result),
+        work=touching(values, result),
     )
     return result
 
@@ -142,6 +144,7 @@ def _launch_distance(machine: OpenCL, before: Array, after: Array) -> Array:
         machine.kernel("matching", "matching_distance"),
         (segments * runs,),
         *(before, after, *shape, sums),
+        work=touching(before, after),
         local=local(machine),
     )
     machine.launch(

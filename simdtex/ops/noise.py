@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.ops.operation import Array, Operation
+from simdtex.ops.operation import Array, Operation, touching
 
 if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
@@ -26,6 +26,7 @@ def _launch(machine: OpenCL, planes: int, n: int, seed: int, level: int) -> Arra
         machine.kernel("noise", "noise"),
         (-(-n // 8), -(-planes // 4)),
         *(np.uint64(seed), np.int32(level), np.int32(planes), np.int32(n), values),
+        work=touching(values),
     )
     return values
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.ops.laplacian import within
-from simdtex.ops.operation import Array, Operation
+from simdtex.ops.operation import Array, Operation, Work
 
 if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
@@ -106,12 +106,16 @@ def _launch_split(machine: OpenCL, picture: Array, taps: Array, torus: bool, ste
             (height * step * pitch // v, together),
             *(picture, *_sizes(*size, torus, side // 2, 1, planes, first, step * first_row, together, height, pitch)),
             padded,
+            work=Work(None, 8.0 * together * height * step * pitch),
         )
         machine.launch(
             split,
             (_up(some, unit) // unit * across // v, together),
             *(padded, *_sizes(together, height, pitch), taps, *_sizes(side, planes, rows, cols)),
             *(*_sizes(first, first_row, some), bands),
+            work=Work(
+                together * some * cols * taps.size, 4.0 * together * (height * step * pitch + some * cols * count)
+            ),
         )
     return bands
 
@@ -142,6 +146,7 @@ def _launch_join(
                 (height * pitch // v, count * together),
                 *(bands, *_sizes(rows, cols, torus, own // 2, count, planes, first, first_row)),
                 *(*_sizes(together, height, pitch), padded),
+                work=Work(None, 4.0 * count * together * height * pitch * (1 + 1 / step**2)),
             )
             machine.launch(
                 join,
@@ -149,6 +154,10 @@ def _launch_join(
                 *(padded, *_sizes(together, height, pitch), taps, *_sizes(count, own, skip)),
                 *_sizes(number == 0, number == len(terms) - 1),
                 *(total, *_sizes(rows, cols, first, first_row, some), picture),
+                work=Work(
+                    count * together * some * cols * own**2 / skip,
+                    4.0 * together * (count * height * pitch + some * across),
+                ),
             )
     return picture
 
