@@ -74,9 +74,10 @@ def synthesize(
     **options
         Of the method. ``mrf``: ``preset``, ``order``, ``levels``, ``relaxation``, ``bandwidth``, ``coherence``, ``xi``,
         ``free_sweeps``, ``pixel``, ``phases``, ``edges``, ``coarsest``, ``schedule``, ``check_schedule``,
-        ``boundary``, ``array``, ``mapping``, ``emulate``; see `simdtex.methods.mrf.Options`. ``multires``: ``alpha``,
-        ``beta``, ``target``, ``thresholds``, ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``,
-        ``phase``, ``boundary``; see `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``, ``levels``,
+        ``boundary``, ``array``, ``mapping``, ``search``, ``suggesting``, ``similar``, ``chance``, ``exhaustive``,
+        ``emulate``; see `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``target``, ``thresholds``,
+        ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``phase``, ``boundary``; see
+        `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``, ``levels``,
         ``orientations``, ``iterations``, ``match``, ``bins``, ``edges``, ``color``, ``start``; see
         `simdtex.methods.pyramid.Options`.
 
