@@ -29,7 +29,8 @@ PAGES = sorted(path for path in (ROOT / "docs").rglob("*.rst") if "_build" not i
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 OF_COMMANDS = {"sheet": METHODS["multires"], "mix": METHODS["pyramid"], "solid": solid}
 REFERENCE = "\n".join(
-    (ROOT / "docs" / "reference" / name).read_text(encoding="utf-8") for name in ("command-line.rst", "search.rst", "bench.rst")
+    (ROOT / "docs" / "reference" / name).read_text(encoding="utf-8")
+    for name in ("command-line.rst", "search.rst", "bench.rst")
 )
 
 

@@ -309,6 +309,21 @@ class OpenCL:
                 event = cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (self.group,), (first,))
                 self.log.add(size, event, kernel)
 
+    def launch_rounds(self, kernel: Any, size: int, rounds: int, *args: Any) -> None:
+        """Enqueue a kernel several times, its last two arguments changing places in between; the others are set once."""
+        if self.array:
+            for number in range(rounds):
+                self.launch(kernel, (size,), *args[:-2], *(args[-2:] if number % 2 == 0 else args[:-3:-1]))
+            return
+        data = [a.data if isinstance(a, cl_array.Array) else a for a in args]
+        kernel.set_args(*data)
+        whole = -(-size // self.group) * self.group
+        for number in range(rounds):
+            kernel.set_arg(len(data) - 2, data[-2 + number % 2])
+            kernel.set_arg(len(data) - 1, data[-1 - number % 2])
+            event = cl.enqueue_nd_range_kernel(self.queue, kernel, (whole,), (self.group,))
+            self.log.add(whole, event, kernel)
+
     def _enqueue(
         self,
         kernel: Any,
