@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a run of `multires` costs, all measured in one run.
 
-    python benchmarks/multires_cost.py [--device TEXT] [--repeats 3]
+    python benchmarks/multires_cost.py [--device TEXT] [--repeats 3] [--only jobs,goal]
 
 Prints seconds (the best of a few runs, kernels compiled before) of whole syntheses, their growth with the output, the
 sample and alpha, the nodes of the sample that a pixel of the finest level is compared with as a share of all, the time
@@ -164,25 +164,32 @@ def memory(machine, device):
             print(f"bytes per {what} pixel, {kind}: {each[0]:4.0f} of the process, {each[1]:4.0f} in arrays")
 
 
+def alone(device):
+    """A process of its own, with its imports and compilations."""
+    printed, kib = output_of(JOB + HIGH_WATER, device or "").splitlines()
+    seconds, first = json.loads(printed)
+    print(f"gravel 256 -> 1024 in a process of its own: {seconds:.1f} s, first progress after {first:.1f} s, ", end="")
+    print(f"peak memory {int(kib) / 1024:.0f} MiB", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--device")
     parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--only-goal", action="store_true", help="only the ratio to the NumPy reference")
+    parser.add_argument("--only", default="", help="parts to run, by name, separated by commas")
     options = parser.parse_args()
-    machine = simdtex.open_machine(options.device)
+    device, repeats = options.device, options.repeats
+    machine = simdtex.open_machine(device)
     print(f"device: {machine.name}, {machine.info.compute_units} compute units")
-    if options.only_goal:
-        goal(machine, options.repeats)
-        return
-    jobs(machine, options.repeats)
-    by_kernel(options.device)
-    goal(machine, options.repeats)
-    printed, kib = output_of(JOB + HIGH_WATER, options.device or "").splitlines()
-    seconds, first = json.loads(printed)
-    print(f"gravel 256 -> 1024 in a process of its own: {seconds:.1f} s, first progress after {first:.1f} s, ", end="")
-    print(f"peak memory {int(kib) / 1024:.0f} MiB")
-    memory(machine, options.device)
+    parts = {
+        "jobs": partial(jobs, machine, repeats),
+        "kernels": partial(by_kernel, device),
+        "goal": partial(goal, machine, repeats),
+        "alone": partial(alone, device),
+        "memory": partial(memory, machine, device),
+    }
+    for name in options.only.split(",") if options.only else parts:
+        parts[name]()
 
 
 if __name__ == "__main__":

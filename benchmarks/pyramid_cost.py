@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a run of `pyramid` costs, all measured in one run.
 
-    python benchmarks/pyramid_cost.py [--device TEXT] [--repeats 3] [--only jobs,sort] [--quick]
+    python benchmarks/pyramid_cost.py [--device TEXT] [--repeats 3] [--only jobs,goal] [--quick]
 
 Prints seconds (the best of a few runs, kernels compiled before) of whole syntheses, the time by kernel, the NumPy
 reference's time next to the device's, solid textures in processes of their own, memory for each pixel and voxel, the

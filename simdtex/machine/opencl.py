@@ -310,7 +310,7 @@ class OpenCL:
                 self.log.add(size, event, kernel)
 
     def launch_rounds(self, kernel: Any, size: int, rounds: int, *args: Any) -> None:
-        """Enqueue a kernel several times, its last two arguments changing places in between; the others are set once."""
+        """Enqueue a kernel several times, its last two arguments changing places; the others are set once."""
         if self.array:
             for number in range(rounds):
                 self.launch(kernel, (size,), *args[:-2], *(args[-2:] if number % 2 == 0 else args[:-3:-1]))

@@ -184,7 +184,7 @@ def suggest_alpha(machine: Machine, analysis: Analysis, options: Options) -> flo
 
     Notes
     -----
-    Cost: eight or nine scans of at most 4096 pixels of each of these levels.
+    Cost: eight or nine scans, without draws, of at most 4096 pixels of each of these levels.
     """
     itself = _sampled(
         machine, analysis.shapes, [np.arange(pixels([shape]), dtype=np.int32) for shape in analysis.shapes]
@@ -265,8 +265,8 @@ def resample(
 
     Notes
     -----
-    A level is one step: no pixel depends on another of its level. Cost: for every pixel at most 3/4 of the nodes above
-    it, times the features; some thousandths of that at usual thresholds. Memory on the device, in bytes per output
+    A level is one step: no pixel depends on another of its level. Cost: for every four pixels at most the nodes above
+    them, times the features; some thousandths of that at usual thresholds. Memory on the device, in bytes per output
     pixel: 20 + 5.3 channels, beside the analysis; on the host about 50 + 5 channels.
     """
     began, worked = perf_counter(), machine.seconds
