@@ -38,6 +38,9 @@ OUT_OF_MEMORY = (
     cl.status_code.INVALID_BUFFER_SIZE,
 )
 
+FEW = 4
+"""Work-items to a work-group of a processor where each has much to do: a small group of sites still feeds all cores."""
+
 LONGEST = 2**17
 """Work-items of a launch over a group: a multiple of every work-group size, and no long launch."""
 
@@ -302,11 +305,12 @@ class OpenCL:
         launch costs a few microseconds.
         """
         kernel.set_args(*(a.data if isinstance(a, cl_array.Array) else a for a in args))
+        group = self.group if self.forced or self.info.kind == "gpu" else FEW
         for begin, end in pairwise(bounds.tolist()):
             kernel.set_arg(1, np.int32(end))
             for first in range(begin, end, LONGEST):
-                size = -(-min(end - first, LONGEST) // self.group) * self.group
-                event = cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (self.group,), (first,))
+                size = -(-min(end - first, LONGEST) // group) * group
+                event = cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (group,), (first,))
                 self.log.add(size, event, kernel)
 
     def launch_rounds(self, kernel: Any, size: int, rounds: int, *args: Any) -> None:
