@@ -72,7 +72,7 @@ def test_few_candidates_and_small_or_huge_neighbourhoods_have_none():
     assert grown(problem(1, order=4, sample_shape=(40, 40)))[0] is None
 
 
-FORMS = [{}, {"vector": 1, "split": 64}, {"vector": 4, "split": 3}]
+FORMS = [{}, {"vector": 1, "step": 1, "split": 64}]
 
 
 def warmed(p, most):

@@ -70,9 +70,10 @@ def _launch(
 ) -> Relaxed:
     count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
     strip, plane = candidates.strip, np.int32(candidates.rows * candidates.cols)
-    defines = {"V": machine.vector, "C": channels, "N": neighbours, "STEP": machine.step, "CHECK": CHECK}
+    defines = {"V": machine.vector, "C": channels, "STEP": machine.step, "CHECK": CHECK}
     f, i, leaves = np.float32, np.int32, strip.leaves
-    near, terms = (machine.empty((count, neighbours * (n + channels)), f) for n in (1, 2))
+    near = machine.empty((count, neighbours * (1 + channels)), f)
+    terms = machine.empty((count, neighbours * (2 + channels)), i)
     least, certain = machine.empty((count,), f), machine.empty((count,), f)
     used, where = machine.empty((count,), i), machine.empty((count,), i)
     features = machine.empty((count, FEATURES), f)
@@ -80,7 +81,7 @@ def _launch(
     machine.launch_sites(
         ("nearest", "nearest_begin"),
         (count,),
-        *(sites, i(count), *field, i(prod(field.values.shape[1:])), offsets, *grid.args),
+        *(sites, i(count), i(neighbours), *field, i(prod(field.values.shape[1:])), offsets, *grid.args),
         *(candidates.index_of, i(candidates.rows), i(candidates.cols)),
         *(candidates.pixels, candidates.positions, candidates.reach, strip.reach),
         *(machine.constant(_spread(strip.offsets)), favour, axes, f(leaves.middle if leaves else 0)),
@@ -96,7 +97,18 @@ def _launch(
             machine.launch_sites(
                 ("nearest", "nearest_leaves"),
                 (count * split,),
-                *(i(count), near, features, least, where, certain, leaves.box, leaves.rows, leaves.order),
+                *(
+                    i(count),
+                    i(neighbours),
+                    near,
+                    features,
+                    least,
+                    where,
+                    certain,
+                    leaves.box,
+                    leaves.rows,
+                    leaves.order,
+                ),
                 *(i(leaves.number), f(leaves.blur), candidates.pixels, plane, candidates.positions, candidates.reach),
                 *(i(split), found, at, work, wanted),
                 defines=defines,
@@ -105,7 +117,7 @@ def _launch(
         machine.launch_sites(
             ("nearest", "nearest_scan"),
             (count * split,),
-            *(i(count), terms, used, near, least, where),
+            *(i(count), i(neighbours), terms, used, near, least, where),
             *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach),
             *(slack(neighbours * channels), i(split), i(leaves is None), wanted, i(row), found, at, work),
             defines=defines,
@@ -121,7 +133,7 @@ def _launch(
         machine.launch_sites(
             ("nearest", "nearest_plain"),
             (pitch // machine.vector, parts),
-            *(around.confidence, around.weighted, i(pitch)),
+            *(around.confidence, around.weighted, i(neighbours), i(pitch)),
             *(candidates.pixels, plane, candidates.positions, i(candidates.size)),
             *(candidates.reach, i(blocks), i(parts), found, at),
             local=machine.tile,
