@@ -290,7 +290,8 @@ def compare(
     emulate : bool
         Whether they are executed as on that array too, which takes longer and gives the same pictures.
     **options
-        Of the method ``mrf``, see `simdtex.methods.mrf.Options`; ``preset`` too.
+        Of the method ``mrf``, see `simdtex.methods.mrf.Options`; ``preset`` too. ``search`` is ``"exact"`` unless
+        given: a schedule is judged by the model, not by a list of candidates.
 
     Returns
     -------
@@ -334,7 +335,7 @@ def compare(
     _check_distinct("seed", keys)
     if "schedule" in options:
         raise TypeError("schedule is no option here; give schedules, a sequence of them")
-    options |= {"array": array, "mapping": mapping, "emulate": emulate}
+    options = {"search": "exact"} | options | {"array": array, "mapping": mapping, "emulate": emulate}
     make_options(**options)
     pixels = check_sample(sample, channel_axis)
     size = _check_sides(pixels.shape[:2], shape)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from math import isqrt
 from typing import Any
 
@@ -152,6 +153,7 @@ class Sublattice:
         return rows % self.a == 0 and cols % self.c == 0 and (cols // self.c * self.b) % self.a == 0
 
 
+@lru_cache(maxsize=64)
 def coloring_sublattice(
     order: int, rows: int | None = None, cols: int | None = None, limit: int | None = None
 ) -> Sublattice | None:

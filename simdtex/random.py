@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 # What a draw is for; the same numbers stand in kernels/common/philox.h.
 START, DRAW, COLOR, SCHEDULE = 1, 2, 3, 4
-NOISE = 5
+NOISE, SEARCH = 5, 6
 
 _LOW = np.uint64(0xFFFFFFFF)
 _SHIFT = np.uint64(32)

@@ -272,12 +272,13 @@ class Meter:
         self._expected = expected
         self._ended = self._fraction = self._cooled = 0.0
         self._sweep_share = self._first_left = 0.0
-        self._free = 0
+        self._free = self._weighed = 0
         self._cooling = True
         self._began = self._level_began = time.perf_counter()
 
-    def begin(self, level: int, grid: Grid, candidates: int) -> None:
-        """Begin a level."""
+    def begin(self, level: int, grid: Grid, candidates: int, weighed: int | None = None) -> None:
+        """Begin a level; a relaxation weighs about `weighed` of its candidates, or all."""
+        self._weighed = candidates if weighed is None else weighed
         self._level_began = time.perf_counter()
         self._cooled = self._sweep_share = self._first_left = 0.0
         self._free = 0
@@ -298,9 +299,9 @@ class Meter:
         self._sweep_share, self._cooled = min(like_the_last, 1 - cooled), cooled
         return int(self.reports[-1]["sweeps"])
 
-    def step(self) -> int:
-        """Begin a step, and return its number within the level, from 1."""
-        self._count("steps", 1)
+    def step(self, steps: int = 1) -> int:
+        """Begin a step, or several that go together, and return the last one's number within the level, from 1."""
+        self._count("steps", steps)
         return int(self.reports[-1]["steps"])
 
     def add(self, relaxations: int, fma: int, share: float) -> None:
@@ -311,13 +312,16 @@ class Meter:
         cooling, free = self._expected[report["level"]]
         done = (self._cooled + self._sweep_share * share) * cooling
         if self._cooled == 1:
-            self._free += relaxations * report["candidates"]
+            self._free += relaxations * self._weighed
             done = cooling + min(self._free, free)
         total = sum(sum(work) for work in self._expected.values())
         self._fraction = max(self._fraction, min(1.0, (self._ended + done) / total))
 
-    def end(self, skipped: int) -> None:
-        """End the level, of whose fma so many were skipped."""
+    def end(self, skipped: int, weighed: tuple[int, int] | None = None) -> None:
+        """End the level: so many fma were skipped, or so many candidates weighed at so many fma."""
+        if weighed is not None:
+            self.reports[-1]["weighed"] = weighed[0] / self.reports[-1]["relaxations"]
+            self.reports[-1]["fma"] += weighed[0] * weighed[1]
         self.reports[-1]["skipped"] = skipped
         self.reports[-1]["seconds"] = time.perf_counter() - self._level_began
         self._ended += sum(self._expected[self.reports[-1]["level"]])

@@ -11,6 +11,9 @@
 #ifndef C
 #define C 1 // channels of a pixel
 #endif
+#ifndef LEVEL
+#define LEVEL float // in which a sample's working grey levels are stored
+#endif
 #define NO_WEIGHT 28.0f // exp(-28) 2^40 < 1
 
 // W_p: Gaussian of equation (7) relative to the best candidate.
@@ -34,7 +37,7 @@ inline uint legal_mass(__global const uint *noise, const int radius, const int y
 
 // W_p times the share of the kernel around y_p that is legal: the mass of candidate p in the mixture over legal
 // levels. Dozens of saturated channels do not make it 0.
-inline ulong mass_of(const float d, const float smallest, const float scale, __global const float *sample,
+inline ulong mass_of(const float d, const float smallest, const float scale, __global const LEVEL *sample,
                      const int plane, const int from, __global const uint *noise, const int radius, const int top)
 {
     ulong w = weight(d, smallest, scale);

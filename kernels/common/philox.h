@@ -5,15 +5,20 @@
 #ifndef SIMDTEX_PHILOX_H
 #define SIMDTEX_PHILOX_H
 
-inline uint4 philox(uint4 counter, uint2 key)
+inline uint4 philox(const uint4 counter, const uint2 key)
 {
+    uint a = counter.x, b = counter.y, c = counter.z, d = counter.w, k0 = key.x, k1 = key.y;
+#pragma unroll
     for (int round = 0; round < 10; ++round) {
-        const uint hi0 = mul_hi(0xD2511F53u, counter.x), lo0 = 0xD2511F53u * counter.x;
-        const uint hi1 = mul_hi(0xCD9E8D57u, counter.z), lo1 = 0xCD9E8D57u * counter.z;
-        counter = (uint4)(hi1 ^ counter.y ^ key.x, lo1, hi0 ^ counter.w ^ key.y, lo0);
-        key += (uint2)(0x9E3779B9u, 0xBB67AE85u);
+        const ulong first = (ulong)0xD2511F53u * a, second = (ulong)0xCD9E8D57u * c;
+        a = (uint)(second >> 32) ^ b ^ k0;
+        b = (uint)second;
+        c = (uint)(first >> 32) ^ d ^ k1;
+        d = (uint)first;
+        k0 += 0x9E3779B9u;
+        k1 += 0xBB67AE85u;
     }
-    return counter;
+    return (uint4)(a, b, c, d);
 }
 
 // What a draw is for; the same numbers stand in simdtex/random.py.
@@ -22,6 +27,7 @@ inline uint4 philox(uint4 counter, uint2 key)
 #define PURPOSE_COLOR 3u
 #define PURPOSE_SCHEDULE 4u
 #define PURPOSE_NOISE 5u
+#define PURPOSE_SEARCH 6u
 
 inline uint4 draw4(const ulong seed, const uint level, const uint turn, const uint site, const uint purpose,
                    const uint attempt)

@@ -85,7 +85,7 @@ _MRF_OPTIONS = (
         "--bandwidth", type=float, help=f"mrf: of the Parzen kernel, in units of h_opt.  [{DEFAULTS.bandwidth}]"
     ),
     click.option(
-        "--coherence", type=float, help=f"mrf: preference for continuing a neighbour's source.  [{DEFAULTS.coherence}]"
+        "--coherence", type=float, help="mrf: preference for continuing a neighbour's source.  [exact 1, coherent 0.2]"
     ),
     click.option("--xi", type=float, help=f"mrf: cooling, below 0; further down is faster.  [{DEFAULTS.xi}]"),
     click.option(
@@ -96,6 +96,17 @@ _MRF_OPTIONS = (
     click.option("--pixel", help=f"mrf: source (pixels of the sample) or density (grey levels).  [{DEFAULTS.pixel}]"),
     click.option("--phases", help=f"mrf: decimated or all: candidates at coarse levels.  [{DEFAULTS.phases}]"),
     click.option("--coarsest", help=f"mrf: gibbs or same: how the coarsest level relaxes.  [{DEFAULTS.coarsest}]"),
+    click.option(
+        "--search", help=f"mrf: exact (all candidates), coherent (a few, much faster) or auto.  [{DEFAULTS.search}]"
+    ),
+    click.option(
+        "--suggesting", type=int, help=f"mrf, coherent: nearest neighbours that suggest one.  [{DEFAULTS.suggesting}]"
+    ),
+    click.option("--similar", type=int, help=f"mrf, coherent: candidates like each of these.  [{DEFAULTS.similar}]"),
+    click.option("--chance", type=int, help=f"mrf, coherent: candidates at random.  [{DEFAULTS.chance}]"),
+    click.option(
+        "--exhaustive", type=int, help=f"mrf, coherent: levels of so few candidates weigh all.  [{DEFAULTS.exhaustive}]"
+    ),
 )
 
 _MULTIRES_OPTIONS = (

@@ -58,15 +58,13 @@ class Account:
 
     def begin(self, grid: Grid, offsets: NDArray[np.int32], candidates: int, channels: int, words: int) -> None:
         """Begin a level: its lattice, neighbourhood and candidates."""
-        by_mapping = {m: ProcessorArray(self.array.rows, self.array.cols, m).shifts(grid, offsets) for m in MAPPINGS}
-        self._grid, self._neighbours = grid, len(offsets)
-        self._shifts = by_mapping[self.array.mapping]
+        self._grid, self._offsets, self._neighbours = grid, offsets, len(offsets)
+        self._shifts = np.zeros(0, np.int64) if self.packed else self.array.shifts(grid, offsets)
         self._flop = FLOP * candidates * len(offsets) * channels
         self._words = words
         self.levels.append(
             {
                 "layers": -(-grid.plane // self.array.size) if self.packed else int(np.prod(self.array.layers(grid))),
-                "shifts": {m: int(shifts.sum()) for m, shifts in by_mapping.items()},
                 **dict.fromkeys(("steps", "passes", "sites", "moved", "routed", "flop"), 0),
                 "model_seconds": 0.0,
             }
@@ -101,7 +99,10 @@ class Account:
             "array": f"{self.array.rows}x{self.array.cols}",
             "mapping": "packed" if self.packed else self.array.mapping,
             "layers": finest["layers"],
-            "shifts": finest["shifts"],
+            "shifts": {
+                m: int(ProcessorArray(self.array.rows, self.array.cols, m).shifts(self._grid, self._offsets).sum())
+                for m in MAPPINGS
+            },
             "active": active,
             "utilisation": active / self.array.size,
             **total,

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
+from itertools import pairwise
 from math import gcd, prod
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,9 @@ OUT_OF_MEMORY = (
     cl.status_code.OUT_OF_HOST_MEMORY,
     cl.status_code.INVALID_BUFFER_SIZE,
 )
+
+LONGEST = 2**17
+"""Work-items of a launch over a group: a multiple of every work-group size, and no long launch."""
 
 
 def kernel_folder() -> Path:
@@ -276,6 +280,20 @@ class OpenCL:
         local = local if local and not self.forced else one_dimensional
         size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
         self._enqueue(kernel, size, *args, local=local)
+
+    def launch_groups(self, kernel: Any, bounds: NDArray[np.int64], *args: Any) -> None:
+        """Enqueue a kernel over groups of work-items one after another, from ``bounds[g]`` up to ``bounds[g + 1]``.
+
+        The kernel's second argument is the end of the group that it is launched for. The others are set once, so that a
+        launch costs a few microseconds.
+        """
+        kernel.set_args(*(a.data if isinstance(a, cl_array.Array) else a for a in args))
+        for begin, end in pairwise(bounds.tolist()):
+            kernel.set_arg(1, np.int32(end))
+            for first in range(begin, end, LONGEST):
+                size = -(-min(end - first, LONGEST) // self.group) * self.group
+                event = cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (self.group,), (first,))
+                self.log.add(size, event)
 
     def _enqueue(
         self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None, begin: int = 0

@@ -9,144 +9,43 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from math import inf, log2, prod
+from itertools import pairwise
+from math import log2, prod
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import schedules
-from simdtex.lattice import Grid, check_order, neighbourhood_offsets
+from simdtex.lattice import Grid, neighbourhood_offsets
 from simdtex.machine import Machine
 from simdtex.machine.accounting import Account
 from simdtex.machine.array import parse_array
+from simdtex.methods.mrf_options import PRESETS, Options, make_options
 from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
 from simdtex.ops.commit import commit
 from simdtex.ops.nearest import nearest
 from simdtex.ops.neighbourhood import Field, neighbourhood
 from simdtex.ops.operation import Array
+from simdtex.ops.search import Rule, Table, search, search_apart, table
 from simdtex.ops.snapshot import snapshot
 from simdtex.ops.start import start
 from simdtex.ops.temperature import temperature
-from simdtex.options import build, one_of, real, true_or_false, whole, within_32_bits
+from simdtex.options import within_32_bits
 from simdtex.run import Callback, Meter, Output, Relaxing, Stage, device_seconds
 from simdtex.sample import Candidates, Sample
 
-PRESETS: dict[str, dict[str, Any]] = {
-    "default": {},
-    "paper": {
-        "relaxation": "gibbs",
-        "bandwidth": 1.0,
-        "coherence": 0.0,
-        "xi": -1.0,
-        "free_sweeps": 0,
-        "pixel": "density",
-        "phases": "decimated",
-        "edges": "whole",
-        "coarsest": "same",
-    },
-}
-"""``paper`` keeps the 1998 rules to the letter."""
+__all__ = ["PRESETS", "Options", "check_fit", "make_options", "synthesize"]
 
 ENOUGH = 64
 """Candidates that the sample must still have at the coarsest of the default levels."""
 
+FEW = 1024
+"""Candidates up to which coherent search weighs all of them in its own kernel."""
 
-@dataclass(frozen=True)
-class Options:
-    """The options of the method ``mrf``.
-
-    Parameters
-    ----------
-    order : int
-        o of equation (3): neighbours within the distance sqrt(o).
-    levels : int, optional
-        M of Algorithm 1. None: the most levels at which the sample still has 64 candidates, and the output's
-        lattice a whole neighbourhood.
-    relaxation : {"icm", "gibbs"}
-        Take the LCPDF's mode, or draw from it.
-    bandwidth : float
-        h in units of h_opt, equation (8).
-    coherence : float
-        The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence.
-    xi : float
-        xi < 0 of equation (13): the further below 0, the fewer sweeps.
-    free_sweeps : int
-        Sweeps over all sites of a level, held ones too, after its equilibrium.
-    pixel : {"source", "density"}
-        A relaxed site takes the pixel of its source in the sample, or a grey level of the Parzen density, whose
-        kernel also spreads over x_s.
-    phases : {"all", "decimated"}
-        Candidates at coarse levels: every sample position, or those of the decimated sample, equation (10).
-    edges : {"auto", "reflect", "whole"}
-        Candidates are those sample positions whose whole neighbourhood lies in the sample, equation (4)
-        (``whole``), or all, those near the edge with a neighbourhood completed by reflection (``reflect``);
-        ``auto`` reflects at the levels at which fewer than three quarters of them have a whole neighbourhood.
-    coarsest : {"gibbs", "same"}
-        How the coarsest level relaxes: by draws, or as the other levels. Its mode says nothing while all is unknown.
-    schedule : str or simdtex.schedules.Schedule
-        Which sites relax together: ``"coloring"``, ``"coloring-fixed"``, ``"luby"``, ``"checkerboard"``,
-        ``"synchronous"``, ``"random-subset"``, ``"raster"``, ``"random-scan"``, ``"block"``, or one of your own.
-    check_schedule : bool
-        Check at every step that a schedule which claims independent sites keeps equation (14).
-    boundary : {"torus", "open"}
-        Whether the output wraps around.
-    array : str, optional
-        A processor array to run on: ``"ROWSxCOLS"`` or ``"maspar-mp1-1k"`` to ``"maspar-mp1-16k"``. None packs the
-        active sites instead.
-    mapping : {"cut-and-stack", "hierarchical"}
-        How a picture larger than the array lies on it.
-    emulate : bool
-        Whether every launch is to have one work-item per PE of the array. False packs all the same, and only
-        accounts for the array.
-    """
-
-    order: int = 18
-    levels: int | None = None
-    relaxation: str = "icm"
-    bandwidth: float = 0.15
-    coherence: float = 1.0
-    xi: float = -1.0
-    free_sweeps: int = 2
-    pixel: str = "source"
-    phases: str = "decimated"
-    edges: str = "auto"
-    coarsest: str = "gibbs"
-    schedule: str | schedules.Schedule = "coloring"
-    check_schedule: bool = False
-    boundary: str = "torus"
-    array: str | None = None
-    mapping: str = "cut-and-stack"
-    emulate: bool = True
-
-    def __post_init__(self) -> None:
-        """Check every value."""
-        check_order(self.order)
-        if self.levels is not None:
-            whole("levels", self.levels, 1)
-        one_of("relaxation", self.relaxation, ("icm", "gibbs"))
-        real("bandwidth", self.bandwidth, 0, above=True)
-        real("coherence", self.coherence, 0)
-        real("xi", self.xi, -inf)
-        if self.xi >= 0:
-            raise ValueError(f"xi is {self.xi}; give a number below 0")
-        whole("free_sweeps", self.free_sweeps, 0)
-        one_of("pixel", self.pixel, ("source", "density"))
-        one_of("phases", self.phases, ("all", "decimated"))
-        one_of("edges", self.edges, ("auto", "reflect", "whole"))
-        one_of("coarsest", self.coarsest, ("gibbs", "same"))
-        one_of("boundary", self.boundary, ("torus", "open"))
-        schedules.get(self.schedule)
-        true_or_false("check_schedule", self.check_schedule)
-        parse_array(self.array or "1x1", self.mapping)
-        true_or_false("emulate", self.emulate)
-
-
-def make_options(preset: str = "default", **given: Any) -> Options:
-    """Options from a preset and what the user gave; unknown names are a TypeError that lists the valid ones."""
-    one_of("preset", preset, PRESETS)
-    return build(Options, "mrf", PRESETS[preset] | given, also=("preset",))
+TOGETHER = 2**16
+"""Sites that coherent search relaxes between two looks at the clock."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +53,7 @@ class _Run:
     """What stays the same throughout a run."""
 
     machine: Machine
+    emulated: bool
     sample: Sample
     planes: Array
     shape: tuple[int, int]
@@ -175,6 +75,21 @@ class _Level(NamedTuple):
     candidates: Candidates
     window: lcpdf.Window
     relaxation: str
+    coherent: _Coherent | None
+
+    @property
+    def weighed(self) -> int:
+        """Most candidates that a site weighs."""
+        return self.coherent.table.slots if self.coherent else self.candidates.size
+
+
+class _Coherent(NamedTuple):
+    """What coherent search of a level needs beside that; ``ahead``: the schedule's sweeps can run in place."""
+
+    table: Table
+    rule: Rule
+    weighed: Array
+    ahead: bool
 
 
 def synthesize(
@@ -215,6 +130,7 @@ def synthesize(
     sample with its margin, and the machine's scratch memory or, if that is more, 65 per candidate. On the host: about
     50 per output pixel.
     """
+    options = options.resolved()
     offsets = neighbourhood_offsets(options.order)
     levels = _number_of_levels(pixels.shape[:2], offsets, shape, options)  # 1
     margin = int(offsets.max()) * 2 ** (levels - 1) if options.edges != "whole" else 0
@@ -229,7 +145,7 @@ def synthesize(
     machine = machine.emulate(array) if emulated else machine
     account = Account(array, packed=options.array is None)
     launches, worked = machine.launches, machine.seconds
-    run = _Run(machine, sample, planes, shape, offsets, options, schedule, seed, levels, account, callback)
+    run = _Run(machine, emulated, sample, planes, shape, offsets, options, schedule, seed, levels, account, callback)
     meter = Meter(_expected_work(run))
     stages = []
 
@@ -237,16 +153,16 @@ def synthesize(
     field = start(machine, planes, everywhere, Grid(*shape), seed)  # 2, 5
     for number in reversed(range(levels)):  # 6
         level, spared = _level(run, number), machine.spared  # 3, 4, 6.1
-        meter.begin(number, level.grid, level.candidates.size)
+        meter.begin(number, level.grid, level.candidates.size, level.weighed)
         words = sample.channels + 1 + bool(options.coherence)  # of a neighbour: pixel, temperature, source
-        account.begin(level.grid, offsets, level.candidates.size, sample.channels, words)
+        account.begin(level.grid, offsets, level.weighed, sample.channels, words)
         state = schedule.init(machine, level.grid, offsets, options.order, seed, number)
         while (temperatures := _temperatures(run, level, field)).any():  # 6.2
             field, state = _sweep(run, level, field, state, temperatures, "relax", meter)
         for _ in range(options.free_sweeps):
             field, state = _sweep(run, level, field, state, temperatures, "free", meter)
         stages.append(Stage(number, _picture(run, level, field)))
-        meter.end(machine.spared - spared)
+        meter.end(machine.spared - spared, _weighed(run, level))
 
     values, source, temperatures = (Grid(*shape).view(machine.get(plane)) for plane in field)
     image = sample.picture(values, source)
@@ -273,7 +189,41 @@ def _level(run: _Run, number: int) -> _Level:
     by_draw = number == run.levels - 1 and options.coarsest == "gibbs"
     relaxation = "gibbs" if by_draw else options.relaxation
     window = lcpdf.window(h, sample.top)
-    return _Level(number, grid, run.machine.put(offsets), candidates, window, relaxation)
+    level = _Level(number, grid, run.machine.put(offsets), candidates, window, relaxation, None)
+    return level._replace(coherent=_coherent(run, level)) if options.search == "coherent" else level
+
+
+def _coherent(run: _Run, level: _Level) -> _Coherent | None:
+    """Lay out coherent search; None where all of many candidates are to be weighed: exact search is made for that."""
+    options, grid = run.options, level.grid
+    exhaustive = level.number == run.levels - 1 or level.candidates.size <= options.exhaustive
+    if exhaustive and level.candidates.size > FEW:
+        return None
+    how = {"suggesting": options.suggesting, "similar": options.similar, "chance": options.chance}
+    working = run.sample.working
+    laid = table(run.machine, level.candidates, working, run.offsets, grid.spacing, **how, exhaustive=exhaustive)
+    gibbs, noisy = level.relaxation == "gibbs", options.pixel == "density"
+    rule = Rule(_favour(options), _xi(options), level.window, gibbs, noisy, run.seed, level.number)
+    weighed = run.machine.put(np.zeros(run.shape, np.int32))
+    in_place = run.schedule.independent(grid, run.offsets) and not getattr(run.schedule, "tile", None)
+    ahead = hasattr(run.schedule, "sweep") and not run.emulated and in_place
+    return _Coherent(laid, rule, weighed, ahead)
+
+
+def _favour(options: Options) -> np.float32:
+    return np.float32(1 / (1 + (options.coherence or 0)))
+
+
+def _xi(options: Options) -> int:
+    return min(-1, round(options.xi * 1024))
+
+
+def _weighed(run: _Run, level: _Level) -> tuple[int, int] | None:
+    """Candidates that a level's relaxations have weighed, and the fma of each; None where they have weighed all."""
+    if not level.coherent:
+        return None
+    weighed = level.grid.view(run.machine.get(level.coherent.weighed))
+    return int(weighed.sum(dtype=np.int64)), 2 * len(run.offsets) * run.sample.channels
 
 
 def _sweep(
@@ -296,24 +246,29 @@ def _sweep(
     sweep = meter.sweep(phase, left)
     wanted, relaxed = int((temperatures > 0).sum()) if phase == "relax" else everywhere.size, 0
     neighbours, channels = len(run.offsets), run.sample.channels
-    size = machine.chunk(level.candidates.size, neighbours, channels, _stores(run.options, level))
+    weighed = level.weighed
+    stores = not level.coherent and _stores(run.options, level)
+    size = machine.chunk(weighed, neighbours, channels, stores)
+    where = {"level": level.number, "sweep": sweep, "phase": phase, "temperature_left": left}
+    if level.coherent and level.coherent.ahead:
+        return _sweep_ahead(run, level, field, state, active(), meter, where)
     old = False
     while True:
         state, info = schedule.step(state, active)  # 6.2.1
         grid = replace(level.grid, tile=info.tile)
         if info.tile and not old:  # what tiles see of one another until the sweep ends
             field, old = Field(*(snapshot(machine, plane, grid.height) for plane in field)), True
-        where = {"level": level.number, "sweep": sweep, "step": meter.step(), "phase": phase, "temperature_left": left}
+        where["step"] = meter.step()
         run.account.step(info.sites)
         outcomes: list[Any] = []
         for part, sites in machine.pieces(info.sites, grid, size):  # 6.2.2
             if outcomes:
                 _tell(run, level, field, meter, where, False)
             outcomes.append((part, _relax(run, part, level, grid, field, sites, info.turn)))
-            work = 2 * level.candidates.size * neighbours * channels * len(sites)
+            work = 2 * weighed * neighbours * channels * len(sites)
             machine.sync(work)
             relaxed += len(sites)
-            meter.add(len(sites), work, min(1.0, relaxed / wanted))
+            meter.add(len(sites), 0 if level.coherent else work, min(1.0, relaxed / wanted))
         for part, outcome in outcomes:  # no site sees another of its step
             field = commit(part, field, *outcome)
         _tell(run, level, field, meter, where, info.last)
@@ -321,21 +276,46 @@ def _sweep(
             return field, state
 
 
+def _sweep_ahead(
+    run: _Run, level: _Level, field: Field, state: Any, active: NDArray[np.bool_], meter: Meter, where: dict[str, Any]
+) -> tuple[Field, Any]:
+    """A whole sweep of coherent search in place: the schedule knows its steps beforehand and keeps equation (14)."""
+    assert level.coherent
+    machine, (laid, rule, weighed, _) = run.machine, level.coherent
+    state, plan = run.schedule.sweep(state, lambda: active)  # type: ignore[attr-defined]
+    sites, steps = machine.put(plan.sites), len(plan.bounds) - 1
+    work = 2 * laid.slots * len(run.offsets) * run.sample.channels
+    together = max(1, steps * TOGETHER // max(1, plan.sites.size))
+    for first in range(0, steps, together):
+        bounds = plan.bounds[first : first + together + 1]
+        field = search(machine, sites, bounds, field, weighed, laid, level.offsets, level.grid, rule, plan.turn)
+        for begin, end in pairwise(bounds.tolist()):
+            run.account.step(plan.sites[begin:end])
+        relaxed = int(bounds[-1] - bounds[0])
+        machine.sync(work * relaxed)
+        where["step"] = meter.step(len(bounds) - 1)
+        meter.add(relaxed, 0, int(bounds[-1]) / max(1, plan.sites.size))
+        _tell(run, level, field, meter, where, int(bounds[-1]) == plan.sites.size)
+    return field, state
+
+
 def _relax(
     run: _Run, machine: Machine, level: _Level, grid: Grid, field: Field, sites: NDArray[np.int32], turn: int
 ) -> tuple[Array, lcpdf.Relaxed, Array]:
     """Steps 6.2.2.1 to 6.2.2.3 for sites that relax together: the sites, what they take, and how warm they are."""
     options = run.options
-    number, _, offsets, candidates, window, relaxation = level
+    number, _, offsets, candidates, window, relaxation, coherent = level
     here = machine.put(sites)
-    favour = np.float32(1 / (1 + options.coherence))
+    if coherent:
+        table, rule, weighed, _ = coherent
+        return here, *search_apart(machine, here, field, weighed, table, offsets, grid, rule, turn)
     if not _stores(options, level):
-        relaxed = nearest(machine, here, field, offsets, grid, candidates, favour)
+        relaxed = nearest(machine, here, field, offsets, grid, candidates, _favour(options))
     else:
         near = neighbourhood(machine, here, field, offsets, grid)  # 6.2.2.1
         distances = lcpdf.distance(machine, near, candidates)
         if options.coherence:
-            distances = coherence(machine, distances, candidates, here, field, offsets, grid, favour)
+            distances = coherence(machine, distances, candidates, here, field, offsets, grid, _favour(options))
         density = options.pixel == "density"
         if relaxation == "gibbs":  # 6.2.2.2
             relaxed = lcpdf.draw(machine, distances, candidates, here, window, density, run.seed, number, turn)
@@ -343,8 +323,7 @@ def _relax(
             relaxed = lcpdf.mode(machine, distances, candidates, window)
         else:
             relaxed = lcpdf.mode_vector(machine, distances, candidates, window)
-    xi = min(-1, round(options.xi * 1024))
-    cooled = temperature(machine, here, field, offsets, grid, xi)  # 6.2.2.3
+    cooled = temperature(machine, here, field, offsets, grid, _xi(options))  # 6.2.2.3
     return here, relaxed, cooled
 
 
@@ -385,6 +364,8 @@ def _expected_work(run: _Run) -> dict[int, tuple[float, float]]:
         coarsest = number == run.levels - 1
         sweeps = min(1024, 1 - 0.6 * len(run.offsets) / options.xi) if coarsest else 6 * 0.75
         candidates = run.sample.positions(run.offsets, grid.spacing, options.phases, options.edges).size
+        if options.search == "coherent" and not coarsest:
+            candidates = min(candidates, (options.suggesting + 1) * (1 + options.similar) + max(1, options.chance))
         sites = grid.rows * grid.cols * candidates
         work[number] = (sites * sweeps, float(sites * options.free_sweeps))
     return work

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 UNCOLORED = -1
 
+ROUNDS = 8
+"""Greedy rounds between two looks at the colours; one too many changes nothing."""
+
 
 def _lattice_reference(grid: Grid, offsets: NDArray[np.int32], pattern: Sublattice) -> NDArray[np.int32]:
     site = np.arange(grid.rows * grid.cols, dtype=np.int32)
@@ -100,7 +103,8 @@ def coloring(machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, s
     colors = lattice_coloring(machine, grid, device_offsets, best)
     result = machine.get(colors)
     while (result == UNCOLORED).any():
-        colors = greedy_coloring(machine, grid, device_offsets, colors, seed)
+        for _ in range(ROUNDS):
+            colors = greedy_coloring(machine, grid, device_offsets, colors, seed)
         result = machine.get(colors)
     used = np.bincount(result.ravel()) > 0
     if grid.torus and used.sum() > best.index:

@@ -157,7 +157,7 @@ def _draw_reference(
     channels = len(candidates.pixels)
     if noisy:
         for c in range(channels):
-            _, mass = _legal(candidates.pixels[c][positions], win)
+            _, mass = legal(candidates.pixels[c][positions], win)
             w = np.where(w > 0, np.maximum(random.below(np.zeros_like(mass), mass, w.T).T, 1), 0)
     cumulative = np.cumsum(w, 0, dtype=np.uint64)
     lo, hi, *_ = random.draw4(seed, level, turn, sites, random.DRAW, 0)
@@ -167,7 +167,7 @@ def _draw_reference(
     for c in range(channels):
         x = candidates.pixels[c][choice].astype(np.int64)
         if noisy:
-            low, mass = _legal(x, win)
+            low, mass = legal(x, win)
             bits = random.draw4(seed, level, turn, sites, random.DRAW, 1 + c)[0].astype(np.uint64)
             u = low + ((bits * mass) >> np.uint64(32)).astype(np.uint32)
             x = x + np.searchsorted(win.noise, u, side="right") - win.radius
@@ -175,7 +175,7 @@ def _draw_reference(
     return Relaxed(choice, values)
 
 
-def _legal(y: NDArray[Any], win: Window) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+def legal(y: NDArray[Any], win: Window) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
     """Where the legal steps from grey level y begin among the cumulative probabilities, and their mass."""
     y = y.astype(np.int64)
     cumulative = np.concatenate([[0], win.noise]).astype(np.uint32)

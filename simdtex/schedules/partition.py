@@ -18,20 +18,33 @@ from simdtex.schedules.schedule import Active, Info
 class State(NamedTuple):
     """What a partition carries.
 
-    ``pixel`` (sites,) pixel index of each site of the grid; ``group`` (sites,) which group it belongs to; ``groups``
-    their number; ``seed`` and ``level`` key the order of groups; ``sweep`` sweeps begun so far; ``sites`` the present
-    sweep's pixel indices, group after group; ``ends`` where each group ends in them; ``done`` groups that were relaxed.
+    ``place`` (sites,) the grid's sites, group after group and row by row within each; ``pixel`` (sites,) their pixel
+    indices; ``starts`` (groups + 1,) where each group begins among them; ``seed`` and ``level`` key the groups' order;
+    ``sweep`` sweeps begun so far; ``sites`` the present sweep's pixel indices, group after group; ``ends`` where each
+    group ends in them; ``done`` groups that were relaxed.
     """
 
+    place: NDArray[np.intp]
     pixel: NDArray[np.int32]
-    group: NDArray[np.int32]
-    groups: int
+    starts: NDArray[np.int64]
     seed: int
     level: int
     sweep: int
     sites: NDArray[np.int32]
     ends: NDArray[np.int64]
     done: int
+
+
+class Sweep(NamedTuple):
+    """A whole sweep that is known beforehand.
+
+    ``sites`` (S,) int32 pixel indices, one step's after the other; ``bounds`` (steps + 1,) where each begins in them,
+    and where the last ends; ``turn`` keys the random numbers of all of them.
+    """
+
+    sites: NDArray[np.int32]
+    bounds: NDArray[np.int64]
+    turn: int
 
 
 class Partition:
@@ -51,8 +64,10 @@ class Partition:
         group = np.ravel(self.groups(machine, grid, offsets, order, seed))
         if group.min() < 0 or group.max() >= group.size:  # numbers with wide gaps
             group = np.unique(group, return_inverse=True)[1]
-        pixel, group, nothing = grid.sites(), group.astype(np.int32, copy=False), np.zeros(0, np.int32)
-        return State(pixel, group, int(group.max()) + 1, seed, level, 0, nothing, np.zeros(0, np.int64), 0)
+        place = np.argsort(group, kind="stable")
+        starts = np.concatenate([[0], np.cumsum(np.bincount(group))])
+        nothing = np.zeros(0, np.int32)
+        return State(place, grid.sites()[place], starts, seed, level, 0, nothing, np.zeros(0, np.int64), 0)
 
     def step(self, state: State, active: Active) -> tuple[State, Info]:
         """The next group that has active sites; a sweep goes by what was active when it began."""
@@ -63,17 +78,25 @@ class Partition:
         state = state._replace(done=state.done + 1)
         return state, Info(sites, state.sweep, state.done == state.ends.size, self.tile)
 
+    def sweep(self, state: State, active: Active) -> tuple[State, Sweep]:
+        """All steps of the next sweep in one go."""
+        state = self._begin(state, active().ravel())
+        return state._replace(done=state.ends.size), Sweep(state.sites, np.concatenate([[0], state.ends]), state.sweep)
+
     def _begin(self, state: State, active: NDArray[np.bool_]) -> State:
         sweep = state.sweep + 1
-        turn = np.arange(state.groups)
+        groups = state.starts.size - 1
+        turn = np.arange(groups)
         if self.shuffled:
             bits = random.draw4(state.seed, state.level, sweep, turn, random.SCHEDULE)[0]
-            turn = np.argsort(np.argsort(bits, kind="stable"), kind="stable")
-        when = turn.astype(np.int32)[state.group[active]]
-        sizes = np.bincount(when, minlength=1)
-        ends = np.cumsum(sizes[sizes > 0]) if when.size else sizes[:1]  # an empty sweep is one empty group
-        sites = state.pixel[active][np.argsort(when, kind="stable")]
-        return state._replace(sweep=sweep, sites=sites, ends=ends, done=0)
+            turn = np.argsort(bits, kind="stable")
+        wanted = active[state.place]
+        sites = state.pixel if wanted.all() else state.pixel[wanted]
+        bounds = np.concatenate([[0], np.cumsum(wanted)])[state.starts]
+        parts = [sites[bounds[g] : bounds[g + 1]] for g in turn.tolist() if bounds[g + 1] > bounds[g]]
+        parts = parts or [sites]  # an empty sweep is one empty group
+        ends = np.cumsum([part.size for part in parts])
+        return state._replace(sweep=sweep, sites=np.concatenate(parts), ends=ends, done=0)
 
 
 class Coloring(Partition):

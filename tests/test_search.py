@@ -1,0 +1,251 @@
+"""Coherent search: candidates that neighbours suggest, weighed in one kernel."""
+
+import itertools
+
+import numpy as np
+import plain
+import pytest
+from cases import REFERENCE, assert_same_bits, host, opencl, problem, texture
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import simdtex
+from simdtex.machine.opencl import OpenCL
+from simdtex.ops import lcpdf
+from simdtex.ops.coloring import coloring
+from simdtex.ops.commit import commit
+from simdtex.ops.neighbourhood import Field, neighbourhood
+from simdtex.ops.search import Rule, most_similar, search, search_apart, table
+
+PLAIN = {"suggesting": 12, "similar": 0, "chance": 4, "exhaustive": False}
+
+
+def laid_out(machine, p, **options):
+    working = p.sample.working
+    return table(machine, p.candidates(machine), working, p.offsets, p.grid.spacing, **PLAIN | options)
+
+
+def rule(p, gibbs=False, noisy=False, coherence=1.0, level=0):
+    window, _ = p.window(0.5)
+    return Rule(np.float32(1 / (1 + coherence)), -1024, window, gibbs, noisy, 2**33 + 5, level)
+
+
+def apart(machine, p, turn=3, gibbs=False, noisy=False, coherence=1.0, **options):
+    """What the problem's sites become, and how many candidates each weighed."""
+    sites, field, offsets = p.on(machine)
+    weighed = machine.put(np.zeros(p.field.source.shape, np.int32))
+    laid, how = laid_out(machine, p, **options), rule(p, gibbs, noisy, coherence)
+    relaxed, cooled = search_apart(machine, sites, field, weighed, laid, offsets, p.grid, how, turn)
+    return host(machine, [relaxed.choice, relaxed.values, cooled, weighed])
+
+
+def suggestions(p, site, suggesting):
+    """Sample positions that the nearest neighbours suggest, each once, in the neighbours' order."""
+    i, j = site[0] // p.grid.spacing, site[1] // p.grid.spacing
+    near = plain.neighbours(i, j, p.order, p.grid.rows, p.grid.cols, p.grid.torus)
+    found = []
+    for (di, dj), r in list(zip(plain.offsets(p.order), near, strict=True))[:suggesting]:
+        if r is None or p.field.temperature[r[0] * p.grid.spacing, r[1] * p.grid.spacing] >= 1024:
+            continue
+        row, col = p.source()[r[0] * p.grid.spacing, r[1] * p.grid.spacing]
+        position = (int(row) - di * p.grid.spacing, int(col) - dj * p.grid.spacing)
+        if position in p.positions() and position not in found:
+            found.append(position)
+    return found
+
+
+@st.composite
+def reflecting(draw, max_order=9):
+    """Problems whose sources lie inside the sample, as those of a run do."""
+    return problem(
+        draw(st.integers(0, 2**16)),
+        order=draw(st.integers(1, max_order)),
+        channels=draw(st.sampled_from([1, 2, 3])),
+        sample_shape=(draw(st.integers(5, 12)), draw(st.integers(5, 12))),
+        shape=(draw(st.integers(1, 12)), draw(st.sampled_from([1, 5, 12, 31]))),
+        spacing=draw(st.sampled_from([1, 2, 4])),
+        torus=draw(st.booleans()),
+        dtype=draw(st.sampled_from([np.uint8, np.uint16, np.float32])),
+        temperatures=draw(st.sampled_from(["mixed", "zero", "one"])),
+        edges="reflect",
+        phases=draw(st.sampled_from(["all", "decimated"])),
+        count=24,
+    )
+
+
+FORMS = st.fixed_dictionaries(
+    {
+        "suggesting": st.sampled_from([1, 5, 60]),
+        "similar": st.sampled_from([0, 0, 2]),
+        "chance": st.sampled_from([0, 1, 4, 6]),
+        "exhaustive": st.sampled_from([False, False, True]),
+        "gibbs": st.booleans(),
+        "noisy": st.booleans(),
+        "coherence": st.sampled_from([0.0, 0.7, 3.0]),
+    }
+)
+
+
+@given(p=reflecting(), form=FORMS)
+@settings(max_examples=30)
+def test_a_device_has_the_references_bits(machine, p, form):
+    assert_same_bits(apart(machine, p, **form), apart(REFERENCE, p, **form))
+
+
+@pytest.mark.parametrize("options", [{"vector": 1}, {"vector": 1, "work_group": 64}, {"work_group": 3}], ids=str)
+@pytest.mark.parametrize("form", [{"similar": 3, "gibbs": True}, {"exhaustive": True}], ids=str)
+def test_the_shape_of_a_launch_changes_no_bit(cl_device, options, form):
+    p = problem(5, order=8, channels=3, shape=(11, 33), count=150, edges="reflect")
+    assert_same_bits(apart(opencl(cl_device, **options), p, **form), apart(REFERENCE, p, **form))
+
+
+def test_a_wide_neighbourhood_takes_more_than_one_vector_a_row(machine):
+    p = problem(6, order=66, shape=(19, 40), sample_shape=(20, 21), count=60, edges="reflect")
+    assert_same_bits(apart(machine, p, gibbs=True), apart(REFERENCE, p, gibbs=True))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("spacing", [1, 2])
+def test_the_mode_is_the_nearest_of_what_is_suggested(seed, spacing):
+    p = problem(seed, order=5, shape=(10, 11), spacing=spacing, edges="reflect", temperatures="mixed", channels=2)
+    favour = 1 / (1 + 0.7)
+    choice, values, cooled, weighed = apart(REFERENCE, p, chance=0, coherence=0.7)
+    for s, site in enumerate(p.where()):
+        found = suggestions(p, site, PLAIN["suggesting"])
+        own = tuple(int(n) for n in p.source()[site])
+        listed = found + [own] * (own in p.positions() and own not in found)
+        t, here = p.temperature(), (p.order, spacing, p.grid.torus)
+        d = [plain.distance(p.image(), t, site, p.padded(), position, *here) for position in listed]
+        d = [a * (favour if position in found else 1) for a, position in zip(d, listed, strict=True)]
+        assert weighed[site] == len(listed)
+        best = listed.index(divmod(int(choice[s]), p.sample.cols))
+        assert d[best] <= min(d) * (1 + 1e-5)
+        assert_same_bits(values[:, s], p.sample.working[:, choice[s]])
+        assert cooled[s] == plain.cooled(p.field.temperature, site, p.order, spacing, p.grid.torus, -1024)
+
+
+def test_where_all_is_known_the_distance_is_that_of_the_exact_search():
+    """A whole number then, in any order of its terms: so are the choices of an exhaustive search."""
+    p = problem(7, order=8, temperatures="zero", edges="reflect", shape=(12, 13))
+    found, candidates = p.distances(REFERENCE, 1.0)
+    choice, *_ = apart(REFERENCE, p, exhaustive=True, suggesting=24)
+    assert_same_bits(choice, lcpdf.best(REFERENCE, found, candidates).choice)
+
+
+def test_an_exhaustive_draw_has_the_probabilities_of_the_exact_one():
+    p = problem(8, order=2, edges="reflect", sample_shape=(4, 5), temperatures="mixed", count=1)
+    found, candidates = p.distances(REFERENCE, 1.0)
+    window, _ = p.window(0.5)
+    share = lcpdf.weights(found.distance, window.scale)[:, 0].astype(float)
+    drawn = [int(apart(REFERENCE, p, turn, gibbs=True, exhaustive=True)[0][0]) for turn in range(1500)]
+    seen = np.array([drawn.count(int(position)) for position in candidates.positions[: candidates.size]])
+    expected = share / share.sum() * len(drawn)
+    often = expected > 5
+    chi2 = ((seen - expected)[often] ** 2 / expected[often]).sum()
+    assert often.sum() > 2
+    assert chi2 < 3 * often.sum() + 10
+
+
+def test_similar_candidates_are_the_nearest_neighbourhoods(machine):
+    p = problem(9, order=5, channels=2, edges="reflect", sample_shape=(8, 7))
+    reach = plain.offsets(p.order)
+    positions, (a, b) = p.positions(), p.padded()
+    patches = np.array([[plane[i + di, j + dj] for di, dj in reach for plane in (a, b)] for i, j in positions], float)
+    d = ((patches[:, None] - patches[None]) ** 2).sum(-1)
+    np.fill_diagonal(d, np.inf)
+    expected = np.argsort(d, 1, kind="stable")[:, :3]
+    for m in (REFERENCE, machine):
+        assert_same_bits(np.asarray(m.get(laid_out(m, p, similar=3).similar)), expected.astype(np.int32))
+
+
+def test_similar_candidates_come_in_pieces(machine):
+    p = problem(10, order=2, edges="reflect", sample_shape=(11, 12))
+    candidates, (_, _, offsets) = p.candidates(machine), p.on(machine)
+    found = machine.put(np.full((candidates.size, 2), -1, np.int32))
+    field = Field(*(machine.put(a) for a in p.field))
+    near = neighbourhood(machine, machine.put(p.sites), field, offsets, p.grid)
+    some = lcpdf.distance(machine, near, candidates)._replace(sites=5)
+    filled = np.asarray(machine.get(most_similar(machine, some, candidates, 40, found)))
+    assert (filled[40:45] >= 0).all()
+    assert (np.delete(filled, range(40, 45), 0) == -1).all()
+
+
+@pytest.mark.parametrize("longest", [16, 2**17])
+def test_a_sweep_in_place_is_step_after_step(machine, monkeypatch, longest):
+    """In pieces, too, where a step has more sites than a launch may."""
+    monkeypatch.setattr("simdtex.machine.opencl.LONGEST", longest)
+    p = problem(11, order=4, shape=(20, 24), edges="reflect")
+    colors = coloring(REFERENCE, p.grid, p.offsets, p.order).ravel()
+    sites = np.argsort(colors, kind="stable").astype(np.int32)
+    bounds = np.concatenate([[0], np.cumsum(np.bincount(colors))])
+    after = {}
+    for m in (REFERENCE, machine):
+        _, field, offsets = p.on(m)
+        weighed, laid = m.put(np.zeros(p.field.source.shape, np.int32)), laid_out(m, p)
+        field = search(m, m.put(sites), bounds, field, weighed, laid, offsets, p.grid, rule(p), 3)
+        after[m.name] = host(m, [*field, weighed])
+    first, second = after.values()
+    assert_same_bits(first, second)
+
+    _, field, offsets = p.on(REFERENCE)
+    laid, weighed = laid_out(REFERENCE, p), np.zeros(p.field.source.shape, np.int32)
+    for begin, end in itertools.pairwise(bounds):
+        here = sites[begin:end]
+        field = commit(
+            REFERENCE,
+            field,
+            here,
+            *search_apart(REFERENCE, here, field, weighed, laid, offsets, p.grid, rule(p), 3),
+        )
+    assert_same_bits(first, [*field, weighed])
+
+
+def test_a_site_that_nothing_suggests_for_weighs_one_candidate_at_random():
+    p = problem(12, order=2, temperatures="one", edges="whole", phases="all", sample_shape=(9, 9), shape=(12, 12))
+    choice, _, _, weighed = apart(REFERENCE, p, chance=0)
+    lonely = [s for s, site in enumerate(p.where()) if tuple(p.source()[site]) not in p.positions()]
+    assert lonely
+    assert all(weighed[p.where()[s]] == 1 for s in lonely)
+    assert len({int(choice[s]) for s in lonely}) > 1
+
+
+def run(device=None, **options):
+    sample = texture((24, 23), seed=4)
+    image, output = simdtex.synthesize(
+        sample, (30, 26), search="coherent", rng=5, device=device, full_output=True, **options
+    )
+    levels = [{k: v for k, v in level.items() if k != "seconds"} for level in output.statistics["levels"]]
+    return [image, output.source, output.temperature], levels
+
+
+def test_a_schedule_that_is_watched_changes_no_bit(cl_device):
+    """Which takes the sweeps step by step, and not in place."""
+    machine = opencl(cl_device)
+    ahead, apart_ = run(machine, order=8), run(machine, order=8, check_schedule=True)
+    assert_same_bits(ahead[0], apart_[0])
+    assert ahead[1] == apart_[1]
+
+
+def test_the_work_is_counted(cl_device):
+    _, levels = run(OpenCL(cl_device), order=8, chance=2, suggesting=20)
+    for level in levels:
+        assert 1 <= level["weighed"] <= (level["candidates"] if level is levels[0] else 23)
+        assert level["fma"] == round(2 * 24 * level["weighed"] * level["relaxations"])
+    assert levels[0]["weighed"] == levels[0]["candidates"], "the coarsest level is exact"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"search": "fast"}, "search"),
+        ({"suggesting": 0}, "suggesting"),
+        ({"similar": -1}, "similar"),
+        ({"chance": 1.5}, "chance"),
+        ({"exhaustive": -2}, "exhaustive"),
+        ({"pixel": "density"}, 'search="exact"'),
+    ],
+    ids=str,
+)
+def test_bad_options_are_one_sentence(options, message):
+    with pytest.raises((ValueError, TypeError), match=message):
+        simdtex.synthesize(texture((12, 12)), (12, 12), **{"search": "coherent"} | options)
