@@ -3,7 +3,7 @@
 
     python benchmarks/cost.py [--device TEXT] [--order 18]
 
-Prints, each from a process of its own, the whole job 128x128 -> 256x256 with skipping and without: seconds, its fma
+Prints, each from a process of its own, the whole job 128x128 -> 256x256 by exact search, with skipping and without: seconds, its fma
 over these and over the device's fma peak (independent chains of vector fma), seconds to the first piece of progress
 from the start of the process (kernels compiled before), and peak memory. Then, for states from the middle of runs, a
 warm sweep and a free one, the rates of the distances alone and of the whole LCPDF step, over the peak. Last, the growth
@@ -54,7 +54,7 @@ def callback(progress):
     first or first.append(time.time() - began)
 start = time.time()
 machine = simdtex.open_machine(sys.argv[4] or None, skip=sys.argv[5] == "True")
-_, output = simdtex.synthesize(samples.grey()[sys.argv[2]], (256, 256), rng=1, order=int(sys.argv[3]), device=machine,
+_, output = simdtex.synthesize(samples.grey()[sys.argv[2]], (256, 256), rng=1, order=int(sys.argv[3]), search="exact", device=machine,
                                callback=callback, full_output=True)
 fma = sum(level["fma"] for level in output.statistics["levels"])
 print(json.dumps([time.time() - start, fma, first[0], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
@@ -113,7 +113,7 @@ def states(machine, pixels, order):
     mrf._relax, mrf._sweep = copied, noted
     axis = -1 if pixels.ndim == 3 else None
     try:
-        simdtex.synthesize(pixels, (256, 256), rng=1, order=order, device=machine, channel_axis=axis)
+        simdtex.synthesize(pixels, (256, 256), rng=1, order=order, search="exact", device=machine, channel_axis=axis)
     finally:
         mrf._relax, mrf._sweep = relax, sweep
     rng = np.random.default_rng(1)

@@ -63,7 +63,7 @@ inline float canonical(__global const float *site, __global const float *y, cons
 //
 // spread   (N,)                      order in which neighbours are best looked at: far from one another
 // near     (S, N * (1 + C))          out: u and x u in canonical order
-// terms    (S, N * (2 + C))          out: offset in the strip, bits of u and of x u; the most certain first, none of u = 0
+// terms    (S, N * (2 + C))          out: offset in the strip, bits of u and x u; the most certain first, not u = 0
 // count    (S,)                      out: terms, a multiple of CHECK
 // axes     (N * C, FEATURES)         orthonormal directions: see nearest_leaves
 // middle                             the grey level that features are taken from

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache, partial
 from math import log2
 from typing import Any, NamedTuple
 
@@ -28,7 +30,7 @@ class Strip(NamedTuple):
 
     ``pixels`` (C, size) float32, the last `TAIL` of them 0; candidate (i, j) of ``rows`` x ``cols``, in the order of
     the list, is pixel ``first`` + i ``pitch`` + j; ``reach`` (N,) int32 pixel offset of each neighbour; ``offsets``
-    the bytes of the neighbourhood's own; ``leaves`` the candidates by features, where a machine skips.
+    the bytes of the neighbourhood's own; ``leaves()`` the candidates by features, made when first asked for.
     """
 
     pixels: Array
@@ -38,7 +40,7 @@ class Strip(NamedTuple):
     cols: int
     reach: Array
     offsets: bytes
-    leaves: Leaves | None
+    leaves: Callable[[], Leaves | None]
 
 
 class Candidates(NamedTuple):
@@ -200,7 +202,7 @@ class Sample:
         first, reaches = row // step * pitch + col // step, machine.put(reach.astype(np.int32))
         shape = (first, pitch, positions.size // wide, wide)
         spread = (offsets[:, 0] * np.int32(self.cols) + offsets[:, 1]) * np.int32(spacing)
-        leaves = grow(machine, self.working, positions, spread, self.top) if getattr(machine, "skip", False) else None
+        leaves = cache(partial(grow, machine, self.working, positions, spread, self.top))
         return Strip(machine.put(pixels), *shape, reaches, offsets.tobytes(), leaves)
 
     def place(self, source: NDArray[np.int32]) -> NDArray[np.int32]:

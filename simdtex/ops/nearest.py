@@ -71,7 +71,7 @@ def _launch(
     count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
     strip, plane = candidates.strip, np.int32(candidates.rows * candidates.cols)
     defines = {"V": machine.vector, "C": channels, "STEP": machine.step, "CHECK": CHECK}
-    f, i, leaves = np.float32, np.int32, strip.leaves
+    f, i, leaves = np.float32, np.int32, strip.leaves() if machine.skip else None
     near = machine.empty((count, neighbours * (1 + channels)), f)
     terms = machine.empty((count, neighbours * (2 + channels)), i)
     least, certain = machine.empty((count,), f), machine.empty((count,), f)
