@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a run costs, against what the device can do, all measured in one run.
 
-    python benchmarks/cost.py [--device TEXT] [--order 18]
+    python benchmarks/cost.py [--device TEXT] [--order 18] [--sample NAME]
 
-Prints, each from a process of its own, the whole job 128x128 -> 256x256 with skipping and without: seconds, its fma
-over these and over the device's fma peak (independent chains of vector fma), seconds to the first piece of progress
-from the start of the process (kernels compiled before), and peak memory. Then, for states from the middle of runs, a
-warm sweep and a free one, the rates of the distances alone and of the whole LCPDF step, over the peak. Last, the growth
-of memory with the output, from two outputs of a tiny sample.
+Prints, each from a process of its own, the whole job 128x128 -> 256x256 by exact search, with skipping and without:
+seconds, its fma over these and over the device's fma peak (independent chains of vector fma), seconds to the first
+piece of progress from the start of the process (kernels compiled before), and peak memory. Then, for states from the
+middle of runs, a warm sweep and a free one, the rates of the distances alone and of the whole LCPDF step, over the peak.
+Last, the growth of memory with the output, from two outputs of a tiny sample.
 """
 
 import argparse
@@ -54,8 +54,8 @@ def callback(progress):
     first or first.append(time.time() - began)
 start = time.time()
 machine = simdtex.open_machine(sys.argv[4] or None, skip=sys.argv[5] == "True")
-_, output = simdtex.synthesize(samples.grey()[sys.argv[2]], (256, 256), rng=1, order=int(sys.argv[3]), device=machine,
-                               callback=callback, full_output=True)
+_, output = simdtex.synthesize(samples.grey()[sys.argv[2]], (256, 256), rng=1, order=int(sys.argv[3]), search="exact",
+                               device=machine, callback=callback, full_output=True)
 fma = sum(level["fma"] for level in output.statistics["levels"])
 print(json.dumps([time.time() - start, fma, first[0], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
 """
@@ -113,7 +113,7 @@ def states(machine, pixels, order):
     mrf._relax, mrf._sweep = copied, noted
     axis = -1 if pixels.ndim == 3 else None
     try:
-        simdtex.synthesize(pixels, (256, 256), rng=1, order=order, device=machine, channel_axis=axis)
+        simdtex.synthesize(pixels, (256, 256), rng=1, order=order, search="exact", device=machine, channel_axis=axis)
     finally:
         mrf._relax, mrf._sweep = relax, sweep
     rng = np.random.default_rng(1)
@@ -160,10 +160,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--device")
     parser.add_argument("--order", type=int, default=18)
+    parser.add_argument("--sample", help="only this one")
     options = parser.parse_args()
     machine = simdtex.open_machine(options.device)
     print(f"device: {machine.name}, {machine.info.compute_units} compute units")
-    for name in samples.grey():
+    every = samples.grey() | samples.colour()
+    every = {name: pixels for name, pixels in every.items() if options.sample in (None, name)}
+    for name in sorted(every.keys() & samples.grey()):
         for skip in (True, False):
             printed = output_of(JOB, sys.path[0], name, str(options.order), options.device or "", str(skip))
             seconds, fma, first, memory = json.loads(printed)
@@ -171,7 +174,7 @@ def main():
             job = f"{name:8} 128x128 -> 256x256, order {options.order}, {'skipping' if skip else 'plain   '}"
             rate = f"{fma / seconds / most:.2f} of the peak of {most / 1e9:.0f} GFMA/s"
             print(f"{job}: {seconds:5.1f} s, {rate}, first progress after {first:.1f} s, peak memory {memory:.0f} MiB")
-    for name, pixels in (samples.grey() | samples.colour()).items():
+    for name, pixels in every.items():
         for phase, arguments in states(machine, pixels, options.order).items():
             most = peak(machine)
             rates, skipped = steps(machine, arguments)
@@ -180,6 +183,8 @@ def main():
                 for what, rate in zip(("distances", "plain", "skipping"), rates, strict=True)
             )
             print(f"{name:8} {phase:5} of the peak of {most / 1e9:3.0f} GFMA/s: {shares}; skipped {skipped:.3f}")
+    if options.sample:
+        return
     small, large = (int(output_of(MEMORY, str(side), options.device or "")) for side in (1024, 3072))
     print(f"memory of the process per output pixel: {(large - small) / (3072**2 - 1024**2):.0f} bytes")
 

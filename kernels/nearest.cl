@@ -20,13 +20,14 @@
 #ifndef CHECK
 #define CHECK 4 // neighbours between two looks at the bound
 #endif
-#ifndef N
-#define N 60 // neighbours
-#endif
 #ifndef BLOCK
 #define BLOCK 64
 #endif
 #define WORDS (2 + C) // of a term: offset, u, x u
+#define FEATURES 16   // of a neighbourhood
+#define FEW 8         // of them, the first, for boxes and a first look
+#define LEAF 64       // candidates to a leaf
+#define MANY 512      // candidates that are weighed one by one before the scan takes over
 #define BUCKETS 8     // of confidence
 #if V == 1
 typedef int ivec;
@@ -38,11 +39,15 @@ typedef JOIN(int, V) ivec;
 #define BITS(x) JOIN(as_int, V)(x)
 #endif
 
-// d_p of one candidate, neighbours in canonical order. `site` holds u and then x u of each neighbour.
-inline float canonical(__global const float *site, __global const float *y, const int plane, __global const int *reach)
+// d_p of one candidate, neighbours in canonical order, or a part of it that exceeds `most` already. `site` holds u and
+// then x u of each neighbour.
+inline float canonical(__global const float *site, __global const float *y, const int plane, __global const int *reach,
+                       const int N, const float most)
 {
     float d = 0.0f;
     for (int k = 0; k < N; ++k) {
+        if (k % 8 == 0 && d > most)
+            break;
         const float u = site[k * (1 + C)];
 #pragma unroll
         for (int c = 0; c < C; ++c) {
@@ -58,19 +63,26 @@ inline float canonical(__global const float *site, __global const float *y, cons
 //
 // spread   (N,)                      order in which neighbours are best looked at: far from one another
 // near     (S, N * (1 + C))          out: u and x u in canonical order
-// terms    (S, N * (2 + C))         out: offset in the strip, u, x u; the most certain first, those with u = 0 left out
+// terms    (S, N * (2 + C))          out: offset in the strip, bits of u and x u; the most certain first, not u = 0
 // count    (S,)                      out: terms, a multiple of CHECK
+// axes     (N * C, FEATURES)         orthonormal directions: see nearest_leaves
+// middle                             the grey level that features are taken from
+// features (S, FEATURES)             out: of the neighbours' grey levels, whatever their temperatures
 // least    (S,), where (S,)          out: the least d' of these candidates and its place in the list
+// certain  (S,)                      out: the smallest u
 // One work-item per site.
-__kernel __attribute__((vec_type_hint(float4))) void nearest_begin(__global const int *restrict sites, const int S, __global const ushort *restrict values,
-                            __global const int *restrict source, __global const ushort *restrict temperature,
-                            const int pixels, __global const int2 *restrict offsets, GRID,
-                            __global const int *restrict index_of, const int sample_rows, const int sample_cols,
-                            __global const float *restrict sample, __global const int *restrict positions,
-                            __global const int *restrict reach, __global const int *restrict strip_reach,
-                            __global const int *restrict spread, const float favour, __global float *restrict near,
-                            __global float *restrict terms, __global int *restrict count,
-                            __global float *restrict least, __global int *restrict where LANES_ARG)
+__kernel __attribute__((vec_type_hint(float4))) void
+nearest_begin(__global const int *restrict sites, const int S, const int N, __global const ushort *restrict values,
+              __global const int *restrict source, __global const ushort *restrict temperature,
+              const int pixels, __global const int2 *restrict offsets, GRID,
+              __global const int *restrict index_of, const int sample_rows, const int sample_cols,
+              __global const float *restrict sample, __global const int *restrict positions,
+              __global const int *restrict reach, __global const int *restrict strip_reach,
+              __global const int *restrict spread, const float favour,
+              __global const float *restrict axes, const float middle, __global float *restrict near,
+              __global int *restrict terms, __global int *restrict count,
+              __global float *restrict features, __global float *restrict least,
+              __global int *restrict where, __global float *restrict certain LANES_ARG)
 {
     const int s = LANE;
     if (IDLE(s))
@@ -78,31 +90,59 @@ __kernel __attribute__((vec_type_hint(float4))) void nearest_begin(__global cons
     const int i = ROW_OF(sites[s]), j = COL_OF(sites[s]);
     const int plane = sample_rows * sample_cols;
     __global float *here = near + s * (N * (1 + C));
-    int proposed[N];
+    __global int *list = terms + s * (N * WORDS); // until the terms come, the places that neighbours propose
     int held[BUCKETS + 1];
     for (int b = 0; b <= BUCKETS; ++b)
         held[b] = 0;
+    float16 feature = 0.0f;
+    int hottest = 0;
     for (int k = 0; k < N; ++k) {
         const int2 o = offsets[k];
         const int r = neighbour(i, j, o.x, o.y, HERE);
         const int t = r < 0 ? 1024 : temperature[r];
         const float u = (float)(1024 - t) * 0x1p-10f;
         here[k * (1 + C)] = u;
-        for (int c = 0; c < C; ++c)
-            here[k * (1 + C) + 1 + c] = t < 1024 ? (float)values[c * pixels + r] * u : 0.0f;
-        proposed[k] = -1;
+        hottest = max(hottest, t);
+        for (int c = 0; c < C; ++c) {
+            const float x = t < 1024 ? (float)values[c * pixels + r] : 0.0f;
+            here[k * (1 + C) + 1 + c] = x * u;
+            feature = fma(vload16(k * C + c, axes), (float16)(x - middle), feature);
+        }
+        list[k] = -1;
         if (t >= 1024)
             continue;
         ++held[BUCKETS - 1 - ((1024 - t) * BUCKETS - 1) / 1024 + 1];
         const int row = source[r] / sample_cols - o.x * spacing;
         const int col = source[r] % sample_cols - o.y * spacing;
         if (row >= 0 && row < sample_rows && col >= 0 && col < sample_cols)
-            proposed[k] = index_of[row * sample_cols + col];
+            list[k] = index_of[row * sample_cols + col];
+    }
+    certain[s] = (float)(1024 - hottest) * 0x1p-10f;
+    vstore16(feature, s, features);
+    // The bound.
+    const int own = index_of[source[sites[s]]];
+    float best = INFINITY;
+    int at = 0x7fffffff;
+    if (own >= 0) {
+        best = canonical(here, sample + positions[own], plane, reach, N, INFINITY);
+        at = own;
+    }
+    int last = -1, before = -1;
+    for (int k = 0; k < N; ++k) {
+        const int p = list[k];
+        if (p < 0 || p == last || p == before)
+            continue;
+        before = last;
+        last = p;
+        const float d = canonical(here, sample + positions[p], plane, reach, N, INFINITY) * favour;
+        if (d < best || (d == best && p < at)) {
+            best = d;
+            at = p;
+        }
     }
     // Terms by confidence, sorted by counting.
     for (int b = 1; b <= BUCKETS; ++b)
         held[b] += held[b - 1];
-    __global float *list = terms + s * (N * WORDS);
     const int m = held[BUCKETS], end = (m + CHECK - 1) / CHECK * CHECK;
     for (int n = 0; n < N; ++n) {
         const int k = spread[n];
@@ -110,67 +150,136 @@ __kernel __attribute__((vec_type_hint(float4))) void nearest_begin(__global cons
         if (u == 0.0f)
             continue;
         const int b = BUCKETS - 1 - ((int)(u * 1024.0f) * BUCKETS - 1) / 1024;
-        __global float *term = list + held[b]++ * WORDS;
-        term[0] = as_float(strip_reach[k]);
-        term[1] = u;
+        __global int *term = list + held[b]++ * WORDS;
+        term[0] = strip_reach[k];
+        term[1] = as_int(u);
         for (int c = 0; c < C; ++c)
-            term[2 + c] = here[k * (1 + C) + 1 + c];
+            term[2 + c] = as_int(here[k * (1 + C) + 1 + c]);
     }
     for (int n = m * WORDS; n < end * WORDS; ++n)
-        list[n] = 0.0f;
+        list[n] = 0;
     count[s] = end;
-    // The bound.
-    const int own = index_of[source[sites[s]]];
-    float best = INFINITY;
-    int at = 0x7fffffff;
-    if (own >= 0) {
-        best = canonical(here, sample + positions[own], plane, reach);
-        at = own;
-    }
-    int last = -1, before = -1;
-    for (int k = 0; k < N; ++k) {
-        const int p = proposed[k];
-        if (p < 0 || p == last || p == before)
-            continue;
-        before = last;
-        last = p;
-        const float d = canonical(here, sample + positions[p], plane, reach) * favour;
-        if (d < best || (d == best && p < at)) {
-            best = d;
-            at = p;
-        }
-    }
     least[s] = best;
     where[s] = at;
 }
 
-#if V == 1
-#define ANY(x) (x)
+// Candidates by their features, for sites whose neighbours are all certain enough. Features are projections of the
+// neighbourhood on orthonormal axes, so with u the smallest of a site's
+//
+//   d_p >= u^2 |x - y|^2 >= u^2 sum_f (X_f - Y_f)^2,
+//
+// and no candidate beyond `radius` of the site's features can win. Leaves are LEAF candidates alike, in a box.
+//
+// box    (FEW, 2, leaves)          least and greatest feature of each leaf; leaves is a multiple of V
+// rows   (FEATURES, leaves * LEAF) features of the candidates, leaf by leaf
+// order  (leaves * LEAF,)          their places in the list
+// blur                             how far rounding may have moved a site's features from a candidate's
+// found, at, work (split, S)       out: as of nearest_scan
+// open   (split, S)                out: whether nearest_scan has to search the site after all
+__kernel __attribute__((vec_type_hint(vec))) void
+nearest_leaves(const int S, const int N, __global const float *restrict near, __global const float *restrict features,
+               __global const float *restrict least, __global const int *restrict where,
+               __global const float *restrict certain, __global const float *restrict box,
+               __global const float *restrict rows, __global const int *restrict order, const int leaves,
+               const float blur, __global const float *restrict sample, const int plane,
+               __global const int *restrict positions, __global const int *restrict reach, const int split,
+               __global float *restrict found, __global int *restrict at, __global ulong *restrict work,
+               __global int *restrict open LANES_ARG)
+{
+#ifdef LANES
+    const int s = LANE, turn = 0;
 #else
-#define ANY(x) any(x)
-#define BITS(x) JOIN(as_int, V)(x)
+    const int s = get_global_id(0) / split, turn = get_global_id(0) % split;
 #endif
-#define INTS JOIN(ivec, V)
-typedef int ivec1;
-typedef int4 ivec4;
-typedef int8 ivec8;
-typedef int16 ivec16;
+    if (IDLE(s))
+        return;
+    float best = least[s];
+    int best_at = where[s];
+    const float u = certain[s];
+    int unfit = u < 0.5f || best == INFINITY;
+    ulong done = 0;
+    if (!unfit) {
+        const float scale = 1.0f / u;
+        float radius = sqrt(best) * scale + blur;
+        radius *= radius * 1.0001f;
+        int weighed = 0;
+        for (int g = turn * V; g < leaves && !unfit; g += split * V) {
+            vec gap = 0.0f;
+            for (int f = 0; f < FEW; ++f) {
+                const vec x = features[s * FEATURES + f];
+                const vec low = LOAD(box + 2 * f * leaves + g), high = LOAD(box + (2 * f + 1) * leaves + g);
+                const vec e = fmax(fmax(low - x, x - high), (vec)0.0f);
+                gap = fma(e, e, gap);
+            }
+            done += 2 * FEW * V;
+            if (!ANY(gap <= radius))
+                continue;
+            float gaps[V];
+            STORE(gap, gaps);
+            for (int l = 0; l < V; ++l) {
+                if (gaps[l] > radius)
+                    continue;
+                done += 2 * FEATURES * LEAF;
+                for (int v = (g + l) * LEAF; v < (g + l + 1) * LEAF; v += V) {
+                    vec d = 0.0f;
+                    for (int f = 0; f < FEW; ++f) {
+                        const vec e = LOAD(rows + f * leaves * LEAF + v) - features[s * FEATURES + f];
+                        d = fma(e, e, d);
+                    }
+                    if (!ANY(d <= radius))
+                        continue;
+                    for (int f = FEW; f < FEATURES; ++f) {
+                        const vec e = LOAD(rows + f * leaves * LEAF + v) - features[s * FEATURES + f];
+                        d = fma(e, e, d);
+                    }
+                    if (!ANY(d <= radius))
+                        continue;
+                    float one[V];
+                    STORE(d, one);
+                    for (int w = 0; w < V; ++w) {
+                        const int p = order[v + w];
+                        if (one[w] > radius || (best == 0.0f && p >= best_at))
+                            continue;
+                        __global const float *y = sample + positions[p];
+                        const float d_p = canonical(near + s * (N * (1 + C)), y, plane, reach, N, best);
+                        ++weighed;
+                        if (d_p < best || (d_p == best && p < best_at)) {
+                            best = d_p;
+                            best_at = p;
+                            radius = sqrt(best) * scale + blur;
+                            radius *= radius * 1.0001f;
+                        }
+                    }
+                }
+            }
+            unfit = weighed > MANY;
+        }
+        done += (ulong)weighed * (2 * N * C);
+    }
+    found[turn * S + s] = best;
+    at[turn * S + s] = best_at;
+    work[turn * S + s] = done;
+    open[turn * S + s] = unfit;
+}
 
 // All candidates against the bound, in blocks of STEP vectors of neighbours in a row of the sample.
 //
 // strip  (C, size)        the sample's pixels of this level, row by row, from which candidates and neighbours are read
 // first, pitch            of the candidates' own pixels in the strip; rows x cols candidates
 // slack                   what a sum in another order may exceed this one by, as a factor
-// found, at  (split, S)   out: the least d' so far and its place
-// work   (split, S)       out: terms weighed
+// all, open  (split, S)   whether all sites are to be searched, or those for which some of these are not 0
+// found, at  (.., S)      out, from this row on: the least d' so far and its place
+// work       (.., S)      out, likewise: fma done
 // `split` work-items to a site, side by side, take its blocks in turn.
-__kernel __attribute__((vec_type_hint(vec))) void nearest_scan(const int S, __global const float *restrict terms, __global const int *restrict count,
-                           __global const float *restrict near, __global const float *restrict least,
-                           __global const int *restrict where, __global const float *restrict strip, const int size,
-                           const int first, const int pitch, const int rows, const int cols,
-                           __global const int *restrict strip_reach, const float slack, const int split,
-                           __global float *restrict found, __global int *restrict at,
-                           __global uint *restrict work LANES_ARG)
+__kernel __attribute__((vec_type_hint(vec))) void
+nearest_scan(const int S, const int N, __global const int *restrict terms, __global const int *restrict count,
+             __global const float *restrict near, __global const float *restrict least,
+             __global const int *restrict where, __global const float *restrict strip, const int size,
+             const int first, const int pitch, const int rows, const int cols,
+             __global const int *restrict strip_reach, const float slack, const int split,
+             const int all, __global const int *restrict open, const int row,
+             __global float *restrict found, __global int *restrict at,
+             __global ulong *restrict work LANES_ARG)
 {
 #ifdef LANES
     const int s = LANE, turn = 0;
@@ -180,12 +289,15 @@ __kernel __attribute__((vec_type_hint(vec))) void nearest_scan(const int S, __gl
     if (IDLE(s))
         return;
     const int wide = (cols + V * STEP - 1) / (V * STEP), m = count[s];
-    __global const float *list = terms + s * (N * WORDS);
+    __global const int *list = terms + s * (N * WORDS);
     float best = least[s];
     int best_at = where[s];
     int limit = as_int(best * slack) + 1; // bits of the least sum that is too far; equals have a chance
-    uint done = 0;
-    for (int b = turn; b < rows * wide; b += split) {
+    ulong done = 0;
+    int wanted = all;
+    for (int n = 0; !all && n < split; ++n)
+        wanted |= open[n * S + s];
+    for (int b = turn; wanted && b < rows * wide; b += split) {
         const int i = b / wide, j = b % wide * (V * STEP);
         __global const float *y = strip + first + i * pitch + j;
         vec d[STEP];
@@ -196,12 +308,12 @@ __kernel __attribute__((vec_type_hint(vec))) void nearest_scan(const int S, __gl
         while (alive && k < m) {
 #pragma unroll
             for (int n = 0; n < CHECK; ++n) {
-                __global const float *term = list + (k + n) * WORDS;
-                const int o = as_int(term[0]);
-                const vec u = term[1];
+                __global const int *term = list + (k + n) * WORDS;
+                const int o = term[0];
+                const vec u = as_float(term[1]);
 #pragma unroll
                 for (int c = 0; c < C; ++c) {
-                    const vec xu = term[2 + c];
+                    const vec xu = as_float(term[2 + c]);
 #pragma unroll
                     for (int q = 0; q < STEP; ++q) {
                         const vec e = fma(-LOAD(y + c * size + o + q * V), u, xu);
@@ -216,7 +328,7 @@ __kernel __attribute__((vec_type_hint(vec))) void nearest_scan(const int S, __gl
                 low = fmin(low, d[q]);
             alive = ANY(BITS(low) < limit);
         }
-        done += k * min(cols - j, V * STEP);
+        done += (ulong)(2 * C * k) * min(cols - j, V * STEP);
         for (int q = 0; alive && q < STEP; ++q) {
             float one[V];
             STORE(d[q], one);
@@ -224,7 +336,7 @@ __kernel __attribute__((vec_type_hint(vec))) void nearest_scan(const int S, __gl
                 const int col = j + q * V + v, p = i * cols + col;
                 if (col >= cols || as_int(one[v]) >= limit)
                     continue;
-                const float exact = canonical(near + s * (N * (1 + C)), y + q * V + v, size, strip_reach);
+                const float exact = canonical(near + s * (N * (1 + C)), y + q * V + v, size, strip_reach, N, best);
                 if (exact < best || (exact == best && p < best_at)) {
                     best = exact;
                     best_at = p;
@@ -233,9 +345,9 @@ __kernel __attribute__((vec_type_hint(vec))) void nearest_scan(const int S, __gl
             }
         }
     }
-    found[turn * S + s] = best;
-    at[turn * S + s] = best_at;
-    work[turn * S + s] = done;
+    found[(row + turn) * S + s] = best;
+    at[(row + turn) * S + s] = best_at;
+    work[(row + turn) * S + s] = done;
 }
 
 // The same without a bound, V sites side by side: every term of every candidate, in the canonical order.
@@ -243,11 +355,12 @@ __kernel __attribute__((vec_type_hint(vec))) void nearest_scan(const int S, __gl
 // confidence (N, P), weighted (N, C, P)   from neighbourhood.cl
 // found, at  (split, P)                   out: the least d and its place
 // One work-item per (V sites, part of the blocks of BLOCK candidates).
-__kernel __attribute__((vec_type_hint(vec))) void nearest_plain(__global const float *restrict confidence, __global const float *restrict weighted,
-                            const int P, __global const float *restrict sample, const int plane,
-                            __global const int *restrict candidates, const int count,
-                            __global const int *restrict reach, const int blocks, const int split,
-                            __global float *restrict found, __global int *restrict at LANES_ARG)
+__kernel __attribute__((vec_type_hint(vec))) void
+nearest_plain(__global const float *restrict confidence, __global const float *restrict weighted,
+              const int N, const int P, __global const float *restrict sample, const int plane,
+              __global const int *restrict candidates, const int count,
+              __global const int *restrict reach, const int blocks, const int split,
+              __global float *restrict found, __global int *restrict at LANES_ARG)
 {
     const int s = LANE * V;
     if (s < 0 || s >= P)
@@ -292,13 +405,13 @@ __kernel __attribute__((vec_type_hint(vec))) void nearest_plain(__global const f
 
 // The nearest of all: the first bound's, and those of every part.
 //
-// found, at (split, P)   from nearest_scan, P = S, or nearest_plain
-// work  (split, S)       from nearest_scan; not read where tallied = 0
+// found, at (split, P)   from nearest_leaves and nearest_scan, P = S, or nearest_plain
+// work  (split, S)       from the former; not read where tallied = 0
 // tally (S,)             in and out: fma done so far for the site of this number
 // One work-item per site.
 __kernel void nearest_end(const int S, const int P, __global const float *restrict least,
                           __global const int *restrict where, const int split, __global const float *restrict found,
-                          __global const int *restrict at, const int tallied, __global const uint *restrict work,
+                          __global const int *restrict at, const int tallied, __global const ulong *restrict work,
                           __global const float *restrict sample, const int plane,
                           __global const int *restrict positions, __global ulong *restrict tally,
                           __global int *restrict choice, __global ushort *restrict values LANES_ARG)
@@ -316,7 +429,7 @@ __kernel void nearest_end(const int S, const int P, __global const float *restri
             p = here;
         }
         if (tallied)
-            tally[s] += (ulong)work[n * S + s] * (2 * C);
+            tally[s] += work[n * S + s];
     }
     const int from = positions[p];
     choice[s] = from;

@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache, partial
 from math import log2
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.leaves import Leaves, grow
 from simdtex.ops.operation import Array
 
 BLOCK = 64
@@ -27,7 +30,7 @@ class Strip(NamedTuple):
 
     ``pixels`` (C, size) float32, the last `TAIL` of them 0; candidate (i, j) of ``rows`` x ``cols``, in the order of
     the list, is pixel ``first`` + i ``pitch`` + j; ``reach`` (N,) int32 pixel offset of each neighbour; ``offsets``
-    the bytes of the neighbourhood's own.
+    the bytes of the neighbourhood's own; ``leaves()`` the candidates by features, made when first asked for.
     """
 
     pixels: Array
@@ -37,6 +40,7 @@ class Strip(NamedTuple):
     cols: int
     reach: Array
     offsets: bytes
+    leaves: Callable[[], Leaves | None]
 
 
 class Candidates(NamedTuple):
@@ -196,7 +200,10 @@ class Sample:
         reach = (offsets[:, 0] * np.int32(pitch) + offsets[:, 1]) * np.int32(spacing // step)
         wide = int(np.searchsorted(positions, (row + 1) * self.cols))
         first, reaches = row // step * pitch + col // step, machine.put(reach.astype(np.int32))
-        return Strip(machine.put(pixels), first, pitch, positions.size // wide, wide, reaches, offsets.tobytes())
+        shape = (first, pitch, positions.size // wide, wide)
+        spread = (offsets[:, 0] * np.int32(self.cols) + offsets[:, 1]) * np.int32(spacing)
+        leaves = cache(partial(grow, machine, self.working, positions, spread, self.top))
+        return Strip(machine.put(pixels), *shape, reaches, offsets.tobytes(), leaves)
 
     def place(self, source: NDArray[np.int32]) -> NDArray[np.int32]:
         """(row, column) in the user's sample of pixel indices, on a last axis."""

@@ -13,14 +13,11 @@ from simdtex.ops.nearest import nearest
 strengths = st.sampled_from([0.0, 0.5, 1.0, 7.0])
 FORMS = [
     {"vector": 1, "step": 1, "split": 64},  # a GPU's
-    {"vector": 1, "split": 7},
     {"vector": 4, "step": 2, "split": 3},
-    {"vector": 8, "step": 1},
     {"step": 8, "work_group": 3},
     {"split": 1000},
-    {"skip": False},
     {"skip": False, "vector": 1, "split": 5},
-    {"skip": False, "vector": 4, "step": 2, "split": 1000},
+    {"skip": False, "split": 1000},
 ]
 
 
@@ -42,7 +39,7 @@ def test_the_reference_is_the_nearest_of_the_rule_the_first_of_several(p, streng
 
 
 @given(p=problems(max_order=18), strength=strengths)
-@settings(max_examples=30)
+@settings(max_examples=25)
 def test_a_device_has_the_references_bits(machine, p, strength):
     assert_same_bits(run(machine, p, strength), run(REFERENCE, p, strength))
 

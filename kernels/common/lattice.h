@@ -19,6 +19,8 @@
 
 inline int wrap(const int i, const int n)
 {
+    if (i >= 0 && i < n) // nearly always, and a division takes long
+        return i;
     const int k = i % n;
     return k < 0 ? k + n : k;
 }

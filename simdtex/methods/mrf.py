@@ -126,7 +126,7 @@ def synthesize(
     Notes
     -----
     Cost: sweeps x sites x candidates x |N| x channels x 2 fma, about 7 sweeps a level. Memory on the device, in bytes:
-    14 + 2 channels per output pixel (20 + 4 channels with the schedule ``block``), 12 channels + 8 per pixel of the
+    14 + 2 channels per output pixel (20 + 4 channels with the schedule ``block``), 12 channels + 78 per pixel of the
     sample with its margin, and the machine's scratch memory or, if that is more, 65 per candidate. On the host: about
     50 per output pixel.
     """
@@ -416,4 +416,4 @@ def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], copi
     pixels, channels = shape[0] * shape[1], sample.channels
     within_32_bits(shape, channels * copies)
     field = copies * (6 + 2 * channels)
-    machine.require(pixels * (8 + field) + sample.rows * sample.cols * (12 * channels + 73))
+    machine.require(pixels * (8 + field) + sample.rows * sample.cols * (12 * channels + 143))

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.lattice import Grid
+from simdtex.leaves import FEATURES
 from simdtex.ops import coherence, lcpdf, neighbourhood
 from simdtex.ops.lcpdf import Relaxed
 from simdtex.ops.neighbourhood import Field
@@ -69,32 +70,56 @@ def _launch(
 ) -> Relaxed:
     count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
     strip, plane = candidates.strip, np.int32(candidates.rows * candidates.cols)
-    defines = {"V": machine.vector, "C": channels, "N": neighbours, "STEP": machine.step, "CHECK": CHECK}
-    near = machine.empty((count, neighbours * (1 + channels)), np.float32)
-    terms = machine.empty((count, neighbours * (2 + channels)), np.float32)
-    used, where = machine.empty((count,), np.int32), machine.empty((count,), np.int32)
-    least = machine.empty((count,), np.float32)
+    defines = {"V": machine.vector, "C": channels, "STEP": machine.step, "CHECK": CHECK}
+    f, i, leaves = np.float32, np.int32, strip.leaves() if machine.skip else None
+    near = machine.empty((count, neighbours * (1 + channels)), f)
+    terms = machine.empty((count, neighbours * (2 + channels)), i)
+    least, certain = machine.empty((count,), f), machine.empty((count,), f)
+    used, where = machine.empty((count,), i), machine.empty((count,), i)
+    features = machine.empty((count, FEATURES), f)
+    axes = leaves.axes if leaves else machine.constant(np.zeros((neighbours * channels, FEATURES), f))
     machine.launch_sites(
         ("nearest", "nearest_begin"),
         (count,),
-        *(sites, np.int32(count), *field, np.int32(prod(field.values.shape[1:])), offsets, *grid.args),
-        *(candidates.index_of, np.int32(candidates.rows), np.int32(candidates.cols)),
+        *(sites, i(count), i(neighbours), *field, i(prod(field.values.shape[1:])), offsets, *grid.args),
+        *(candidates.index_of, i(candidates.rows), i(candidates.cols)),
         *(candidates.pixels, candidates.positions, candidates.reach, strip.reach),
-        *(machine.constant(_spread(strip.offsets)), favour, near, terms, used, least, where),
+        *(machine.constant(_spread(strip.offsets)), favour, axes, f(leaves.middle if leaves else 0)),
+        *(near, terms, used, features, least, where, certain),
         defines=defines,
     )
-    tally = machine.tally.slots(count)
     if machine.skip:
         split = machine.split(count, -(-strip.cols // (machine.vector * machine.step)) * strip.rows)
-        pitch = count
-        found, at, work = (machine.empty((split, count), t) for t in (np.float32, np.int32, np.uint32))
+        pitch, row = count, split if leaves else 0  # the leaves' results come first
+        parts = row + split
+        found, at, work, wanted = (machine.empty((parts, count), t) for t in (f, i, np.uint64, i))
+        if leaves:
+            machine.launch_sites(
+                ("nearest", "nearest_leaves"),
+                (count * split,),
+                *(
+                    i(count),
+                    i(neighbours),
+                    near,
+                    features,
+                    least,
+                    where,
+                    certain,
+                    leaves.box,
+                    leaves.rows,
+                    leaves.order,
+                ),
+                *(i(leaves.number), f(leaves.blur), candidates.pixels, plane, candidates.positions, candidates.reach),
+                *(i(split), found, at, work, wanted),
+                defines=defines,
+            )
         shape = (strip.first, strip.pitch, strip.rows, strip.cols)
         machine.launch_sites(
             ("nearest", "nearest_scan"),
             (count * split,),
-            *(np.int32(count), terms, used, near, least, where),
-            *(strip.pixels, np.int32(strip.pixels.shape[1]), *(np.int32(n) for n in shape), strip.reach),
-            *(slack(neighbours * channels), np.int32(split), found, at, work),
+            *(i(count), i(neighbours), terms, used, near, least, where),
+            *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach),
+            *(slack(neighbours * channels), i(split), i(leaves is None), wanted, i(row), found, at, work),
             defines=defines,
         )
         machine.tally.expect(2 * count * candidates.size * neighbours * channels)
@@ -102,24 +127,25 @@ def _launch(
         blocks = candidates.positions.size // BLOCK
         around = neighbourhood.neighbourhood(machine, sites, field, offsets, grid)
         pitch = around.weighted.shape[2]
-        split = machine.split(pitch // machine.vector, blocks)
-        found, at = machine.empty((split, pitch), np.float32), machine.empty((split, pitch), np.int32)
+        parts = machine.split(pitch // machine.vector, blocks)
+        found, at = machine.empty((parts, pitch), f), machine.empty((parts, pitch), i)
         work = where
         machine.launch_sites(
             ("nearest", "nearest_plain"),
-            (pitch // machine.vector, split),
-            *(around.confidence, around.weighted, np.int32(pitch)),
-            *(candidates.pixels, plane, candidates.positions, np.int32(candidates.size)),
-            *(candidates.reach, np.int32(blocks), np.int32(split), found, at),
+            (pitch // machine.vector, parts),
+            *(around.confidence, around.weighted, i(neighbours), i(pitch)),
+            *(candidates.pixels, plane, candidates.positions, i(candidates.size)),
+            *(candidates.reach, i(blocks), i(parts), found, at),
             local=machine.tile,
             defines=defines,
         )
+    tally = machine.tally.slots(count)
     out = Relaxed(machine.empty((count,), np.int32), machine.empty((channels, count), np.uint16))
     machine.launch_sites(
         ("nearest", "nearest_end"),
         (count,),
-        *(np.int32(count), np.int32(pitch), least, where, np.int32(split), found, at),
-        *(np.int32(machine.skip), work, candidates.pixels, plane, candidates.positions, tally, *out),
+        *(i(count), i(pitch), least, where, i(parts), found, at),
+        *(i(machine.skip), work, candidates.pixels, plane, candidates.positions, tally, *out),
         defines=defines,
     )
     return out
