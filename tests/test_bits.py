@@ -26,7 +26,6 @@ COHERENT = {"search": "coherent"}
 RUNS = {
     "defaults": ((13, 12), None, np.uint8, (11, 14), {"order": 8}),
     "exact": ((30, 31), None, np.uint8, (12, 14), {"order": 8, "search": "exact"}),
-    "exact-colour": ((12, 11), 3, np.uint8, (10, 13), {"order": 2, "boundary": "open", "search": "exact"}),
     "paper": ((14, 13), None, np.uint8, (9, 11), {"preset": "paper", "order": 2}),
     "paper-icm": ((12, 13), None, np.uint8, (10, 9), {"preset": "paper", "order": 5, "relaxation": "icm"}),
     "gibbs-source": ((12, 12), None, np.uint8, (15, 7), {"order": 5, "relaxation": "gibbs", "boundary": "open"}),

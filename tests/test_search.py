@@ -55,12 +55,12 @@ def suggestions(p, site, suggesting):
 
 
 @st.composite
-def reflecting(draw, max_order=9):
+def reflecting(draw):
     """Problems whose sources lie inside the sample, as those of a run do."""
     return problem(
         draw(st.integers(0, 2**16)),
-        order=draw(st.integers(1, max_order)),
-        channels=draw(st.sampled_from([1, 2, 3])),
+        order=draw(st.sampled_from([2, 8])),  # each is a program of its own, as are channels
+        channels=draw(st.sampled_from([1, 3])),
         sample_shape=(draw(st.integers(5, 12)), draw(st.integers(5, 12))),
         shape=(draw(st.integers(1, 12)), draw(st.sampled_from([1, 5, 12, 31]))),
         spacing=draw(st.sampled_from([1, 2, 4])),
@@ -87,7 +87,7 @@ FORMS = st.fixed_dictionaries(
 
 
 @given(p=reflecting(), form=FORMS)
-@settings(max_examples=30)
+@settings(max_examples=20)
 def test_a_device_has_the_references_bits(machine, p, form):
     assert_same_bits(apart(machine, p, **form), apart(REFERENCE, p, **form))
 
@@ -137,7 +137,7 @@ def test_an_exhaustive_draw_has_the_probabilities_of_the_exact_one():
     found, candidates = p.distances(REFERENCE, 1.0)
     window, _ = p.window(0.5)
     share = lcpdf.weights(found.distance, window.scale)[:, 0].astype(float)
-    drawn = [int(apart(REFERENCE, p, turn, gibbs=True, exhaustive=True)[0][0]) for turn in range(1500)]
+    drawn = [int(apart(REFERENCE, p, turn, gibbs=True, exhaustive=True)[0][0]) for turn in range(700)]
     seen = np.array([drawn.count(int(position)) for position in candidates.positions[: candidates.size]])
     expected = share / share.sum() * len(drawn)
     often = expected > 5

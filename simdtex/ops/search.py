@@ -355,10 +355,10 @@ def _apart_launch(
 
 def _defines(machine: OpenCL, field: Field, table: Table, grid: Grid) -> dict[str, int]:
     slots = table.suggesting if table.exhaustive else table.slots
-    defines = {"C": len(field.values), "RADIUS": table.disc.shape[0] // 2, "SLOTS": slots, "V": machine.vector}
+    whole = -(-slots // 64) * 64  # so that few programs serve all
+    defines = {"C": len(field.values), "RADIUS": table.disc.shape[0] // 2, "SLOTS": whole, "V": machine.vector}
     defines |= {"TILES": 1} if grid.tile else {}
-    kept = table.slots if table.slots <= KEPT else 0
-    return defines | ({"ALL": 1, "KEPT": kept} if table.exhaustive else {})
+    return defines | ({"ALL": 1, "KEPT": KEPT if table.slots <= KEPT else 0} if table.exhaustive else {})
 
 
 def _arguments(
