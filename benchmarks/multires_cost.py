@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What a run of `multires` costs, all measured in one run.
 
-    python benchmarks/multires_cost.py [--device TEXT] [--repeats 3]
+    python benchmarks/multires_cost.py [--device TEXT] [--repeats 3] [--only jobs,goal]
 
 Prints seconds (the best of a few runs, kernels compiled before) of whole syntheses, their growth with the output, the
 sample and alpha, the nodes of the sample that a pixel of the finest level is compared with as a share of all, the time
@@ -102,22 +102,24 @@ def jobs(machine, repeats):
 
 
 def by_kernel(device):
-    """Device seconds of each kernel, told apart by waiting for every launch."""
+    """Device seconds of each kernel."""
     machine = simdtex.open_machine(device, profile=True)
-    launch, spent = machine.launch, {}
-
-    def timed(kernel, *args, **kwargs):
-        before = machine.seconds
-        launch(kernel, *args, **kwargs)
-        spent[kernel.function_name] = spent.get(kernel.function_name, 0.0) + machine.seconds - before
-
-    machine.launch = timed
     run(machine, picture("gravel", 256), 1024, alpha=0.3)
-    spent.clear()
-    seconds = run(machine, picture("gravel", 256), 1024, alpha=0.3)["seconds"]
-    print(f"by kernel, gravel 256 -> 1024, {seconds:.3f} s")
-    for name, busy in sorted(spent.items(), key=lambda item: -item[1]):
-        print(f"{name:18} {busy:7.3f} s, {busy / seconds:.1%}")
+    statistics = run(machine, picture("gravel", 256), 1024, alpha=0.3)
+    print(f"by kernel, gravel 256 -> 1024, {statistics['seconds']:.3f} s")
+    for kernel in statistics["kernels"]:
+        busy = kernel["seconds"]
+        print(f"{kernel['name']:18} {busy:7.3f} s, {busy / statistics['seconds']:.1%}")
+
+
+def goal(machine, repeats):
+    """The NumPy reference beside the device."""
+    plain = simdtex.open_machine("reference")
+    for side, output in ((64, 128), (128, 256)):
+        fast, _ = best_of(repeats, machine, picture("gravel", side), output, alpha=0.3)
+        slow = run(plain, picture("gravel", side), output, alpha=0.3)["seconds"]
+        took = f"{slow:.2f} s in NumPy, {fast:.4f} s on the device: {slow / fast:.0f} times"
+        print(f"gravel {side} -> {output}: {took}", flush=True)
 
 
 def held(machine, sample, side):
@@ -162,24 +164,32 @@ def memory(machine, device):
             print(f"bytes per {what} pixel, {kind}: {each[0]:4.0f} of the process, {each[1]:4.0f} in arrays")
 
 
+def alone(device):
+    """A process of its own, with its imports and compilations."""
+    printed, kib = output_of(JOB + HIGH_WATER, device or "").splitlines()
+    seconds, first = json.loads(printed)
+    print(f"gravel 256 -> 1024 in a process of its own: {seconds:.1f} s, first progress after {first:.1f} s, ", end="")
+    print(f"peak memory {int(kib) / 1024:.0f} MiB", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--device")
     parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--only", default="", help="parts to run, by name, separated by commas")
     options = parser.parse_args()
-    machine = simdtex.open_machine(options.device)
+    device, repeats = options.device, options.repeats
+    machine = simdtex.open_machine(device)
     print(f"device: {machine.name}, {machine.info.compute_units} compute units")
-    jobs(machine, options.repeats)
-    by_kernel(options.device)
-    device, _ = best_of(options.repeats, machine, picture("gravel", 64), 128, alpha=0.3)
-    reference, _ = best_of(options.repeats, simdtex.open_machine("reference"), picture("gravel", 64), 128, alpha=0.3)
-    ratio = reference / device
-    print(f"gravel 64 -> 128: {reference:.2f} s in NumPy, {device:.3f} s on the device: {ratio:.0f} times")
-    printed, kib = output_of(JOB + HIGH_WATER, options.device or "").splitlines()
-    seconds, first = json.loads(printed)
-    print(f"gravel 256 -> 1024 in a process of its own: {seconds:.1f} s, first progress after {first:.1f} s, ", end="")
-    print(f"peak memory {int(kib) / 1024:.0f} MiB")
-    memory(machine, options.device)
+    parts = {
+        "jobs": partial(jobs, machine, repeats),
+        "kernels": partial(by_kernel, device),
+        "goal": partial(goal, machine, repeats),
+        "alone": partial(alone, device),
+        "memory": partial(memory, machine, device),
+    }
+    for name in options.only.split(",") if options.only else parts:
+        parts[name]()
 
 
 if __name__ == "__main__":

@@ -23,6 +23,14 @@ __kernel void laplacian_reduce(__global const int *restrict fine, const int plan
     coarse[plane * half_rows * half_cols + s] = (sum + 128) >> 8;
 }
 
+// `within` for -1 .. n.
+inline int beside(const int i, const int n, const int torus)
+{
+    if (torus)
+        return i < 0 ? n - 1 : i == n ? 0 : i;
+    return i < 0 ? min(1, n - 1) : i == n ? max(0, n - 2) : i;
+}
+
 // 2up(G_{i+1}) at pixel (i, j) of level i. In each direction the first child of a pixel takes (1, 6, 1) / 8 around it,
 // the second (4, 4) / 8. Level i is made of tiles of tile_rows x tile_cols pixels, `coarse` of tiles of half as many.
 inline int expanded(__global const int *restrict coarse, const int rows, const int cols, const int tile_rows,
@@ -31,11 +39,13 @@ inline int expanded(__global const int *restrict coarse, const int rows, const i
     const int weight[2][3] = {{1, 6, 1}, {0, 4, 4}};
     const int p = i % tile_rows, q = j % tile_cols;
     const int k = i / tile_rows * ((tile_rows + 1) / 2) + p / 2, l = j / tile_cols * ((tile_cols + 1) / 2) + q / 2;
+    const int left = beside(l - 1, cols, torus), right = beside(l + 1, cols, torus);
+    const int u = 6 - 2 * (q & 1), v = 1 - (q & 1), w = 1 + 3 * (q & 1);
     int sum = 0;
-    for (int a = 0; a < 3; ++a)
-        for (int b = 0; b < 3; ++b)
-            sum += weight[p & 1][a] * weight[q & 1][b] *
-                   coarse[within(k + a - 1, rows, torus) * cols + within(l + b - 1, cols, torus)];
+    for (int a = 0; a < 3; ++a) {
+        __global const int *g = coarse + beside(k + a - 1, rows, torus) * cols;
+        sum += weight[p & 1][a] * (v * g[left] + u * g[l] + w * g[right]);
+    }
     return (sum + 32) >> 6;
 }
 

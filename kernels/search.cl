@@ -23,6 +23,9 @@
 #ifndef SLOTS
 #define SLOTS 64 // candidates that a site may have, -D ALL apart
 #endif
+#ifndef KEPT
+#define KEPT 0 // with -D ALL: distances that are kept, all of them or none
+#endif
 #ifndef V
 #define V 1
 #endif
@@ -129,11 +132,13 @@ __kernel void search(__global const int *restrict sites, const int S, __global u
     const int s = LANE;
     if (IDLE(s))
         return;
-    const int site = sites[s], i = ROW_OF(site), j = COL_OF(site);
+    const int site = sites[s], whole_row = site / width, i = whole_row / spacing, j = (site - whole_row * width) / spacing;
 
     // Rows and columns of the square around the site as parts of a pixel index, -1 outside an open lattice.
     int row[SIDE], col[SIDE];
+#ifdef TILES
     bool row_apart[SIDE], col_apart[SIDE];
+#endif
     for (int a = 0; a < SIDE; ++a) {
         int k = i + a - RADIUS, l = j + a - RADIUS;
         while (torus && k < 0)
@@ -146,36 +151,38 @@ __kernel void search(__global const int *restrict sites, const int S, __global u
             l -= cols;
         row[a] = k < 0 || k >= rows ? -1 : SITE(k, 0);
         col[a] = l < 0 || l >= cols ? -1 : SITE(0, l);
-        row_apart[a] = tile_rows > 0 && k / max(1, tile_rows) != i / max(1, tile_rows);
-        col_apart[a] = tile_rows > 0 && l / max(1, tile_cols) != j / max(1, tile_cols);
+#ifdef TILES
+        row_apart[a] = k / tile_rows != i / tile_rows;
+        col_apart[a] = l / tile_cols != j / tile_cols;
+#endif
     }
+#ifdef TILES
+#define APART_FROM(a, b) (row_apart[a] || col_apart[b] ? elsewhere : 0)
+#else
+#define APART_FROM(a, b) 0
+#endif
 #define PIXEL(a, b)                                                                                                    \
-    (row[a] < 0 || col[b] < 0 || row[a] + col[b] == site                                                               \
-         ? -1                                                                                                          \
-         : row[a] + col[b] + (row_apart[a] || col_apart[b] ? elsewhere : 0))
+    (row[a] < 0 || col[b] < 0 || row[a] + col[b] == site ? -1 : row[a] + col[b] + APART_FROM(a, b))
 
     // The neighbourhood, as in neighbourhood.cl, and the sum of equation (13).
     WINDOW;
     int sum = xi, members = 0;
 #if V > 1
-    if (spacing == 1 && tile_rows == 0 && rows >= SIDE && j >= RADIUS && j - RADIUS + 16 * CHUNKS <= cols) {
-        int16 heat = 0, count_ = 0;
+    if (spacing == 1 && !tile_rows && rows >= SIDE && j >= RADIUS && j - RADIUS + 16 * CHUNKS <= cols) {
+        float16 heat = 0.0f, inside = 0.0f; // whole numbers below 2^24, so in any order
         for (int a = 0; a < SIDE; ++a)
             for (int k = 0; k < CHUNKS; ++k) {
                 const int cell = a * CHUNKS + k, from = max(row[a], 0) + j - RADIUS + 16 * k;
                 const float16 in = row[a] < 0 ? (float16)0.0f : vload16(cell, disc);
-                const int16 t = convert_int16(vload16(0, temperature + from));
-                u[cell] = convert_float16(1024 - t) * 0x1p-10f * in;
+                const float16 t = convert_float16(vload16(0, temperature + from));
+                u[cell] = (1024.0f - t) * 0x1p-10f * in;
                 for (int c = 0; c < C; ++c)
                     xu[cell * C + c] = convert_float16(vload16(0, values + c * area + from)) * u[cell];
-                const int16 inside = convert_int16(in);
-                heat += t * inside;
-                count_ += inside;
+                heat += t * in;
+                inside += in;
             }
-        for (int n = 0; n < 16; ++n) {
-            sum += ((__private int *)&heat)[n];
-            members += ((__private int *)&count_)[n];
-        }
+        sum += (int)folded(heat);
+        members = (int)folded(inside);
     } else
 #endif
     {
@@ -223,13 +230,22 @@ __kernel void search(__global const int *restrict sites, const int S, __global u
 #ifdef ALL
     m = count;
 #define NUMBER(k) (k)
-#define D(k) (distance_to(at[k], u, xu, lattice, plane, down) * (listed(k, list, suggested, seen) ? favour : 1.0f))
+#define WEIGHED(k) (distance_to(at[k], u, xu, lattice, plane, down) * (listed(k, list, suggested, seen) ? favour : 1.0f))
+#if KEPT
+#define D(k) distance[k]
+    float distance[KEPT];
+#else
+#define D(k) WEIGHED(k)
+#endif
     float smallest = INFINITY;
     int best = 0;
     for (int k = 0; k < m; ++k) {
-        const float d = D(k);
+        const float d = WEIGHED(k);
         best = d < smallest ? k : best;
         smallest = fmin(d, smallest);
+#if KEPT
+        distance[k] = d;
+#endif
     }
 #else
     ADD(index_of[source[site]])
@@ -242,7 +258,7 @@ __kernel void search(__global const int *restrict sites, const int S, __global u
         const uint4 bits = draw4(seed, level, turn, site, PURPOSE_SEARCH, k / 4);
         const uint word[4] = {bits.x, bits.y, bits.z, bits.w};
         for (int n = 0; n < 4 && k + n < draws; ++n)
-            ADD(mul_hi(word[n], (uint)count))
+            ADD((int)((ulong)word[n] * (uint)count >> 32))
     }
 #define NUMBER(k) list[k]
 #define D(k) distance[k]

@@ -112,6 +112,7 @@ def mix(
     chosen = pyramid.make_options(**with_channels_last(options, channel_axis))
     seed, machine = as_seed(rng), open_machine(device)
 
+    machine.profile()  # forget what was before
     began, worked = perf_counter(), machine.seconds
     used = [i for i, weight in enumerate(weights) if weight] + ([] if palette is None else [palette])
     levels = pyramid.number_of_levels(chosen, *size, *(side for i in used for side in pictures[i].shape[:2]))
@@ -126,6 +127,7 @@ def mix(
     image, output = pyramid.synthesize_from(machine, texture, size, chosen, levels, seed, seen)
     image = restored(image, channel_axis)
     output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
+    output.statistics.update(machine.profile() or {})
     return (image, output) if full_output else image
 
 

@@ -208,7 +208,8 @@ class Output:
         Each level's picture at its end, the coarsest first. None with ``pyramid``; its callback sees every iteration.
     statistics : dict
         ``device``, ``seed``, ``options``, ``seconds``, ``device_seconds`` (of kernels; None unless the machine was
-        opened with ``profile=True``), and ``levels``: one dict per level with ``level``, ``rows``, ``cols``,
+        opened with ``profile=True``; then there are ``kernels`` and ``gaps`` too, as of
+        `simdtex.machine.log.Log.take`), and ``levels``: one dict per level with ``level``, ``rows``, ``cols``,
         ``candidates``, ``seconds``, and what is particular to the method.
 
     Notes

@@ -74,9 +74,10 @@ def synthesize(
     **options
         Of the method. ``mrf``: ``preset``, ``order``, ``levels``, ``relaxation``, ``bandwidth``, ``coherence``, ``xi``,
         ``free_sweeps``, ``pixel``, ``phases``, ``edges``, ``coarsest``, ``schedule``, ``check_schedule``,
-        ``boundary``, ``array``, ``mapping``, ``emulate``; see `simdtex.methods.mrf.Options`. ``multires``: ``alpha``,
-        ``beta``, ``target``, ``thresholds``, ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``,
-        ``phase``, ``boundary``; see `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``, ``levels``,
+        ``boundary``, ``array``, ``mapping``, ``search``, ``suggesting``, ``similar``, ``chance``, ``exhaustive``,
+        ``emulate``; see `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``target``, ``thresholds``,
+        ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``phase``, ``boundary``; see
+        `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``, ``levels``,
         ``orientations``, ``iterations``, ``match``, ``bins``, ``edges``, ``color``, ``start``; see
         `simdtex.methods.pyramid.Options`.
 
@@ -114,7 +115,10 @@ def synthesize(
     size = check_shape(shape)
     chosen = METHODS[method].make_options(**with_channels_last(options, channel_axis))
     seed, seen = as_seed(rng), seeing(callback, channel_axis)
-    image, output = METHODS[method].synthesize(open_machine(device), pixels, size, chosen, seed, seen)
+    machine = open_machine(device)
+    machine.profile()  # forget what was before
+    image, output = METHODS[method].synthesize(machine, pixels, size, chosen, seed, seen)
+    output.statistics.update(machine.profile() or {})
     image = restored(image, channel_axis)
     if not full_output:
         return image
@@ -184,7 +188,10 @@ def synthesize_solid(
     size = _check_block(shape)
     chosen = solid.make_options(**options)
     seen = seeing(callback, None if channel_axis is None else -1)
-    volume, output = solid.synthesize(open_machine(device), pixels, size, chosen, as_seed(rng), seen)
+    machine = open_machine(device)
+    machine.profile()  # forget what was before
+    volume, output = solid.synthesize(machine, pixels, size, chosen, as_seed(rng), seen)
+    output.statistics.update(machine.profile() or {})
     volume = restored(volume, None if channel_axis is None else -1)
     return (volume, output) if full_output else volume
 

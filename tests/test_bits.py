@@ -20,6 +20,7 @@ REQUIRED = bool(os.environ.get("SIMDTEX_REQUIRE_OPENCL"))
 
 MULTIRES = {"method": "multires"}
 PYRAMID = {"method": "pyramid", "iterations": 2}
+COHERENT = {"search": "coherent"}
 
 # sample shape, channels, type, output shape, options
 RUNS = {
@@ -67,6 +68,19 @@ RUNS = {
         (13, 10),
         {"order": 5, "phases": "all", "edges": "reflect", "levels": 3, "xi": -20.0},
     ),
+    "coherent": ((20, 21), None, np.uint8, (26, 28), COHERENT | {"order": 8}),
+    "coherent-16-bit-gibbs": ((13, 14), None, np.uint16, (17, 12), COHERENT | {"order": 5, "relaxation": "gibbs"}),
+    "coherent-colour-density": (
+        (12, 13),
+        3,
+        np.uint8,
+        (14, 11),
+        COHERENT | {"order": 2, "relaxation": "gibbs", "pixel": "density", "boundary": "open", "chance": 0},
+    ),
+    "coherent-similar": ((12, 13), None, np.float32, (14, 15), COHERENT | {"order": 5, "similar": 2, "phases": "all"}),
+    "coherent-luby": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "schedule": "luby"}),
+    "coherent-block": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "schedule": "block:5x4"}),
+    "coherent-array": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "array": "4x8", "exhaustive": 200}),
     "multires": ((13, 11), None, np.uint8, (15, 18), MULTIRES),
     "multires-colour": (
         (11, 14),
@@ -153,6 +167,8 @@ def synthesis(name, device):
     elif name.startswith("solid"):
         make = simdtex.synthesize_solid
     axis = None if channels is None else -1
+    if make is simdtex.synthesize and "method" not in options:
+        options = {"search": "exact"} | options
     image, output = make(sample, shape, channel_axis=axis, rng=2**40 + 3, device=device, full_output=True, **options)
     reports = output.statistics.get("levels") or output.statistics["iterations"]
     own = ("seconds", "skipped")  # the machine's own; the reference skips nothing

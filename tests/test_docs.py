@@ -28,7 +28,10 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = sorted(path for path in (ROOT / "docs").rglob("*.rst") if "_build" not in path.parts)
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 OF_COMMANDS = {"sheet": METHODS["multires"], "mix": METHODS["pyramid"], "solid": solid}
-REFERENCE = (ROOT / "docs" / "reference" / "command-line.rst").read_text(encoding="utf-8")
+REFERENCE = "\n".join(
+    (ROOT / "docs" / "reference" / name).read_text(encoding="utf-8")
+    for name in ("command-line.rst", "search.rst", "bench.rst")
+)
 
 
 def page_id(path):
@@ -178,10 +181,11 @@ def test_every_kernel_and_operation_is_in_the_table():
 
 
 def documented(program):
-    """Option names under ``.. program:: simdtex PROGRAM``."""
+    """Option names under every ``.. program:: simdtex PROGRAM``."""
     sections = re.split(r"^\.\. program:: simdtex ?", REFERENCE, flags=re.MULTILINE)
-    text = next(section for section in sections[1:] if section.splitlines()[0] == program)
-    signatures = re.findall(r"^\.\. option:: (.*)$", text, re.MULTILINE)
+    texts = [section for section in sections[1:] if section.splitlines()[0] == program]
+    assert texts
+    signatures = [one for text in texts for one in re.findall(r"^\.\. option:: (.*)$", text, re.MULTILINE)]
     return {part.split()[0] for signature in signatures for part in signature.split(", ")}
 
 

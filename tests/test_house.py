@@ -67,7 +67,7 @@ def test_every_file_names_its_licence():
 
 # Imports go one way: a part of the package may know of those to its right.
 ONE_WAY = [
-    *("cli", "report", "comparison", "series", "mixtures", "synthesis", "methods", "recorder", "schedules"),
+    *("cli", "report", "bench", "comparison", "series", "mixtures", "synthesis", "methods", "recorder", "schedules"),
     *("analysis", "histograms", "pyramids", "palette", "machine", "ops", "device"),
 ]
 

@@ -10,7 +10,7 @@ inline uint4 philox(const uint4 counter, const uint2 key)
     uint a = counter.x, b = counter.y, c = counter.z, d = counter.w, k0 = key.x, k1 = key.y;
 #pragma unroll
     for (int round = 0; round < 10; ++round) {
-        const ulong first = (ulong)0xD2511F53u * a, second = (ulong)0xCD9E8D57u * c;
+        const ulong first = 0xD2511F53ul * a, second = 0xCD9E8D57ul * c; // PoCL's mul_hi is in halves
         a = (uint)(second >> 32) ^ b ^ k0;
         b = (uint)second;
         c = (uint)(first >> 32) ^ d ^ k1;
@@ -19,6 +19,19 @@ inline uint4 philox(const uint4 counter, const uint2 key)
         k1 += 0xBB67AE85u;
     }
     return (uint4)(a, b, c, d);
+}
+
+// The same for 8 counters, the n-th word of each in the n-th vector: two vector products a round.
+inline void philox8(ulong8 *x, ulong8 *y, ulong8 *z, ulong8 *w, uint2 key)
+{
+    for (int round = 0; round < 10; ++round) {
+        const ulong8 even = 0xD2511F53ul * *x, odd = 0xCD9E8D57ul * *z;
+        *x = (odd >> 32) ^ *y ^ key.x;
+        *z = (even >> 32) ^ *w ^ key.y;
+        *y = odd & 0xFFFFFFFFul;
+        *w = even & 0xFFFFFFFFul;
+        key += (uint2)(0x9E3779B9u, 0xBB67AE85u);
+    }
 }
 
 // What a draw is for; the same numbers stand in simdtex/random.py.

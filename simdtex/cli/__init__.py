@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command line: ``simdtex synth``, ``solid``, ``mix``, ``sheet``, ``schedules``, ``ising`` and the rest."""
+"""The command line: ``simdtex synth``, ``solid``, ``mix``, ``sheet``, ``schedules``, ``bench`` and the rest."""
 
 from __future__ import annotations
 
 import click
 
 from simdtex import __version__
+from simdtex.cli.bench import bench
 from simdtex.cli.demo import demo
 from simdtex.cli.devices import devices
 from simdtex.cli.ising import ising
@@ -22,5 +23,5 @@ def main() -> None:
     """More of a texture from a sample of it, by parallel relaxation on any OpenCL device."""
 
 
-for command in (synth, solid, mix, sheet, schedules, ising, devices, demo):
+for command in (synth, solid, mix, sheet, schedules, ising, bench, devices, demo):
     main.add_command(command)

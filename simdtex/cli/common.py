@@ -51,6 +51,7 @@ DEVICE = click.option(
 )
 
 SEED = click.option("--seed", type=int, help="Same seed, same picture on every device.  [a fresh one, printed]")
+PROFILE = click.option("--profile", is_flag=True, help="Print what each kernel took, and what was left to the host.")
 QUIET = click.option("-q", "--quiet", is_flag=True, help="No progress bar and no summary.")
 LEVELS = click.option("--levels", type=int, help="Of the multigrid, or of the pyramid.  [as many as the sample feeds]")
 BOUNDARY = click.option("--boundary", help=f"mrf, multires: torus (the result tiles) or open.  [{DEFAULTS.boundary}]")
@@ -63,6 +64,25 @@ _ORIENTATIONS = {
     "multires": f"of edge and line filters.  [{MULTIRES.orientations}]",
     "pyramid": f"1, 2, 4 or 6, of the steerable pyramid.  [{PYRAMID.orientations}]",
 }
+
+
+def opened(device: str | None, profile: bool) -> Any:
+    """What to hand on as the device: a machine that measures its kernels, where a profile is wanted."""
+    if not profile:
+        return device
+    from simdtex.machine import open_machine
+
+    machine = open_machine(device, profile=True)
+    if machine.seconds is None:
+        raise ValueError("--profile times the kernels of an OpenCL device and the reference has none; leave it out")
+    return machine
+
+
+def print_profile(statistics: dict[str, Any]) -> None:
+    """Print the profile of a run, in lines of full length where no terminal breaks them."""
+    from simdtex.report.profile import render
+
+    render(statistics, Console(width=None if sys.stdout.isatty() else 200))
 
 
 def stages_option(what: str) -> Callable[[Command], Command]:

@@ -11,14 +11,17 @@ import click
 
 from simdtex.cli.common import (
     DEVICE,
+    PROFILE,
     QUIET,
     SEED,
     check_distinct,
     given,
     last_iteration,
     numbers,
+    opened,
     output_shape,
     plainly,
+    print_profile,
     pyramid_options,
     stages_option,
     watching,
@@ -48,6 +51,7 @@ CHOSEN = ("palette", "pattern", "low", "high")
 @SEED
 @DEVICE
 @stages_option("every iteration")
+@PROFILE
 @QUIET
 @plainly
 def mix(
@@ -59,6 +63,7 @@ def mix(
     seed: int | None,
     device: str | None,
     stages: Path | None,
+    profile: bool,
     quiet: bool,
     **options: Any,
 ) -> None:
@@ -89,7 +94,7 @@ def mix(
             shape,
             channel_axis=-1 if colour else None,
             rng=seed,
-            device=device,
+            device=opened(device, profile),
             callback=callback,
             full_output=True,
             **given(options | chosen | {"average": weights, "start": begin}),
@@ -101,6 +106,8 @@ def mix(
             f"in {time.perf_counter() - began:.1f} s on {run.statistics['device']}, seed {run.statistics['seed']}"
         )
         click.echo(last_iteration(run.statistics))
+    if profile:
+        print_profile(run.statistics)
 
 
 def sample_number(name: str, text: str | None, samples: tuple[Path, ...]) -> int | None:

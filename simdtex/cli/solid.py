@@ -13,12 +13,15 @@ import numpy as np
 
 from simdtex.cli.common import (
     DEVICE,
+    PROFILE,
     QUIET,
     SEED,
     check_distinct,
     given,
     last_iteration,
+    opened,
     plainly,
+    print_profile,
     pyramid_options,
     stages_option,
     watching,
@@ -62,6 +65,7 @@ SIDE = 128
 @SEED
 @DEVICE
 @stages_option("the middle slice of every iteration")
+@PROFILE
 @QUIET
 @plainly
 def solid(
@@ -73,6 +77,7 @@ def solid(
     seed: int | None,
     device: str | None,
     stages: Path | None,
+    profile: bool,
     quiet: bool,
     **options: Any,
 ) -> None:
@@ -104,7 +109,7 @@ def solid(
             shape,
             channel_axis=read.channel_axis,
             rng=seed,
-            device=device,
+            device=opened(device, profile),
             callback=callback,
             full_output=True,
             **given(options | {"start": begin}),
@@ -121,6 +126,8 @@ def solid(
             f"in {seconds:.1f} s on {run.statistics['device']}, seed {run.statistics['seed']}"
         )
         click.echo(last_iteration(run.statistics))
+    if profile:
+        print_profile(run.statistics)
 
 
 def block_shape(text: str) -> tuple[int, int, int]:

@@ -13,6 +13,7 @@ from rich.console import Console
 from simdtex.cli.common import (
     DEFAULTS,
     DEVICE,
+    PROFILE,
     QUIET,
     SEED,
     candidates_per_level,
@@ -20,8 +21,10 @@ from simdtex.cli.common import (
     given,
     last_iteration,
     method_options,
+    opened,
     output_shape,
     plainly,
+    print_profile,
     stages_option,
     watching,
 )
@@ -66,6 +69,7 @@ from simdtex.cli.common import (
     metavar="MAP=OUT",
     help="Carry the arrangement over to another map of the material (normal, height); may be repeated.",
 )
+@PROFILE
 @QUIET
 @plainly
 def synth(
@@ -80,6 +84,7 @@ def synth(
     source_map: Path | None,
     also: tuple[str, ...],
     accounting: bool,
+    profile: bool,
     quiet: bool,
     **options: Any,
 ) -> None:
@@ -115,7 +120,7 @@ def synth(
             method=method,
             channel_axis=picture.channel_axis,
             rng=seed,
-            device=device,
+            device=opened(device, profile),
             callback=callback,
             full_output=True,
             **given(options | {"start": begin}),
@@ -138,6 +143,8 @@ def synth(
             click.echo(f"{thresholds}; candidates per level, coarse to fine: {candidates_per_level(levels)}")
         if method == "pyramid":
             click.echo(last_iteration(run.statistics))
+    if profile:
+        print_profile(run.statistics)
     if accounting:
         render(run.statistics["accounting"], Console())
 

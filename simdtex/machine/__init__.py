@@ -58,6 +58,10 @@ class Machine(Protocol):
         """Wait until everything is done, or, given the fma just asked for, as often as keeps launches answering."""
         ...
 
+    def profile(self) -> dict[str, Any] | None:
+        """The kernels launched since this was called last and their times; None where that is not measured."""
+        ...
+
     def require(self, size: int) -> None:
         """Raise DeviceError where this many bytes are more than there is."""
         ...

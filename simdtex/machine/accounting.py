@@ -72,19 +72,26 @@ class Account:
 
     def step(self, sites: NDArray[np.int32]) -> None:
         """Count the sites of one step."""
-        report = self.levels[-1]
         if self.packed:
-            passes, moved = -(-sites.size // self.array.size), 0
-            routed = sites.size * self._neighbours * self._words
-        else:
-            layers = np.unique(self.array.place(sites, self._grid).layer)
-            passes, moved, routed = layers.size, int(self._shifts[layers].sum()) * self._words, 0
-        report["steps"] += 1
+            self.packed_steps(np.array([sites.size]))
+            return
+        layers = np.unique(self.array.place(sites, self._grid).layer)
+        self._add(1, sites.size, layers.size, int(self._shifts[layers].sum()) * self._words, 0)
+
+    def packed_steps(self, sizes: NDArray[np.int64]) -> None:
+        """Count steps of so many sites, where sites are packed."""
+        sites = int(sizes.sum())
+        routed = sites * self._neighbours * self._words
+        self._add(sizes.size, sites, int((-(-sizes // self.array.size)).sum()), 0, routed)
+
+    def _add(self, steps: int, sites: int, passes: int, moved: int, routed: int) -> None:
+        report = self.levels[-1]
+        report["steps"] += steps
         report["passes"] += passes
-        report["sites"] += sites.size
+        report["sites"] += sites
         report["moved"] += moved
         report["routed"] += routed
-        report["flop"] += sites.size * self._flop
+        report["flop"] += sites * self._flop
         report["model_seconds"] += passes * self._flop / FLOPS + WORD * (moved / XNET + routed / ROUTER)
 
     def report(self) -> dict[str, Any]:

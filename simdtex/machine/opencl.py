@@ -25,7 +25,7 @@ from simdtex.machine import tuner
 from simdtex.machine.array import ProcessorArray
 from simdtex.machine.log import Log
 from simdtex.machine.tally import Tally
-from simdtex.ops.operation import Array, Operation, P, R
+from simdtex.ops.operation import Array, Operation, P, R, Work
 from simdtex.sample import BLOCK
 
 LITTLE = 2**16
@@ -37,6 +37,9 @@ OUT_OF_MEMORY = (
     cl.status_code.OUT_OF_HOST_MEMORY,
     cl.status_code.INVALID_BUFFER_SIZE,
 )
+
+FEW = 4
+"""Work-items to a work-group of a processor where each has much to do: a small group of sites still feeds all cores."""
 
 LONGEST = 2**17
 """Work-items of a launch over a group: a multiple of every work-group size, and no long launch."""
@@ -168,6 +171,11 @@ class OpenCL:
         self.sync()
         return self.log.seconds
 
+    def profile(self) -> dict[str, Any] | None:
+        """What was launched since this was called last, see `simdtex.machine.log.Log.take`."""
+        self.sync()
+        return self.log.take()
+
     @property
     def spared(self) -> int:
         """Fma of distances that a bound has spared so far."""
@@ -259,27 +267,36 @@ class OpenCL:
         *args: Any,
         local: tuple[int, ...] | None = None,
         defines: Mapping[str, int] | None = None,
+        work: Work | None = None,
     ) -> None:
         """Enqueue a kernel, given as (file, name), over sites that relax together: common/lanes.h."""
         defines = defines or {}
         if self._lane is None:
-            self.launch(self.kernel(*kernel, **defines), size, *args, local=local)
+            self.launch(self.kernel(*kernel, **defines), size, *args, local=local, work=work)
         else:
-            self._enqueue(self.kernel(*kernel, LANES=1, **defines), self._lane.shape, *args, self._lane)
+            self._enqueue(self.kernel(*kernel, LANES=1, **defines), self._lane.shape, *args, self._lane, work=work)
 
-    def launch(self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None) -> None:
+    def launch(
+        self,
+        kernel: Any,
+        size: tuple[int, ...],
+        *args: Any,
+        local: tuple[int, ...] | None = None,
+        work: Work | None = None,
+    ) -> None:
         """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels guard.
 
-        On an array, as many times as it takes with one work-item per PE.
+        On an array, as many times as it takes with one work-item per PE. `work` is what all of it does, for profiles.
         """
         if self.array:
             for begin in range(0, size[0], self.array.size):
-                self._enqueue(kernel, (self.array.size,), *args, begin=begin)
+                self._enqueue(kernel, (self.array.size,), *args, begin=begin, work=work)
+                work = work and Work(0.0, 0.0)  # the first has said it all
             return
         one_dimensional = (self.group,) + (1,) * (len(size) - 1)
         local = local if local and not self.forced else one_dimensional
         size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
-        self._enqueue(kernel, size, *args, local=local)
+        self._enqueue(kernel, size, *args, local=local, work=work)
 
     def launch_groups(self, kernel: Any, bounds: NDArray[np.int64], *args: Any) -> None:
         """Enqueue a kernel over groups of work-items one after another, from ``bounds[g]`` up to ``bounds[g + 1]``.
@@ -288,17 +305,39 @@ class OpenCL:
         launch costs a few microseconds.
         """
         kernel.set_args(*(a.data if isinstance(a, cl_array.Array) else a for a in args))
+        group = self.group if self.forced or self.info.kind == "gpu" else FEW
         for begin, end in pairwise(bounds.tolist()):
             kernel.set_arg(1, np.int32(end))
             for first in range(begin, end, LONGEST):
-                size = -(-min(end - first, LONGEST) // self.group) * self.group
-                event = cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (self.group,), (first,))
-                self.log.add(size, event)
+                size = -(-min(end - first, LONGEST) // group) * group
+                event = cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (group,), (first,))
+                self.log.add(size, event, kernel)
+
+    def launch_rounds(self, kernel: Any, size: int, rounds: int, *args: Any) -> None:
+        """Enqueue a kernel several times, its last two arguments changing places; the others are set once."""
+        if self.array:
+            for number in range(rounds):
+                self.launch(kernel, (size,), *args[:-2], *(args[-2:] if number % 2 == 0 else args[:-3:-1]))
+            return
+        data = [a.data if isinstance(a, cl_array.Array) else a for a in args]
+        kernel.set_args(*data)
+        whole = -(-size // self.group) * self.group
+        for number in range(rounds):
+            kernel.set_arg(len(data) - 2, data[-2 + number % 2])
+            kernel.set_arg(len(data) - 1, data[-1 - number % 2])
+            event = cl.enqueue_nd_range_kernel(self.queue, kernel, (whole,), (self.group,))
+            self.log.add(whole, event, kernel)
 
     def _enqueue(
-        self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None, begin: int = 0
+        self,
+        kernel: Any,
+        size: tuple[int, ...],
+        *args: Any,
+        local: tuple[int, ...] | None = None,
+        begin: int = 0,
+        work: Work | None = None,
     ) -> None:
         data = [a.data if isinstance(a, cl_array.Array) else a for a in args]
         offset = (begin,) if begin else None
         event = kernel(self.queue, size, local or (gcd(size[0], self.group),), *data, global_offset=offset)
-        self.log.add(prod(size), event)
+        self.log.add(prod(size), event, kernel, work)

@@ -55,6 +55,9 @@ class Reference:
     def sync(self, work: int = 0) -> None:
         """Nothing runs behind one's back here."""
 
+    def profile(self) -> None:
+        """Nothing is timed here."""
+
     def require(self, size: int) -> None:
         """Nothing is known of the memory here."""
 

@@ -289,8 +289,11 @@ def _sweep_ahead(
     for first in range(0, steps, together):
         bounds = plan.bounds[first : first + together + 1]
         field = search(machine, sites, bounds, field, weighed, laid, level.offsets, level.grid, rule, plan.turn)
-        for begin, end in pairwise(bounds.tolist()):
-            run.account.step(plan.sites[begin:end])
+        if run.account.packed:
+            run.account.packed_steps(np.diff(bounds))
+        else:
+            for begin, end in pairwise(bounds.tolist()):
+                run.account.step(plan.sites[begin:end])
         relaxed = int(bounds[-1] - bounds[0])
         machine.sync(work * relaxed)
         where["step"] = meter.step(len(bounds) - 1)

@@ -184,29 +184,30 @@ def suggest_alpha(machine: Machine, analysis: Analysis, options: Options) -> flo
 
     Notes
     -----
-    Cost: eight or nine scans of at most 4096 pixels of each of these levels.
+    Cost: eight or nine scans, without draws, of at most 4096 pixels of each of these levels.
     """
+    itself = _sampled(
+        machine, analysis.shapes, [np.arange(pixels([shape]), dtype=np.int32) for shape in analysis.shapes]
+    )
     low, high = 0, MOST * STEPS
     while high - low > 1:  # candidates only grow with alpha
         middle = (low + high) // 2
-        reached = _mean_candidates(machine, analysis, options, middle / STEPS) >= options.target
+        reached = _mean_candidates(machine, analysis, itself, options, middle / STEPS) >= options.target
         low, high = (low, middle) if reached else (middle, high)
     return high / STEPS
 
 
-def _mean_candidates(machine: Machine, analysis: Analysis, options: Options, alpha: float) -> float:
+def _mean_candidates(machine: Machine, analysis: Analysis, itself: Sampled, options: Options, alpha: float) -> float:
     structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
-    itself = [np.arange(rows * cols, dtype=np.int32) for rows, cols in analysis.shapes]
-    sampled = _sampled(machine, analysis.shapes, itself)
     means = []
-    for level in range((analysis.levels - 1) // 2, analysis.levels - 1):  # upward: what is above is still the sample
+    for level in range((analysis.levels - 1) // 2, analysis.levels - 1):
         begin, n = pixels(analysis.shapes[:level]), pixels(analysis.shapes[level : level + 1])
         few = n <= STRETCHES * STRETCH
         counts = []
         for first in [0] if few else [i * n // STRETCHES for i in range(STRETCHES)]:
             end = n if few else first + STRETCH
-            sampled = candidates(machine, structure, sampled, level, first, end, options.phase == "match", 0)
-            counts.append(machine.get(sampled.counts[begin + first : begin + end])[:, 0])
+            candidates(machine, structure, itself, level, first, end, options.phase == "match", 0, draw=False)
+            counts.append(machine.get(itself.counts[begin + first : begin + end])[:, 0])
         means.append(float(np.concatenate(counts).mean()))
     return float(np.mean(means)) if means else inf
 
@@ -264,8 +265,8 @@ def resample(
 
     Notes
     -----
-    A level is one step: no pixel depends on another of its level. Cost: for every pixel at most 3/4 of the nodes above
-    it, times the features; some thousandths of that at usual thresholds. Memory on the device, in bytes per output
+    A level is one step: no pixel depends on another of its level. Cost: for every four pixels at most the nodes above
+    them, times the features; some thousandths of that at usual thresholds. Memory on the device, in bytes per output
     pixel: 20 + 5.3 channels, beside the analysis; on the host about 50 + 5 channels.
     """
     began, worked = perf_counter(), machine.seconds
@@ -292,7 +293,7 @@ def resample(
         source, counts = _read(machine, sampled, shapes, level)
         picture = _collapsed(machine, analysis, level, source, picture)  # CollapsePyramid
         image = analysis.sample.picture(machine.get(picture), source if level == 0 else None)
-        place = np.stack(np.divmod(source, np.int32(analysis.shapes[level][1])), -1)
+        place = _place(source, analysis.shapes[level][1])
         record.end(Stage(level, image, place, np.ascontiguousarray(counts[..., 0])), counts, nodes)
 
     used: dict[str, Any] = {"alpha": alpha, "levels": analysis.levels}
@@ -330,7 +331,8 @@ class _Record:
     def end(self, stage: Stage, counts: NDArray[np.int32], nodes: int) -> None:
         """A level is done; counts (rows, cols, 2) are candidates and nodes compared, of so many nodes."""
         self.stages.append(stage)
-        (rows, cols), (mean, compared) = counts.shape[:2], counts.mean((0, 1)).tolist()
+        rows, cols = counts.shape[:2]
+        mean, compared = (float(np.ascontiguousarray(counts[..., k]).mean()) for k in range(2))
         report = {
             "level": stage.level,
             "rows": rows,
@@ -378,7 +380,8 @@ def _structure(machine: Machine, analysis: Analysis, table: NDArray[np.float64])
 
 def _sampled(machine: Machine, shapes: Sequence[tuple[int, int]], source: Sequence[NDArray[np.int32]]) -> Sampled:
     together = np.concatenate(source)
-    counts = np.tile(np.array([1, 0], np.int32), (together.size, 1))
+    counts = np.zeros((together.size, 2), np.int32)
+    counts[-pixels(shapes[-1:]) :, 0] = 1  # of the top; the others are to be counted
     return Sampled(machine.put(together), machine.put(counts), machine.put(_lattice(shapes, 0)))
 
 
@@ -396,6 +399,14 @@ def _read(
     begin, end = pixels(shapes[:level]), pixels(shapes[: level + 1])
     source, counts = machine.get(sampled.source[begin:end]), machine.get(sampled.counts[begin:end])
     return source.reshape(shapes[level]), counts.reshape(*shapes[level], 2)
+
+
+def _place(source: NDArray[np.int32], cols: int) -> NDArray[np.int32]:
+    """(row, column) of pixels on a last axis."""
+    place = np.empty((*source.shape, 2), np.int32)
+    place[..., 0] = row = source // np.int32(cols)
+    place[..., 1] = source - row * np.int32(cols)  # quicker than divmod
+    return place
 
 
 def _collapsed(

@@ -22,6 +22,7 @@ from simdtex.machine import Machine
 from simdtex.ops.matching import distance, inverse_cdf, match_lookup, match_ranks
 from simdtex.ops.noise import noise
 from simdtex.ops.operation import Array
+from simdtex.ops.ranking import ranking
 from simdtex.ops.sort import sort
 from simdtex.options import build, one_of, real_array, whole, within_32_bits
 from simdtex.palette import Decorrelated, Palette, decorrelated, palette
@@ -152,22 +153,25 @@ class Matcher:
             planes, shape = 1, [planes, *shape]
         segments = values.reshape((bands * planes, prod(shape)))
         if self._options.match == "rank":
-            matched = match_ranks(self._machine, self.order(segments), wanted.table)
+            matched, moved = ranking(self._machine, segments, self._ties(segments.shape[1]), wanted.table)
         else:
             matched = match_lookup(self._machine, segments, wanted.table)
-        moved = distance(self._machine, segments, matched)
+            moved = distance(self._machine, segments, matched)
         self._machine.sync(MATCHING * bands * planes * prod(shape))
         self._moved.append((name, moved, wanted.deviations * planes * prod(shape)))
         return matched.reshape(values.shape)
 
     def order(self, segments: Array) -> Array:
         """Indices of each segment's values (segments, n) in ascending order; equal ones come in a random order."""
-        n = segments.shape[1]
+        return sort(self._machine, segments, self._ties(segments.shape[1]))
+
+    def _ties(self, n: int) -> Array:
+        """The order in which equal ones of n values come."""
         if n not in self._first:
             bits = noise(self._machine, 1, n, self._seed, TIES)
             itself = self._machine.put(np.arange(n, dtype=np.int32))
             self._first[n] = sort(self._machine, bits, itself).reshape(n)
-        return sort(self._machine, segments, self._first[n])
+        return self._first[n]
 
     def distances(self) -> dict[str, float]:
         """Mean distance that the values of each subband were moved since the last call, in its standard deviations."""

@@ -50,14 +50,22 @@ class Sampled(NamedTuple):
 
 
 def _reference(
-    structure: Structure, sampled: Sampled, level: int, first: int, end: int, match: bool, seed: int
+    structure: Structure,
+    sampled: Sampled,
+    level: int,
+    first: int,
+    end: int,
+    match: bool,
+    seed: int,
+    draw: bool = True,
 ) -> Sampled:
     begin = int(sampled.lattice[level, 2])
     step = max(1, TOGETHER // (4 * int(structure.lattice[level + 1, :2].prod())))
     for s in range(first, end, step):
         sites = np.arange(s, min(end, s + step))
         choice, counts = _drawn(structure, sampled, level, sites, match, seed)
-        sampled.source[begin + sites] = choice
+        if draw:
+            sampled.source[begin + sites] = choice
         sampled.counts[begin + sites] = counts
     return sampled
 
@@ -123,22 +131,26 @@ def _launch(
     end: int,
     match: bool,
     seed: int,
+    draw: bool = True,
 ) -> Sampled:
     levels, features = structure.threshold.shape
-    above = (np.int32(level), np.int32(levels - 1), np.int32(match))
-    pyramids = (structure.lattice, structure.features, structure.threshold, sampled.lattice)
-    pixels = (np.int32(first), np.int32(end), sampled.source, sampled.counts)
-    for name, key in (("candidates_count", ()), ("candidates_draw", (np.uint64(seed),))):
-        kernel = machine.kernel("candidates", name, FEATURES=features)
-        machine.launch(kernel, (end - first,), *key, *above, *pyramids, *pixels)
+    items = -(-(end - first) // 4)  # one for four siblings; where these are fewer, an item takes several
+    machine.launch(
+        machine.kernel("candidates", "candidates", FEATURES=features),
+        (items,),
+        *(np.uint64(seed), np.int32(level), np.int32(levels - 1), np.int32(match), np.int32(draw)),
+        *(structure.lattice, structure.features, structure.threshold, sampled.lattice),
+        *(np.int32(first), np.int32(end), np.int32(items), sampled.source, sampled.counts),
+    )
     return sampled
 
 
 candidates = Operation("candidates", _reference, _launch)
-"""``candidates(machine, structure, sampled, level, first, end, match, seed)``: pixels first .. end-1 of a level.
+"""``candidates(machine, structure, sampled, level, first, end, match, seed, draw=True)``: pixels first .. end-1.
 
-``sampled`` is changed in place. With ``match`` a candidate stands where the pixel does among its siblings, in an even
-or odd row and column, and below a node that stands for as many pixels of the sample as the pixel's parent does, which
-those at its edge may not; else any child of a node that passes is one. Cost: at most 3/4 x nodes x M comparisons a
-pixel; 12 bytes of memory a pixel.
+``sampled`` is changed in place; without ``draw`` only its counts. With ``match`` a candidate stands where the pixel
+does among its siblings, in an even or odd row and column, and below a node that stands for as many pixels of the sample
+as the pixel's parent does, which those at its edge may not; else any child of a node that passes is one. Cost: at most
+nodes x M comparisons for four pixels, and about a sixteenth of that more for each that is drawn from many candidates;
+12 bytes of memory a pixel.
 """

@@ -46,8 +46,14 @@ lattice_coloring = Operation("lattice_coloring", _lattice_reference, _lattice_la
 
 
 def _greedy_reference(
-    grid: Grid, offsets: NDArray[np.int32], colors: NDArray[np.int32], seed: int
+    grid: Grid, offsets: NDArray[np.int32], colors: NDArray[np.int32], seed: int, rounds: int = 1
 ) -> NDArray[np.int32]:
+    for _ in range(rounds):
+        colors = _greedy_round(grid, offsets, colors, seed)
+    return colors
+
+
+def _greedy_round(grid: Grid, offsets: NDArray[np.int32], colors: NDArray[np.int32], seed: int) -> NDArray[np.int32]:
     flat = colors.ravel()
     bare = np.flatnonzero(flat == UNCOLORED).astype(np.int32)
     r = grid.flat.neighbours(bare, offsets)
@@ -61,14 +67,13 @@ def _greedy_reference(
     return new.reshape(colors.shape)
 
 
-def _greedy_launch(machine: OpenCL, grid: Grid, offsets: Array, colors: Array, seed: int) -> Array:
-    new = machine.empty(colors.shape, np.int32)
-    machine.launch(
-        machine.kernel("coloring", "coloring_greedy"),
-        (colors.size,),
-        *(*grid.args, offsets, np.int32(offsets.shape[0]), np.uint64(seed), colors, new),
-    )
-    return new
+def _greedy_launch(machine: OpenCL, grid: Grid, offsets: Array, colors: Array, seed: int, rounds: int = 1) -> Array:
+    one, other = machine.empty(colors.shape, np.int32), machine.empty(colors.shape, np.int32)
+    kernel = machine.kernel("coloring", "coloring_greedy")
+    arguments = (*grid.args, offsets, np.int32(offsets.shape[0]), np.uint64(seed))
+    machine.launch_rounds(kernel, colors.size, 1, *arguments, colors, one)
+    machine.launch_rounds(kernel, colors.size, rounds - 1, *arguments, one, other)
+    return one if rounds % 2 else other
 
 
 greedy_coloring = Operation("greedy_coloring", _greedy_reference, _greedy_launch)
@@ -103,8 +108,7 @@ def coloring(machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, s
     colors = lattice_coloring(machine, grid, device_offsets, best)
     result = machine.get(colors)
     while (result == UNCOLORED).any():
-        for _ in range(ROUNDS):
-            colors = greedy_coloring(machine, grid, device_offsets, colors, seed)
+        colors = greedy_coloring(machine, grid, device_offsets, colors, seed, ROUNDS)
         result = machine.get(colors)
     used = np.bincount(result.ravel()) > 0
     if grid.torus and used.sum() > best.index:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.ops.laplacian import within
-from simdtex.ops.operation import Array, Operation
+from simdtex.ops.operation import Array, Operation, touching
 
 if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
@@ -81,6 +81,7 @@ def _launch(machine: OpenCL, picture: Array, band: Array, taps: Array, torus: bo
         (rows * cols, planes * (1 + count)),
         *(picture, band, np.int32(planes), np.int32(rows), np.int32(cols), np.int32(torus)),
         *(taps, np.int32(count), np.int32(side), features),
+        work=touching(picture, band, features, fma=picture.size * taps.size),
     )
     return features
 

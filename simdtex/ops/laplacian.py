@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.ops.operation import Array, Operation
+from simdtex.ops.operation import Array, Operation, touching
 
 if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
@@ -77,6 +77,7 @@ def _launch_reduce(machine: OpenCL, fine: Array, torus: bool) -> Array:
         machine.kernel("laplacian", "laplacian_reduce"),
         (coarse.shape[1] * coarse.shape[2], planes),
         *(fine, *_sizes(planes, rows, cols, torus), coarse),
+        work=touching(fine, coarse, fma=25 * coarse.size),
     )
     return coarse
 
@@ -88,6 +89,7 @@ def _launch_band(machine: OpenCL, fine: Array, coarse: Array, torus: bool) -> Ar
         machine.kernel("laplacian", "laplacian_band"),
         (rows * cols, planes),
         *(fine, coarse, *_sizes(planes, rows, cols, torus), band),
+        work=touching(fine, coarse, band, fma=25 / 4 * band.size),
     )
     return band
 
@@ -99,6 +101,7 @@ def _launch_collapse(machine: OpenCL, band: Array, source: Array, coarse: Array,
         machine.kernel("laplacian", "laplacian_collapse"),
         (rows * cols, band.shape[0]),
         *(band, *_sizes(*band.shape, torus), source, *_sizes(rows, cols), coarse, *_sizes(*coarse.shape[1:]), fine),
+        work=touching(band, source, coarse, fine, fma=25 / 4 * fine.size),
     )
     return fine
 

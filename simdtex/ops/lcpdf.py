@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from simdtex import random
 from simdtex.ops.arithmetic import exp32, fma32
 from simdtex.ops.neighbourhood import Neighbourhoods
-from simdtex.ops.operation import Array, Operation
+from simdtex.ops.operation import Array, Operation, touching
 from simdtex.sample import BLOCK, Candidates
 
 if TYPE_CHECKING:
@@ -122,6 +122,7 @@ def _distance_launch(machine: OpenCL, near: Neighbourhoods, candidates: Candidat
         *(candidates.reach, np.int32(blocks), distance, nearest),
         local=machine.tile,
         defines=_defines(machine, candidates),
+        work=touching(*near[:2], distance, fma=2 * near.weighted.size / padded * near.sites * candidates.size),
     )
     return Distances(distance, nearest, near.sites)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.ops.operation import Array, Operation
+from simdtex.ops.operation import Array, Operation, touching
 from simdtex.ops.sort import local, run_length
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def inverse_cdf(sorted_values: NDArray[np.int32], bins: int = BINS) -> NDArray[n
     return np.array(table, np.int32)
 
 
-def _each(segments: int, targets: int) -> int:
+def each_of(segments: int, targets: int) -> int:
     """Segments that share a target."""
     if segments % targets:
         raise ValueError(f"{segments} segments cannot share {targets} targets evenly")
@@ -72,25 +72,26 @@ def _ranks(order: NDArray[np.int32], targets: NDArray[np.int32]) -> NDArray[np.i
     (segments, n), m = order.shape, targets.shape[1]
     rank = (2 * np.arange(n, dtype=np.int64) + 1) * m // (2 * n)
     values = np.empty_like(order)
-    np.put_along_axis(values, order, targets[:, rank].repeat(_each(segments, len(targets)), 0), 1)
+    np.put_along_axis(values, order, targets[:, rank].repeat(each_of(segments, len(targets)), 0), 1)
     return values
 
 
 def _launch_ranks(machine: OpenCL, order: Array, targets: Array) -> Array:
     (segments, n), m = order.shape, targets.shape[1]
-    each = _each(segments, targets.shape[0])
+    each = each_of(segments, targets.shape[0])
     values = machine.empty(order.shape, np.int32)
     machine.launch(
         machine.kernel("matching", "matching_ranks"),
         (n, segments),
         *(order, np.int32(segments), np.int32(n), targets, np.int32(each), np.int32(m), values),
+        work=touching(order, targets, values),
     )
     return values
 
 
 def _lookup(values: NDArray[np.int32], tables: NDArray[np.int32]) -> NDArray[np.int32]:
     (segments, n), bins = values.shape, tables.shape[1] - 1
-    each = _each(segments, len(tables))
+    each = each_of(segments, len(tables))
     result = np.empty_like(values)
     for segment, own in enumerate(values.astype(np.int64)):
         table = tables[segment // each].astype(np.int64)
@@ -109,7 +110,7 @@ def _lookup(values: NDArray[np.int32], tables: NDArray[np.int32]) -> NDArray[np.
 
 def _launch_lookup(machine: OpenCL, values: Array, tables: Array) -> Array:
     (segments, n), bins = values.shape, tables.shape[1] - 1
-    each = _each(segments, tables.shape[0])
+    each = each_of(segments, tables.shape[0])
     runs, shape = _runs(machine, segments, n, bins)
     ranges, spans = machine.empty((segments, runs, 2), np.int32), machine.empty((segments, 2), np.int32)
     counts, cdf = machine.empty((segments, runs, bins), np.uint32), machine.empty((segments, bins + 1), np.uint32)
@@ -125,6 +126,7 @@ def _launch_lookup(machine: OpenCL, values: Array, tables: Array) -> Array:
         machine.kernel("matching", "matching_lookup"),
         (n, segments),
         *(values, s, np.int32(n), spans, b, cdf, tables, np.int32(each), result),
+        work=touching(values, result),
     )
     return result
 
@@ -142,6 +144,7 @@ def _launch_distance(machine: OpenCL, before: Array, after: Array) -> Array:
         machine.kernel("matching", "matching_distance"),
         (segments * runs,),
         *(before, after, *shape, sums),
+        work=touching(before, after),
         local=local(machine),
     )
     machine.launch(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.lattice import Grid
-from simdtex.ops.operation import Array, Operation
+from simdtex.ops.operation import Array, Operation, touching
 
 if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
@@ -55,6 +55,7 @@ def _launch(machine: OpenCL, sites: Array, field: Field, offsets: Array, grid: G
         *(sites, np.int32(count), np.int32(padded), field.values, field.temperature),
         *(np.int32(channels), np.int32(prod(field.values.shape[1:])), offsets, np.int32(neighbours), *grid.args),
         *(confidence, weighted),
+        work=touching(sites, confidence, weighted),
     )
     return Neighbourhoods(confidence, weighted, count)
 

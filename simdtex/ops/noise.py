@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.ops.operation import Array, Operation
+from simdtex.ops.operation import Array, Operation, touching
 
 if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
@@ -24,8 +24,9 @@ def _launch(machine: OpenCL, planes: int, n: int, seed: int, level: int) -> Arra
     values = machine.empty((planes, n), np.int32)
     machine.launch(
         machine.kernel("noise", "noise"),
-        (n, -(-planes // 4)),
+        (-(-n // 8), -(-planes // 4)),
         *(np.uint64(seed), np.int32(level), np.int32(planes), np.int32(n), values),
+        work=touching(values),
     )
     return values
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Concatenate, Generic, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, Generic, NamedTuple, ParamSpec, TypeVar
 
 if TYPE_CHECKING:
     from simdtex.machine import Machine
@@ -16,6 +16,26 @@ R = TypeVar("R")
 
 Array = Any
 """An array of the machine: `numpy.ndarray` on the reference, `pyopencl.array.Array` on a device."""
+
+
+class Work(NamedTuple):
+    """What a launch says that it does, for profiles.
+
+    Attributes
+    ----------
+    fma : float or None
+        Multiply-adds that the operation asks for, however the kernel saves some of them; None where it is not known.
+    bytes : float or None
+        The least that has to be moved: every array read or written once.
+    """
+
+    fma: float | None
+    bytes: float | None
+
+
+def touching(*arrays: Array, fma: float | None = None) -> Work:
+    """The work of a launch that reads or writes each of these device arrays once."""
+    return Work(fma, float(sum(array.nbytes for array in arrays)))
 
 
 @dataclass(frozen=True)

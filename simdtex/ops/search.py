@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 LANES = 16
 """Partial sums of a distance: one for each column, modulo 16, of the square around a neighbourhood."""
 
+KEPT = 256
+"""Distances that a work-item can keep; of more candidates they are computed again."""
+
 
 class Table(NamedTuple):
     """What coherent search needs of a level.
@@ -322,7 +325,7 @@ def _launch(
     turn: int,
 ) -> Field:
     arguments = _arguments(machine, sites, field, weighed, table, offsets, grid, rule, turn)
-    kernel = machine.kernel("search", "search", **_defines(machine, field, table))
+    kernel = machine.kernel("search", "search", **_defines(machine, field, table, grid))
     machine.launch_groups(kernel, bounds, *arguments, field.values, field.source, field.temperature)
     return field
 
@@ -345,15 +348,17 @@ def _apart_launch(
         (sites.size,),
         *_arguments(machine, sites, field, weighed, table, offsets, grid, rule, turn),
         *(relaxed.values, relaxed.choice, cooled),
-        defines=_defines(machine, field, table) | {"APART": 1},
+        defines=_defines(machine, field, table, grid) | {"APART": 1},
     )
     return relaxed, cooled
 
 
-def _defines(machine: OpenCL, field: Field, table: Table) -> dict[str, int]:
+def _defines(machine: OpenCL, field: Field, table: Table, grid: Grid) -> dict[str, int]:
     slots = table.suggesting if table.exhaustive else table.slots
     defines = {"C": len(field.values), "RADIUS": table.disc.shape[0] // 2, "SLOTS": slots, "V": machine.vector}
-    return defines | ({"ALL": 1} if table.exhaustive else {})
+    defines |= {"TILES": 1} if grid.tile else {}
+    kept = table.slots if table.slots <= KEPT else 0
+    return defines | ({"ALL": 1, "KEPT": kept} if table.exhaustive else {})
 
 
 def _arguments(

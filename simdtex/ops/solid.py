@@ -9,6 +9,7 @@ Results are right where what is reduced is below 2**23 and what is expanded belo
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from math import prod
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from simdtex.ops.fold import folded
 from simdtex.ops.laplacian import within
-from simdtex.ops.operation import Array, Operation
+from simdtex.ops.operation import Array, Operation, Work, touching
 
 if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
@@ -99,12 +100,19 @@ def _parts(slices: int, pixels: int) -> Iterator[tuple[np.int32, tuple[int, int]
         yield np.int32(first), (pixels, min(step, slices - first))
 
 
+def _work(size: tuple[int, int], fma: int | None, values: int) -> Work:
+    """The work of a launch whose items each do so many fma and read or write so many values."""
+    items = prod(size)
+    return Work(None if fma is None else float(fma * items), 4.0 * values * items)
+
+
 def _launch_reduce(machine: OpenCL, fine: Array, torus: bool) -> Array:
     depth, rows, cols = above(fine.shape, torus)
     coarse = machine.empty((depth, rows, cols), np.int32)
     kernel = machine.kernel("solid", "solid_reduce")
     for first, size in _parts(depth, rows * cols):
-        machine.launch(kernel, size, fine, first, *_sizes(*fine.shape, torus), coarse)
+        work = _work(size, 125, 8 + 1)
+        machine.launch(kernel, size, fine, first, *_sizes(*fine.shape, torus), coarse, work=work)
     return coarse
 
 
@@ -120,7 +128,8 @@ def _launch_expanded(machine: OpenCL, function: str, known: Array, coarse: Array
     depth, rows, cols = coarse.shape
     kernel = machine.kernel("solid", function)
     for first, size in _parts(depth, rows * cols):
-        machine.launch(kernel, size, known, coarse, first, *_sizes(*known.shape, torus), result)
+        work = _work(size, 125, 8 + 8 + 1)
+        machine.launch(kernel, size, known, coarse, first, *_sizes(*known.shape, torus), result, work=work)
     return result
 
 
@@ -138,7 +147,8 @@ def _launch_turn(machine: OpenCL, block: Array, axes: Sequence[int]) -> Array:
     turned = machine.empty((depth, rows, cols), np.int32)
     kernel = machine.kernel("solid", "solid_turn")
     for first, size in _parts(depth, rows * cols):
-        machine.launch(kernel, size, block, first, *_sizes(depth, rows, cols, *(steps[axis] for axis in axes)), turned)
+        sizes = _sizes(depth, rows, cols, *(steps[axis] for axis in axes))
+        machine.launch(kernel, size, block, first, *sizes, turned, work=_work(size, None, 2))
     return turned
 
 
@@ -147,7 +157,8 @@ def _launch_mean(machine: OpenCL, blocks: Sequence[Array]) -> Array:
     _check_count(k)
     mean = machine.empty(blocks[0].shape, np.int32)
     four = [*blocks, *[blocks[0]] * (MOST_BLOCKS - k)]
-    machine.launch(machine.kernel("solid", "solid_mean", COUNT=k), (mean.size,), *four, np.int32(mean.size), mean)
+    kernel, work = machine.kernel("solid", "solid_mean", COUNT=k), touching(*blocks, mean)
+    machine.launch(kernel, (mean.size,), *four, np.int32(mean.size), mean, work=work)
     return mean
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.ops.operation import Array, Operation
+from simdtex.ops.operation import Array, Operation, Work
 
 if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
@@ -56,15 +56,19 @@ def _launch(machine: OpenCL, values: Array, first: Array) -> Array:
         pieces = min(most, segments - begin)
         shape = np.array([pieces, n, runs, length], np.int32)
         size = (pieces * runs,)
-        machine.launch(read, size, values, np.int32(begin), first, *shape, pairs, local=group)
+        once = 8.0 * pieces * n  # bytes of keys and their indices
+        machine.launch(
+            read, size, values, np.int32(begin), first, *shape, pairs, local=group, work=Work(None, 2 * once)
+        )
         for shift in range(0, 32, 8):
-            machine.launch(count, size, pairs, *shape, np.int32(shift), counts, local=group)
+            machine.launch(count, size, pairs, *shape, np.int32(shift), counts, local=group, work=Work(None, once))
             machine.launch(scan, (pieces * DIGITS,), np.int32(pieces), np.int32(runs), counts, totals)
             machine.launch(
                 scatter,
                 size,
                 *(pairs, *shape, np.int32(shift), counts, totals, moved, np.int32(shift == 24), order, np.int32(begin)),
                 local=group,
+                work=Work(None, 2 * once),
             )
             pairs, moved = moved, pairs
     return order

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.ops.laplacian import within
-from simdtex.ops.operation import Array, Operation
+from simdtex.ops.operation import Array, Operation, Work
 
 if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
@@ -104,13 +104,18 @@ def _launch_split(machine: OpenCL, picture: Array, taps: Array, torus: bool, ste
         machine.launch(
             pad,
             (height * step * pitch // v, together),
-            *(picture, *_sizes(*size, torus, side // 2, first, step * first_row, together, height, pitch), padded),
+            *(picture, *_sizes(*size, torus, side // 2, 1, planes, first, step * first_row, together, height, pitch)),
+            padded,
+            work=Work(None, 8.0 * together * height * step * pitch),
         )
         machine.launch(
             split,
             (_up(some, unit) // unit * across // v, together),
             *(padded, *_sizes(together, height, pitch), taps, *_sizes(side, planes, rows, cols)),
             *(*_sizes(first, first_row, some), bands),
+            work=Work(
+                together * some * cols * taps.size, 4.0 * together * (height * step * pitch + some * cols * count)
+            ),
         )
     return bands
 
@@ -125,30 +130,34 @@ def _launch_join(
     side = max(taps.shape[1] for _, taps, _ in terms)
     pitch = _up(across + side - 1, v)
     join = machine.kernel("steerable", "steerable_join", V=v, ROWS=ROWS[1])
-    order = [(number, f) for number, (bands, _, _) in enumerate(terms) for f in range(bands.shape[0])]
+    most = max(bands.shape[0] for bands, _, _ in terms)
     padded = total = None
-    for first, together, first_row, some in _pieces(machine, planes, rows, pitch, side, unit):
+    for first, together, first_row, some in _pieces(machine, planes, rows, most * pitch, side, unit):
         height = _up(some, unit) + side - 1
         if padded is None:  # the first piece is the largest
-            padded = machine.empty(together * height * pitch, np.float32)
-            total = machine.empty(together * some * across, np.float32)
-        for number, f in order:
-            bands, taps, step = terms[number]
-            own = taps.shape[1]
+            padded = machine.empty(most * together * height * pitch, np.float32)
+            total = padded if len(terms) == 1 else machine.empty(together * some * across, np.float32)
+        for number, (bands, taps, step) in enumerate(terms):
+            count, own = taps.shape[:2]
             # Every other row is zeros, but where the rows repeat after an odd number even ones meet odd ones.
             skip = 1 if rows == 1 or (torus and rows % 2) else step
             machine.launch(
                 machine.kernel("steerable", "steerable_pad", V=v, SPREAD=step, APART=1),
-                (height * pitch // v, together),
-                *(bands, *_sizes(rows, cols, torus, own // 2, f * planes + first, first_row, together, height, pitch)),
-                padded,
+                (height * pitch // v, count * together),
+                *(bands, *_sizes(rows, cols, torus, own // 2, count, planes, first, first_row)),
+                *(*_sizes(together, height, pitch), padded),
+                work=Work(None, 4.0 * count * together * height * pitch * (1 + 1 / step**2)),
             )
             machine.launch(
                 join,
                 (_up(some, ROWS[1] * skip) // ROWS[1] * across // v, together),
-                *(padded, *_sizes(together, height, pitch), taps, *_sizes(f, own, skip)),
-                *_sizes((number, f) == order[0], (number, f) == order[-1]),
+                *(padded, *_sizes(together, height, pitch), taps, *_sizes(count, own, skip)),
+                *_sizes(number == 0, number == len(terms) - 1),
                 *(total, *_sizes(rows, cols, first, first_row, some), picture),
+                work=Work(
+                    count * together * some * cols * own**2 / skip,
+                    4.0 * together * (count * height * pitch + some * across),
+                ),
             )
     return picture
 

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex bench``: what the devices here can do, and what the methods make of it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from simdtex.cli.common import plainly
+
+
+@click.command()
+@click.option(
+    "--device",
+    metavar="TEXT",
+    help="Measure this device alone: part of its name or platform, or an index of `simdtex devices`.  [all usable]",
+)
+@click.option("--quick", is_flag=True, help="Small sizes: within a minute instead of some six.")
+@click.option("--json", "path", type=click.Path(path_type=Path), metavar="FILE", help="Write all that was measured.")
+@click.option("--plot", "folder", type=click.Path(path_type=Path), metavar="DIR", help="Draw rooflines and growth.")
+@click.option("-q", "--quiet", is_flag=True, help="No word on what is being measured, and no tables.")
+@plainly
+def bench(device: str | None, quick: bool, path: Path | None, folder: Path | None, quiet: bool) -> None:
+    """Measure what devices can do at most, and what the methods take.
+
+    Everything is measured in one run and compared in ratios: with the device's own limits, with the NumPy reference,
+    and with a program of library code (BLAS, FFTs, k-d trees) on as many threads. Leave the machine alone meanwhile.
+    """
+    from simdtex.bench import run as benchmark
+    from simdtex.bench import sizes
+    from simdtex.image import atomic_path, check_writable
+    from simdtex.report.bench import plot, render
+    from simdtex.report.folder import earlier_files
+
+    if path:
+        check_writable(path, suffixes=(".json",))
+    if folder:
+        earlier_files(folder, "the plots", lambda folder: {found.name for found in folder.glob("*.png")})
+    infos = benchmark.chosen(device)
+
+    def tell(what: str) -> None:
+        if not quiet:
+            click.echo(what, err=True)
+
+    found = benchmark.run(sizes.QUICK if quick else sizes.FULL, infos, tell)
+    if path:
+        with atomic_path(path) as whole:
+            whole.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    pictures = plot(found, folder) if folder else []
+    if not quiet:
+        render(found, Console(width=None if sys.stdout.isatty() else 200))
+        for picture in [*([path] if path else []), *pictures]:
+            click.echo(picture)

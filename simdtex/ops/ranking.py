@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Histogram matching by rank, from values to values: `sort`, `match_ranks` and `distance` as one operation."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.ops.matching import distance, each_of, match_ranks
+from simdtex.ops.operation import Array, Operation
+from simdtex.ops.sort import SCRATCH, local, sort
+
+if TYPE_CHECKING:
+    from simdtex.machine.opencl import OpenCL
+
+COUNTERS = 3 * 2**11
+"""Of a segment: for 11 bits in each of three passes."""
+
+SHORT, LONG = 2**15, 2**22
+"""Values of a segment that one work-item sorts where there are few of them, and where there are many."""
+
+
+def alone(machine: OpenCL, segments: int, n: int) -> bool:
+    """Whether one work-item is to sort a whole segment; it changes no bit.
+
+    It saves a dozen launches. A long segment is divided on a graphics processor, or where cores would go without one.
+    """
+    if machine.info.kind == "gpu":
+        return False
+    return n <= (LONG if 2 * segments >= machine.info.compute_units else SHORT)
+
+
+def _reference(
+    values: NDArray[np.int32], first: NDArray[np.int32], targets: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    matched = match_ranks.reference(sort.reference(values, first), targets)
+    return matched, distance.reference(values, matched)
+
+
+def _launch(machine: OpenCL, values: Array, first: Array, targets: Array) -> tuple[Array, Array]:
+    segments, n = values.shape
+    if not alone(machine, segments, n):
+        matched = match_ranks.launch(machine, sort.launch(machine, values, first), targets)
+        return matched, distance.launch(machine, values, matched)
+    each, m = each_of(segments, targets.shape[0]), targets.shape[1]
+    most = min(segments, max(1, SCRATCH // max(n, COUNTERS // 2)))
+    pairs, counts = machine.empty((2, most, n, 2), np.uint32), machine.empty((most, COUNTERS), np.uint32)
+    matched, moved = machine.empty((segments, n), np.int32), machine.empty((segments,), np.int64)
+    kernel = machine.kernel("ranking", "ranking")
+    for begin in range(0, segments, most):
+        pieces = min(most, segments - begin)
+        machine.launch(
+            kernel,
+            (pieces,),
+            *(values, np.int32(begin), first, np.int32(pieces), np.int32(n)),
+            *(targets, np.int32(each), np.int32(m), pairs, counts, matched, moved),
+            local=local(machine),
+        )
+    return matched, moved
+
+
+ranking = Operation("ranking", _reference, _launch)
+"""``ranking(machine, values, first, targets)``: (segments, n) int32 with the histograms of the targets, and how far.
+
+``values`` (segments, n) int32, equal ones in the order of the permutation ``first`` (n,) int32; ``targets`` (T, m)
+int32 are sorted. The second result, (segments,) int64, is the sum of |before - after| over each segment. Cost: two to
+four passes over the values, 16 bytes of scratch for each of 2**22 at a time.
+"""

@@ -1,0 +1,190 @@
+"""Profiles: what each kernel took, what it said it does, and what was left to the host."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from cases import opencl, texture
+from click.testing import CliRunner
+
+import simdtex
+from simdtex.cli import main
+from simdtex.image import write
+from simdtex.lattice import neighbourhood_offsets
+from simdtex.machine.array import parse_array
+from simdtex.machine.log import KEPT, PENDING, Log, Times
+from simdtex.machine.opencl import OpenCL
+from simdtex.machine.reference import Reference
+from simdtex.ops.noise import noise
+from simdtex.ops.operation import Work, touching
+from simdtex.report.profile import rate_text, rows, seconds_text, summary
+
+
+class Event:
+    """A kernel that ran from one nanosecond to another."""
+
+    def __init__(self, start, end):
+        self.profile = SimpleNamespace(start=start, end=end)
+        self.waited = False
+
+    def wait(self):
+        self.waited = True
+
+
+def kernel(name):
+    return SimpleNamespace(function_name=name)
+
+
+def test_times_are_exact_but_for_a_median_of_some_of_many():
+    times = Times()
+    values = np.random.default_rng(1).integers(1, 10**6, 5 * KEPT)
+    for value in values.tolist():
+        times.add(value)
+    report = times.report()
+    assert (times.count, times.nanoseconds) == (values.size, values.sum())
+    assert (times.least, times.most) == (values.min(), values.max())
+    assert len(times._kept) <= KEPT
+    assert report["median"] == pytest.approx(np.median(values) * 1e-9, rel=0.02)
+    few = Times()
+    for value in (5, 1, 3):
+        few.add(value)
+    assert few.report() == pytest.approx({"calls": 3, "min": 1e-9, "median": 3e-9, "max": 5e-9, "seconds": 9e-9})
+    assert Times().report() == {"calls": 0, "min": 0, "median": 0, "max": 0, "seconds": 0}
+
+
+def test_a_log_tells_kernels_shares_rates_and_gaps():
+    log = Log(True)
+    log.add(8, Event(100, 200), kernel("fast"), Work(1000, 50))
+    log.add(8, Event(250, 550), kernel("slow"), Work(None, 600))
+    log.add(8, Event(550, 650), kernel("fast"), Work(500, 50))
+    log.settle()
+    taken = log.take()
+    slow, fast = taken["kernels"]
+    assert (slow["name"], slow["calls"], slow["share"]) == ("slow", 1, 0.6)
+    assert (slow["fma"], slow["fma_rate"], slow["bytes"]) == (None, None, 600)
+    assert slow["byte_rate"] == pytest.approx(600 / 300e-9)
+    assert (fast["calls"], fast["fma"], fast["share"]) == (2, 1500, 0.4)
+    assert fast["fma_rate"] == pytest.approx(1500 / 200e-9)
+    assert taken["gaps"]["calls"] == 2
+    assert taken["gaps"]["seconds"] == pytest.approx(50e-9)
+    assert log.seconds == pytest.approx(500e-9)
+    assert log.take() == {"kernels": [], "gaps": Times().report()}  # begun anew
+    assert log.seconds == pytest.approx(500e-9)
+
+
+def test_a_kernel_that_does_not_always_say_what_it_does_has_no_rate():
+    log = Log(True)
+    log.add(8, Event(0, 10), kernel("a"), Work(1, 1))
+    log.add(8, Event(10, 20), kernel("a"))
+    log.settle()
+    (only,) = log.take()["kernels"]
+    assert only["fma"] is only["bytes"] is only["fma_rate"] is None
+
+
+def test_events_do_not_pile_up():
+    log = Log(True)
+    events = [Event(2 * i, 2 * i + 1) for i in range(3 * PENDING)]
+    for event in events:
+        log.add(1, event, kernel("a"))
+        assert len(log._pending) < PENDING
+    assert any(event.waited for event in events)
+    log.settle()
+    assert log.take()["kernels"][0]["calls"] == len(events)
+
+
+def test_without_profiling_nothing_is_kept():
+    log = Log(False)
+    log.add(1, Event(0, 1), kernel("a"))
+    assert (log.launches, log.seconds, log.take(), log._pending) == (1, None, None, [])
+    log = Log(True)
+    with log.paused():
+        log.add(1, Event(0, 1), kernel("a"))
+        assert log.seconds is None
+    assert log.take()["kernels"] == []
+
+
+def test_a_machine_tells_what_launches_state(any_device):
+    machine = OpenCL(any_device, profile=True)
+    values = noise(machine, 4, 100, 1, 0)
+    (only,) = machine.profile()["kernels"]
+    assert (only["name"], only["calls"], only["bytes"], only["fma"]) == ("noise", 1, values.nbytes, None)
+    assert 0 < only["min"] == only["median"] == only["max"] == only["seconds"]
+    assert touching(values, fma=3) == (3, 1600)
+
+
+def test_a_processor_array_states_the_work_once(any_device):
+    totals = []
+    for array in (None, "4x4"):
+        machine = OpenCL(any_device, profile=True)
+        options = {"order": 2, "levels": 1, "xi": -100.0, "free_sweeps": 1, "array": array, "relaxation": "gibbs"}
+        run = simdtex.synthesize(texture((12, 12)), (10, 10), rng=1, device=machine, full_output=True, **options)[1]
+        found = {entry["name"]: entry for entry in run.statistics["kernels"]}
+        own = found["lcpdf_distance"]
+        totals.append(own["fma"])
+        assert own["fma"] == run.statistics["levels"][0]["fma"]
+        assert own["bytes"] > 0
+        assert sum(entry["seconds"] for entry in found.values()) == pytest.approx(run.statistics["device_seconds"])
+    assert totals[0] == totals[1] > len(neighbourhood_offsets(2)) * 100
+    machine = OpenCL(any_device, profile=True).emulate(parse_array("4x4"))
+    values = noise(machine, 1, 100, 1, 0)
+    (only,) = machine.profile()["kernels"]
+    assert (only["calls"], only["bytes"]) == (7, values.nbytes)
+
+
+def test_statistics_have_kernels_only_where_they_are_measured(any_device):
+    sample = texture((16, 16))
+    for machine in (opencl(any_device), Reference()):
+        run = simdtex.synthesize(sample, (8, 8), order=1, rng=1, device=machine, full_output=True)[1]
+        assert "kernels" not in run.statistics
+        assert machine.profile() is None
+
+
+def test_numbers_are_written_with_three_digits():
+    assert [seconds_text(s) for s in (1.234, 0.01234, 1.234e-6, 123.4)] == ["1.23 s", "12.3 ms", "1.23 us", "123 s"]
+    assert [rate_text(r) for r in (1.5e12, 2.5e9, 99.96e6, 1500, 12, None)] == [
+        *("1.50 T", "2.50 G", "100 M", "1.50 k", "12.0", "-")
+    ]
+
+
+def test_the_table_and_the_sentence():
+    entry = {"name": "a", "calls": 1234, "min": 1e-6, "median": 2e-6, "max": 3e-3, "seconds": 0.5, "share": 0.25}
+    assert rows([entry | {"fma_rate": 2e9, "byte_rate": None}]) == [
+        ("a", "1,234", "1.00 us", "2.00 us", "3.00 ms", "500 ms", "25.0%", "2.00 G", "-")
+    ]
+    gaps = {"calls": 7, "min": 0, "median": 1e-3, "max": 0.2, "seconds": 0.5}
+    text = summary({"seconds": 2.0, "device_seconds": 1.0, "gaps": gaps})
+    assert text == (
+        "wall time 2.00 s: kernels 1.00 s (50.0%); between them 500 ms (25.0%) in 7 gaps, median 1.00 ms, longest "
+        "200 ms; before the first and after the last 500 ms"
+    )
+    assert summary({"seconds": 2.0, "device_seconds": 1.0, "gaps": gaps | {"calls": 0}}).endswith("(50.0%)")
+
+
+@pytest.mark.parametrize(
+    ("command", "kernels"),
+    [
+        (("synth", "--order", "1"), "start"),
+        (("synth", "--method", "multires"), "candidates_draw"),
+        (("solid", "--iterations", "1"), "solid_turn"),
+        (("mix", "--iterations", "1"), "sort_scatter"),
+    ],
+)
+def test_profile_prints_a_table(any_device, tmp_path, command, kernels):
+    sample, out = tmp_path / "in.png", tmp_path / ("out.npy" if command[0] == "solid" else "out.png")
+    write(sample, texture((16, 16)))
+    device = ("--device", str(any_device.index), "-q")
+    done = CliRunner().invoke(main, [*command, str(sample), "-o", str(out), "--size", "12", *device, "--profile"])
+    assert done.exit_code == 0, done.output
+    assert kernels in done.output
+    assert "wall time" in done.output
+
+
+def test_the_reference_has_no_profile(tmp_path):
+    sample = tmp_path / "in.png"
+    write(sample, texture((16, 16)))
+    words = ["synth", str(sample), "-o", str(tmp_path / "out.png"), "--device", "reference", "--profile"]
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 2
+    assert done.output.count("\n") == 1
+    assert "--profile times the kernels of an OpenCL device" in done.output
+    assert not (tmp_path / "out.png").exists()
