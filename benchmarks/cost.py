@@ -6,7 +6,7 @@
 Prints, each from a process of its own, the whole job 128x128 -> 256x256 by exact search, with skipping and without:
 seconds, its fma over these and over the device's fma peak (independent chains of vector fma), seconds to the first
 piece of progress from the start of the process (kernels compiled before), and peak memory. Then, for states from the
-middle of runs, a warm sweep and a free one, the rates of the distances alone and of the whole LCPDF step, over the peak.
+middle of runs, a warm sweep and a free one, the rates of the distances alone and of the whole LCPDF step over the peak.
 Last, the growth of memory with the output, from two outputs of a tiny sample.
 """
 
@@ -75,25 +75,27 @@ def output_of(*arguments):
     return subprocess.run([sys.executable, "-c", *arguments], capture_output=True, text=True, check=True).stdout
 
 
-def best_of(function, machine, repeats=7):
-    function()
-    machine.sync()
+def seconds_of(functions, machine, repeats=7):
+    """The median seconds of each, taken in turn: a shared processor's speed comes and goes."""
     seconds = []
-    for _ in range(repeats):
-        began = time.perf_counter()
-        function()
-        machine.sync()
-        seconds.append(time.perf_counter() - began)
-    return min(seconds)
+    for _ in range(repeats + 1):
+        seconds.append([])
+        for function in functions:
+            machine.sync()
+            began = time.perf_counter()
+            function()
+            machine.sync()
+            seconds[-1].append(time.perf_counter() - began)
+    return np.median(seconds[1:], 0)
 
 
 def peak(machine):
-    """Fma per second, the best of a few runs."""
+    """A function that does independent chains of fma, and how many it does."""
     items = 64 * machine.info.compute_units
     buffer = cl.Buffer(machine.context, cl.mem_flags.READ_WRITE, 64 * items)
     cl.enqueue_fill_buffer(machine.queue, buffer, np.float32(0), 0, 64 * items)
     kernel = cl.Kernel(cl.Program(machine.context, PEAK).build(), "peak")
-    return items * 20000 * 10 * 16 / best_of(lambda: kernel(machine.queue, (items,), (8,), buffer), machine)
+    return lambda: kernel(machine.queue, (items,), (8,), buffer), items * 20000 * 10 * 16
 
 
 def states(machine, pixels, order):
@@ -126,7 +128,7 @@ def states(machine, pixels, order):
 
 
 def steps(machine, arguments):
-    """Fma per second in the distances alone, in the step without skipping and with it; and the share that is skipped.
+    """Fma per second at the peak, in the distances alone, in the step without skipping and with it; the share skipped.
 
     A step that skips is given the fma of one that does not.
     """
@@ -144,16 +146,16 @@ def steps(machine, arguments):
         for some in near:
             lcpdf.distance(machine, some, candidates)
 
-    def whole():  # what it commits goes into copies, so that every repeat finds the same state
+    def whole(skip):  # what it commits goes into copies, so that every repeat finds the same state
+        machine.skip = skip
         for some in pieces(False):
             commit(machine, after, *mrf._relax(run, machine, level, grid, field, some, turn))
 
     after = Field(*(machine.put(machine.get(array)) for array in field))
-    rates = [fma / best_of(distances, machine, 3)]
-    for machine.skip in (False, True):
-        spared = machine.spared
-        rates.append(fma / best_of(whole, machine))
-    return rates, (machine.spared - spared) / (8 * fma)
+    chains, in_chains = peak(machine)
+    spared = machine.spared
+    seconds = seconds_of([chains, distances, lambda: whole(False), lambda: whole(True)], machine)
+    return np.array([in_chains, fma, fma, fma]) / seconds, (machine.spared - spared) / (8 * fma)
 
 
 def main():
@@ -170,14 +172,14 @@ def main():
         for skip in (True, False):
             printed = output_of(JOB, sys.path[0], name, str(options.order), options.device or "", str(skip))
             seconds, fma, first, memory = json.loads(printed)
-            most = peak(machine)
+            chains, in_chains = peak(machine)
+            most = in_chains / seconds_of([chains], machine)[0]
             job = f"{name:8} 128x128 -> 256x256, order {options.order}, {'skipping' if skip else 'plain   '}"
             rate = f"{fma / seconds / most:.2f} of the peak of {most / 1e9:.0f} GFMA/s"
             print(f"{job}: {seconds:5.1f} s, {rate}, first progress after {first:.1f} s, peak memory {memory:.0f} MiB")
     for name, pixels in every.items():
         for phase, arguments in states(machine, pixels, options.order).items():
-            most = peak(machine)
-            rates, skipped = steps(machine, arguments)
+            (most, *rates), skipped = steps(machine, arguments)
             shares = ", ".join(
                 f"{what} {rate / most:.2f}"
                 for what, rate in zip(("distances", "plain", "skipping"), rates, strict=True)
