@@ -22,6 +22,9 @@ __kernel void coloring_lattice(GRID, __global const int2 *restrict offsets, cons
     const int own = COSET(i, j);
     bool clash = false;
     for (int k = 0; k < N; ++k) {
+        const int row = i + offsets[k].x, col = j + offsets[k].y;
+        if (row >= 0 && row < rows && col >= 0 && col < cols) // no seam in between, so another coset
+            continue;
         const int r = neighbour(i, j, offsets[k].x, offsets[k].y, FLAT);
         clash = clash || (r >= 0 && r < site && COSET(r / cols, r % cols) == own);
     }

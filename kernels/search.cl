@@ -61,6 +61,14 @@ inline float folded(const float16 a)
 #define WINDOW_ARG __private const float16 *u, __private const float16 *xu
 #endif
 
+#if V > 1
+// Every first or second of what follows p, 16 of them.
+inline float16 spread(__global const ushort *p, const int spacing)
+{
+    return convert_float16(spacing == 1 ? vload16(0, p) : (ushort16)(vload16(0, p).even, vload16(1, p).even));
+}
+#endif
+
 // Equation (12): d of the candidate at place q of the sample's lattice, whose rows are `down` apart.
 inline float distance_to(const int q, WINDOW_ARG, __global const LEVEL *restrict lattice, const int plane, const int down)
 {
@@ -168,16 +176,16 @@ __kernel void search(__global const int *restrict sites, const int S, __global u
     WINDOW;
     int sum = xi, members = 0;
 #if V > 1
-    if (spacing == 1 && !tile_rows && rows >= SIDE && j >= RADIUS && j - RADIUS + 16 * CHUNKS <= cols) {
+    if (spacing <= 2 && !tile_rows && rows >= SIDE && j >= RADIUS && (j - RADIUS + 16 * CHUNKS) * spacing <= width) {
         float16 heat = 0.0f, inside = 0.0f; // whole numbers below 2^24, so in any order
         for (int a = 0; a < SIDE; ++a)
             for (int k = 0; k < CHUNKS; ++k) {
-                const int cell = a * CHUNKS + k, from = max(row[a], 0) + j - RADIUS + 16 * k;
+                const int cell = a * CHUNKS + k, from = max(row[a], 0) + (j - RADIUS + 16 * k) * spacing;
                 const float16 in = row[a] < 0 ? (float16)0.0f : vload16(cell, disc);
-                const float16 t = convert_float16(vload16(0, temperature + from));
+                const float16 t = spread(temperature + from, spacing);
                 u[cell] = (1024.0f - t) * 0x1p-10f * in;
                 for (int c = 0; c < C; ++c)
-                    xu[cell * C + c] = convert_float16(vload16(0, values + c * area + from)) * u[cell];
+                    xu[cell * C + c] = spread(values + c * area + from, spacing) * u[cell];
                 heat += t * in;
                 inside += in;
             }
