@@ -251,7 +251,8 @@ def _sweep(
     size = machine.chunk(weighed, neighbours, channels, stores)
     where = {"level": level.number, "sweep": sweep, "phase": phase, "temperature_left": left}
     if level.coherent and level.coherent.ahead:
-        return _sweep_ahead(run, level, field, state, active(), meter, where)
+        now = temperatures > 0 if phase == "relax" else everywhere
+        return _sweep_ahead(run, level, field, state, now, meter, where)
     old = False
     while True:
         state, info = schedule.step(state, active)  # 6.2.1

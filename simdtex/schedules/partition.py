@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -90,8 +91,8 @@ class Partition:
         groups = state.starts.size - 1
         turn = np.arange(groups)
         if self.shuffled:
-            bits = random.draw4(state.seed, state.level, sweep, turn, random.SCHEDULE)[0]
-            turn = np.argsort(bits, kind="stable")
+            first, at = divmod(sweep, AHEAD)
+            turn = _orders(state.seed, state.level, first * AHEAD, groups)[at]
         wanted = active[state.place]
         sites = state.pixel if wanted.all() else state.pixel[wanted]
         counts = [np.count_nonzero(wanted[begin:end]) for begin, end in pairwise(state.starts.tolist())]
@@ -100,6 +101,17 @@ class Partition:
         parts = parts or [sites]  # an empty sweep is one empty group
         ends = np.cumsum([part.size for part in parts])
         return state._replace(sweep=sweep, sites=np.concatenate(parts), ends=ends, done=0)
+
+
+AHEAD = 32
+
+
+@lru_cache(maxsize=8)
+def _orders(seed: int, level: int, first: int, groups: int) -> NDArray[np.intp]:
+    """Random orders of groups, (sweeps, groups): a sweep at a time they cost ten times as much."""
+    sweeps = np.repeat(first + np.arange(AHEAD), groups)
+    bits = random.draw4(seed, level, sweeps, np.tile(np.arange(groups), AHEAD), random.SCHEDULE)[0]
+    return np.argsort(bits.reshape(AHEAD, groups), 1, kind="stable")
 
 
 class Coloring(Partition):
