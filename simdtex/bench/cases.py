@@ -71,10 +71,8 @@ def case_of(entry: dict[str, Any]) -> Case:
 
 
 def searches() -> tuple[str, ...]:
-    """The values of the option ``search`` of ``mrf``; one empty text where it has none."""
-    if "search" not in mrf.Options.__dataclass_fields__:
-        return ("",)
-    return tuple(getattr(mrf, "SEARCHES", ("exact", "coherent")))
+    """The searches of ``mrf`` that are measured."""
+    return ("exact", "coherent")
 
 
 def picture(side: int) -> NDArray[np.uint8]:

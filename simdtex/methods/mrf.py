@@ -125,9 +125,10 @@ def synthesize(
 
     Notes
     -----
-    Cost: sweeps x sites x candidates x |N| x channels x 2 fma, about 7 sweeps a level. Memory on the device, in bytes:
-    14 + 2 channels per output pixel (20 + 4 channels with the schedule ``block``), 12 channels + 78 per pixel of the
-    sample with its margin, and the machine's scratch memory or, if that is more, 65 per candidate. On the host: about
+    Cost: sweeps x sites x candidates x |N| x channels x 2 fma, about 7 sweeps a level; with coherent search some 7
+    candidates instead of all. Memory on the device, in bytes:
+    18 + 2 channels per output pixel (24 + 4 channels with the schedule ``block``), 14 channels + 4 similar + 151 per
+    pixel of the sample with its margin, and the machine's scratch memory or, if that is more, 65 per candidate. On the host: about
     50 per output pixel.
     """
     options = options.resolved()
@@ -136,7 +137,7 @@ def synthesize(
     margin = int(offsets.max()) * 2 ** (levels - 1) if options.edges != "whole" else 0
     sample = Sample(pixels, pixels.shape[-1] * len(offsets), margin)
     schedule = schedules.get(options.schedule)
-    _check_memory(machine, sample, shape, copies=2 if getattr(schedule, "tile", None) else 1)
+    _check_memory(machine, sample, shape, options.similar, copies=2 if getattr(schedule, "tile", None) else 1)
     if options.check_schedule:
         schedule = schedules.Checked(schedule)
     planes = sample.planes(machine)
@@ -413,8 +414,8 @@ def check_fit(sample: tuple[int, ...], radius: int, order: int) -> None:
     )
 
 
-def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], copies: int) -> None:
+def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], similar: int, copies: int) -> None:
     pixels, channels = shape[0] * shape[1], sample.channels
     within_32_bits(shape, channels * copies)
     field = copies * (6 + 2 * channels)
-    machine.require(pixels * (8 + field) + sample.rows * sample.cols * (12 * channels + 143))
+    machine.require(pixels * (12 + field) + sample.rows * sample.cols * (14 * channels + 151 + 4 * similar))
