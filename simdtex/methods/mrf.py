@@ -126,10 +126,9 @@ def synthesize(
     Notes
     -----
     Cost: sweeps x sites x candidates x |N| x channels x 2 fma, about 7 sweeps a level; with coherent search some 7
-    candidates instead of all. Memory on the device, in bytes:
-    18 + 2 channels per output pixel (24 + 4 channels with the schedule ``block``), 14 channels + 4 similar + 151 per
-    pixel of the sample with its margin, and the machine's scratch memory or, if that is more, 65 per candidate. On the host: about
-    50 per output pixel.
+    candidates instead of all. Memory on the device, in bytes: 18 + 2 channels per output pixel (24 + 4 channels with
+    the schedule ``block``), 14 channels + 4 similar + 151 per pixel of the sample with its margin, and the machine's
+    scratch memory or, if that is more, 65 per candidate. On the host: about 50 per output pixel.
     """
     options = options.resolved()
     offsets = neighbourhood_offsets(options.order)
