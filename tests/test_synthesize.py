@@ -413,7 +413,7 @@ BAD = [
     ({"bandwidth": "1"}, TypeError, "bandwidth must be a number"),
     ({"coherence": -0.5}, ValueError, "coherence is -0.5; give a number of at least 0"),
     ({"coherence": math.nan}, ValueError, "coherence is nan"),
-    ({"coherence": None}, TypeError, "coherence must be a number"),
+    ({"coherence": "much"}, TypeError, "coherence must be a number"),
     ({"xi": 0}, ValueError, "xi"),
     ({"xi": 0.5}, ValueError, "xi"),
     ({"xi": math.nan}, ValueError, "xi"),

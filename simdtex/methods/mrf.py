@@ -368,8 +368,9 @@ def _expected_work(run: _Run) -> dict[int, tuple[float, float]]:
         coarsest = number == run.levels - 1
         sweeps = min(1024, 1 - 0.6 * len(run.offsets) / options.xi) if coarsest else 6 * 0.75
         candidates = run.sample.positions(run.offsets, grid.spacing, options.phases, options.edges).size
-        if options.search == "coherent" and not coarsest:
-            candidates = min(candidates, (options.suggesting + 1) * (1 + options.similar) + max(1, options.chance))
+        if options.search == "coherent" and not coarsest and candidates > options.exhaustive:
+            own = min(options.suggesting, len(run.offsets)) + 1
+            candidates = min(candidates, own * (1 + options.similar) + max(1, options.chance))
         sites = grid.rows * grid.cols * candidates
         work[number] = (sites * sweeps, float(sites * options.free_sweeps))
     return work
