@@ -16,6 +16,7 @@ from simdtex.ops.coloring import coloring
 from simdtex.ops.commit import commit
 from simdtex.ops.neighbourhood import Field, neighbourhood
 from simdtex.ops.search import Rule, most_similar, search, search_apart, table
+from simdtex.schedules import Coloring
 
 PLAIN = {"suggesting": 12, "similar": 0, "chance": 4, "exhaustive": False}
 
@@ -224,6 +225,24 @@ def test_a_schedule_that_is_watched_changes_no_bit(cl_device):
     ahead, apart_ = run(machine, order=8), run(machine, order=8, check_schedule=True)
     assert_same_bits(ahead[0], apart_[0])
     assert ahead[1] == apart_[1]
+
+
+def test_a_partition_with_steps_of_its_own_takes_them(cl_device):
+    class Reversed(Coloring):
+        """Colours in the opposite order of columns within a step, which changes nothing but goes through `step`."""
+
+        steps = 0
+
+        def step(self, state, active):
+            self.steps += 1
+            state, info = super().step(state, active)
+            return state, info._replace(sites=info.sites[::-1].copy())
+
+    own = Reversed()
+    machine = opencl(cl_device)
+    ours, levels = run(machine, order=8, schedule=own)
+    assert own.steps == sum(level["steps"] for level in levels)
+    assert_same_bits(ours, run(machine, order=8)[0])
 
 
 def test_the_work_is_counted(cl_device):

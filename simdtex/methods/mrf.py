@@ -206,7 +206,7 @@ def _coherent(run: _Run, level: _Level) -> _Coherent | None:
     rule = Rule(_favour(options), _xi(options), level.window, gibbs, noisy, run.seed, level.number)
     weighed = run.machine.put(np.zeros(run.shape, np.int32))
     in_place = run.schedule.independent(grid, run.offsets) and not getattr(run.schedule, "tile", None)
-    ahead = hasattr(run.schedule, "sweep") and not run.emulated and in_place
+    ahead = callable(getattr(run.schedule, "sweep", None)) and not run.emulated and in_place
     return _Coherent(laid, rule, weighed, ahead)
 
 

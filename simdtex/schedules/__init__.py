@@ -12,7 +12,16 @@ import re
 from collections.abc import Callable
 from importlib.metadata import entry_points
 
-from simdtex.schedules.partition import Block, Checkerboard, Coloring, FixedColoring, Partition, Raster, Synchronous
+from simdtex.schedules.partition import (
+    Block,
+    Checkerboard,
+    Coloring,
+    FixedColoring,
+    Partition,
+    Plan,
+    Raster,
+    Synchronous,
+)
 from simdtex.schedules.scattered import Luby, RandomScan, RandomSubset, Scattered
 from simdtex.schedules.schedule import Active, Checked, Info, Schedule, Watched, neighbours_in
 
@@ -27,6 +36,7 @@ __all__ = [
     "Info",
     "Luby",
     "Partition",
+    "Plan",
     "RandomScan",
     "RandomSubset",
     "Raster",

@@ -37,7 +37,7 @@ class State(NamedTuple):
     done: int
 
 
-class Sweep(NamedTuple):
+class Plan(NamedTuple):
     """A whole sweep that is known beforehand.
 
     ``sites`` (S,) int32 pixel indices, one step's after the other; ``bounds`` (steps + 1,) where each begins in them,
@@ -56,6 +56,11 @@ class Partition:
     shuffled = False
     """Whether the groups come in a fresh random order each sweep, or always in their own."""
     tile: tuple[int, int] | None = None
+
+    def __init_subclass__(cls) -> None:
+        """A subclass with steps of its own has no sweeps that are known beforehand, unless it says them."""
+        if "step" in cls.__dict__ and "sweep" not in cls.__dict__:
+            cls.sweep = None  # type: ignore[assignment, method-assign]
 
     def groups(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """(rows, cols) whole numbers from 0: the group of each site."""
@@ -81,10 +86,10 @@ class Partition:
         state = state._replace(done=state.done + 1)
         return state, Info(sites, state.sweep, state.done == state.ends.size, self.tile)
 
-    def sweep(self, state: State, active: Active) -> tuple[State, Sweep]:
+    def sweep(self, state: State, active: Active) -> tuple[State, Plan]:
         """All steps of the next sweep in one go."""
         state = self._begin(state, active().ravel())
-        return state._replace(done=state.ends.size), Sweep(state.sites, np.concatenate([[0], state.ends]), state.sweep)
+        return state._replace(done=state.ends.size), Plan(state.sites, np.concatenate([[0], state.ends]), state.sweep)
 
     def _begin(self, state: State, active: NDArray[np.bool_]) -> State:
         sweep = state.sweep + 1
