@@ -25,8 +25,22 @@ import simdtex
 from simdtex.quality import measure
 from simdtex.report.sheet import contact_sheet
 
+MRF = {
+    "default": {},
+    "search=exact": {"search": "exact"},
+    "coherence=0": {"coherence": 0.0},
+    "coherence=0.5": {"coherence": 0.5},
+    "coherence=1": {"coherence": 1.0},
+    "order=8": {"order": 8},
+    "suggesting=8": {"suggesting": 8},
+    "similar=2": {"similar": 2},
+    "chance=0": {"chance": 0},
+    "chance=16": {"chance": 16},
+    "exhaustive=1024": {"exhaustive": 1024},
+    "free_sweeps=0": {"free_sweeps": 0},
+}
 EXACT = {
-    "": {},
+    "default": {},
     "coherence=0": {"coherence": 0.0},
     "coherence=0.5": {"coherence": 0.5},
     "coherence=2": {"coherence": 2.0},
@@ -38,26 +52,11 @@ EXACT = {
     "phases=all": {"phases": "all", "levels": 4},
     "coarsest=same": {"coarsest": "same"},
     "pixel=density": {"pixel": "density"},
-}
-MRF = {
-    "default": {},
-    "coherence=0": {"coherence": 0.0},
-    "coherence=0.5": {"coherence": 0.5},
-    "coherence=1": {"coherence": 1.0},
-    "order=8": {"order": 8},
-    "suggesting=8": {"suggesting": 8},
-    "similar=2": {"similar": 2},
-    "chance=0": {"chance": 0},
-    "chance=16": {"chance": 16},
-    "exhaustive=1024": {"exhaustive": 1024},
-    "free_sweeps=0": {"free_sweeps": 0},
-    **{f"search=exact, {name}".rstrip(", "): {"search": "exact", **given} for name, given in EXACT.items()},
     "preset=paper": {"preset": "paper"},
     "preset=paper, icm": {"preset": "paper", "relaxation": "icm", "coarsest": "gibbs"},
     "preset=paper, bandwidth=0.15": {"preset": "paper", "bandwidth": 0.15},
 }
-GREY_ONLY = ("edges", "phases", "coarsest", "free_sweeps", "pixel", "paper")
-MRF_SEEDS = {"default": 3, "search=exact": 3}
+IN_COLOUR = ("default", "coherence=0", "coherence=0.5", "coherence=2", "order=8", "relaxation=gibbs")
 MULTIRES = {
     "alpha=0": {"alpha": 0.0},
     "alpha=0.05": {"alpha": 0.05},
@@ -143,11 +142,19 @@ class Study(NamedTuple):
 STUDIES = {
     "mrf": Study(
         settings=MRF,
-        skipped={"colour": [setting for setting in MRF if any(word in setting for word in GREY_ONLY)], "grey": []},
+        skipped={"colour": ["free_sweeps=0"], "grey": []},
+        figures=FIGURES,
+        seeds=3,
+        table="mrf.csv",
+        prefix="mrf-",
+    ),
+    "exact": Study(
+        settings=EXACT,
+        skipped={"colour": [setting for setting in EXACT if setting not in IN_COLOUR], "grey": []},
         figures=FIGURES,
         seeds=1,
-        table="table.csv",
-        prefix="",
+        table="exact.csv",
+        prefix="exact-",
     ),
     "multires": Study(
         settings=MULTIRES,
@@ -170,12 +177,13 @@ STUDIES = {
 
 def tried(method):
     """The settings to try in turn: label, options, seeds (None: as many as asked for)."""
-    if method != "mrf":
+    if method in ("multires", "pyramid"):
         yield "mrf", {"method": "mrf", "search": "exact"}, 1
     if method == "pyramid":
         yield "multires", {"method": "multires"}, 1
+    own = {"method": "mrf", "search": "exact"} if method == "exact" else {"method": method}
     for label, given in STUDIES[method].settings.items():
-        yield label, {"method": method, **given}, MRF_SEEDS.get(label) if method == "mrf" else None
+        yield label, own | given, None
 
 
 def main():
