@@ -5,8 +5,8 @@
                                [--quick]
 
 Writes a table (mean over the seeds) and one sheet of pictures per sample, and prints each line as it is made:
-table.csv and NAME.png for `mrf`, multires.csv and multires-NAME.png for `multires`, pyramid.csv and pyramid-NAME.png
-for `pyramid`. The first lines of the latter two are other methods with their defaults. Outputs are twice the sample in
+mrf.csv and mrf-NAME.png for `mrf`, likewise for `multires` and `pyramid`, and for `exact`: `mrf` with the exact search.
+The first lines of `multires` and `pyramid` are other methods with their defaults. Outputs are twice the sample in
 each direction. ``--quick`` takes half of each sample's sides.
 """
 
@@ -190,7 +190,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--method", choices=STUDIES, default="mrf")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "docs" / "study")
-    parser.add_argument("--seeds", type=int, help="1 with mrf and 3 with others unless given")
+    parser.add_argument("--seeds", type=int, help="1 with exact and 3 with others unless given")
     parser.add_argument("--only", default="")
     parser.add_argument("--device")
     parser.add_argument("--quick", action="store_true", help="small samples")

@@ -27,7 +27,8 @@ numpydoc_show_class_members = False
 # The page of the study shows each method's table and all the pictures that benchmarks/study.py has written:
 # name of the result -> table, beginning of the pictures' names.
 STUDIES = {
-    "study": ("table.csv", ""),
+    "study": ("mrf.csv", "mrf-"),
+    "study-exact": ("exact.csv", "exact-"),
     "study-multires": ("multires.csv", "multires-"),
     "study-pyramid": ("pyramid.csv", "pyramid-"),
 }
