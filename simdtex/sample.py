@@ -224,11 +224,12 @@ class Sample:
         (rows, cols, C) array
             The source's pixel, plus what the working level differs from the source's own.
         """
-        row, col = np.moveaxis(self.place(source), -1, 0)
-        own = self.pixels[row, col]
-        step = np.moveaxis(values.astype(np.int64) - self.working[:, source], 0, -1)
-        if not step.any():
+        row, col = np.divmod(source, np.int32(self.cols))
+        own = self.pixels[row - np.int32(self.margin), col - np.int32(self.margin)]
+        usual = self.working[:, source]
+        if (values == usual).all():
             return np.ascontiguousarray(own)
+        step = np.moveaxis(values.astype(np.int64) - usual, 0, -1)
         return moved(own, step * self.unit, self.pixels)
 
 

@@ -26,7 +26,7 @@ class State(NamedTuple):
     group ends in them; ``done`` groups that were relaxed.
     """
 
-    place: NDArray[np.intp]
+    place: NDArray[np.int32]
     pixel: NDArray[np.int32]
     starts: NDArray[np.int64]
     seed: int
@@ -72,7 +72,7 @@ class Partition:
         if group.min() < 0 or group.max() >= group.size:  # numbers with wide gaps
             group = np.unique(group, return_inverse=True)[1]
         few = group.astype(np.uint16) if group.max() < 2**16 else group  # sorts in linear time
-        place = np.argsort(few, kind="stable")
+        place = np.argsort(few, kind="stable").astype(np.int32)
         starts = np.concatenate([[0], np.cumsum(np.bincount(group))])
         nothing = np.zeros(0, np.int32)
         return State(place, grid.sites()[place], starts, seed, level, 0, nothing, np.zeros(0, np.int64), 0)
