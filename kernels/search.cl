@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Coherent search: the relaxation of a site that weighs a few candidates instead of all. They are, in this order,
 //
-//   1. p_r + (s - r), where the sample continues the source p_r of neighbour r, r one of the `suggesting` nearest neighbours
-//      that a relaxation has touched (t < 1);
+//   1. p_r + (s - r), where the sample continues the source p_r of neighbour r, r one of the `suggesting` nearest
+//      neighbours that a relaxation has touched (t < 1);
 //   2. the present source of s;
 //   3. the K positions of the sample most similar to each of those so far;
 //   4. `chance` positions at random, and one where there would be none at all,
 //
-// each of them once. The distance of equation (12), its coherence (1. is favoured), the weights of equation (7), the draw
-// or mode and the temperature of equation (13) are those of lcpdf.cl, coherence.cl and temperature.cl, in one kernel.
+// each of them once. The distance of equation (12), its coherence (1. is favoured), the weights of equation (7), the
+// draw or mode and the temperature of equation (13) are those of lcpdf.cl, coherence.cl and temperature.cl, all in one
+// kernel.
 // -D ALL weighs every candidate of the level instead.
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/lanes.h"
@@ -33,8 +34,8 @@
 #define CHUNKS ((SIDE + 15) / 16)
 #define CELLS (SIDE * CHUNKS) // of 16 lanes: the square around the neighbourhood, row by row
 
-// The sum over neighbours has one order: lane n takes the columns n, n + 16, ... of the square, row by row, channels inside;
-// then lanes n and n + 8 are added, n and n + 4, n and n + 2, n and n + 1.
+// The sum over neighbours has one order: lane n takes the columns n, n + 16, ... of the square, row by row, channels
+// inside; then lanes n and n + 8 are added, n and n + 4, n and n + 2, n and n + 1.
 #if V == 1
 inline float folded(__private float *a)
 {
@@ -70,7 +71,8 @@ inline float16 spread(__global const ushort *p, const int spacing)
 #endif
 
 // Equation (12): d of the candidate at place q of the sample's lattice, whose rows are `down` apart.
-inline float distance_to(const int q, WINDOW_ARG, __global const LEVEL *restrict lattice, const int plane, const int down)
+inline float distance_to(const int q, WINDOW_ARG, __global const LEVEL *restrict lattice, const int plane,
+                         const int down)
 {
     __global const LEVEL *y = lattice + q - RADIUS * down - RADIUS;
 #if V == 1
@@ -83,7 +85,8 @@ inline float distance_to(const int q, WINDOW_ARG, __global const LEVEL *restrict
                 const float un = u[cell * 16 + n];
                 if (un == 0.0f) // would add 0
                     continue;
-                const float e = fma(-(float)y[c * plane + cell / CHUNKS * down + cell % CHUNKS * 16 + n], un, xu[(cell * C + c) * 16 + n]);
+                const float yn = (float)y[c * plane + cell / CHUNKS * down + cell % CHUNKS * 16 + n];
+                const float e = fma(-yn, un, xu[(cell * C + c) * 16 + n]);
                 d[n] = fma(e, e, d[n]);
             }
 #else
@@ -92,7 +95,8 @@ inline float distance_to(const int q, WINDOW_ARG, __global const LEVEL *restrict
     for (int cell = 0; cell < CELLS; ++cell)
 #pragma unroll
         for (int c = 0; c < C; ++c) {
-            const float16 e = fma(-convert_float16(vload16(0, y + c * plane + cell / CHUNKS * down + cell % CHUNKS * 16)), u[cell], xu[cell * C + c]);
+            const float16 yn = convert_float16(vload16(0, y + c * plane + cell / CHUNKS * down + cell % CHUNKS * 16));
+            const float16 e = fma(-yn, u[cell], xu[cell * C + c]);
             d = fma(e, e, d);
         }
 #endif
@@ -112,8 +116,8 @@ inline bool listed(const int i, __private const int *list, const int m, const ul
 }
 
 // sites    (S,)          those that relax together are first .. S-1
-// values (C, H, W), source (H, W), temperature (H, W)   the field, in and out: in place, since no two of these sites are
-//                        neighbours; -D APART writes to new_values (C, S), new_source (S,), new_temperature (S,) instead
+// values (C, H, W), source (H, W), temperature (H, W)   the field, in and out: in place, since no two of these sites
+//                        are neighbours; -D APART writes to new_values (C, S), new_source, new_temperature (S,) instead
 // weighed  (H, W)        in and out: candidates that each site has weighed so far
 // offsets  (N, 2)        canonical order
 // disc     (CELLS, 16)   1 on the neighbourhood, 0 elsewhere
@@ -128,8 +132,9 @@ inline bool listed(const int i, __private const int *list, const int m, const ul
 __kernel void search(__global const int *restrict sites, const int S, __global ushort *values, __global int *source,
                      __global ushort *temperature, __global int *restrict weighed, const int area, GRID,
                      __global const int2 *restrict offsets, const int N, __global const float *restrict disc,
-                     __global const int *restrict reach, const int suggesting, __global const int *restrict index_of, const int pixels,
-                     __global const int *restrict positions, __global const int *restrict at, const int count,
+                     __global const int *restrict reach, const int suggesting,
+                     __global const int *restrict index_of, const int pixels, __global const int *restrict positions,
+                     __global const int *restrict at, const int count,
                      __global const LEVEL *restrict lattice, const int plane, const int down,
                      __global const int *restrict similar, const int K, const int chance, const float favour,
                      const int xi, const float scale, __global const uint *restrict noise, const int noise_radius,
@@ -140,7 +145,7 @@ __kernel void search(__global const int *restrict sites, const int S, __global u
     const int s = LANE;
     if (IDLE(s))
         return;
-    const int site = sites[s], whole_row = site / width, i = whole_row / spacing, j = (site - whole_row * width) / spacing;
+    const int site = sites[s], line = site / width, i = line / spacing, j = (site - line * width) / spacing;
 
     // Rows and columns of the square around the site as parts of a pixel index, -1 outside an open lattice.
     int row[SIDE], col[SIDE];
@@ -172,7 +177,8 @@ __kernel void search(__global const int *restrict sites, const int S, __global u
 #define PIXEL(a, b)                                                                                                    \
     (row[a] < 0 || col[b] < 0 || row[a] + col[b] == site ? -1 : row[a] + col[b] + APART_FROM(a, b))
 
-    // The neighbourhood, as in neighbourhood.cl, and the sum of equation (13).
+    // The neighbourhood, as in neighbourhood.cl, and the sum of equation (13). Vectors also read what is no neighbour,
+    // which others may be writing, and multiply it by 0.
     WINDOW;
     int sum = xi, members = 0;
 #if V > 1
@@ -238,7 +244,8 @@ __kernel void search(__global const int *restrict sites, const int S, __global u
 #ifdef ALL
     m = count;
 #define NUMBER(k) (k)
-#define WEIGHED(k) (distance_to(at[k], u, xu, lattice, plane, down) * (listed(k, list, suggested, seen) ? favour : 1.0f))
+#define FAVOUR(k) (listed(k, list, suggested, seen) ? favour : 1.0f)
+#define WEIGHED(k) (distance_to(at[k], u, xu, lattice, plane, down) * FAVOUR(k))
 #if KEPT
 #define D(k) distance[k]
     float distance[KEPT];
@@ -317,8 +324,8 @@ __kernel void search(__global const int *restrict sites, const int S, __global u
     weighed[site] += m;
 }
 
-// The K candidates whose neighbourhoods are most like that of candidate first + s, by the distances of lcpdf.cl; nearest first,
-// the lowest index where several are as near.
+// The K candidates whose neighbourhoods are most like that of candidate first + s, by the distances of lcpdf.cl;
+// nearest first, the lowest index where several are as near.
 //
 // distance (candidates, P)
 // similar  (candidates, K)   out: rows first .. first + S - 1
