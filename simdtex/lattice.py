@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import isqrt
 from typing import Any
 
@@ -82,7 +82,7 @@ class Grid:
         """Pixels of the whole picture."""
         return self.height * self.width
 
-    @property
+    @cached_property
     def args(self) -> tuple[np.int32, ...]:
         """The GRID arguments of a kernel (kernels/common/lattice.h)."""
         numbers = (self.rows, self.cols, self.spacing, self.width, self.torus, *(self.tile or (0, 0)), self.plane)

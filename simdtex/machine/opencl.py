@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import pyopencl as cl
-import pyopencl.array as cl_array
 import pyopencl.tools as cl_tools
 from numpy.typing import NDArray
 
@@ -23,6 +22,7 @@ from simdtex.device import DeviceError, DeviceInfo
 from simdtex.lattice import Grid
 from simdtex.machine import tuner
 from simdtex.machine.array import ProcessorArray
+from simdtex.machine.buffers import DeviceArray
 from simdtex.machine.log import Log
 from simdtex.machine.tally import Tally
 from simdtex.ops.operation import Array, Operation, P, R, Work
@@ -128,7 +128,11 @@ class OpenCL:
         array = np.array(array, order="C")
         with self._memory_errors():  # little comes in turn, and is not waited for: its event keeps the copy
             later = array.nbytes <= LITTLE
-            return cl_array.to_device(self.queue, array, allocator=self._pool if later else None, async_=later)
+            result = self.empty(array.shape, array.dtype) if later else self._alone(array.shape, array.dtype)
+            if array.size:
+                event = cl.enqueue_copy(self.queue, result.data, array, is_blocking=not later)
+                result.event = event if later else None
+            return result
 
     def get(self, array: Array) -> Any:
         """Copy from the device."""
@@ -137,7 +141,13 @@ class OpenCL:
 
     def empty(self, shape: Any, dtype: Any) -> Array:
         """An array whose contents do not matter yet, from a pool."""
-        return cl_array.empty(self.queue, shape, dtype, allocator=self._pool)
+        dtype = np.dtype(dtype)
+        return DeviceArray(self._pool.allocate(max(1, prod(shape) * dtype.itemsize)), tuple(shape), dtype)
+
+    def _alone(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> DeviceArray:
+        """The same from no pool: large arrays that come once."""
+        size = max(1, prod(shape) * dtype.itemsize)
+        return DeviceArray(cl.Buffer(self.context, cl.mem_flags.READ_WRITE, size), shape, dtype)
 
     def constant(self, array: Any) -> Array:
         """A small table on the device, uploaded once."""
@@ -304,7 +314,7 @@ class OpenCL:
         The kernel's second argument is the end of the group that it is launched for. The others are set once, so that a
         launch costs a few microseconds.
         """
-        kernel.set_args(*(a.data if isinstance(a, cl_array.Array) else a for a in args))
+        kernel.set_args(*(a.data if type(a) is DeviceArray else a for a in args))
         group = self.group if self.forced or self.info.kind == "gpu" else FEW
         for begin, end in pairwise(bounds.tolist()):
             kernel.set_arg(1, np.int32(end))
@@ -319,7 +329,7 @@ class OpenCL:
             for number in range(rounds):
                 self.launch(kernel, (size,), *args[:-2], *(args[-2:] if number % 2 == 0 else args[:-3:-1]))
             return
-        data = [a.data if isinstance(a, cl_array.Array) else a for a in args]
+        data = [a.data if type(a) is DeviceArray else a for a in args]
         kernel.set_args(*data)
         whole = -(-size // self.group) * self.group
         for number in range(rounds):
@@ -337,7 +347,7 @@ class OpenCL:
         begin: int = 0,
         work: Work | None = None,
     ) -> None:
-        data = [a.data if isinstance(a, cl_array.Array) else a for a in args]
+        data = [a.data if type(a) is DeviceArray else a for a in args]
         offset = (begin,) if begin else None
         event = kernel(self.queue, size, local or (gcd(size[0], self.group),), *data, global_offset=offset)
         self.log.add(prod(size), event, kernel, work)

@@ -15,7 +15,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 Array = Any
-"""An array of the machine: `numpy.ndarray` on the reference, `pyopencl.array.Array` on a device."""
+"""An array of the machine: `numpy.ndarray` on the reference, `simdtex.machine.buffers.DeviceArray` on a device."""
 
 
 class Work(NamedTuple):
