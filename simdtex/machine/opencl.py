@@ -128,7 +128,7 @@ class OpenCL:
         array = np.array(array, order="C")
         with self._memory_errors():  # little comes in turn, and is not waited for: its event keeps the copy
             later = array.nbytes <= LITTLE
-            result = self.empty(array.shape, array.dtype) if later else self._alone(array.shape, array.dtype)
+            result = self._pooled(array.shape, array.dtype) if later else self._alone(array.shape, array.dtype)
             if array.size:
                 event = cl.enqueue_copy(self.queue, result.data, array, is_blocking=not later)
                 result.event = event if later else None
@@ -141,8 +141,10 @@ class OpenCL:
 
     def empty(self, shape: Any, dtype: Any) -> Array:
         """An array whose contents do not matter yet, from a pool."""
-        dtype = np.dtype(dtype)
-        return DeviceArray(self._pool.allocate(max(1, prod(shape) * dtype.itemsize)), tuple(shape), dtype)
+        return self._pooled(tuple(shape), np.dtype(dtype))
+
+    def _pooled(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> DeviceArray:
+        return DeviceArray(self._pool.allocate(max(1, prod(shape) * dtype.itemsize)), shape, dtype)
 
     def _alone(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> DeviceArray:
         """The same from no pool: large arrays that come once."""
