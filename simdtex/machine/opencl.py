@@ -141,7 +141,7 @@ class OpenCL:
 
     def empty(self, shape: Any, dtype: Any) -> Array:
         """An array whose contents do not matter yet, from a pool."""
-        return self._pooled(tuple(shape), np.dtype(dtype))
+        return self._pooled((int(shape),) if isinstance(shape, (int, np.integer)) else tuple(shape), np.dtype(dtype))
 
     def _pooled(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> DeviceArray:
         return DeviceArray(self._pool.allocate(max(1, prod(shape) * dtype.itemsize)), shape, dtype)
