@@ -43,9 +43,11 @@ class DeviceArray:
         """Size of the first axis."""
         return self.shape[0]
 
-    def reshape(self, *shape: int) -> DeviceArray:
-        """The same memory in another shape."""
-        return DeviceArray(self.data, shape, self.dtype, self.event)
+    def reshape(self, *shape: Any) -> DeviceArray:
+        """The same memory in another shape, given as numbers or a tuple; one of them may be -1."""
+        wanted = shape[0] if isinstance(shape[0], tuple) else shape
+        left = self.size // max(1, prod(n for n in wanted if n != -1))
+        return DeviceArray(self.data, tuple(left if n == -1 else int(n) for n in wanted), self.dtype, self.event)
 
     def get(self, queue: cl.CommandQueue) -> Any:
         """Wait for the queue, and copy to NumPy."""
