@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import prod
 from typing import Any
 
@@ -49,9 +50,29 @@ class DeviceArray:
         left = self.size // max(1, prod(n for n in wanted if n != -1))
         return DeviceArray(self.data, tuple(left if n == -1 else int(n) for n in wanted), self.dtype, self.event)
 
+    def __getitem__(self, rows: slice) -> Part:
+        """Some of the first axis, to be copied to NumPy and nothing else."""
+        begin, end, step = rows.indices(len(self))
+        assert step == 1
+        return Part(self, begin, max(begin, end))
+
     def get(self, queue: cl.CommandQueue) -> Any:
         """Wait for the queue, and copy to NumPy."""
-        result = np.empty(self.shape, self.dtype)
-        if self.size:
-            cl.enqueue_copy(queue, result, self.data)
+        return self[:].get(queue) if self.shape else self.reshape(1)[:].get(queue).reshape(())
+
+
+@dataclass(frozen=True)
+class Part:
+    """Rows ``begin`` to ``end`` - 1 of an array's first axis."""
+
+    whole: DeviceArray
+    begin: int
+    end: int
+
+    def get(self, queue: cl.CommandQueue) -> Any:
+        """Wait for the queue, and copy to NumPy."""
+        result = np.empty((self.end - self.begin, *self.whole.shape[1:]), self.whole.dtype)
+        if result.size:
+            row = self.whole.nbytes // len(self.whole)
+            cl.enqueue_copy(queue, result, self.whole.data, src_offset=self.begin * row)
         return result
