@@ -166,14 +166,20 @@ def _draw_reference(
     choice = positions[(cumulative > target).argmax(0)]
     values = np.zeros((channels, sites.size), np.uint16)
     for c in range(channels):
-        x = candidates.pixels[c][choice].astype(np.int64)
-        if noisy:
-            low, mass = legal(x, win)
-            bits = random.draw4(seed, level, turn, sites, random.DRAW, 1 + c)[0].astype(np.uint64)
-            u = low + ((bits * mass) >> np.uint64(32)).astype(np.uint32)
-            x = x + np.searchsorted(win.noise, u, side="right") - win.radius
-        values[c] = x
+        x = candidates.pixels[c][choice].astype(np.uint16)
+        values[c] = stepped(x, c, sites, win, seed, level, turn) if noisy else x
     return Relaxed(choice, values)
+
+
+def stepped(
+    x: NDArray[np.uint16], c: int, sites: NDArray[np.int32], win: Window, seed: int, level: int, turn: int
+) -> NDArray[np.uint16]:
+    """Grey levels drawn from the kernel of equation (7) around those of channel c."""
+    low, mass = legal(x, win)
+    bits = random.draw4(seed, level, turn, sites, random.DRAW, 1 + c)[0].astype(np.uint64)
+    u = low + ((bits * mass) >> np.uint64(32)).astype(np.uint32)
+    step = np.searchsorted(win.noise, u, side="right") - win.radius
+    return (x.astype(np.int64) + step).astype(np.uint16)
 
 
 def legal(y: NDArray[Any], win: Window) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:

@@ -22,6 +22,7 @@ from simdtex.ops.commit import commit
 from simdtex.ops.lcpdf import Distances, Relaxed, Window
 from simdtex.ops.neighbourhood import Field, Neighbourhoods
 from simdtex.ops.operation import Array, Operation
+from simdtex.ops.temperature import temperature
 from simdtex.sample import Candidates
 
 if TYPE_CHECKING:
@@ -218,9 +219,9 @@ def _apart_reference(
         chosen = np.where(d == d.min(0), numbers, table.candidates.size).min(0)
     values = lattice[:, table.at[chosen]]
     if rule.gibbs and rule.noisy:
-        values = np.stack([_stepped(x, c, sites, rule, turn) for c, x in enumerate(values)])
-    t = np.where(r < 0, 0, field.temperature.ravel()[r].astype(np.int32))
-    cooled = (np.maximum(0, rule.xi + t.sum(0)) // np.maximum(1, (r >= 0).sum(0))).astype(np.uint16)
+        keys = (rule.seed, rule.level, turn)
+        values = np.stack([lcpdf.stepped(x, c, sites, rule.window, *keys) for c, x in enumerate(values)])
+    cooled = temperature.reference(sites, field, offsets, grid, rule.xi)
     return Relaxed(table.candidates.positions[chosen], values), cooled
 
 
@@ -278,15 +279,6 @@ def _distances(
     while len(d) > 1:
         d = d[: len(d) // 2] + d[len(d) // 2 :]
     return np.where(numbers < 0, np.float32(np.inf), d[0])
-
-
-def _stepped(x: NDArray[np.uint16], c: int, sites: NDArray[np.int32], rule: Rule, turn: int) -> NDArray[np.uint16]:
-    """Grey levels drawn from the kernel of equation (7) around those of channel c."""
-    low, mass = lcpdf.legal(x, rule.window)
-    bits = random.draw4(rule.seed, rule.level, turn, sites, random.DRAW, 1 + c)[0].astype(np.uint64)
-    u = low + ((bits * mass) >> np.uint64(32)).astype(np.uint32)
-    step = np.searchsorted(rule.window.noise, u, side="right") - rule.window.radius
-    return (x.astype(np.int64) + step).astype(np.uint16)
 
 
 def _reference(
