@@ -24,11 +24,11 @@ from skimage import data
 
 import simdtex
 from simdtex.methods.pyramid import MEMORY, TIES
-from simdtex.methods.solid import MEMORY as MEMORY_OF_BLOCKS
+from simdtex.methods.pyramid.pyramids import Transform
+from simdtex.methods.pyramid.solid import MEMORY as MEMORY_OF_BLOCKS
 from simdtex.ops.noise import noise
 from simdtex.ops.sort import sort
-from simdtex.pyramids import Transform
-from simdtex.steerable_filters import filters
+from simdtex.ops.steerable_filters import filters
 
 POOL = ThreadPoolExecutor(os.cpu_count())
 

@@ -21,11 +21,11 @@ from skimage import data
 from skimage.transform import resize
 
 import simdtex
-from simdtex.pyramids import decompose
-from simdtex.quality import seam
+from simdtex.experiments.quality import seam
+from simdtex.methods.pyramid.pyramids import decompose
+from simdtex.ops.steerable_filters import ORIENTATIONS, filters
 from simdtex.report.plots import FAINT, INK, figure_png, new_figure, tidy
 from simdtex.report.sheet import LEAST_SIDE, contact_sheet, enlarged
-from simdtex.steerable_filters import ORIENTATIONS, filters
 
 COLOURS = ("#D55E00", "#0072B2", "#56B4E9", "#009E73", "#8A6D00", "#E69F00", "#CC79A7", "#000000")
 

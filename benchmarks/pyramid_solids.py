@@ -17,7 +17,7 @@ from scipy.stats import wasserstein_distance
 from skimage import data
 
 import simdtex
-from simdtex.pyramids import decompose
+from simdtex.methods.pyramid.pyramids import decompose
 from simdtex.report.plots import figure_png, new_figure, tidy
 from simdtex.report.sheet import contact_sheet
 from simdtex.report.solid import view

@@ -18,7 +18,7 @@ import samples
 from rich.console import Console
 
 import simdtex
-from simdtex.comparison import FIGURES, compare
+from simdtex.experiments.comparison import FIGURES, compare
 from simdtex.report import schedule_plots as plots
 from simdtex.report.schedules import reading, terminal_tables
 

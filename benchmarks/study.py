@@ -22,7 +22,7 @@ import samples
 from pyramid_figures import png
 
 import simdtex
-from simdtex.quality import measure
+from simdtex.experiments.quality import measure
 from simdtex.report.sheet import contact_sheet
 
 MRF = {

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from skimage import data
 
-from simdtex.comparison import compare
+from simdtex.experiments.comparison import compare
 from simdtex.report.schedules import write_comparison
 from simdtex.schedules import Partition
 

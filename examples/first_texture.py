@@ -8,7 +8,7 @@ from pathlib import Path
 from skimage import data
 
 import simdtex
-from simdtex.image import write
+from simdtex.io.image import write
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")

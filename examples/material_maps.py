@@ -13,8 +13,8 @@ import numpy as np
 from skimage import data
 
 import simdtex
-from simdtex.image import write
-from simdtex.source_map import apply_source_map, save_source_map
+from simdtex.io.image import write
+from simdtex.model.source_map import apply_source_map, save_source_map
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")

@@ -13,7 +13,7 @@ from skimage import data
 from skimage.transform import downscale_local_mean
 
 import simdtex
-from simdtex.image import write
+from simdtex.io.image import write
 from simdtex.report.sheet import contact_sheet
 from simdtex.report.solid import view
 

@@ -3,9 +3,9 @@
 
 from importlib.metadata import version
 
-from simdtex.device import DeviceError, devices
 from simdtex.machine import open_machine
-from simdtex.mixtures import mix
+from simdtex.machine.devices import DeviceError, devices
+from simdtex.methods.pyramid.mixtures import mix
 from simdtex.run import Output, Progress
 from simdtex.synthesis import lcpdf, suggest_alpha, synthesize, synthesize_solid
 

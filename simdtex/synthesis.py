@@ -3,26 +3,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
 from math import isqrt
 from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.analysis import analyse
-from simdtex.image import check_sample
-from simdtex.lattice import Grid, neighbourhood_offsets
+from simdtex.envelope import check_shape, executed, with_channels_last
+from simdtex.io.image import check_sample
 from simdtex.machine import Machine, open_machine
-from simdtex.methods import mrf, multires, pyramid, solid
-from simdtex.ops import lcpdf as parzen
-from simdtex.ops.histogram import histogram
-from simdtex.ops.neighbourhood import Field, neighbourhood
-from simdtex.options import one_of, real, real_array, whole
+from simdtex.methods import mrf, multires, pyramid
+from simdtex.methods.mrf.density import lcpdf_at
+from simdtex.methods.multires.analysis import analyse
+from simdtex.methods.pyramid import solid
+from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.sample import Sample
+from simdtex.options import one_of, real, whole
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
-from simdtex.sample import Sample
 
 METHODS: dict[str, Any] = {"mrf": mrf, "multires": multires, "pyramid": pyramid}
 
@@ -114,16 +112,13 @@ def synthesize(
     pixels = check_sample(sample, channel_axis)
     size = check_shape(shape)
     chosen = METHODS[method].make_options(**with_channels_last(options, channel_axis))
-    seed, seen = as_seed(rng), seeing(callback, channel_axis)
-    machine = open_machine(device)
-    machine.profile()  # forget what was before
-    image, output = METHODS[method].synthesize(machine, pixels, size, chosen, seed, seen)
-    output.statistics.update(machine.profile() or {})
-    image = restored(image, channel_axis)
-    if not full_output:
-        return image
-    stages = [replace(stage, image=restored(stage.image, channel_axis)) for stage in output.stages]
-    return image, replace(output, stages=stages)
+    seed = as_seed(rng)
+
+    def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
+        result: tuple[NDArray[Any], Output] = METHODS[method].synthesize(machine, pixels, size, chosen, seed, seen)
+        return result
+
+    return executed(device, channel_axis, callback, full_output, run)
 
 
 def synthesize_solid(
@@ -155,7 +150,7 @@ def synthesize_solid(
         Return statistics too.
     **options
         ``pyramid``, ``levels``, ``orientations``, ``iterations``, ``match``, ``bins``, ``edges``, ``color``,
-        ``start`` (a block, channels last), ``solids``, ``slices``; see `simdtex.methods.solid.Options`. With
+        ``start`` (a block, channels last), ``solids``, ``slices``; see `simdtex.methods.pyramid.solid.Options`. With
         ``pyramid="steerable"`` the 3-D Laplacian pyramid and the steerable pyramids of all x-y, x-z and y-z slices are
         matched; ``"laplacian"`` is the first alone.
 
@@ -187,13 +182,12 @@ def synthesize_solid(
     pixels = check_sample(sample, channel_axis)
     size = _check_block(shape)
     chosen = solid.make_options(**options)
-    seen = seeing(callback, None if channel_axis is None else -1)
-    machine = open_machine(device)
-    machine.profile()  # forget what was before
-    volume, output = solid.synthesize(machine, pixels, size, chosen, as_seed(rng), seen)
-    output.statistics.update(machine.profile() or {})
-    volume = restored(volume, None if channel_axis is None else -1)
-    return (volume, output) if full_output else volume
+    seed = as_seed(rng)
+
+    def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
+        return solid.synthesize(machine, pixels, size, chosen, seed, seen)
+
+    return executed(device, None if channel_axis is None else -1, callback, full_output, run)
 
 
 def suggest_alpha(
@@ -324,77 +318,8 @@ def lcpdf(
     mrf.check_fit(y.shape, int(offsets.max()), order)
 
     machine = open_machine(device)
-    grid = Grid(x.shape[0], x.shape[1], 1, boundary == "torus")
-    field = Field(
-        machine.put(x[None].astype(np.uint16)),
-        machine.put(np.zeros(x.shape, np.int32)),
-        machine.put(_check_temperature(temperature, x.shape)),
-    )
-    candidates = grey.candidates(machine, offsets, 1)
-    h = bandwidth * parzen.optimal_bandwidth(grey.variance, candidates.size, len(offsets) + 1)
-    window = parzen.window(h, levels - 1)
-    device_offsets = machine.put(offsets)
-    rows = [np.zeros((0, levels))]
-    step = min(machine.chunk(candidates.size, len(offsets), 1), 4096)
-    for first in range(0, len(where), step):
-        here = machine.put(where[first : first + step])
-        near = neighbourhood(machine, here, field, device_offsets, grid)
-        distances = parzen.distance(machine, near, candidates)
-        if estimator == "parzen":
-            density = machine.get(parzen.table(machine, distances, candidates, window)).astype(np.float64)
-            rows.append(density / np.cumsum(density, 1)[:, -1:])
-        else:
-            counts = machine.get(histogram(machine, distances, candidates, levels))
-            rows.append(_shares(counts, where[first : first + step], grid))
-    return np.concatenate(rows)
-
-
-def _shares(counts: NDArray[np.uint32], sites: NDArray[np.int32], grid: Grid) -> NDArray[np.float64]:
-    total = counts.sum(1, keepdims=True)
-    if not total.all():
-        row, col = divmod(int(sites[(total[:, 0] == 0).argmax()]), grid.width)
-        raise ValueError(
-            f"no neighbourhood of the sample equals that of site ({row}, {col}); "
-            'use fewer grey levels, a smaller order, or estimator="parzen"'
-        )
-    shares: NDArray[np.float64] = counts / total
-    return shares
-
-
-def seeing(callback: Callback | None, channel_axis: int | None) -> Callback | None:
-    """The callback, which sees pictures with the sample's own axes."""
-    if callback is None:
-        return None
-
-    def seen(progress: Any) -> Any:
-        read: Callable[[], NDArray[Any]] = progress.image
-        return callback(replace(progress, image=lambda: restored(read(), channel_axis)))
-
-    return seen
-
-
-def with_channels_last(options: dict[str, Any], channel_axis: int | None) -> dict[str, Any]:
-    """The options, where a picture to start from has its channels last."""
-    start = options.get("start")
-    if start is None or channel_axis is None or real_array("start", start).ndim < 3:
-        return options
-    return options | {"start": np.moveaxis(np.asarray(start), channel_axis, -1)}
-
-
-def restored(image: NDArray[Any], channel_axis: int | None) -> NDArray[Any]:
-    """A picture (rows, cols, channels) with the axes that the sample has."""
-    return image[..., 0] if channel_axis is None else np.moveaxis(image, -1, channel_axis)
-
-
-def check_shape(shape: Any, least: int = 1) -> tuple[int, int]:
-    """The rows and columns of an output; raises unless they are two whole numbers of at least `least`."""
-    try:
-        rows, cols = shape
-    except (TypeError, ValueError):
-        raise ValueError(f"shape must be two whole numbers (rows, columns), not {shape!r}") from None
-    whole("rows of the output", rows, least)
-    whole("columns of the output", cols, least)
-    return int(rows), int(cols)
+    grid, t = Grid(x.shape[0], x.shape[1], 1, boundary == "torus"), _check_temperature(temperature, x.shape)
+    return lcpdf_at(machine, x, grey, where, t, offsets, grid, bandwidth, estimator)
 
 
 def _check_block(shape: Any) -> tuple[int, int, int]:

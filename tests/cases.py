@@ -6,12 +6,12 @@ from typing import NamedTuple
 import numpy as np
 from hypothesis import strategies as st
 
-from simdtex.lattice import Grid, neighbourhood_offsets
 from simdtex.machine.reference import Reference
+from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.sample import Sample
 from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
 from simdtex.ops.neighbourhood import Field, neighbourhood
-from simdtex.sample import Sample
 
 REFERENCE = Reference()
 

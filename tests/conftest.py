@@ -11,8 +11,8 @@ import functools
 import hypothesis
 import pytest
 
-from simdtex import device as device_module
-from simdtex.device import DeviceInfo
+from simdtex.machine import devices as device_module
+from simdtex.machine.devices import DeviceInfo
 
 REQUIRE = "SIMDTEX_REQUIRE_OPENCL"
 WHOLE_RUNS = ("test_bits",)
@@ -64,7 +64,7 @@ def pytest_generate_tests(metafunc):
 def _take(info: DeviceInfo | None) -> DeviceInfo:
     """Hand a device to a test; where there is none, fail if one is required, else skip."""
     if info is None:
-        message = "no usable OpenCL device here; `python -m simdtex.device` says why"
+        message = "no usable OpenCL device here; `python -m simdtex.machine.devices` says why"
         if os.environ.get(REQUIRE):
             pytest.fail(message)
         pytest.skip(message)

@@ -10,9 +10,9 @@ from cases import REFERENCE, assert_same_bits, host, opencl, texture
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from simdtex.analysis import analyse, pyramid
+from simdtex.methods.multires.analysis import analyse, pyramid
+from simdtex.model.stretched import TOP, Stretched
 from simdtex.ops.filters import bank
-from simdtex.stretched import TOP, Stretched
 
 WARNING = "is as large as the filters"
 sides = st.integers(1, 12)
@@ -133,7 +133,7 @@ def energy(column, residue):
 
 def test_the_energy_of_many_large_features_is_exact():
     """Sums beyond 2**53, which float64 does not hold, and beyond one block of them."""
-    from simdtex.analysis import _energy
+    from simdtex.methods.multires.analysis import _energy
 
     features = np.random.default_rng(2).integers(-2 * TOP, 2 * TOP, (2**20 + 3, 2), np.int32)
     features[:, 1] //= 2**15

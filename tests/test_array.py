@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import simdtex
-from simdtex.lattice import Grid, neighbourhood_offsets
-from simdtex.machine.accounting import FLOPS, ROUTER, XNET, Account
-from simdtex.machine.array import ARRAYS, MAPPINGS, ProcessorArray, parse_array
+from simdtex.maspar.accounting import FLOPS, ROUTER, XNET, Account
+from simdtex.maspar.array import ARRAYS, MAPPINGS, ProcessorArray, parse_array
+from simdtex.model.lattice import Grid, neighbourhood_offsets
 
 SCHEDULES = ["coloring", "luby", "synchronous", "random-subset:0.3", "block:4x4"]
 

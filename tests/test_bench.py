@@ -18,7 +18,7 @@ from simdtex.bench.elsewhere import measure_elsewhere
 from simdtex.bench.limits import measure_copy, measure_peak
 from simdtex.bench.sizes import FULL, QUICK, Sizes, with_searches
 from simdtex.cli import main
-from simdtex.device import DeviceError
+from simdtex.machine.devices import DeviceError
 from simdtex.machine.opencl import OpenCL
 from simdtex.machine.reference import Reference
 from simdtex.report.bench import percent, plot, times

@@ -264,7 +264,7 @@ def test_any_seed_has_the_references_bits(cl_device, seed):
 CHILD = """
 import json, sys
 import test_bits
-from simdtex.device import find
+from simdtex.machine.devices import find
 from simdtex.machine import open_machine
 from simdtex.machine.opencl import OpenCL
 machine = open_machine(sys.argv[1]) if sys.argv[1] != "llvmpipe" else OpenCL(find("llvmpipe"), vector=1, work_group=8)
@@ -347,10 +347,10 @@ import sys
 import numpy as np
 import simdtex
 from cases import REFERENCE, assert_same_bits, texture
-from simdtex import leaves
-from simdtex.device import find
+from simdtex.ops import leaves
+from simdtex.machine.devices import find
 from simdtex.machine.opencl import OpenCL
-from simdtex.methods.ising import ising
+from simdtex.experiments.ising import ising
 
 info = find("oclgrind")
 colour, grey = texture((6, 5), 3), texture((7, 6))
@@ -392,7 +392,7 @@ print("same bits throughout")
 PLANTED = """
 import numpy as np
 import pyopencl as cl
-from simdtex.device import find
+from simdtex.machine.devices import find
 from simdtex.machine.opencl import OpenCL
 
 machine = OpenCL(find("oclgrind"))

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from simdtex import image
 from simdtex.cli import main
-from simdtex.source_map import load_source_map
+from simdtex.io import image
+from simdtex.model.source_map import load_source_map
 
 
 @pytest.fixture

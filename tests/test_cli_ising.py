@@ -12,7 +12,7 @@ from PIL import Image
 from rich.console import Console
 
 from simdtex.cli import main
-from simdtex.estimates import Estimate, Finding
+from simdtex.experiments.estimates import Estimate, Finding
 from simdtex.report.ising import _sublattice, terminal_tables
 
 PICTURES = ["autocorrelation.png", "energy.png", "lattices.png", "magnetisation.png"]

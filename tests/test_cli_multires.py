@@ -8,11 +8,11 @@ from cases import texture
 from click.testing import CliRunner
 
 import simdtex
-from simdtex import image
 from simdtex.cli import main
 from simdtex.cli.common import numbers
-from simdtex.series import series
-from simdtex.source_map import load_source_map
+from simdtex.experiments.thresholds import series
+from simdtex.io import image
+from simdtex.model.source_map import load_source_map
 
 
 @pytest.fixture

@@ -8,10 +8,10 @@ from cases import texture
 from click.testing import CliRunner
 
 import simdtex
-from simdtex import image, volume
 from simdtex.cli import main
 from simdtex.cli.common import last_iteration
 from simdtex.cli.solid import block_shape
+from simdtex.io import image, volume
 from simdtex.report.solid import view
 
 GREY, COLOUR = texture((32, 28)), texture((32, 28), 3, seed=1)

@@ -8,8 +8,8 @@ from cases import texture
 from click.testing import CliRunner
 from test_page import assert_needs_nothing_else, embedded, read_page
 
-from simdtex import image
 from simdtex.cli import main
+from simdtex.io import image
 
 FILES = [
     *("changed.png", "costs.png", "index.html", "oscillation.png", "pictures.png", "quality.png", "results.json"),
@@ -154,7 +154,7 @@ def test_ctrl_c_leaves_no_report(folder, monkeypatch):
     def stop(*args, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("simdtex.comparison.synthesize", stop)
+    monkeypatch.setattr("simdtex.experiments.comparison.synthesize", stop)
     result = small(folder)
     assert result.exit_code == 130 and "stopped" in result.output
     assert listing(folder) == ["sample.png"]

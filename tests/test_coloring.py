@@ -11,7 +11,7 @@ from cases import REFERENCE, assert_same_bits
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simdtex.lattice import Grid, coloring_sublattice, neighbourhood_offsets
+from simdtex.model.lattice import Grid, coloring_sublattice, neighbourhood_offsets
 from simdtex.ops.coloring import UNCOLORED, coloring, greedy_coloring, lattice_coloring
 
 TINY = [(1, 1), (1, 2), (1, 5), (5, 1), (2, 2), (2, 3), (3, 3), (4, 2)]

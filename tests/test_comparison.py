@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from cases import texture
 
-from simdtex.comparison import Entry, Recorder, Spread, compare
+from simdtex.experiments.comparison import Entry, Recorder, Spread, compare
 from simdtex.report.page import Figure
 from simdtex.report.schedules import mark, reading, sections, terminal_tables
 from simdtex.schedules import Checkerboard, Coloring

@@ -10,8 +10,9 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
-from simdtex import device, runtimes
-from simdtex.device import DeviceError, DeviceInfo
+from simdtex.machine import devices as device
+from simdtex.machine import runtimes
+from simdtex.machine.devices import DeviceError, DeviceInfo
 
 
 def fake(index, name, platform="Acme OpenCL", kind="cpu", usable=True, **more):
@@ -272,7 +273,7 @@ def run_with_icds(folder: Path, *args: str) -> subprocess.CompletedProcess[str]:
 
 
 SAY = """
-from simdtex import device
+from simdtex.machine import devices as device
 try:
     print(device.find().kind)
 except device.DeviceError as error:
@@ -288,13 +289,13 @@ def test_an_icd_that_names_no_library(tmp_path):
     assert alone.returncode == 0, alone.stderr
     assert alone.stdout.startswith("No usable OpenCL device was found: install")
     assert alone.stdout.endswith("\nreference\n")
-    assert run_with_icds(tmp_path, "-m", "simdtex.device", "--ensure").returncode == 1
+    assert run_with_icds(tmp_path, "-m", "simdtex.machine.devices", "--ensure").returncode == 1
     pocl = Path("/etc/OpenCL/vendors/pocl.icd")
     if pocl.exists():
         (tmp_path / "pocl.icd").write_text(pocl.read_text())
         beside = run_with_icds(tmp_path, "-c", SAY)
         assert beside.stdout == "cpu\nreference\n"
-        assert run_with_icds(tmp_path, "-m", "simdtex.device", "--ensure").returncode == 0
+        assert run_with_icds(tmp_path, "-m", "simdtex.machine.devices", "--ensure").returncode == 0
 
 
 # The Intel CPU runtime of the package index

@@ -18,9 +18,9 @@ from skimage import data
 import simdtex
 from simdtex import cli
 from simdtex.cli.common import given
-from simdtex.image import write
-from simdtex.methods import solid
+from simdtex.io.image import write
 from simdtex.methods.mrf import PRESETS
+from simdtex.methods.pyramid import solid
 from simdtex.synthesis import METHODS
 
 ROOT = Path(__file__).resolve().parent.parent

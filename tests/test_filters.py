@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.ndimage import correlate, correlate1d
 from tolerances import HALF, TAP
 
+from simdtex.model.stretched import TOP
 from simdtex.ops.filters import bank, filters
-from simdtex.stretched import TOP
 
 UNIT = 2**14
 BANKS = [(orientations, sigma, side) for orientations in (1, 3, 4, 6) for sigma, side in ((0.5, 3), (0.7, 3), (1.0, 5))]

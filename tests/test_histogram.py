@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import simdtex
+from simdtex.model.sample import Sample
 from simdtex.ops.histogram import histogram
-from simdtex.sample import Sample
 
 LEVELS = 3
 

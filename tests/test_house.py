@@ -12,8 +12,8 @@ KERNELS = sorted(path.stem for path in (ROOT / "kernels").glob("*.cl"))
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 
-def imports(path):
-    """Every module that a file imports when it runs, as a dotted name; what only type checkers see is left out."""
+def imports(path, everything=False):
+    """Every module that a file imports, as a dotted name; what only type checkers see is left out, unless asked for."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     hidden = {
         id(inside)
@@ -24,7 +24,7 @@ def imports(path):
     }
     found = set()
     for node in ast.walk(tree):
-        if id(node) in hidden:
+        if id(node) in hidden and not everything:
             continue
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
@@ -65,35 +65,86 @@ def test_every_file_names_its_licence():
     assert [str(p) for p in sources if "SPDX-License-Identifier: BSD-3-Clause" not in p.read_text()[:200]] == []
 
 
-# Imports go one way: a part of the package may know of those to its right.
-ONE_WAY = [
-    *("cli", "report", "bench", "comparison", "series", "mixtures", "synthesis", "methods", "recorder", "schedules"),
-    *("analysis", "histograms", "pyramids", "palette", "machine", "ops", "device"),
+# The rooms of the house; imports go one way: a room may know of those after it.
+ROOMS = [
+    *("__main__", "cli", "report", "bench", "experiments", "__init__", "synthesis", "methods", "envelope", "schedules"),
+    *("ops", "machine", "maspar", "model", "run", "io", "options", "random"),
 ]
 
 
-@pytest.mark.parametrize("part", ONE_WAY)
-def test_imports_go_one_way(part):
-    earlier = ONE_WAY[: ONE_WAY.index(part)]
-    files = [p for p in MODULES if p.is_relative_to(PACKAGE / part) or p == PACKAGE / f"{part}.py"]
-    assert files or part == "cli"
-    for path in files:
-        for name in imports(path):
-            assert not any(name == f"simdtex.{up}" or name.startswith(f"simdtex.{up}.") for up in earlier), (
-                f"{path.relative_to(ROOT)} imports {name}"
-            )
+def room(module):
+    """The first part of a dotted name within the package; the package itself is ``__init__``."""
+    _, _, rest = module.partition(".")
+    return rest.partition(".")[0] or "__init__"
+
+
+def graph():
+    """Module -> the modules of the package that it imports anywhere, also for type checkers alone."""
+    names = {dotted(path): path for path in MODULES}
+    found = {}
+    for name, path in names.items():
+        told = imports(path, everything=True)
+        packages = {n for n in told if n in names and not any(other.startswith(f"{n}.") for other in told & set(names))}
+        found[name] = packages - {name}
+    return found
+
+
+def dotted(path):
+    """The dotted name of a module."""
+    parts = ("simdtex", *path.relative_to(PACKAGE).with_suffix("").parts)
+    return ".".join(parts).removesuffix(".__init__")
+
+
+def test_every_module_stands_in_a_room():
+    assert {room(dotted(path)) for path in MODULES} == set(ROOMS)
+
+
+def test_few_modules_stand_at_the_top():
+    assert len([path for path in PACKAGE.glob("*.py") if not path.name.startswith("__")]) <= 6
+
+
+@pytest.mark.parametrize("path", MODULES, ids=dotted)
+def test_imports_go_one_way(path):
+    here = ROOMS.index(room(dotted(path)))
+    for name in imports(path, everything=True):
+        if name == "simdtex.__version__" or not name.startswith("simdtex."):
+            continue
+        there = room(name) if room(name) in ROOMS else "__init__"
+        assert ROOMS.index(there) >= here, f"{path.relative_to(ROOT)} imports {name}"
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    knows = graph()
+    assert sum(map(len, knows.values())) > 200
+
+    def reached(start):
+        seen, todo = set(), [start]
+        while todo:
+            new = knows[todo.pop()] - seen
+            seen |= new
+            todo += new
+        return seen
+
+    assert [name for name in knows if name in reached(name)] == []
+
+
+def test_methods_and_schedules_ask_no_object_what_it_is():
+    """What a schedule or a machine has is declared in its protocol."""
+    for path in within("methods") + within("schedules"):
+        text = path.read_text(encoding="utf-8")
+        assert not re.search(r"getattr\(|hasattr\(|type: ignore", text), path.relative_to(ROOT)
 
 
 def test_methods_and_schedules_know_nothing_of_opencl():
     for path in within("methods") + within("schedules"):
         for name in imports(path):
-            assert not name.startswith(("pyopencl", "simdtex.machine.opencl", "simdtex.device")), (
+            assert not name.startswith(("pyopencl", "simdtex.machine.opencl", "simdtex.machine.devices")), (
                 f"{path.relative_to(ROOT)} imports {name}"
             )
 
 
 def test_operations_and_the_reference_need_no_opencl_to_be_imported():
-    for path in [*within("ops"), PACKAGE / "machine" / "reference.py", PACKAGE / "lattice.py"]:
+    for path in [*within("ops"), PACKAGE / "machine" / "reference.py", *within("model")]:
         assert not [name for name in imports(path) if name.startswith("pyopencl")]
 
 

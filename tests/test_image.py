@@ -18,7 +18,7 @@ import tifffile
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simdtex import image
+from simdtex.io import image
 
 
 def noise(shape, dtype, seed=0):

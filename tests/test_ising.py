@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from simdtex import random
-from simdtex.estimates import estimate, findings
-from simdtex.exact import CRITICAL
-from simdtex.lattice import Grid, neighbourhood_offsets
-from simdtex.methods.ising import Chains, ising
+from simdtex.experiments.estimates import estimate, findings
+from simdtex.experiments.ising import Chains, ising
+from simdtex.experiments.onsager import CRITICAL
+from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.ising import heat_bath_chances, ising_commit, ising_relax, ising_sequence
 from simdtex.schedules import Info, Luby
 

@@ -7,9 +7,9 @@ from cases import REFERENCE, assert_same_bits, host, opencl
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from simdtex.analysis import pyramid
+from simdtex.methods.multires.analysis import pyramid
+from simdtex.model.stretched import TOP
 from simdtex.ops.laplacian import half, laplacian_band, laplacian_collapse, laplacian_reduce, within
-from simdtex.stretched import TOP
 
 RANGES = {"sample": (0, TOP), "bits": (0, 1), "signed": (-TOP, TOP), "small": (-3, 3)}
 sides = st.integers(1, 9)

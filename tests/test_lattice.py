@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simdtex.lattice import Grid, Sublattice, check_order, coloring_sublattice, neighbourhood_offsets
+from simdtex.model.lattice import Grid, Sublattice, check_order, coloring_sublattice, neighbourhood_offsets
 
 
 @pytest.mark.parametrize(("order", "count"), [(1, 4), (2, 8), (3, 8), (4, 12), (5, 20), (8, 24), (18, 60)])

@@ -5,7 +5,7 @@ import pytest
 from cases import REFERENCE, assert_same_bits, opencl, problem
 from test_nearest import flat, run
 
-from simdtex import leaves
+from simdtex.ops import leaves
 
 
 def grown(p):

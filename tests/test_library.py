@@ -7,17 +7,17 @@ from scipy.stats import chisquare
 from tolerances import FFT, MATRIX_PRODUCT, SIGNIFICANCE
 
 import simdtex
-from simdtex.analysis import analyse
 from simdtex.bench import library as module
 from simdtex.bench.cases import Case, searches
 from simdtex.bench.library import Library
 from simdtex.methods import multires
+from simdtex.methods.multires.analysis import analyse
+from simdtex.methods.pyramid.pyramids import Transform
 from simdtex.ops import lcpdf
 from simdtex.ops.candidates import candidates
 from simdtex.ops.filters import bank, filters
 from simdtex.ops.neighbourhood import neighbourhood
 from simdtex.ops.sort import sort
-from simdtex.pyramids import Transform
 
 LIBRARY = Library()
 

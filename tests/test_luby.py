@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from simdtex import random
-from simdtex.lattice import Grid, neighbourhood_offsets
+from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.luby import IN, UNDECIDED, luby
 
 TINY = [(1, 1), (1, 2), (1, 5), (5, 1), (2, 2), (2, 3), (3, 3)]

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import simdtex
-from simdtex.device import DeviceError
+from simdtex.machine.devices import DeviceError
+from simdtex.machine.interface import Operation
 from simdtex.machine.opencl import OpenCL
 from simdtex.machine.reference import Reference
-from simdtex.ops.operation import Operation
-from simdtex.sample import BLOCK
+from simdtex.model.sample import BLOCK
 
 
 def test_a_machine_is_its_own_device():

@@ -13,8 +13,8 @@ from scipy.stats import chisquare
 from tolerances import SIGNIFICANCE
 
 import simdtex
-from simdtex.analysis import analyse
 from simdtex.methods import multires
+from simdtex.methods.multires.analysis import analyse
 from simdtex.ops.candidates import Sampled, Structure, candidates
 
 INF = math.inf

@@ -6,7 +6,7 @@ from cases import REFERENCE, assert_same_bits, host, opencl, problem, problems
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from simdtex.lattice import neighbourhood_offsets
+from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.ops import nearest as module
 from simdtex.ops.nearest import nearest
 

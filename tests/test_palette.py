@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tolerances import DECORRELATED, DIRECTION
 
-from simdtex.palette import FLAT, decorrelated, palette
-from simdtex.stretched import TOP, Stretched
+from simdtex.methods.pyramid.palette import FLAT, decorrelated, palette
+from simdtex.model.stretched import TOP, Stretched
 
 
 def planes_of(shape=(12, 11), channels=3, dtype=np.uint8, seed=0):

@@ -9,14 +9,14 @@ from click.testing import CliRunner
 
 import simdtex
 from simdtex.cli import main
-from simdtex.image import write
-from simdtex.lattice import neighbourhood_offsets
-from simdtex.machine.array import parse_array
+from simdtex.io.image import write
+from simdtex.machine.interface import Work, touching
 from simdtex.machine.log import KEPT, PENDING, Log, Times
 from simdtex.machine.opencl import OpenCL
 from simdtex.machine.reference import Reference
+from simdtex.maspar.array import parse_array
+from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.ops.noise import noise
-from simdtex.ops.operation import Work, touching
 from simdtex.report.profile import rate_text, rows, seconds_text, summary
 
 

@@ -1,4 +1,4 @@
-"""Pyramids of pictures in their own unit: `simdtex.pyramids.decompose`, and the transform that methods use."""
+"""Pyramids of pictures in their own unit, and the transform that methods use."""
 
 import numpy as np
 import plain_pyramid as plain
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pyrtools.pyramids import SteerablePyramidSpace
 from tolerances import HALF, MIRRORED, PARSEVAL, PYRTOOLS, RECONSTRUCTION
 
-from simdtex.pyramids import Pyramid, Transform, decompose, most_levels
+from simdtex.methods.pyramid.pyramids import Pyramid, Transform, decompose, most_levels
 
 KINDS = pytest.mark.parametrize("kind", ["steerable", "laplacian"])
 BORDERS = pytest.mark.parametrize("boundary", ["open", "torus"])

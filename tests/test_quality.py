@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import wasserstein_distance
 
-from simdtex import quality
+from simdtex.experiments import quality
 
 RNG_TOLERANCE = 1e-5  # single precision of centred values of a few standard deviations
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simdtex import image
+from simdtex.io import image
 from simdtex.report import sheet
 from simdtex.report.stages import StageWriter
 from simdtex.run import Relaxing, Sampling

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simdtex import image
+from simdtex.io import image
 from simdtex.report import solid
 from simdtex.report.sheet import GAP, TEXT
 

@@ -12,8 +12,8 @@ from test_schedules import CLAIMS, Told
 
 import simdtex
 from simdtex import schedules
-from simdtex.lattice import Grid, neighbourhood_offsets
 from simdtex.machine.reference import Reference
+from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.schedules import get
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "schedules.rst"

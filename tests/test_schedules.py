@@ -12,7 +12,7 @@ from cases import REFERENCE, assert_same_bits
 from scipy import stats
 
 from simdtex import schedules
-from simdtex.lattice import Grid, neighbourhood_offsets
+from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.schedules import SCHEDULES, Checked, Info, get, neighbours_in
 
 

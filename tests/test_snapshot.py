@@ -7,7 +7,7 @@ import plain
 import pytest
 from cases import REFERENCE, assert_same_bits, host, problem
 
-from simdtex.lattice import Grid, neighbourhood_offsets
+from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.neighbourhood import Field, neighbourhood
 from simdtex.ops.snapshot import TYPES, snapshot
 from simdtex.ops.temperature import temperature

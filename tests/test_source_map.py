@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simdtex.source_map import apply_source_map, load_source_map, save_source_map
+from simdtex.model.source_map import apply_source_map, load_source_map, save_source_map
 
 
 def some_map(seed, shape=(7, 9), sample=(5, 6)):

@@ -9,9 +9,9 @@ from scipy.stats import chisquare
 from tolerances import SIGNIFICANCE
 
 from simdtex import random
-from simdtex.lattice import Grid
+from simdtex.model.lattice import Grid
+from simdtex.model.sample import Sample
 from simdtex.ops.start import start
-from simdtex.sample import Sample
 
 
 def run(machine, sample, positions, shape, seed):

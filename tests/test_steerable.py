@@ -11,7 +11,7 @@ from pyrtools.pyramids.filters import parse_filter
 from tolerances import HALF, ODD_TORUS, PARSEVAL, PYRTOOLS, RECONSTRUCTION, UNIT32
 
 from simdtex.ops.steerable import steerable_join, steerable_split
-from simdtex.steerable_filters import ORIENTATIONS, UNIT, filters
+from simdtex.ops.steerable_filters import ORIENTATIONS, UNIT, filters
 
 TOP = 2**20
 BANKS = pytest.mark.parametrize("orientations", ORIENTATIONS)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tolerances import CONTRAST
 
-from simdtex.stretched import LUMA, TOP, Stretched
+from simdtex.model.stretched import LUMA, TOP, Stretched
 
 DTYPES = [np.bool_, np.uint8, np.int8, np.uint16, np.int16, np.int32, np.uint32, np.int64, np.uint64]
 FLOATS = [np.float16, np.float32, np.float64]

@@ -12,8 +12,8 @@ from plain_multires import as_large
 from test_multires import alike
 
 import simdtex
-from simdtex.analysis import analyse
 from simdtex.methods.multires import STRETCH, STRETCHES, Options, differences, suggest_alpha, thresholds
+from simdtex.methods.multires.analysis import analyse
 
 
 @pytest.mark.parametrize("beta", [20, 20.0, 100, 1000.0, Fraction(1, 2)])

@@ -9,7 +9,7 @@ import PIL.Image
 import pytest
 import tifffile
 
-from simdtex import image, volume
+from simdtex.io import image, volume
 
 WHOLE = ["uint8", "uint16", "uint32", "uint64", "int8", "int16", "int32", "int64"]
 HOLDS = {

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 from skimage import data
 
-from simdtex import runtimes
+from simdtex.machine import runtimes
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
 

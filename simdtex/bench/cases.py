@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.lattice import neighbourhood_offsets
 from simdtex.machine import Machine
 from simdtex.methods import mrf
-from simdtex.sample import Sample
+from simdtex.model.lattice import neighbourhood_offsets
+from simdtex.model.sample import Sample
 from simdtex.synthesis import synthesize, synthesize_solid
 
 METHODS = ("mrf", "multires", "pyramid", "solid")

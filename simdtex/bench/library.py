@@ -16,17 +16,17 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from simdtex.lattice import Grid
+from simdtex.machine.interface import Operation, P, R
 from simdtex.machine.reference import Reference
+from simdtex.model.lattice import Grid
+from simdtex.model.sample import Candidates
 from simdtex.ops import lcpdf
 from simdtex.ops.candidates import Sampled, Structure, candidates
 from simdtex.ops.coherence import coherence
 from simdtex.ops.filters import filters
 from simdtex.ops.neighbourhood import Field, Neighbourhoods, neighbourhood
-from simdtex.ops.operation import Operation, P, R
 from simdtex.ops.sort import sort
 from simdtex.ops.steerable import steerable_join, steerable_split
-from simdtex.sample import Candidates
 
 TABLE = 2**26
 """Values of the right factor of a matrix product that are made at a time."""

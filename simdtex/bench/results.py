@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from simdtex.bench.cases import Case, case_of
-from simdtex.lattice import neighbourhood_offsets
+from simdtex.model.lattice import neighbourhood_offsets
 
 FORMAT = "simdtex bench 1"
 

@@ -19,7 +19,7 @@ from simdtex.bench.elsewhere import measure_elsewhere
 from simdtex.bench.limits import measure_copy, measure_peak
 from simdtex.bench.results import FORMAT
 from simdtex.bench.sizes import Sizes, with_searches
-from simdtex.device import DeviceError, DeviceInfo, devices, find
+from simdtex.machine.devices import DeviceError, DeviceInfo, devices, find
 from simdtex.machine.opencl import OpenCL
 
 
@@ -28,7 +28,7 @@ def chosen(device: str | None = None) -> list[DeviceInfo]:
 
     Raises
     ------
-    simdtex.device.DeviceError
+    simdtex.machine.devices.DeviceError
         There is none, or it is the reference.
     """
     if device is not None:

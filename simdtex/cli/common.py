@@ -283,7 +283,7 @@ def command_line(context: click.Context) -> str:
 
 def output_shape(size: str | None, pixels: Any, start: Any = None) -> tuple[int, int]:
     """Rows and columns of ``--size``, or by default those of a picture to begin with, or twice those of the sample."""
-    from simdtex.image import parse_size
+    from simdtex.io.image import parse_size
 
     if size:
         return parse_size(size)

@@ -23,7 +23,7 @@ def demo(output: Path, size: str, seed: int, device: str | None) -> None:
     """Synthesise brick, grass and gravel from scikit-image's own pictures."""
     from skimage import data
 
-    from simdtex import image
+    from simdtex.io import image
     from simdtex.machine import open_machine
     from simdtex.report.sheet import contact_sheet
     from simdtex.synthesis import synthesize

@@ -15,6 +15,6 @@ from simdtex.cli.common import plainly
 @plainly
 def devices() -> None:
     """List every OpenCL device, whether it works, and which one would be chosen."""
-    from simdtex.device import render
+    from simdtex.machine.devices import render
 
     render(Console(width=None if sys.stdout.isatty() else 200))

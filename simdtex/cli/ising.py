@@ -57,11 +57,11 @@ def ising(
     quiet: bool,
 ) -> None:
     """Relax Ising spins by each schedule and compare with the exact energy and magnetisation."""
-    from simdtex import image
     from simdtex import schedules as known
-    from simdtex.estimates import findings
+    from simdtex.experiments.estimates import findings
+    from simdtex.experiments.ising import check, ising
+    from simdtex.io import image
     from simdtex.machine import open_machine
-    from simdtex.methods.ising import check, ising
     from simdtex.options import whole
     from simdtex.random import as_seed
     from simdtex.report import ising as report

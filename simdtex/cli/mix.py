@@ -72,8 +72,8 @@ def mix(
     A sample is named in options by its path as it stands in the command, or by its number from 1. The method is Heeger
     and Bergen's (1995).
     """
-    from simdtex import image
-    from simdtex.mixtures import mix as mixed
+    from simdtex.io import image
+    from simdtex.methods.pyramid.mixtures import mix as mixed
 
     chosen = {name: sample_number(name, options.pop(name), samples) for name in CHOSEN}
     weights = None if average is None else numbers("--average", average)

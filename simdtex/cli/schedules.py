@@ -57,9 +57,9 @@ def schedules(
 
     Without SAMPLE it is 128x128 pixels of the brick of scikit-image.
     """
-    from simdtex import image
     from simdtex import schedules as known
-    from simdtex.comparison import compare
+    from simdtex.experiments.comparison import compare
+    from simdtex.io import image
     from simdtex.options import whole
     from simdtex.report.page import check_folder
     from simdtex.report.schedules import terminal_tables, write_comparison
@@ -99,7 +99,7 @@ def schedules(
 
 
 def _sample(path: Path | None) -> tuple[Any, int | None]:
-    from simdtex import image
+    from simdtex.io import image
 
     if path is None:
         from skimage import data

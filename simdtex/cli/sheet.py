@@ -54,10 +54,10 @@ def sheet(
 
     Below each picture stand the mean candidates of its levels, coarse to fine.
     """
-    from simdtex import image
+    from simdtex.experiments.thresholds import series
+    from simdtex.io import image
     from simdtex.random import as_seed
     from simdtex.report.sheet import contact_sheet
-    from simdtex.series import series
 
     image.check_writable(output, np.uint8, 3)
     check_distinct([output], [sample])

@@ -26,7 +26,7 @@ from simdtex.cli.common import (
     stages_option,
     watching,
 )
-from simdtex.methods import solid as method
+from simdtex.methods.pyramid import solid as method
 
 DEFAULTS = method.Options()
 SIDE = 128
@@ -85,7 +85,7 @@ def solid(
 
     The method is Heeger and Bergen's (1995), for textures that look alike in all directions.
     """
-    from simdtex import image, volume
+    from simdtex.io import image, volume
     from simdtex.report.solid import view
     from simdtex.synthesis import synthesize_solid
 

@@ -89,8 +89,8 @@ def synth(
     **options: Any,
 ) -> None:
     """Make more of the texture SAMPLE."""
-    from simdtex import image
-    from simdtex import source_map as maps
+    from simdtex.io import image
+    from simdtex.model import source_map as maps
     from simdtex.report.accounting import render
     from simdtex.synthesis import synthesize
 
@@ -151,7 +151,7 @@ def synth(
 
 def _other_map(text: str, sample: tuple[int, int]) -> tuple[Any, Path]:
     """Read the map of ``--also MAP=OUT`` and check that it can be carried over and written."""
-    from simdtex import image
+    from simdtex.io import image
 
     name, equals, out = text.partition("=")
     if not (name and equals and out):

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from statistics import median
 from typing import Any
 
-from simdtex.ops.operation import Work
+from simdtex.machine.interface import Work
 
 PENDING = 4096
 """Launches whose events may wait for being read."""

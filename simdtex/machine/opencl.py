@@ -18,15 +18,15 @@ import pyopencl as cl
 import pyopencl.tools as cl_tools
 from numpy.typing import NDArray
 
-from simdtex.device import DeviceError, DeviceInfo
-from simdtex.lattice import Grid
-from simdtex.machine import tuner
-from simdtex.machine.array import ProcessorArray
 from simdtex.machine.buffers import DeviceArray
+from simdtex.machine.devices import DeviceError, DeviceInfo
+from simdtex.machine.forms import Form, default
+from simdtex.machine.interface import Array, Operation, P, R, Work
 from simdtex.machine.log import Log
 from simdtex.machine.tally import Tally
-from simdtex.ops.operation import Array, Operation, P, R, Work
-from simdtex.sample import BLOCK
+from simdtex.maspar.array import ProcessorArray
+from simdtex.model.lattice import Grid
+from simdtex.model.sample import BLOCK
 
 LITTLE = 2**16
 """Bytes that are copied to a device without waiting."""
@@ -58,7 +58,7 @@ class OpenCL:
     Parameters
     ----------
     info : DeviceInfo
-        From `simdtex.device.find`.
+        From `simdtex.machine.devices.find`.
     work_group : int, optional
         Forces the work-group size of every launch; changes no bit of any result.
     scratch : int, optional
@@ -96,8 +96,8 @@ class OpenCL:
         on_gpu = info.kind == "gpu"
         self.forced = work_group is not None
         self.scratch = scratch or (2**28 if on_gpu else 2**24)
-        form = tuner.default(info)  # a fixed group size: PoCL compiles once per size
-        self.take(tuner.Form(vector or form.vector, step or form.step, work_group or form.group))
+        form = default(info)  # a fixed group size: PoCL compiles once per size
+        self.take(Form(vector or form.vector, step or form.step, work_group or form.group))
         if BLOCK % self.step:
             raise ValueError(f"step is {self.step}; give a divisor of {BLOCK}")
         self.skip = skip
@@ -113,7 +113,7 @@ class OpenCL:
         self._programs: dict[tuple[str, str], Any] = {}
         self._kernels: dict[tuple[str, str, str], Any] = {}
 
-    def take(self, form: tuner.Form) -> None:
+    def take(self, form: Form) -> None:
         """Take this form of the inner loop."""
         self.vector, self.step, self.group = form
         self.tile = (self.group, 1) if self.info.kind == "gpu" else (1, 8)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.lattice import Grid
-from simdtex.machine.array import ProcessorArray
-from simdtex.ops.operation import Array, Operation, P, R
+from simdtex.machine.interface import Array, Operation, P, R
+from simdtex.maspar.array import ProcessorArray
+from simdtex.model.lattice import Grid
 
 
 class Reference:

@@ -3,14 +3,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from simdtex.ops.operation import Array
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
+from simdtex.machine.interface import Array, Launcher
 
 
 class Tally:
@@ -18,10 +13,10 @@ class Tally:
 
     Parameters
     ----------
-    machine : OpenCL
+    machine : Launcher
     """
 
-    def __init__(self, machine: OpenCL) -> None:
+    def __init__(self, machine: Launcher) -> None:
         self._machine = machine
         self._slots: Array | None = None
         self._spared = 0

@@ -15,15 +15,14 @@ import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import platformdirs
 import pyopencl as cl
 
-if TYPE_CHECKING:
-    from simdtex.device import DeviceInfo
-    from simdtex.machine.opencl import OpenCL
+from simdtex.machine.forms import Form, default, others
+from simdtex.machine.opencl import OpenCL
 
 FOLDER, SWITCH = "SIMDTEX_CACHE", "SIMDTEX_TUNE"
 FILE = "tuning.json"
@@ -59,26 +58,6 @@ __kernel __attribute__((vec_type_hint(vec))) void tune(__global const float *x, 
     STORE(sum, out + get_global_id(0) * V);
 }
 """
-
-
-class Form(NamedTuple):
-    """``vector`` sites or candidates side by side, ``step`` of them in registers, ``group`` work-items to a group."""
-
-    vector: int
-    step: int
-    group: int
-
-
-def default(info: DeviceInfo) -> Form:
-    """The form of a device that nothing is known of."""
-    return Form(1, 4, 64) if info.kind == "gpu" else Form(16, 4, 16)
-
-
-def others(info: DeviceInfo) -> list[Form]:
-    """Forms that may be faster, the likeliest first."""
-    if info.kind == "gpu":
-        return [Form(1, 8, 64), Form(1, 4, 128), Form(1, 2, 64), Form(4, 4, 64), Form(1, 4, 256)]
-    return [Form(8, 4, 16), Form(16, 2, 16), Form(8, 8, 16), Form(4, 4, 16), Form(1, 8, 16)]
 
 
 def probe(machine: OpenCL, form: Form) -> Callable[[], float]:

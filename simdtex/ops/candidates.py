@@ -7,16 +7,13 @@ them: from the top down, parents before children, the children of a node row by 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.ops.operation import Array, Operation
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
+from simdtex.machine.interface import Array, Launcher, Operation
 
 TOGETHER = 2**22
 """Pixels times candidates that the twin looks at together."""
@@ -123,7 +120,7 @@ def _children(
 
 
 def _launch(
-    machine: OpenCL,
+    machine: Launcher,
     structure: Structure,
     sampled: Sampled,
     level: int,

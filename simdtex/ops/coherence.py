@@ -3,19 +3,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.lattice import Grid
+from simdtex.machine.interface import Array, Launcher, Operation
+from simdtex.model.lattice import Grid
+from simdtex.model.sample import BLOCK, Candidates
 from simdtex.ops.lcpdf import Distances
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.operation import Array, Operation
-from simdtex.sample import BLOCK, Candidates
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
 
 
 def _reference(
@@ -42,7 +37,7 @@ def _reference(
 
 
 def _launch(
-    machine: OpenCL,
+    machine: Launcher,
     distances: Distances,
     candidates: Candidates,
     sites: Array,

@@ -3,17 +3,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.lattice import Grid, Sublattice, coloring_sublattice
-from simdtex.ops.operation import Array, Operation
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
+from simdtex.machine.interface import Array, Launcher, Operation
+from simdtex.model.lattice import Grid, Sublattice, coloring_sublattice
 
 UNCOLORED = -1
 
@@ -31,7 +28,7 @@ def _lattice_reference(grid: Grid, offsets: NDArray[np.int32], pattern: Sublatti
     return colors.reshape(grid.rows, grid.cols)
 
 
-def _lattice_launch(machine: OpenCL, grid: Grid, offsets: Array, pattern: Sublattice) -> Array:
+def _lattice_launch(machine: Launcher, grid: Grid, offsets: Array, pattern: Sublattice) -> Array:
     colors = machine.empty((grid.rows, grid.cols), np.int32)
     basis = (np.int32(pattern.a), np.int32(pattern.b), np.int32(pattern.c))
     machine.launch(
@@ -67,7 +64,7 @@ def _greedy_round(grid: Grid, offsets: NDArray[np.int32], colors: NDArray[np.int
     return new.reshape(colors.shape)
 
 
-def _greedy_launch(machine: OpenCL, grid: Grid, offsets: Array, colors: Array, seed: int, rounds: int = 1) -> Array:
+def _greedy_launch(machine: Launcher, grid: Grid, offsets: Array, colors: Array, seed: int, rounds: int = 1) -> Array:
     one, other = machine.empty(colors.shape, np.int32), machine.empty(colors.shape, np.int32)
     kernel = machine.kernel("coloring", "coloring_greedy")
     arguments = (*grid.args, offsets, np.int32(offsets.shape[0]), np.uint64(seed))

@@ -3,17 +3,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.ops.lcpdf import Relaxed
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.operation import Array, Operation
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
 
 
 def _reference(field: Field, sites: NDArray[np.int32], relaxed: Relaxed, cooled: NDArray[np.uint16]) -> Field:
@@ -23,7 +18,7 @@ def _reference(field: Field, sites: NDArray[np.int32], relaxed: Relaxed, cooled:
     return field
 
 
-def _launch(machine: OpenCL, field: Field, sites: Array, relaxed: Relaxed, cooled: Array) -> Field:
+def _launch(machine: Launcher, field: Field, sites: Array, relaxed: Relaxed, cooled: Array) -> Field:
     channels, height, width = field.values.shape
     machine.launch_sites(
         ("commit", "commit"),

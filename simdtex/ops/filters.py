@@ -3,16 +3,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.machine.interface import Array, Launcher, Operation, touching
 from simdtex.ops.laplacian import within
-from simdtex.ops.operation import Array, Operation, touching
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
 
 UNIT_BITS = 14
 """Taps are whole multiples of 2**-14."""
@@ -72,7 +67,7 @@ def _reference(
     return np.stack(features, -1).reshape(rows * cols, -1).astype(np.int32)
 
 
-def _launch(machine: OpenCL, picture: Array, band: Array, taps: Array, torus: bool) -> Array:
+def _launch(machine: Launcher, picture: Array, band: Array, taps: Array, torus: bool) -> Array:
     planes, rows, cols = picture.shape
     count, side = taps.shape[0], taps.shape[1]
     features = machine.empty((rows * cols, planes * (1 + count)), np.int32)

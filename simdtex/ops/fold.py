@@ -8,15 +8,10 @@ everywhere. A filter laid over it is the filter with holes that the next level o
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.ops.operation import Array, Operation
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
+from simdtex.machine.interface import Array, Launcher, Operation
 
 
 def folded(n: int) -> NDArray[np.intp]:
@@ -36,7 +31,7 @@ def _unfold(coarse: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[np.int
     return picture
 
 
-def _launch_fold(machine: OpenCL, picture: Array) -> Array:
+def _launch_fold(machine: Launcher, picture: Array) -> Array:
     planes, rows, cols = picture.shape
     coarse = machine.empty((planes, folded(rows).size, folded(cols).size), np.int32)
     machine.launch(
@@ -47,7 +42,7 @@ def _launch_fold(machine: OpenCL, picture: Array) -> Array:
     return coarse
 
 
-def _launch_unfold(machine: OpenCL, coarse: Array, shape: tuple[int, ...]) -> Array:
+def _launch_unfold(machine: Launcher, coarse: Array, shape: tuple[int, ...]) -> Array:
     rows, cols = shape
     picture = machine.empty((coarse.shape[0], rows, cols), np.int32)
     machine.launch(

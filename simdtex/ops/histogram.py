@@ -3,17 +3,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.machine.interface import Array, Launcher, Operation
+from simdtex.model.sample import BLOCK, Candidates
 from simdtex.ops.lcpdf import Distances
-from simdtex.ops.operation import Array, Operation
-from simdtex.sample import BLOCK, Candidates
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
 
 
 def _reference(distances: Distances, candidates: Candidates, levels: int) -> NDArray[np.uint32]:
@@ -24,7 +19,7 @@ def _reference(distances: Distances, candidates: Candidates, levels: int) -> NDA
     return counts
 
 
-def _launch(machine: OpenCL, distances: Distances, candidates: Candidates, levels: int) -> Array:
+def _launch(machine: Launcher, distances: Distances, candidates: Candidates, levels: int) -> Array:
     counts = machine.empty((distances.sites, levels), np.uint32)
     blocks, padded = distances.nearest.shape
     machine.launch(

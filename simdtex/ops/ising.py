@@ -11,17 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import prod
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.lattice import Grid
-from simdtex.ops.operation import Array, Operation
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
+from simdtex.machine.interface import Array, Launcher, Operation
+from simdtex.model.lattice import Grid
 
 
 def heat_bath_chances(temperatures: Sequence[float], neighbours: int) -> NDArray[np.uint32]:
@@ -91,7 +88,7 @@ def _model(offsets: Array, grid: Grid, chances: Array, seed: int) -> tuple[Any, 
 
 
 def _launch_relax(
-    machine: OpenCL, spins: Array, sites: Array, offsets: Array, grid: Grid, chances: Array, seed: int, turn: int
+    machine: Launcher, spins: Array, sites: Array, offsets: Array, grid: Grid, chances: Array, seed: int, turn: int
 ) -> Array:
     chains, temperatures = int(spins.shape[0]), int(chances.shape[0])
     relaxed = machine.empty((chains, sites.size), np.uint8)
@@ -105,7 +102,7 @@ def _launch_relax(
     return relaxed
 
 
-def _launch_commit(machine: OpenCL, spins: Array, sites: Array, relaxed: Array) -> Array:
+def _launch_commit(machine: Launcher, spins: Array, sites: Array, relaxed: Array) -> Array:
     chains = int(spins.shape[0])  # which temperature is whose does not matter here
     machine.launch(
         machine.kernel("ising", "ising_commit"),
@@ -116,7 +113,7 @@ def _launch_commit(machine: OpenCL, spins: Array, sites: Array, relaxed: Array) 
 
 
 def _launch_sequence(
-    machine: OpenCL, spins: Array, queue: Array, offsets: Array, grid: Grid, chances: Array, seed: int
+    machine: Launcher, spins: Array, queue: Array, offsets: Array, grid: Grid, chances: Array, seed: int
 ) -> Array:
     temperatures = chances.shape[0]
     seeds = spins.shape[0] // temperatures

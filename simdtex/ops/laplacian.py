@@ -7,15 +7,10 @@ stay within 32 bits where what is reduced is below 2**23, and what is collapsed 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.ops.operation import Array, Operation, touching
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
+from simdtex.machine.interface import Array, Launcher, Operation, touching
 
 
 def half(shape: tuple[int, ...]) -> tuple[int, int]:
@@ -70,7 +65,7 @@ def _sizes(*numbers: int) -> tuple[np.int32, ...]:
     return tuple(np.int32(n) for n in numbers)
 
 
-def _launch_reduce(machine: OpenCL, fine: Array, torus: bool) -> Array:
+def _launch_reduce(machine: Launcher, fine: Array, torus: bool) -> Array:
     planes, rows, cols = fine.shape
     coarse = machine.empty((planes, *half((rows, cols))), np.int32)
     machine.launch(
@@ -82,7 +77,7 @@ def _launch_reduce(machine: OpenCL, fine: Array, torus: bool) -> Array:
     return coarse
 
 
-def _launch_band(machine: OpenCL, fine: Array, coarse: Array, torus: bool) -> Array:
+def _launch_band(machine: Launcher, fine: Array, coarse: Array, torus: bool) -> Array:
     planes, rows, cols = fine.shape
     band = machine.empty(fine.shape, np.int32)
     machine.launch(
@@ -94,7 +89,7 @@ def _launch_band(machine: OpenCL, fine: Array, coarse: Array, torus: bool) -> Ar
     return band
 
 
-def _launch_collapse(machine: OpenCL, band: Array, source: Array, coarse: Array, torus: bool) -> Array:
+def _launch_collapse(machine: Launcher, band: Array, source: Array, coarse: Array, torus: bool) -> Array:
     rows, cols = source.shape
     fine = machine.empty((band.shape[0], rows, cols), np.int32)
     machine.launch(

@@ -8,19 +8,16 @@ relaxation and users take from it. The kernels are in ``kernels/lcpdf.cl``.
 from __future__ import annotations
 
 from math import exp, log, pow, sqrt
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
+from simdtex.machine.interface import Array, Launcher, Operation, touching
+from simdtex.model.sample import BLOCK, Candidates
 from simdtex.ops.arithmetic import exp32, fma32
 from simdtex.ops.neighbourhood import Neighbourhoods
-from simdtex.ops.operation import Array, Operation, touching
-from simdtex.sample import BLOCK, Candidates
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
 
 HEAVIEST = 16
 """Candidates whose values compete for the mode of a pixel vector."""
@@ -109,7 +106,7 @@ def _distance_reference(near: Neighbourhoods, candidates: Candidates) -> Distanc
     return Distances(d, None, sites)
 
 
-def _distance_launch(machine: OpenCL, near: Neighbourhoods, candidates: Candidates) -> Distances:
+def _distance_launch(machine: Launcher, near: Neighbourhoods, candidates: Candidates) -> Distances:
     neighbours, _, padded = near.weighted.shape
     blocks = candidates.positions.size // BLOCK
     distance = machine.empty((blocks * BLOCK, padded), np.float32)
@@ -191,7 +188,7 @@ def legal(y: NDArray[Any], win: Window) -> tuple[NDArray[np.uint32], NDArray[np.
 
 
 def _draw_launch(
-    machine: OpenCL,
+    machine: Launcher,
     distances: Distances,
     candidates: Candidates,
     sites: Array,
@@ -217,7 +214,7 @@ def _best_reference(distances: Distances, candidates: Candidates) -> Relaxed:
     return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
 
 
-def _best_launch(machine: OpenCL, distances: Distances, candidates: Candidates) -> Relaxed:
+def _best_launch(machine: Launcher, distances: Distances, candidates: Candidates) -> Relaxed:
     return _take(machine, "best", distances, candidates, None)
 
 
@@ -254,7 +251,7 @@ def _mode_reference(distances: Distances, candidates: Candidates, win: Window) -
     return Relaxed(choice, values)
 
 
-def _mode_launch(machine: OpenCL, distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
+def _mode_launch(machine: Launcher, distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
     gauss = (machine.constant(win.gauss), np.int32(win.radius))
     return _take(machine, "mode", distances, candidates, win, *gauss)
 
@@ -283,7 +280,7 @@ def _mode_vector_reference(distances: Distances, candidates: Candidates, win: Wi
     return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
 
 
-def _mode_vector_launch(machine: OpenCL, distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
+def _mode_vector_launch(machine: Launcher, distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
     return _take(machine, "mode_vector", distances, candidates, win)
 
 
@@ -304,7 +301,7 @@ def _table_reference(distances: Distances, candidates: Candidates, win: Window) 
     return table
 
 
-def _table_launch(machine: OpenCL, distances: Distances, candidates: Candidates, win: Window) -> Array:
+def _table_launch(machine: Launcher, distances: Distances, candidates: Candidates, win: Window) -> Array:
     shape = (distances.sites, win.top + 1)
     mass, table = machine.empty(shape, np.uint64), machine.empty(shape, np.float32)
     machine.launch_sites(
@@ -324,7 +321,7 @@ table = Operation("table", _table_reference, _table_launch)
 # -- what the launchers share ---------------------------------------------------------------------------------
 
 
-def _defines(machine: OpenCL, candidates: Candidates) -> dict[str, int]:
+def _defines(machine: Launcher, candidates: Candidates) -> dict[str, int]:
     channels = candidates.pixels.shape[0]
     return {"V": machine.vector, "C": channels, "BLOCK": BLOCK, "STEP": machine.step, "HEAVIEST": HEAVIEST}
 
@@ -341,7 +338,7 @@ def _weighing(distances: Distances, win: Window | None) -> list[Any]:
 
 
 def _take(
-    machine: OpenCL,
+    machine: Launcher,
     name: str,
     distances: Distances,
     candidates: Candidates,

@@ -3,16 +3,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.machine.interface import Array, Launcher, Operation, touching
 from simdtex.ops.arithmetic import fma32
-from simdtex.ops.operation import Array, Operation, touching
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
 
 CHAINS = 10
 """Chains of each value in `peak`."""
@@ -31,7 +26,7 @@ def _peak(values: NDArray[np.float32], rounds: int, width: int) -> NDArray[np.fl
     return total
 
 
-def _launch_peak(machine: OpenCL, values: Array, rounds: int, width: int) -> Array:
+def _launch_peak(machine: Launcher, values: Array, rounds: int, width: int) -> Array:
     result, items = machine.empty(values.shape, np.float32), values.size // width
     machine.launch(
         machine.kernel("limits", "limits_peak", V=width, CHAINS=CHAINS),
@@ -46,7 +41,7 @@ def _copy(values: NDArray[np.float32], width: int) -> NDArray[np.float32]:
     return values.copy()
 
 
-def _launch_copy(machine: OpenCL, values: Array, width: int) -> Array:
+def _launch_copy(machine: Launcher, values: Array, width: int) -> Array:
     result, items = machine.empty(values.shape, np.float32), values.size // width
     machine.launch(
         machine.kernel("limits", "limits_copy", V=width, CHAINS=CHAINS),

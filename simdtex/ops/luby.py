@@ -3,17 +3,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.lattice import Grid
-from simdtex.ops.operation import Array, Operation
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
+from simdtex.machine.interface import Array, Launcher, Operation
+from simdtex.model.lattice import Grid
 
 UNDECIDED, IN, OUT = 0, 1, 2
 
@@ -38,7 +33,7 @@ def _reference(
 
 
 def _launch(
-    machine: OpenCL, grid: Grid, offsets: Array, active: Array, seed: int, level: int, count: int
+    machine: Launcher, grid: Grid, offsets: Array, active: Array, seed: int, level: int, count: int
 ) -> NDArray[np.uint8]:
     sites = grid.rows * grid.cols
     priority = machine.empty((sites,), np.uint32)

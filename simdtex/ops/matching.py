@@ -6,16 +6,11 @@ Segments are rows of a (segments, n) int32 array. T targets serve segments // T 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.ops.operation import Array, Operation, touching
+from simdtex.machine.interface import Array, Launcher, Operation, touching
 from simdtex.ops.sort import local, run_length
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
 
 FRACTION = 20
 """Bits of a fraction of a bin."""
@@ -76,7 +71,7 @@ def _ranks(order: NDArray[np.int32], targets: NDArray[np.int32]) -> NDArray[np.i
     return values
 
 
-def _launch_ranks(machine: OpenCL, order: Array, targets: Array) -> Array:
+def _launch_ranks(machine: Launcher, order: Array, targets: Array) -> Array:
     (segments, n), m = order.shape, targets.shape[1]
     each = each_of(segments, targets.shape[0])
     values = machine.empty(order.shape, np.int32)
@@ -108,7 +103,7 @@ def _lookup(values: NDArray[np.int32], tables: NDArray[np.int32]) -> NDArray[np.
     return result
 
 
-def _launch_lookup(machine: OpenCL, values: Array, tables: Array) -> Array:
+def _launch_lookup(machine: Launcher, values: Array, tables: Array) -> Array:
     (segments, n), bins = values.shape, tables.shape[1] - 1
     each = each_of(segments, tables.shape[0])
     runs, shape = _runs(machine, segments, n, bins)
@@ -136,7 +131,7 @@ def _distance(before: NDArray[np.int32], after: NDArray[np.int32]) -> NDArray[np
     return total
 
 
-def _launch_distance(machine: OpenCL, before: Array, after: Array) -> Array:
+def _launch_distance(machine: Launcher, before: Array, after: Array) -> Array:
     segments, n = before.shape
     runs, shape = _runs(machine, segments, n)
     sums, totals = machine.empty((segments, runs), np.int64), machine.empty((segments,), np.int64)
@@ -155,7 +150,7 @@ def _launch_distance(machine: OpenCL, before: Array, after: Array) -> Array:
     return totals
 
 
-def _runs(machine: OpenCL, segments: int, n: int, table: int = 0) -> tuple[int, NDArray[np.int32]]:
+def _runs(machine: Launcher, segments: int, n: int, table: int = 0) -> tuple[int, NDArray[np.int32]]:
     """Runs of a segment, no shorter than the table that each fills; and what a kernel over runs is told."""
     length = min(n, max(run_length(machine, segments, n), table))
     runs = -(-n // length)

@@ -7,26 +7,66 @@ source, and then drops whatever is proved to lie beyond the best so far: ``docs/
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Callable
+from functools import cache, lru_cache, partial
 from math import prod
-from typing import TYPE_CHECKING
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.lattice import Grid
-from simdtex.leaves import FEATURES
+from simdtex.machine.interface import Array, Launcher, Machine, Operation
+from simdtex.model.lattice import Grid
+from simdtex.model.sample import BLOCK, Candidates, Sample
 from simdtex.ops import coherence, lcpdf, neighbourhood
 from simdtex.ops.lcpdf import Relaxed
+from simdtex.ops.leaves import FEATURES, Leaves, grow
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.operation import Array, Operation
-from simdtex.sample import BLOCK, Candidates
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
 
 CHECK = 4
 """Neighbours between two looks at the bound; every neighbourhood has a multiple of 4."""
+
+TAIL = 1024
+"""Values after a strip that may be read where the candidates' rows end; nothing comes of them."""
+
+
+class Strip(NamedTuple):
+    """The sample's pixels that the candidates of a level and their neighbours are, row by row.
+
+    ``pixels`` (C, size) float32, the last `TAIL` of them 0; candidate (i, j) of ``rows`` x ``cols``, in the order of
+    the list, is pixel ``first`` + i ``pitch`` + j; ``reach`` (N,) int32 pixel offset of each neighbour; ``offsets``
+    the bytes of the neighbourhood's own; ``leaves()`` the candidates by features, made when first asked for.
+    """
+
+    pixels: Array
+    first: int
+    pitch: int
+    rows: int
+    cols: int
+    reach: Array
+    offsets: bytes
+    leaves: Callable[[], Leaves | None]
+
+
+def lay_out(
+    machine: Machine, sample: Sample, offsets: NDArray[np.int32], spacing: int, phases: str, edges: str
+) -> Strip:
+    """The strip of a level's candidates: see `simdtex.model.sample.Sample.positions`."""
+    positions = sample.positions(offsets, spacing, phases, edges)
+    step = spacing if phases == "decimated" else 1
+    row, col = (int(n) for n in divmod(positions[0], sample.cols))
+    planes = sample.working.reshape(sample.channels, sample.rows, sample.cols)[
+        :, row % step :: step, col % step :: step
+    ]
+    pitch = planes.shape[2]
+    pixels = np.pad(planes.reshape(sample.channels, -1).astype(np.float32), ((0, 0), (0, TAIL)))
+    reach = (offsets[:, 0] * np.int32(pitch) + offsets[:, 1]) * np.int32(spacing // step)
+    wide = int(np.searchsorted(positions, (row + 1) * sample.cols))
+    first, reaches = row // step * pitch + col // step, machine.put(reach.astype(np.int32))
+    shape = (first, pitch, positions.size // wide, wide)
+    spread = (offsets[:, 0] * np.int32(sample.cols) + offsets[:, 1]) * np.int32(spacing)
+    leaves = cache(partial(grow, machine, sample.working, positions, spread, sample.top))
+    return Strip(machine.put(pixels), *shape, reaches, offsets.tobytes(), leaves)
 
 
 def slack(terms: int) -> np.float32:
@@ -57,6 +97,7 @@ def _reference(
     offsets: NDArray[np.int32],
     grid: Grid,
     candidates: Candidates,
+    strip: Strip,
     favour: np.float32,
 ) -> Relaxed:
     near = neighbourhood.neighbourhood.reference(sites, field, offsets, grid)
@@ -66,10 +107,17 @@ def _reference(
 
 
 def _launch(
-    machine: OpenCL, sites: Array, field: Field, offsets: Array, grid: Grid, candidates: Candidates, favour: np.float32
+    machine: Launcher,
+    sites: Array,
+    field: Field,
+    offsets: Array,
+    grid: Grid,
+    candidates: Candidates,
+    strip: Strip,
+    favour: np.float32,
 ) -> Relaxed:
     count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
-    strip, plane = candidates.strip, np.int32(candidates.rows * candidates.cols)
+    plane = np.int32(candidates.rows * candidates.cols)
     defines = {"V": machine.vector, "C": channels, "STEP": machine.step, "CHECK": CHECK}
     f, i, leaves = np.float32, np.int32, strip.leaves() if machine.skip else None
     near = machine.empty((count, neighbours * (1 + channels)), f)

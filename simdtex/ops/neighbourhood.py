@@ -4,16 +4,13 @@
 from __future__ import annotations
 
 from math import prod
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.lattice import Grid
-from simdtex.ops.operation import Array, Operation, touching
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
+from simdtex.machine.interface import Array, Launcher, Operation, touching
+from simdtex.model.lattice import Grid
 
 
 class Field(NamedTuple):
@@ -44,7 +41,7 @@ def _reference(sites: NDArray[np.int32], field: Field, offsets: NDArray[np.int32
     return Neighbourhoods(u, np.moveaxis(x * u, 0, 1), sites.size)
 
 
-def _launch(machine: OpenCL, sites: Array, field: Field, offsets: Array, grid: Grid) -> Neighbourhoods:
+def _launch(machine: Launcher, sites: Array, field: Field, offsets: Array, grid: Grid) -> Neighbourhoods:
     count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
     padded = -(-count // machine.vector) * machine.vector
     confidence = machine.empty((neighbours, padded), np.float32)

@@ -3,16 +3,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.ops.operation import Array, Operation, touching
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
+from simdtex.machine.interface import Array, Launcher, Operation, touching
 
 
 def _reference(planes: int, n: int, seed: int, level: int) -> NDArray[np.int32]:
@@ -20,7 +15,7 @@ def _reference(planes: int, n: int, seed: int, level: int) -> NDArray[np.int32]:
     return np.concatenate(draws)[:planes].view(np.int32)
 
 
-def _launch(machine: OpenCL, planes: int, n: int, seed: int, level: int) -> Array:
+def _launch(machine: Launcher, planes: int, n: int, seed: int, level: int) -> Array:
     values = machine.empty((planes, n), np.int32)
     machine.launch(
         machine.kernel("noise", "noise"),

@@ -3,17 +3,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.ops.matching import distance, each_of, match_ranks
-from simdtex.ops.operation import Array, Operation
 from simdtex.ops.sort import SCRATCH, local, sort
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
 
 COUNTERS = 3 * 2**11
 """Of a segment: for 11 bits in each of three passes."""
@@ -22,7 +17,7 @@ SHORT, LONG = 2**15, 2**22
 """Values of a segment that one work-item sorts where there are few of them, and where there are many."""
 
 
-def alone(machine: OpenCL, segments: int, n: int) -> bool:
+def alone(machine: Launcher, segments: int, n: int) -> bool:
     """Whether one work-item is to sort a whole segment; it changes no bit.
 
     It saves a dozen launches. A long segment is divided on a graphics processor, or where cores would go without one.
@@ -39,7 +34,7 @@ def _reference(
     return matched, distance.reference(values, matched)
 
 
-def _launch(machine: OpenCL, values: Array, first: Array, targets: Array) -> tuple[Array, Array]:
+def _launch(machine: Launcher, values: Array, first: Array, targets: Array) -> tuple[Array, Array]:
     segments, n = values.shape
     if not alone(machine, segments, n):
         matched = match_ranks.launch(machine, sort.launch(machine, values, first), targets)

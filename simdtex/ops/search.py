@@ -9,25 +9,21 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import prod
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.lattice import Grid
+from simdtex.machine.interface import Array, Launcher, Machine, Operation
+from simdtex.model.lattice import Grid
+from simdtex.model.sample import Candidates
 from simdtex.ops import lcpdf
 from simdtex.ops.arithmetic import fma32
 from simdtex.ops.commit import commit
 from simdtex.ops.lcpdf import Distances, Relaxed, Window
 from simdtex.ops.neighbourhood import Field, Neighbourhoods
-from simdtex.ops.operation import Array, Operation
 from simdtex.ops.temperature import temperature
-from simdtex.sample import Candidates
-
-if TYPE_CHECKING:
-    from simdtex.machine import Machine
-    from simdtex.machine.opencl import OpenCL
 
 LANES = 16
 """Partial sums of a distance: one for each column, modulo 16, of the square around a neighbourhood."""
@@ -172,7 +168,7 @@ def _most_similar_reference(
 
 
 def _most_similar_launch(
-    machine: OpenCL, distances: Distances, candidates: Candidates, first: int, found: Array
+    machine: Launcher, distances: Distances, candidates: Candidates, first: int, found: Array
 ) -> Array:
     machine.launch(
         machine.kernel("search", "search_similar"),
@@ -305,7 +301,7 @@ def _reference(
 
 
 def _launch(
-    machine: OpenCL,
+    machine: Launcher,
     sites: Array,
     bounds: NDArray[np.int64],
     field: Field,
@@ -323,7 +319,7 @@ def _launch(
 
 
 def _apart_launch(
-    machine: OpenCL,
+    machine: Launcher,
     sites: Array,
     field: Field,
     weighed: Array,
@@ -345,7 +341,7 @@ def _apart_launch(
     return relaxed, cooled
 
 
-def _defines(machine: OpenCL, field: Field, table: Table, grid: Grid) -> dict[str, int]:
+def _defines(machine: Launcher, field: Field, table: Table, grid: Grid) -> dict[str, int]:
     slots = table.suggesting if table.exhaustive else table.slots
     whole = -(-slots // 64) * 64  # so that few programs serve all
     defines = {"C": len(field.values), "RADIUS": table.disc.shape[0] // 2, "SLOTS": whole, "V": machine.vector}
@@ -354,7 +350,7 @@ def _defines(machine: OpenCL, field: Field, table: Table, grid: Grid) -> dict[st
 
 
 def _arguments(
-    machine: OpenCL,
+    machine: Launcher,
     sites: Array,
     field: Field,
     weighed: Array,

@@ -4,15 +4,12 @@
 from __future__ import annotations
 
 from math import prod
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.ops.operation import Array, Operation
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
+from simdtex.machine.interface import Array, Launcher, Operation
 
 TYPES = {"uint8": "uchar", "uint16": "ushort", "int32": "int"}
 
@@ -22,7 +19,7 @@ def _reference(picture: NDArray[Any], height: int) -> NDArray[Any]:
     return np.ascontiguousarray(np.concatenate([now, now], -2))  # rows may have been laid out in any way
 
 
-def _launch(machine: OpenCL, picture: Array, height: int) -> Array:
+def _launch(machine: Launcher, picture: Array, height: int) -> Array:
     *planes, rows, width = picture.shape
     plane, count = height * width, prod(planes)
     stacked = picture if rows == 2 * height else machine.empty((*planes, 2 * height, width), picture.dtype)

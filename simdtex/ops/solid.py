@@ -10,17 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from math import prod
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.machine.interface import Array, Launcher, Operation, Work, touching
 from simdtex.ops.fold import folded
 from simdtex.ops.laplacian import within
-from simdtex.ops.operation import Array, Operation, Work, touching
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
 
 MOST_ITEMS = 2**21
 """Work-items of a launch, about: so that none is long on a slow device."""
@@ -106,7 +102,7 @@ def _work(size: tuple[int, int], fma: int | None, values: int) -> Work:
     return Work(None if fma is None else float(fma * items), 4.0 * values * items)
 
 
-def _launch_reduce(machine: OpenCL, fine: Array, torus: bool) -> Array:
+def _launch_reduce(machine: Launcher, fine: Array, torus: bool) -> Array:
     depth, rows, cols = above(fine.shape, torus)
     coarse = machine.empty((depth, rows, cols), np.int32)
     kernel = machine.kernel("solid", "solid_reduce")
@@ -116,7 +112,7 @@ def _launch_reduce(machine: OpenCL, fine: Array, torus: bool) -> Array:
     return coarse
 
 
-def _launch_expanded(machine: OpenCL, function: str, known: Array, coarse: Array, torus: bool) -> Array:
+def _launch_expanded(machine: Launcher, function: str, known: Array, coarse: Array, torus: bool) -> Array:
     result = machine.empty(known.shape, np.int32)
     if torus and any(n % 2 for n in known.shape):
         sign = 1 if function == "solid_collapse" else -1
@@ -133,15 +129,15 @@ def _launch_expanded(machine: OpenCL, function: str, known: Array, coarse: Array
     return result
 
 
-def _launch_band(machine: OpenCL, fine: Array, coarse: Array, torus: bool) -> Array:
+def _launch_band(machine: Launcher, fine: Array, coarse: Array, torus: bool) -> Array:
     return _launch_expanded(machine, "solid_band", fine, coarse, torus)
 
 
-def _launch_collapse(machine: OpenCL, band: Array, coarse: Array, torus: bool) -> Array:
+def _launch_collapse(machine: Launcher, band: Array, coarse: Array, torus: bool) -> Array:
     return _launch_expanded(machine, "solid_collapse", band, coarse, torus)
 
 
-def _launch_turn(machine: OpenCL, block: Array, axes: Sequence[int]) -> Array:
+def _launch_turn(machine: Launcher, block: Array, axes: Sequence[int]) -> Array:
     steps = (block.shape[1] * block.shape[2], block.shape[2], 1)
     depth, rows, cols = (block.shape[axis] for axis in axes)
     turned = machine.empty((depth, rows, cols), np.int32)
@@ -152,7 +148,7 @@ def _launch_turn(machine: OpenCL, block: Array, axes: Sequence[int]) -> Array:
     return turned
 
 
-def _launch_mean(machine: OpenCL, blocks: Sequence[Array]) -> Array:
+def _launch_mean(machine: Launcher, blocks: Sequence[Array]) -> Array:
     k = len(blocks)
     _check_count(k)
     mean = machine.empty(blocks[0].shape, np.int32)

@@ -3,15 +3,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.ops.operation import Array, Operation, Work
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
+from simdtex.machine.interface import Array, Launcher, Operation, Work
 
 SCRATCH = 2**22
 """Values that are sorted together, unless one segment has more: 16 bytes each for keys and indices, twice."""
@@ -20,7 +15,7 @@ DIGITS = 256
 """Values of the 8 bits that a pass sorts by."""
 
 
-def run_length(machine: OpenCL, segments: int, n: int) -> int:
+def run_length(machine: Launcher, segments: int, n: int) -> int:
     """How many values of a segment a work-item takes in turn; it changes no bit.
 
     Enough work-items to fill the device, but no run so short that its table of counters is the greater work.
@@ -31,7 +26,7 @@ def run_length(machine: OpenCL, segments: int, n: int) -> int:
     return -(-n // runs)
 
 
-def local(machine: OpenCL) -> tuple[int]:
+def local(machine: Launcher) -> tuple[int]:
     """Work-items of a group where each takes a run: on a processor a few long ones are to be shared out."""
     return (64,) if machine.info.kind == "gpu" else (1,)
 
@@ -40,7 +35,7 @@ def _reference(values: NDArray[np.int32], first: NDArray[np.int32]) -> NDArray[n
     return first[np.argsort(values[:, first], axis=1, kind="stable")]
 
 
-def _launch(machine: OpenCL, values: Array, first: Array) -> Array:
+def _launch(machine: Launcher, values: Array, first: Array) -> Array:
     segments, n = values.shape
     order = machine.empty((segments, n), np.int32)
     most = min(segments, max(1, SCRATCH // max(n, DIGITS)))

@@ -3,18 +3,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.lattice import Grid
+from simdtex.machine.interface import Array, Launcher, Operation
+from simdtex.model.lattice import Grid
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.operation import Array, Operation
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
 
 
 def _reference(pixels: NDArray[np.float32], positions: NDArray[np.int32], grid: Grid, seed: int) -> Field:
@@ -24,7 +19,7 @@ def _reference(pixels: NDArray[np.float32], positions: NDArray[np.int32], grid: 
     return Field(pixels[:, source].astype(np.uint16), source, np.full(shape, 1024, np.uint16))
 
 
-def _launch(machine: OpenCL, pixels: Array, positions: Array, grid: Grid, seed: int) -> Field:
+def _launch(machine: Launcher, pixels: Array, positions: Array, grid: Grid, seed: int) -> Field:
     channels, plane = pixels.shape
     shape = (grid.height, grid.width)
     field = Field(

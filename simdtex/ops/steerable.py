@@ -2,7 +2,7 @@
 """The steerable pyramid of Simoncelli and Freeman in whole numbers: its filters, and their transposes.
 
 Pictures are (planes, rows, cols) int32, bands (bands, planes, rows, cols) int32, and taps (bands, side, side) float32
-with an odd side, from `simdtex.steerable_filters`. Sums are float32, over terms, bands, tap rows and tap columns in
+with an odd side, from `simdtex.ops.steerable_filters`. Sums are float32, over terms, bands, tap rows and tap columns in
 this order, each step an fma. They are rounded to whole numbers in the end, and must fit 32 bits. Taps are multiples of
 2**-24, so the twin has each step exactly in double precision, as long as sums stay below 2**28.
 """
@@ -10,16 +10,13 @@ this order, each step an fma. They are rounded to whole numbers in the end, and 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.machine.interface import Array, Launcher, Operation, Work
 from simdtex.ops.laplacian import within
-from simdtex.ops.operation import Array, Operation, Work
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
 
 PADDED = 2**24
 """Most float32 values that are laid out at a time, fewer where the machine's scratch memory is smaller."""
@@ -73,7 +70,7 @@ def _sizes(*numbers: int) -> tuple[np.int32, ...]:
     return tuple(np.int32(n) for n in numbers)
 
 
-def _pieces(machine: OpenCL, planes: int, rows: int, line: int, extra: int, unit: int) -> Iterator[tuple[int, ...]]:
+def _pieces(machine: Launcher, planes: int, rows: int, line: int, extra: int, unit: int) -> Iterator[tuple[int, ...]]:
     """Planes, or rows of a plane, that fit in scratch memory: first plane, planes, first row, rows.
 
     A row takes `line` values, and a piece `extra` rows more than its own, which are whole units.
@@ -86,7 +83,7 @@ def _pieces(machine: OpenCL, planes: int, rows: int, line: int, extra: int, unit
             yield first, min(together, planes - first), first_row, min(strip, rows - first_row)
 
 
-def _launch_split(machine: OpenCL, picture: Array, taps: Array, torus: bool, step: int) -> Array:
+def _launch_split(machine: Launcher, picture: Array, taps: Array, torus: bool, step: int) -> Array:
     planes, *size = picture.shape
     count, side, _ = taps.shape
     rows, cols = (-(-n // step) for n in size)
@@ -121,7 +118,7 @@ def _launch_split(machine: OpenCL, picture: Array, taps: Array, torus: bool, ste
 
 
 def _launch_join(
-    machine: OpenCL, terms: Sequence[tuple[Array, Array, int]], shape: tuple[int, int], torus: bool
+    machine: Launcher, terms: Sequence[tuple[Array, Array, int]], shape: tuple[int, int], torus: bool
 ) -> Array:
     planes, (rows, cols) = terms[0][0].shape[1], shape
     picture = machine.empty((planes, rows, cols), np.int32)

@@ -3,17 +3,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.lattice import Grid
+from simdtex.machine.interface import Array, Launcher, Operation
+from simdtex.model.lattice import Grid
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.operation import Array, Operation
-
-if TYPE_CHECKING:
-    from simdtex.machine.opencl import OpenCL
 
 
 def _reference(
@@ -26,7 +21,7 @@ def _reference(
     return cooled
 
 
-def _launch(machine: OpenCL, sites: Array, field: Field, offsets: Array, grid: Grid, xi: int) -> Array:
+def _launch(machine: Launcher, sites: Array, field: Field, offsets: Array, grid: Grid, xi: int) -> Array:
     cooled = machine.empty((sites.size,), np.uint16)
     machine.launch_sites(
         ("temperature", "temperature"),

@@ -14,10 +14,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Plot
 from numpy.typing import NDArray
 
-from simdtex.comparison import Spread
-from simdtex.estimates import FAIR, LEVEL, Estimate, Finding
-from simdtex.exact import CRITICAL
-from simdtex.methods.ising import Chains
+from simdtex.experiments.comparison import Spread
+from simdtex.experiments.estimates import FAIR, LEVEL, Estimate, Finding
+from simdtex.experiments.ising import Chains
+from simdtex.experiments.onsager import CRITICAL
 from simdtex.report.page import Figure, Section, Table, Text, write_report
 from simdtex.report.plots import INK, dots, figure_png, named_rows, new_figure, styles, tidy
 

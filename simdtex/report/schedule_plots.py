@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
-from simdtex.comparison import Comparison, Entry, Spread, Sweep
-from simdtex.image import to_display
+from simdtex.experiments.comparison import Comparison, Entry, Spread, Sweep
+from simdtex.io.image import to_display
 from simdtex.report.plots import Curve, curves, dots, figure_png, legend, named_rows, new_figure, styles, tidy
 from simdtex.report.sheet import contact_sheet
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import rich.table
 
 from simdtex import __version__
-from simdtex.comparison import Comparison, Entry, Spread
+from simdtex.experiments.comparison import Comparison, Entry, Spread
 from simdtex.report import schedule_plots as plots
 from simdtex.report.page import Figure, Section, Table, Text, write_report
 
@@ -42,7 +42,7 @@ FIGURES, PERCENT, THREE, TWO = Form(), Form(2, 100, " %"), Form(3), Form(2)
 
 
 class Column(NamedTuple):
-    """A column of the tables: a figure of `simdtex.comparison.FIGURES`, its heads on the page and the terminal."""
+    """A column of the tables: a figure of `FIGURES` of the comparison, its heads on the page and the terminal."""
 
     figure: str
     head: str

@@ -16,7 +16,7 @@ import PIL.ImageDraw
 import PIL.ImageFont
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.image import atomic_path, check_writable, to_display, write
+from simdtex.io.image import atomic_path, check_writable, to_display, write
 
 __all__ = [
     "animation",

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 
-from simdtex.image import check_writable, to_display, write
+from simdtex.io.image import check_writable, to_display, write
 from simdtex.report.sheet import GAP, LEAST_SIDE, MOST_SIDE, contact_sheet, fitted
 
 __all__ = ["view"]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.image import to_display, write
+from simdtex.io.image import to_display, write
 from simdtex.report.folder import earlier_files
 from simdtex.report.sheet import (
     FRAME_SIDE,

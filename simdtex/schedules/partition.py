@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.lattice import Grid
+from simdtex.model.lattice import Grid
 from simdtex.ops.coloring import coloring
 from simdtex.options import whole
 from simdtex.schedules.schedule import Active, Info

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.lattice import Grid
+from simdtex.model.lattice import Grid
 from simdtex.ops.luby import luby
 from simdtex.schedules.partition import neighbourless
 from simdtex.schedules.schedule import Active, Info

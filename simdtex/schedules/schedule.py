@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.lattice import Grid
+from simdtex.model.lattice import Grid
 
 Active = Callable[[], NDArray[np.bool_]]
 """``active()`` tells, per site of the grid (rows, cols), whether it wants relaxing now; its array never changes."""

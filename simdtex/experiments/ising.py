@@ -1,0 +1,294 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The Ising model by heat-bath relaxation under any schedule: what a schedule samples, against what is known exactly.
+
+The conditional distributions are as simple as can be, so whatever is wrong with a result is the schedule's doing.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex import random, schedules
+from simdtex.machine import Machine
+from simdtex.machine.interface import Array
+from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.ops.ising import heat_bath_chances, ising_commit, ising_relax, ising_sequence
+from simdtex.ops.snapshot import snapshot
+from simdtex.options import one_of, real, whole
+
+STARTS = ("up", "random")
+
+AT_ONCE = 2**22
+"""Relaxations in one launch at most, so that none is long."""
+
+QUEUE = 2**16
+"""Steps in one launch of `ising_sequence` at most: one work-item does them all."""
+
+
+@dataclass(frozen=True)
+class Chains:
+    """Markov chains of the Ising model: T temperatures, R chains at each, n sweeps after the burn-in.
+
+    Attributes
+    ----------
+    schedule : str
+    independent : bool
+        Whether the schedule keeps equation (14) on this lattice.
+    temperatures : (T,) float64 array
+        In units of J / k_B.
+    boundary : str
+    energy : (T, R, n) float64 array
+        Energy per spin after each sweep, in units of J.
+    lagged : (T, R, n) float64 array
+        The same with one spin of each bond taken before the sweep and the other after it.
+    even, odd : (T, R, n) float64 array
+        Mean spin of the sublattices whose row + column is even and odd.
+    spins : (T, R, H, W) uint8 array
+        In the end, 0 down and 1 up.
+    steps, relaxations, launches : int
+        Of the schedule; sites of all those steps, in one chain; kernels enqueued.
+    seconds : float
+    """
+
+    schedule: str
+    independent: bool
+    temperatures: NDArray[np.float64]
+    boundary: str
+    energy: NDArray[np.float64]
+    lagged: NDArray[np.float64]
+    even: NDArray[np.float64]
+    odd: NDArray[np.float64]
+    spins: NDArray[np.uint8]
+    steps: int
+    relaxations: int
+    launches: int
+    seconds: float
+
+    @property
+    def magnetisation(self) -> NDArray[np.float64]:
+        """(T, R, n) mean spin."""
+        height, width = self.spins.shape[-2:]
+        even = (height * width + 1) // 2
+        whole: NDArray[np.float64] = (self.even * even + self.odd * (height * width - even)) / (height * width)
+        return whole
+
+
+def ising(
+    machine: Machine,
+    size: tuple[int, int],
+    temperatures: Sequence[float],
+    schedule: str | schedules.Schedule,
+    *,
+    seeds: int = 16,
+    sweeps: int = 1000,
+    burn_in: int = 500,
+    seed: int = 1,
+    boundary: str = "torus",
+    start: str = "up",
+    callback: Callable[[float], Any] | None = None,
+) -> Chains:
+    """Relax Ising spins by a schedule, and measure after every sweep.
+
+    Parameters
+    ----------
+    machine : Machine
+    size : (int, int)
+        Rows and columns, 2 or more.
+    temperatures : sequence of float
+        Above 0, in units of J / k_B. All run side by side; none changes another's result.
+    schedule : str or simdtex.schedules.Schedule
+    seeds : int
+        R, independent chains at each temperature; they share the schedule's choices.
+    sweeps, burn_in : int
+        Sweeps that are measured, 1 or more, and sweeps before them.
+    seed : int
+        0 to 2**64 - 1; keys every random number.
+    boundary : {"torus", "open"}
+    start : {"up", "random"}
+        All spins up, which below T_c is close to equilibrium, or each by the toss of a coin, which may freeze into
+        stripes there.
+    callback : callable, optional
+        Called with the share of the work that is done after every sweep.
+
+    Returns
+    -------
+    Chains
+
+    Raises
+    ------
+    ValueError, TypeError
+        A value is out of range; the sentence names the remedy.
+
+    Notes
+    -----
+    Each step draws the spins of its sites from their conditional distributions, P(up) = 1 / (1 + exp(-2 S / T)) for
+    neighbours that sum to S. The energy is -(1/N) times the sum over bonds of the product of their spins. The same bits
+    on every machine.
+
+    Cost: sweeps x sites x chains draws, and reading back the spins after every sweep that is measured. Steps of one
+    site that follow one another cost one launch together. Memory: up to 3 bytes per spin on the device, some 20 on the
+    host, and 32 there per chain and sweep.
+    """
+    check(size, temperatures, seeds, sweeps, burn_in, boundary, start)
+    machine.require(3 * size[0] * size[1] * seeds * len(temperatures))
+    began, launches = time.perf_counter(), machine.launches
+    schedule = schedules.get(schedule)
+    grid, offsets = Grid(*size, torus=boundary == "torus"), neighbourhood_offsets(1)
+    count = len(temperatures)
+    chances = heat_bath_chances(temperatures, len(offsets))
+    run = _Run(machine, grid, machine.put(offsets), machine.put(chances), seed, schedule)
+    spins = machine.put(np.tile(_first(size, seeds, seed, start), (count, 1, 1)))
+    state = schedule.init(machine, grid, offsets, 1, seed, 0)
+
+    measured = np.empty((sweeps, 4, count * seeds))
+    now = machine.get(spins)[:, : grid.height]
+    for sweep in range(burn_in + sweeps):
+        spins, state = run.sweep(spins, state)
+        k = sweep - burn_in
+        if k >= -1:
+            before, now = now, machine.get(spins)[:, : grid.height]
+        if k >= 0:
+            measured[k] = _measure(before, now, grid)
+        if callback:
+            callback((sweep + 1) / (burn_in + sweeps))
+    energy, lagged, even, odd = np.moveaxis(measured.reshape(sweeps, 4, count, seeds), 0, -1)
+    return Chains(
+        schedule=schedule.name,
+        independent=schedule.independent(grid, offsets),
+        temperatures=np.array(temperatures, np.float64),
+        boundary=boundary,
+        energy=energy,
+        lagged=lagged,
+        even=even,
+        odd=odd,
+        spins=now.reshape(count, seeds, *size),
+        steps=run.steps,
+        relaxations=run.relaxations,
+        launches=machine.launches - launches,
+        seconds=time.perf_counter() - began,
+    )
+
+
+@dataclass
+class _Run:
+    """What stays the same throughout a run, and what it has done so far."""
+
+    machine: Machine
+    grid: Grid
+    offsets: Array
+    chances: Array
+    seed: int
+    schedule: schedules.Schedule
+    steps: int = 0
+    relaxations: int = 0
+
+    def __post_init__(self) -> None:
+        self.everywhere = np.ones((self.grid.rows, self.grid.cols), bool)
+
+    def sweep(self, spins: Array, state: Any) -> tuple[Array, Any]:
+        """A sweep of the schedule."""
+        queue: list[tuple[int, int]] = []
+        old = False
+        while True:
+            state, info = self.schedule.step(state, lambda: self.everywhere)
+            self.steps += 1
+            self.relaxations += info.sites.size
+            if info.tile and not old:  # what tiles see of one another until the sweep ends
+                spins, old = snapshot(self.machine, self._flush(spins, queue), self.grid.height), True
+            if info.sites.size == 1 and not info.tile:
+                queue.append((int(info.sites[0]), info.turn))
+            elif info.sites.size:
+                spins = self._step(self._flush(spins, queue), info)
+            if info.last:
+                return self._flush(spins, queue), state
+
+    def _step(self, spins: Array, info: schedules.Info) -> Array:
+        """Relax the sites of a step, every old value read before the first new one is written."""
+        machine, grid = self.machine, replace(self.grid, tile=info.tile)
+        most = max(1, AT_ONCE // spins.shape[0])
+        relaxed = []
+        for k in range(0, info.sites.size, most):
+            sites = machine.put(info.sites[k : k + most])
+            drawn = ising_relax(machine, spins, sites, self.offsets, grid, self.chances, self.seed, info.turn)
+            relaxed.append((sites, drawn))
+            self._sync(sites.size, spins)
+        for sites, drawn in relaxed:
+            spins = ising_commit(machine, spins, sites, drawn)
+        return spins
+
+    def _flush(self, spins: Array, queue: list[tuple[int, int]]) -> Array:
+        """Do the steps of one site each that have been put off; the queue is empty then."""
+        most = min(QUEUE, max(1, 4 * AT_ONCE // spins.shape[0]))
+        for k in range(0, len(queue), most):
+            part = np.array(queue[k : k + most], np.uint32).view(np.int32)
+            put = self.machine.put(part)
+            spins = ising_sequence(self.machine, spins, put, self.offsets, self.grid, self.chances, self.seed)
+            self._sync(len(part), spins)
+        queue.clear()
+        return spins
+
+    def _sync(self, sites: int, spins: Array) -> None:
+        self.machine.sync(100 * sites * int(spins.shape[0]))  # a draw is about as much work as 100 fma
+
+
+def _first(size: tuple[int, int], seeds: int, seed: int, start: str) -> NDArray[np.uint8]:
+    """(seeds, H, W) spins before the first sweep."""
+    if start == "up":
+        return np.ones((seeds, *size), np.uint8)
+    bits = random.draw4(seed, 0, 0, np.arange(size[0] * size[1]), random.START, np.arange(seeds)[:, None])[0]
+    return (bits >> np.uint32(31)).astype(np.uint8).reshape(seeds, *size)
+
+
+def _measure(before: NDArray[np.uint8], now: NDArray[np.uint8], grid: Grid) -> NDArray[np.float64]:
+    """(4, chains): energy, energy across the sweep, and the mean spins of the even and the odd sublattice."""
+    old, new = (2 * spins.astype(np.int8) - 1 for spins in (before, now))
+    sites = grid.rows * grid.cols
+    parity = np.indices((grid.rows, grid.cols)).sum(0) % 2
+    total = new.sum((1, 2), dtype=np.int64)
+    odd = new[:, parity == 1].sum(1, dtype=np.int64)
+    energies = [-(new * _field(spins, grid.torus)).sum((1, 2), dtype=np.int64) / (2 * sites) for spins in (new, old)]
+    return np.stack([*energies, (total - odd) / ((sites + 1) // 2), odd / (sites // 2)])
+
+
+def _field(spins: NDArray[np.int8], torus: bool) -> NDArray[np.int8]:
+    """The sum of each site's neighbours."""
+    if torus:
+        return np.asarray(sum(np.roll(spins, by, axis) for axis in (1, 2) for by in (1, -1)), np.int8)
+    field = np.zeros_like(spins)
+    field[:, 1:] += spins[:, :-1]
+    field[:, :-1] += spins[:, 1:]
+    field[:, :, 1:] += spins[:, :, :-1]
+    field[:, :, :-1] += spins[:, :, 1:]
+    return field
+
+
+def check(
+    size: tuple[int, int],
+    temperatures: Sequence[float],
+    seeds: int,
+    sweeps: int,
+    burn_in: int,
+    boundary: str = "torus",
+    start: str = "up",
+) -> None:
+    """Raise ValueError or TypeError where `ising` would, but for the schedule, in one sentence."""
+    for side in size:
+        whole("a side of the lattice", side, 2)
+    if not len(temperatures):
+        raise ValueError("there is no temperature; give one at least, say 2.0")
+    for temperature in temperatures:
+        real("temperature", temperature, 0, above=True)
+    whole("seeds", seeds, 1)
+    whole("sweeps", sweeps, 1)
+    whole("burn_in", burn_in, 0)
+    one_of("boundary", boundary, ("torus", "open"))
+    one_of("start", start, STARTS)
+    spins = size[0] * size[1] * seeds * len(temperatures)
+    if 2 * spins >= 2**31:
+        raise ValueError(f"{spins} spins in all are too many; give a smaller size or fewer seeds, below 2**30 in all")

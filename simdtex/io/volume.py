@@ -1,0 +1,327 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Reading and writing solid textures without changing a single value of them.
+
+A volume is an array (depth, rows, cols) or (depth, rows, cols, channels): x-y slices one behind the other, each like a
+picture with row 0 at the top. x is the column, y the row, z the depth.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import secrets
+import shutil
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import imagecodecs
+import nrrd
+import numpy as np
+import tifffile
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from simdtex.io import image
+from simdtex.io.decode import native
+
+__all__ = ["check_writable", "read", "write"]
+
+Array = NDArray[Any]
+PathLike = str | os.PathLike[str]
+
+KEY = "volume"
+"""The name of the array in an ``.npz`` file."""
+
+_WHOLE = frozenset(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))
+_NRRD = _WHOLE | {"float32", "float64"}
+# suffix, "" for a folder of slices: the types and the numbers of channels it holds without loss; None is any
+_FORMATS: dict[str, tuple[frozenset[str] | None, tuple[int, ...] | None]] = {
+    ".npz": (None, None),
+    ".npy": (None, None),
+    ".tif": (_NRRD | {"float16"}, None),
+    ".tiff": (_NRRD | {"float16"}, None),
+    ".nrrd": (_NRRD, None),
+    "": (frozenset({"uint8", "uint16"}), (1, 2, 3, 4)),
+}
+_SLICE = re.compile(r"slice-([0-9]{3,})\.png")
+_BIG = 2**32 - 2**25  # bytes from which on a TIFF must be a BigTIFF
+
+
+# ---------------------------------------------------------------- writing
+
+
+def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int | None = None) -> None:
+    """Find out before long work whether its result can be written there.
+
+    Parameters
+    ----------
+    path : path
+        The file, or the folder of slices, to be written later; nothing is created now.
+    dtype : dtype, optional
+        The type of the values; None leaves it unchecked.
+    channels : int, optional
+        The number of channels; None leaves it unchecked.
+
+    Raises
+    ------
+    ValueError
+        The suffix names no format that holds such values, or the place cannot be written; a folder is only replaced
+        where nothing but slices is in it.
+    """
+    target = Path(path)
+    suffix = target.suffix.lower()
+    if suffix not in _FORMATS:
+        raise ValueError(
+            f"{target} ends in {target.suffix}: end its name in one of {', '.join(sorted(filter(None, _FORMATS)))}, "
+            "or give a name without suffix for a folder of PNG slices"
+        )
+    if not suffix and os.path.isdir(target):
+        _check_folder(target)
+    else:
+        image.check_writable(target, suffixes=(suffix,))
+        if not suffix and target.exists():
+            raise ValueError(f"{target} is a file: give another name for the folder of slices, or a suffix")
+    if _holds(suffix, dtype, channels):
+        return
+    other = next(s for s in (".nrrd", ".tif", ".npz") if _holds(s, dtype, channels))
+    what = "values" if dtype is None else f"{np.dtype(dtype)} values"
+    if channels is not None:
+        what += f" of {channels} channel" + "s" * (channels != 1)
+    raise ValueError(f"{target}: {suffix or 'PNG slices'} cannot hold {what}: end its name in {other} instead")
+
+
+def _holds(suffix: str, dtype: DTypeLike | None, channels: int | None) -> bool:
+    types, counts = _FORMATS[suffix]
+    return (dtype is None or types is None or np.dtype(dtype).name in types) and (
+        channels is None or counts is None or channels in counts
+    )
+
+
+def _check_folder(target: Path) -> None:
+    if any(not _SLICE.fullmatch(name) for name in os.listdir(target)):
+        raise ValueError(f"{target} is a folder with other files in it: give a new name for the folder of slices")
+    if not os.access(os.path.dirname(os.path.realpath(target)), os.W_OK | os.X_OK):
+        raise ValueError(f"the folder {target.parent} is not writable: choose another folder")
+
+
+def write(path: PathLike, volume: ArrayLike, channel_axis: int | None = None) -> None:
+    """Write a solid texture in the format that the suffix names, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        ``.npz`` (compressed, key ``"volume"``) or ``.npy``, of any type; ``.tif`` ``.tiff``, a page for each slice, of
+        any type but bool; ``.nrrd``, whole numbers and floats of 32 and 64 bits; or a name without suffix for a folder
+        of slices ``slice-000.png``, 8 or 16 bits, up to 4 channels. A folder of slices that is there is replaced.
+    volume : array_like, (depth, rows, cols) or with channels
+        Real numbers, written as they are.
+    channel_axis : int, optional
+        The axis of the channels; None takes the last one of four.
+
+    Raises
+    ------
+    TypeError
+        The values are not real numbers.
+    ValueError
+        The path cannot be written, or its format cannot hold such values; it names one that can.
+
+    Notes
+    -----
+    A single channel is written as none, but in ``.npz`` and ``.npy``. In an NRRD file x runs fastest, then y, then z,
+    with the channels as a vector before them: what ParaView, 3D Slicer and Fiji expect. It is not compressed, because
+    not every version of ParaView decompresses.
+    """
+    values = _checked(volume, channel_axis)
+    check_writable(path, values.dtype, values.shape[3] if values.ndim == 4 else 1)
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".npz", ".npy") and values.ndim == 4 and values.shape[3] == 1:
+        values = values[..., 0]
+    try:
+        with _folder(Path(path)) if not suffix else image.atomic_path(path) as temporary:
+            _ENCODERS[suffix](temporary, values)
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else str(error)
+        remedy = "free some space" if error.errno == errno.ENOSPC else "choose another path"
+        raise ValueError(f"{os.fspath(path)} could not be written ({reason}): {remedy}") from None
+
+
+def _checked(volume: ArrayLike, channel_axis: int | None) -> Array:
+    """The values with their channels, if any, last; contiguous."""
+    values = np.asarray(volume)
+    if values.dtype.kind not in "buif":
+        raise TypeError(f"the volume holds {values.dtype} values: give integers or real floats")
+    if values.ndim not in (3, 4) or values.size == 0:
+        raise ValueError(
+            f"the volume has the shape {values.shape}: give (depth, rows, cols) or (depth, rows, cols, channels)"
+        )
+    if channel_axis is not None:
+        if values.ndim != 4 or not -4 <= channel_axis < 4:
+            raise ValueError(
+                f"channel_axis is {channel_axis} and the volume has {values.ndim} axes: give None, or one of four axes"
+            )
+        values = np.moveaxis(values, channel_axis, -1)
+    return native(values)
+
+
+@contextmanager
+def _folder(target: Path) -> Iterator[Path]:
+    """Give an empty folder beside `target`, and rename it to `target` when the block succeeds."""
+    target = Path(os.path.realpath(target))
+    temporary, old = (target.with_name(f".{secrets.token_hex(8)}") for _ in range(2))
+    try:
+        temporary.mkdir()
+        yield temporary
+        try:
+            if target.exists():
+                target.rename(old)
+            temporary.rename(target)
+        except BaseException:
+            if old.exists() and not target.exists():
+                old.rename(target)
+            raise
+    finally:
+        for folder in (temporary, old):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _write_npz(path: Path, values: Array) -> None:
+    with path.open("wb") as file:  # NumPy would add its own suffix to a name in capitals
+        np.savez_compressed(file, volume=values)
+
+
+def _write_npy(path: Path, values: Array) -> None:
+    with path.open("wb") as file:
+        np.save(file, values, allow_pickle=False)
+
+
+def _write_tiff(path: Path, values: Array) -> None:
+    channels = values.shape[3] if values.ndim == 4 else 1
+    colours = 3 if channels in (3, 4) else 1
+    with tifffile.TiffWriter(path, bigtiff=values.nbytes > _BIG) as file:
+        for page in values:
+            file.write(
+                page,
+                photometric="rgb" if colours == 3 else "minisblack",
+                planarconfig="contig" if channels > 1 else None,
+                # a second or fourth channel is alpha, more than four are plain numbers
+                extrasamples=(["unassalpha"] if channels in (2, 4) else [0] * (channels - colours)) or None,
+                compression="zlib",
+                metadata=None,
+            )
+
+
+def _write_nrrd(path: Path, values: Array) -> None:
+    # without the fields of a space: VTK would read the sizes of a vector volume wrongly after them
+    header = {"encoding": "raw", "kinds": ["vector"] * (values.ndim - 3) + ["domain"] * 3}
+    with warnings.catch_warnings(), path.open("wb") as file:
+        warnings.simplefilter("ignore", DeprecationWarning)  # pynrrd asks for the time in an old way
+        nrrd.write(file, values, header, index_order="C")
+
+
+def _write_slices(path: Path, values: Array) -> None:
+    digits = max(3, len(str(len(values) - 1)))
+    for number, picture in enumerate(values):
+        image.write(path / f"slice-{number:0{digits}}.png", picture)
+
+
+_ENCODERS: dict[str, Callable[[Path, Array], None]] = {
+    ".npz": _write_npz,
+    ".npy": _write_npy,
+    ".tif": _write_tiff,
+    ".tiff": _write_tiff,
+    ".nrrd": _write_nrrd,
+    "": _write_slices,
+}
+
+
+# ---------------------------------------------------------------- reading
+
+
+def read(path: PathLike) -> Array:
+    """Read a solid texture that `write` or another program has written.
+
+    Parameters
+    ----------
+    path : path
+        A file ``.npz`` (key ``"volume"``, or its only array), ``.npy``, ``.tif``, ``.tiff`` (a page for each slice) or
+        ``.nrrd``, or a folder of slices ``slice-000.png``, ...
+
+    Returns
+    -------
+    ndarray, (depth, rows, cols) or (depth, rows, cols, channels)
+        The values with their type, in native byte order.
+
+    Raises
+    ------
+    ValueError
+        There is no such file or folder, it is damaged, or does not hold a volume.
+    """
+    target = Path(path)
+    folder = os.path.isdir(target)
+    suffix = "" if folder else target.suffix.lower()
+    if not os.path.exists(target):
+        raise ValueError(f"{target} does not exist: check the path of the volume")
+    if suffix not in _DECODERS or (not suffix and not folder):
+        raise ValueError(
+            f"{target} is of no kind that is known here: give a folder of slices, or a file that ends in one of "
+            f"{', '.join(sorted(filter(None, _DECODERS)))}"
+        )
+    try:
+        return _checked(_DECODERS[suffix](target), None)
+    except OSError as error:
+        reason = os.strerror(error.errno) if error.errno else _one_line(error)
+        raise ValueError(f"{target} cannot be read ({reason}): check the file") from None
+    except Exception as error:  # every decoder has its own exceptions for a damaged file
+        raise ValueError(f"{target} cannot be read as a volume ({_one_line(error)}): write it again") from None
+
+
+def _one_line(error: BaseException) -> str:
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) <= 200 else text[:197] + "..."
+
+
+def _read_npz(path: Path) -> Array:
+    with np.load(path, allow_pickle=False) as arrays:
+        names = list(arrays)
+        if KEY not in names and len(names) != 1:
+            raise ValueError(f"it has the arrays {', '.join(names)} and none called {KEY}")
+        return np.asarray(arrays[KEY if KEY in names else names[0]])
+
+
+def _read_npy(path: Path) -> Array:
+    return np.asarray(np.load(path, allow_pickle=False))
+
+
+def _read_tiff(path: Path) -> Array:
+    with tifffile.TiffFile(path) as file:
+        return np.stack([_page(page) for page in file.pages])
+
+
+def _page(page: Any) -> Array:
+    separate = page.axes == "SYX"
+    return np.moveaxis(page.asarray(), 0, -1) if separate else np.asarray(page.asarray())
+
+
+def _read_nrrd(path: Path) -> Array:
+    return np.asarray(nrrd.read(str(path), index_order="C")[0])
+
+
+def _read_slices(path: Path) -> Array:
+    numbered = {int(match[1]): name for name in os.listdir(path) if (match := _SLICE.fullmatch(name))}
+    if sorted(numbered) != list(range(len(numbered))) or not numbered:
+        raise ValueError("it has no slices slice-000.png, slice-001.png and so on without a gap")
+    # not image.read, which leaves an opaque alpha channel out
+    return np.stack([imagecodecs.png_decode((path / numbered[k]).read_bytes()) for k in range(len(numbered))])
+
+
+_DECODERS: dict[str, Callable[[Path], Array]] = {
+    ".npz": _read_npz,
+    ".npy": _read_npy,
+    ".tif": _read_tiff,
+    ".tiff": _read_tiff,
+    ".nrrd": _read_nrrd,
+    "": _read_slices,
+}

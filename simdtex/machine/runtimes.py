@@ -1,0 +1,209 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The OpenCL runtimes of this machine: which platforms the loader knows, and what works on them."""
+
+from __future__ import annotations
+
+import functools
+import importlib.metadata
+import os
+import signal
+import site
+import subprocess
+import sys
+import tempfile
+import textwrap
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import pyopencl as cl
+
+__all__ = ["clean", "failure", "failures", "intel_library", "one_line", "platforms"]
+
+_INTEL = "libintelocl.so"
+_MARK = "simdtex-probe:"
+_SECONDS = 60.0  # a first build takes a second or two; a busy machine, several times that
+_FOLDERS = ("OCL_ICD_VENDORS", "OPENCL_VENDOR_PATH")  # how users name a folder to the loader
+
+# a*a - (1 + 2^-11) is 2^-24 for a = 1 + 2^-12 if fma rounds once, and 0 if it rounds twice.
+_SOURCE = """
+__kernel void probe(__global const float *a, __global float *b)
+{
+    const size_t i = get_global_id(0);
+    b[i] = fma(a[i], a[i], -(1.0f + 0x1p-11f));
+}
+"""
+
+
+def platforms() -> list[cl.Platform]:
+    """Return the platforms that the loader knows, each once; the first call decides.
+
+    A loader reads its folder once in a process. A program that asks pyopencl for
+    platforms before simdtex does sees what its environment tells, and so do we.
+    """
+    import pyopencl
+
+    try:
+        try:
+            with _folder():
+                found = pyopencl.get_platforms()
+        except OSError:  # no place for a temporary folder: what the loader sees by itself
+            found = pyopencl.get_platforms()
+    except pyopencl.Error:  # the loader's way to say that there is none
+        return []
+    return list(dict.fromkeys(found))
+
+
+def intel_library() -> Path | None:
+    """Return the library of the Intel CPU runtime installed from the package index, if any."""
+    for base in (sys.prefix, site.getuserbase()):
+        path = Path(base, "lib", _INTEL)
+        if path.is_file():
+            return path
+    try:
+        entries = importlib.metadata.files("intel-opencl-rt") or []
+    except importlib.metadata.PackageNotFoundError:
+        return None
+    paths = (Path(str(entry.locate())).resolve() for entry in entries if entry.name == _INTEL)
+    return next((path for path in paths if path.is_file()), None)
+
+
+@contextmanager
+def _folder() -> Iterator[None]:
+    """Let the loader also see the Intel CPU runtime, for as long as the context lasts.
+
+    The .icd file in its wheel names a path that does not exist, and the loader reads one
+    folder only, so it is given a folder with all of them. A folder the user chose wins,
+    and Windows registers its runtimes itself.
+    """
+    chosen = any(os.environ.get(name) for name in _FOLDERS)
+    library = intel_library() if sys.platform == "linux" and not chosen else None
+    if library is None:
+        yield
+        return
+    with tempfile.TemporaryDirectory(prefix="simdtex-icd-") as folder:
+        _copy(Path(folder))
+        Path(folder, "intel.icd").write_text(f"{library}\n")
+        before = {name: os.environ.get(name) for name in _FOLDERS}
+        os.environ[_FOLDERS[0]] = folder
+        try:
+            yield
+        finally:
+            for name, value in before.items():
+                if value is None:
+                    os.environ.pop(name, None)
+                else:
+                    os.environ[name] = value
+
+
+def _copy(folder: Path) -> None:
+    """Copy the .icd files that the loader would have read itself."""
+    import pyopencl
+
+    sources = (
+        Path("/etc/OpenCL/vendors"),
+        Path(sys.prefix, "etc", "OpenCL", "vendors"),  # conda's place
+        Path(pyopencl.__file__).parent / ".libs",  # PoCL's wheel puts its own beside the loader
+    )
+    for number, source in enumerate(sources):
+        for entry in sorted(source.glob("*.icd")):
+            try:
+                library = Path(entry.read_text().strip())
+            except (OSError, UnicodeDecodeError):
+                continue  # the loader skips what it cannot read, too
+            if library.name == _INTEL or (library.is_absolute() and not library.exists()):
+                continue  # the Intel runtime is added by its true path
+            if (source / library).is_file():
+                library = source / library
+            (folder / f"{number}-{entry.name}").write_text(f"{library}\n")
+
+
+@functools.cache
+def failure(handle: cl.Device) -> str:
+    """Build and run a tiny program, once; return why the device is not usable, or nothing."""
+    import pyopencl
+
+    try:
+        with warnings.catch_warnings():
+            # Intel's runtime writes a build log even for a clean build.
+            warnings.simplefilter("ignore", pyopencl.CompilerWarning)
+            context = pyopencl.Context([handle])
+            program = pyopencl.Program(context, _SOURCE).build(["-cl-std=CL1.2"])
+        queue = pyopencl.CommandQueue(context)
+        host = np.full(64, 1 + 2.0**-12, np.float32)
+        flags = pyopencl.mem_flags
+        source = pyopencl.Buffer(context, flags.READ_ONLY | flags.COPY_HOST_PTR, hostbuf=host)
+        target = pyopencl.Buffer(context, flags.WRITE_ONLY, host.nbytes)
+        pyopencl.Kernel(program, "probe")(queue, host.shape, None, source, target)
+        result = np.zeros_like(host)
+        pyopencl.enqueue_copy(queue, result, target)
+    except Exception as error:  # whatever goes wrong, this device is not usable
+        return one_line(error)
+    return "" if np.all(result == 2.0**-24) else "a tiny program ran, but gave a wrong answer"
+
+
+def failures(indices: Sequence[int]) -> list[str]:
+    """Run `failure` for lines of the listing, each in a process of its own.
+
+    Parameters
+    ----------
+    indices : sequence of int
+        Places in the listing of `simdtex.machine.devices`.
+
+    Returns
+    -------
+    list of str
+        For each, why the device is not usable, or nothing.
+    """
+    # The children get this process's own path, so that they find the same package.
+    code = (
+        "import sys; sys.path[:] = {path!r}\n"
+        "from simdtex.machine import devices as device\n"
+        "line = device.probe(device.devices(probe=False)[{index}])\n"
+        "print('\\n{mark}' + line.reason, flush=True)"
+    )
+    children = [
+        subprocess.Popen(
+            [sys.executable, "-c", code.format(path=sys.path, index=index, mark=_MARK)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            errors="replace",
+        )
+        for index in indices
+    ]
+    return [_answer(child) for child in children]
+
+
+def _answer(child: subprocess.Popen[str]) -> str:
+    try:
+        output, _ = child.communicate(timeout=_SECONDS)
+    except subprocess.TimeoutExpired:
+        child.kill()
+        child.communicate()
+        return f"a tiny program did not finish within {_SECONDS:.0f} seconds"
+    answers = [line for line in output.splitlines() if line.startswith(_MARK)]
+    if answers:
+        return answers[-1].removeprefix(_MARK)
+    names = {int(number): number.name for number in signal.Signals}
+    how = names.get(-child.returncode, f"exit code {child.returncode}")
+    return f"the runtime crashed on a tiny program ({how})"
+
+
+def clean(text: str) -> str:
+    """Return a runtime's text on one line, without its padding."""
+    return " ".join(str(text).replace("\0", " ").split())
+
+
+def one_line(error: BaseException) -> str:
+    """Return the telling lines of a build log or message as one short line."""
+    lines = [clean(line) for line in str(error).splitlines() if line.strip()]
+    telling = [line for line in lines[1:] if "error" in line.lower()]
+    text = " - ".join(lines[:1] + telling[:1]) or type(error).__name__
+    return textwrap.shorten(text, 160, placeholder=" ...").rstrip(".")

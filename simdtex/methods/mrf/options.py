@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The options of the method ``mrf``, their defaults, and the presets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Any
+
+from simdtex import schedules
+from simdtex.maspar.array import parse_array
+from simdtex.model.lattice import check_order
+from simdtex.options import build, one_of, real, true_or_false, whole
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "paper": {
+        "relaxation": "gibbs",
+        "bandwidth": 1.0,
+        "coherence": 0.0,
+        "xi": -1.0,
+        "free_sweeps": 0,
+        "pixel": "density",
+        "phases": "decimated",
+        "edges": "whole",
+        "coarsest": "same",
+        "search": "exact",
+    },
+}
+"""``paper`` keeps the 1998 rules to the letter."""
+
+
+COHERENCE_OF_A_LIST = 0.2
+"""The default of ``coherence`` with coherent search: a list holds little else to weigh against continuing."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """The options of the method ``mrf``.
+
+    Parameters
+    ----------
+    order : int
+        o of equation (3): neighbours within the distance sqrt(o).
+    levels : int, optional
+        M of Algorithm 1. None: the most levels at which the sample still has 64 candidates, and the output's
+        lattice a whole neighbourhood.
+    relaxation : {"icm", "gibbs"}
+        Take the LCPDF's mode, or draw from it.
+    bandwidth : float
+        h in units of h_opt, equation (8).
+    coherence : float, optional
+        The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence. None: 1
+        where all candidates are weighed, 0.2 with coherent search.
+    xi : float
+        xi < 0 of equation (13): the further below 0, the fewer sweeps.
+    free_sweeps : int
+        Sweeps over all sites of a level, held ones too, after its equilibrium.
+    pixel : {"source", "density"}
+        A relaxed site takes the pixel of its source in the sample, or a grey level of the Parzen density, whose
+        kernel also spreads over x_s.
+    phases : {"all", "decimated"}
+        Candidates at coarse levels: every sample position, or those of the decimated sample, equation (10).
+    edges : {"auto", "reflect", "whole"}
+        Candidates are those sample positions whose whole neighbourhood lies in the sample, equation (4)
+        (``whole``), or all, those near the edge with a neighbourhood completed by reflection (``reflect``);
+        ``auto`` reflects at the levels at which fewer than three quarters of them have a whole neighbourhood.
+    coarsest : {"gibbs", "same"}
+        How the coarsest level relaxes: by draws, or as the other levels. Its mode says nothing while all is unknown.
+    schedule : str or simdtex.schedules.Schedule
+        Which sites relax together: ``"coloring"``, ``"coloring-fixed"``, ``"luby"``, ``"checkerboard"``,
+        ``"synchronous"``, ``"random-subset"``, ``"raster"``, ``"random-scan"``, ``"block"``, or one of your own.
+    check_schedule : bool
+        Check at every step that a schedule which claims independent sites keeps equation (14).
+    boundary : {"torus", "open"}
+        Whether the output wraps around.
+    array : str, optional
+        A processor array to run on: ``"ROWSxCOLS"`` or ``"maspar-mp1-1k"`` to ``"maspar-mp1-16k"``. None packs the
+        active sites instead.
+    mapping : {"cut-and-stack", "hierarchical"}
+        How a picture larger than the array lies on it.
+    search : {"auto", "exact", "coherent"}
+        Whether a site weighs all candidates of a level, or, at all but the coarsest level, only a few: those that
+        continue the source of a neighbour, its own source, and some more. ``auto`` is ``coherent`` for
+        ``relaxation="icm"`` with ``pixel="source"``, and ``exact`` where a site draws or takes the mode of a density.
+    suggesting : int
+        ``coherent``: nearest neighbours whose sources suggest a candidate each.
+    similar : int
+        ``coherent``: candidates more for each of these, those whose neighbourhoods in the sample are most like its own.
+    chance : int
+        ``coherent``: candidates at random.
+    exhaustive : int
+        ``coherent``: a level with so many candidates or fewer weighs them all.
+    emulate : bool
+        Whether every launch is to have one work-item per PE of the array. False packs all the same, and only
+        accounts for the array.
+    """
+
+    order: int = 18
+    levels: int | None = None
+    relaxation: str = "icm"
+    bandwidth: float = 0.15
+    coherence: float | None = None
+    xi: float = -1.0
+    free_sweeps: int = 2
+    pixel: str = "source"
+    phases: str = "decimated"
+    edges: str = "auto"
+    coarsest: str = "gibbs"
+    schedule: str | schedules.Schedule = "coloring"
+    check_schedule: bool = False
+    boundary: str = "torus"
+    array: str | None = None
+    mapping: str = "cut-and-stack"
+    search: str = "auto"
+    suggesting: int = 24
+    similar: int = 0
+    chance: int = 4
+    exhaustive: int = 64
+    emulate: bool = True
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        check_order(self.order)
+        if self.levels is not None:
+            whole("levels", self.levels, 1)
+        one_of("relaxation", self.relaxation, ("icm", "gibbs"))
+        real("bandwidth", self.bandwidth, 0, above=True)
+        if self.coherence is not None:
+            real("coherence", self.coherence, 0)
+        real("xi", self.xi, -inf)
+        if self.xi >= 0:
+            raise ValueError(f"xi is {self.xi}; give a number below 0")
+        whole("free_sweeps", self.free_sweeps, 0)
+        one_of("pixel", self.pixel, ("source", "density"))
+        one_of("phases", self.phases, ("all", "decimated"))
+        one_of("edges", self.edges, ("auto", "reflect", "whole"))
+        one_of("coarsest", self.coarsest, ("gibbs", "same"))
+        one_of("boundary", self.boundary, ("torus", "open"))
+        one_of("search", self.search, ("auto", "exact", "coherent"))
+        whole("suggesting", self.suggesting, 1)
+        whole("similar", self.similar, 0)
+        whole("chance", self.chance, 0)
+        whole("exhaustive", self.exhaustive, 0)
+        if (self.search, self.relaxation, self.pixel) == ("coherent", "icm", "density"):
+            raise ValueError(
+                'search="coherent" finds no mode of a density; '
+                'give search="exact", pixel="source" or relaxation="gibbs"'
+            )
+        schedules.get(self.schedule)
+        true_or_false("check_schedule", self.check_schedule)
+        parse_array(self.array or "1x1", self.mapping)
+        true_or_false("emulate", self.emulate)
+
+    def resolved(self) -> Options:
+        """The same with what ``search="auto"`` and ``coherence=None`` stand for."""
+        nearest = (self.relaxation, self.pixel) == ("icm", "source")
+        search = ("coherent" if nearest else "exact") if self.search == "auto" else self.search
+        usual = COHERENCE_OF_A_LIST if search == "coherent" else 1.0
+        return replace(self, search=search, coherence=usual if self.coherence is None else self.coherence)
+
+
+def make_options(preset: str = "default", **given: Any) -> Options:
+    """Options from a preset and what the user gave; unknown names are a TypeError that lists the valid ones."""
+    one_of("preset", preset, PRESETS)
+    return build(Options, "mrf", PRESETS[preset] | given, also=("preset",))

@@ -1,0 +1,438 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Multiresolution sampling: the procedure of De Bonet (1997).
+
+`analyse` (analysis.py) is the first phase; `resample` is the second, his SynthesizePyramid and CollapsePyramid level by
+level. Numbers in parentheses are the paper's equations. Level 0 is the finest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from math import inf, prod
+from numbers import Real
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simdtex.machine import Machine
+from simdtex.machine.interface import Array
+from simdtex.methods.multires.analysis import Analysis, analyse
+from simdtex.ops.candidates import Sampled, Structure, candidates
+from simdtex.ops.laplacian import laplacian_collapse
+from simdtex.options import build, one_of, real, whole, within_32_bits
+from simdtex.run import Callback, Output, Sampling, Stage, device_seconds, paced
+
+ANY = 2**32 - 1
+"""The threshold that every difference passes."""
+
+VALUES = 4
+"""Values for each pixel of an output that kernels number: two counts, all levels together."""
+
+LAUNCH = 4e8
+"""Comparisons that the first launch of a level may take if no node fails."""
+
+WIDEST = 100
+"""The largest sigma; a filter of one far narrower does not know it from a larger one."""
+
+STEPS, MOST = 100, 4
+"""`suggest_alpha` tries the multiples of 1/100 up to 4."""
+
+STRETCHES, STRETCH = 16, 256
+"""Of pixels, in each level, that `suggest_alpha` counts the candidates of."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """The options of the method ``multires``.
+
+    Parameters
+    ----------
+    alpha : float or "auto"
+        Of T = alpha / k**beta (13), 0 or more: 0 tiles the sample (but for parts that are equal to the bit), infinity
+        samples every band on its own. ``"auto"`` takes what `simdtex.suggest_alpha` does for ``target``.
+    beta : float
+        Of the same, 0 or more. k counts levels from the lowest frequency upward.
+    target : float
+        With ``alpha="auto"``, candidates that a pixel of the coarser levels is to have on average.
+    thresholds : array, optional
+        T itself, in place of alpha and beta: one row for each level but the finest, the lowest frequency first; one
+        column for all features or one for each.
+    orientations : int
+        Of the first and of the second derivatives of a Gaussian in the filter bank (7); 0 leaves the bands alone.
+    sigma : float
+        Of that Gaussian, in pixels; 0.2 to 100.
+    filter_size : int
+        Rows and columns of the filters; odd. A level smaller than that has no responses.
+    features : {"luminance", "channels"}
+        Whether features are made of the luminance or of every channel. Bands are copied with all their channels.
+    levels : int, optional
+        Of the pyramids. None: down to a single pixel.
+    phase : {"match", "free"}
+        Whether a candidate must stand in an even or odd row and column as the pixel does. ``"free"`` is the paper's
+        text.
+    boundary : {"torus", "open"}
+        Whether pyramids wrap around, or continue as in a mirror.
+    """
+
+    alpha: float | str = 0.3
+    beta: float = 0.0
+    target: float = 1.1
+    thresholds: ArrayLike | None = None
+    orientations: int = 4
+    sigma: float = 0.7
+    filter_size: int = 3
+    features: str = "luminance"
+    levels: int | None = None
+    phase: str = "match"
+    boundary: str = "torus"
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        if isinstance(self.alpha, str):
+            if self.alpha != "auto":
+                raise ValueError(f"alpha is {self.alpha!r}; give a number of at least 0, or 'auto'")
+        elif not (isinstance(self.alpha, Real) and self.alpha == inf):
+            real("alpha", self.alpha, 0)
+        real("beta", self.beta, 0)
+        real("target", self.target, 1)
+        whole("orientations", self.orientations, 0)
+        real("sigma", self.sigma, 0.2)
+        if self.sigma > WIDEST:
+            raise ValueError(f"sigma is {self.sigma}; give at most {WIDEST}")
+        whole("filter_size", self.filter_size, 3)
+        if self.filter_size % 2 == 0:
+            raise ValueError(f"filter_size is {self.filter_size}; give an odd number, 3 or 5")
+        one_of("features", self.features, ("luminance", "channels"))
+        if self.levels is not None:
+            whole("levels", self.levels, 1)
+        one_of("phase", self.phase, ("match", "free"))
+        one_of("boundary", self.boundary, ("torus", "open"))
+        if self.thresholds is not None:
+            _check_thresholds(self.thresholds)
+
+    @property
+    def analysis(self) -> dict[str, Any]:
+        """Those that bear on the analysis."""
+        names = ("orientations", "sigma", "filter_size", "features", "levels", "boundary")
+        return {name: getattr(self, name) for name in names}
+
+
+def make_options(**given: Any) -> Options:
+    """Options from what the user gave; unknown names are a TypeError that lists the valid ones."""
+    return build(Options, "multires", given)
+
+
+# -- thresholds -----------------------------------------------------------------------------------------------
+
+
+def _alpha(machine: Machine, analysis: Analysis, options: Options) -> float | None:
+    """The alpha of a run, None where a table stands in its place."""
+    if options.thresholds is not None:
+        return None
+    return suggest_alpha(machine, analysis, options) if isinstance(options.alpha, str) else float(options.alpha)
+
+
+def thresholds(levels: int, options: Options, alpha: float | None) -> NDArray[np.float64]:
+    """T of every level (levels, 1 or M), the finest first: alpha / k**beta (13), or the user's table without alpha."""
+    if alpha is not None:
+        k = np.arange(levels, 0, -1, dtype=np.float64)[:, None]  # 1 at the top
+        with np.errstate(over="ignore"):
+            divisor = (k ** float(options.beta)).astype(np.float32)  # so that the last bit of a libm does not show
+        return np.full_like(k, inf) if alpha == inf else float(alpha) / divisor.astype(np.float64)
+    table = np.asarray(options.thresholds, np.float64)
+    table = table if table.ndim == 2 else table[:, None]
+    if len(table) != levels - 1:
+        fewer = f", or levels={len(table) + 1}" if len(table) < levels - 1 else ""
+        raise ValueError(
+            f"thresholds has {len(table)} rows; give {levels - 1}, one for each level but the finest{fewer}"
+        )
+    return np.concatenate([np.zeros((1, table.shape[1])), table[::-1]])
+
+
+def differences(analysis: Analysis, table: NDArray[np.float64]) -> NDArray[np.uint32]:
+    """The largest difference of each feature (levels, M) whose square, divided by Z, is not above T, (9) to (11)."""
+    if table.shape[1] not in (1, analysis.energy.shape[1]):
+        raise ValueError(
+            f"thresholds has {table.shape[1]} columns; give 1, or {analysis.energy.shape[1]}, one for each feature"
+        )
+    with np.errstate(invalid="ignore", over="ignore"):
+        largest = np.sqrt(table * analysis.energy)
+    return np.where(np.isinf(table), ANY, np.minimum(largest, ANY)).astype(np.uint32)
+
+
+def suggest_alpha(machine: Machine, analysis: Analysis, options: Options) -> float:
+    """The alpha at which pixels have `Options.target` candidates on average, counted on the sample itself.
+
+    Only the coarser half of the levels that are sampled counts: what is chosen there rearranges the sample. At the
+    finer ones flat parts have many candidates at any alpha.
+
+    Parameters
+    ----------
+    machine : Machine
+    analysis : Analysis
+    options : Options
+        Of which ``target``, ``beta`` and ``phase`` matter, beside those of the analysis.
+
+    Returns
+    -------
+    float
+        The least multiple of 1/100 at which the candidates of the sample's own pixels, averaged over each of these
+        levels and then over the levels, reach the target; 4 where none below does.
+
+    Notes
+    -----
+    Cost: eight or nine scans, without draws, of at most 4096 pixels of each of these levels.
+    """
+    itself = _sampled(
+        machine, analysis.shapes, [np.arange(pixels([shape]), dtype=np.int32) for shape in analysis.shapes]
+    )
+    low, high = 0, MOST * STEPS
+    while high - low > 1:  # candidates only grow with alpha
+        middle = (low + high) // 2
+        reached = _mean_candidates(machine, analysis, itself, options, middle / STEPS) >= options.target
+        low, high = (low, middle) if reached else (middle, high)
+    return high / STEPS
+
+
+def _mean_candidates(machine: Machine, analysis: Analysis, itself: Sampled, options: Options, alpha: float) -> float:
+    structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
+    means = []
+    for level in range((analysis.levels - 1) // 2, analysis.levels - 1):
+        begin, n = pixels(analysis.shapes[:level]), pixels(analysis.shapes[level : level + 1])
+        few = n <= STRETCHES * STRETCH
+        counts = []
+        for first in [0] if few else [i * n // STRETCHES for i in range(STRETCHES)]:
+            end = n if few else first + STRETCH
+            candidates(machine, structure, itself, level, first, end, options.phase == "match", 0, draw=False)
+            counts.append(machine.get(itself.counts[begin + first : begin + end])[:, 0])
+        means.append(float(np.concatenate(counts).mean()))
+    return float(np.mean(means)) if means else inf
+
+
+# -- the second phase: synthesis ------------------------------------------------------------------------------
+
+
+def synthesize(
+    machine: Machine,
+    sample: NDArray[Any],
+    shape: tuple[int, int],
+    options: Options,
+    seed: int,
+    callback: Callback | None = None,
+) -> tuple[NDArray[Any], Output]:
+    """Both phases: `analyse`, then `resample`, which says what comes in and out."""
+    began, worked = perf_counter(), machine.seconds
+    within_32_bits(shape, max(VALUES, sample.shape[-1]))  # before any work
+    analysis = analyse(machine, sample, **options.analysis)
+    image, output = resample(machine, analysis, shape, options, seed, callback)
+    output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
+    return image, output
+
+
+def resample(
+    machine: Machine,
+    analysis: Analysis,
+    shape: tuple[int, int],
+    options: Options,
+    seed: int,
+    callback: Callback | None = None,
+) -> tuple[NDArray[Any], Output]:
+    """The second phase of the paper: SynthesizePyramid and CollapsePyramid, level by level.
+
+    Parameters
+    ----------
+    machine : Machine
+        What executes the steps.
+    analysis : Analysis
+        Of the sample, made with the same options.
+    shape : (int, int)
+        Rows and columns of the output.
+    options : Options
+    seed : int
+        Key of every random number.
+    callback : callable, optional
+        Called with a `simdtex.run.Sampling` after every piece of a level.
+
+    Returns
+    -------
+    image : (rows, cols, channels) array
+        In the sample's type.
+    output : simdtex.run.Output
+        Source map, stages with their source maps and candidates, statistics.
+
+    Notes
+    -----
+    A level is one step: no pixel depends on another of its level. Cost: for every four pixels at most the nodes above
+    them, times the features; some thousandths of that at usual thresholds. Memory on the device, in bytes per output
+    pixel: 20 + 5.3 channels, beside the analysis; on the host about 50 + 5 channels.
+    """
+    began, worked = perf_counter(), machine.seconds
+    channels = len(analysis.sample.planes)
+    within_32_bits(shape, max(VALUES, channels))
+    shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
+    machine.require(pixels(shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis))
+    alpha = _alpha(machine, analysis, options)
+    structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
+    record = _Record(shapes, callback)
+
+    top = analysis.levels - 1
+    sampled = _copied(machine, shapes, analysis.shapes[top])
+    picture = None
+    for level in reversed(range(analysis.levels)):  # Loop i from top level downto 0
+        nodes = pixels(analysis.shapes[level + 1 :])
+        if level < top:
+            least = 1 + int(LAUNCH / (nodes * analysis.features.shape[1]))
+            for first, end in paced(pixels([shapes[level]]), least):  # Loop x', y'
+                match = options.phase == "match"
+                sampled = candidates(machine, structure, sampled, level, first, end, match, seed)  # (9) to (12)
+                machine.sync()
+                record.tell(level, end)
+        source, counts = _read(machine, sampled, shapes, level)
+        picture = _collapsed(machine, analysis, level, source, picture)  # CollapsePyramid
+        image = analysis.sample.picture(machine.get(picture), source if level == 0 else None)
+        place = _place(source, analysis.shapes[level][1])
+        record.end(Stage(level, image, place, np.ascontiguousarray(counts[..., 0])), counts, nodes)
+
+    used: dict[str, Any] = {"alpha": alpha, "levels": analysis.levels}
+    if options.thresholds is not None:
+        used["thresholds"] = np.asarray(options.thresholds).tolist()
+    statistics = {
+        "device": machine.name,
+        "seed": seed,
+        "options": {f.name: getattr(options, f.name) for f in fields(Options)} | used,
+        "seconds": perf_counter() - began,
+        "device_seconds": device_seconds(machine, worked),
+        "levels": record.reports,
+    }
+    return image, Output(place, None, record.stages, statistics)
+
+
+class _Record:
+    """The stages and reports of a run as it goes on, and what its callback is told of them."""
+
+    def __init__(self, shapes: list[tuple[int, int]], callback: Callback | None) -> None:
+        self.stages: list[Stage] = []
+        self.reports: list[dict[str, Any]] = []
+        self._shapes, self._callback = shapes, callback
+        self._began = perf_counter()
+
+    def tell(self, level: int, sampled: int, ended: bool = False) -> None:
+        """So many pixels of a level are sampled. Pictures are those of the last stage, which has been read back."""
+        if self._callback:
+            share = (pixels(self._shapes[level + 1 :]) + sampled) / pixels(self._shapes)
+            last = self.stages[-1]
+            now: dict[str, Any] = {"level": level, "levels": len(self._shapes), "fraction": share}
+            now |= {"image": lambda: last.image, "candidates": lambda: last.candidates}
+            self._callback(Sampling(end_of_level=ended, **now))
+
+    def end(self, stage: Stage, counts: NDArray[np.int32], nodes: int) -> None:
+        """A level is done; counts (rows, cols, 2) are candidates and nodes compared, of so many nodes."""
+        self.stages.append(stage)
+        rows, cols = counts.shape[:2]
+        mean, compared = (float(np.ascontiguousarray(counts[..., k]).mean()) for k in range(2))
+        report = {
+            "level": stage.level,
+            "rows": rows,
+            "cols": cols,
+            "candidates": mean,
+            "most": int(counts[..., 0].max()),
+        }
+        self.reports.append(report | {"nodes": nodes, "compared": compared, "seconds": perf_counter() - self._began})
+        self._began = perf_counter()
+        self.tell(stage.level, rows * cols, ended=True)
+
+
+def pixels(shapes: Sequence[tuple[int, int]]) -> int:
+    """Of some levels together."""
+    return sum(rows * cols for rows, cols in shapes)
+
+
+def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int], spacing: int) -> tuple[int, int]:
+    """Rows and columns of a level of the output, which is made of whole tiles and the beginning of one more.
+
+    Parameters
+    ----------
+    shape, sample : (int, int)
+        Rows and columns of the output and of the sample.
+    own : (int, int)
+        Of the sample's level.
+    spacing : int
+        2**level.
+    """
+    rows, cols = (n // m * k + -(-(n % m) // spacing) for n, m, k in zip(shape, sample, own, strict=True))
+    return rows, cols
+
+
+def _lattice(shapes: Sequence[tuple[int, int]], first: int) -> NDArray[np.int32]:
+    """Lattices as of `Structure` and `Sampled`, where levels stand one after another, from one of them on."""
+    begins = np.cumsum([0, *(rows * cols * (level >= first) for level, (rows, cols) in enumerate(shapes))])
+    ragged = [sum((n % 2**level > 0) << axis for axis, n in enumerate(shapes[0])) for level in range(len(shapes))]
+    return np.array([(*shape, *rest) for shape, *rest in zip(shapes, begins, ragged, strict=False)], np.int32)
+
+
+def _structure(machine: Machine, analysis: Analysis, table: NDArray[np.float64]) -> Structure:
+    most, lattice = machine.put(differences(analysis, table)), machine.put(_lattice(analysis.shapes, 1))
+    return Structure(analysis.features, most, lattice)
+
+
+def _sampled(machine: Machine, shapes: Sequence[tuple[int, int]], source: Sequence[NDArray[np.int32]]) -> Sampled:
+    together = np.concatenate(source)
+    counts = np.zeros((together.size, 2), np.int32)
+    counts[-pixels(shapes[-1:]) :, 0] = 1  # of the top; the others are to be counted
+    return Sampled(machine.put(together), machine.put(counts), machine.put(_lattice(shapes, 0)))
+
+
+def _copied(machine: Machine, shapes: Sequence[tuple[int, int]], own: tuple[int, int]) -> Sampled:
+    """The top level, copied and repeated to fill; nothing yet below it."""
+    row, col = np.indices(shapes[-1], np.int32)
+    source = row % np.int32(own[0]) * np.int32(own[1]) + col % np.int32(own[1])
+    return _sampled(machine, shapes, [np.zeros(pixels(shapes[:-1]), np.int32), source.ravel()])
+
+
+def _read(
+    machine: Machine, sampled: Sampled, shapes: Sequence[tuple[int, int]], level: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """A level's source (rows, cols) and counts (rows, cols, 2)."""
+    begin, end = pixels(shapes[:level]), pixels(shapes[: level + 1])
+    source, counts = machine.get(sampled.source[begin:end]), machine.get(sampled.counts[begin:end])
+    return source.reshape(shapes[level]), counts.reshape(*shapes[level], 2)
+
+
+def _place(source: NDArray[np.int32], cols: int) -> NDArray[np.int32]:
+    """(row, column) of pixels on a last axis."""
+    place = np.empty((*source.shape, 2), np.int32)
+    place[..., 0] = row = source // np.int32(cols)
+    place[..., 1] = source - row * np.int32(cols)  # quicker than divmod
+    return place
+
+
+def _collapsed(
+    machine: Machine, analysis: Analysis, level: int, source: NDArray[np.int32], coarse: Array | None
+) -> Array:
+    """G of a level of the output, from its source map and G of the level above."""
+    band = analysis.bands[level]
+    if coarse is None:
+        residue = machine.get(band)
+        return machine.put(np.ascontiguousarray(residue.reshape(len(residue), -1)[:, source]))
+    return laplacian_collapse(machine, band, machine.put(source), coarse, analysis.torus)
+
+
+def _check_thresholds(table: ArrayLike) -> None:
+    try:
+        values = np.asarray(table)
+    except ValueError:
+        raise ValueError("thresholds is ragged; give rows of equal length") from None
+    if values.dtype.kind not in "iuf":
+        raise TypeError(f"thresholds must be an array of numbers, not of {values.dtype}")
+    if values.ndim not in (1, 2) or not values.size:
+        raise ValueError(f"thresholds has shape {values.shape}; give one row for each level but the finest")
+    if not (values >= 0).all():
+        raise ValueError("thresholds must be numbers of at least 0")
+
+
+def _held(analysis: Analysis) -> int:
+    """Bytes of an analysis on the device."""
+    return 4 * (pixels(analysis.shapes) * len(analysis.sample.planes) + int(prod(analysis.features.shape)))

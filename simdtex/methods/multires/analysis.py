@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The analysis pyramid of a sample: its bands and local texture measures, De Bonet's equations (5) to (7)."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.machine import Machine
+from simdtex.machine.interface import Array
+from simdtex.model.stretched import Stretched
+from simdtex.ops.filters import bank, filters
+from simdtex.ops.laplacian import half, laplacian_band, laplacian_reduce
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """The analysis pyramid of a sample.
+
+    Attributes
+    ----------
+    sample : Stretched
+    shapes : list of (int, int)
+        Rows and columns of each level.
+    bands : list of (channels, rows, cols) int32 arrays of the machine
+        L_i, level by level, and last the low-pass residue.
+    features : (nodes, M) int32 array of the machine
+        F^j of the levels from 1 on (7).
+    energy : (levels, M) float64 array
+        Z of (10): the mean square of each feature over its level, the variance for the residue.
+    torus : bool
+        Whether pyramids wrap around.
+    """
+
+    sample: Stretched
+    shapes: list[tuple[int, int]]
+    bands: list[Array]
+    features: Array
+    energy: NDArray[np.float64]
+    torus: bool
+
+    @property
+    def levels(self) -> int:
+        """Of the pyramid, with the residue."""
+        return len(self.shapes)
+
+
+def pyramid(machine: Machine, picture: Array, levels: int, torus: bool) -> tuple[list[Array], list[Array]]:
+    """The Gaussian and the Laplacian pyramid of a picture, (5) and (6).
+
+    Parameters
+    ----------
+    machine : Machine
+    picture : (planes, rows, cols) int32 array of the machine
+    levels : int
+        1 or more.
+    torus : bool
+        Whether the picture wraps around, or continues as in a mirror.
+
+    Returns
+    -------
+    gaussian, laplacian : lists of arrays of the machine
+        G_0, G_1, ... and L_0, L_1, ...; the last L is the low-pass residue, the last G.
+    """
+    gaussian = [picture]
+    while len(gaussian) < levels:
+        gaussian.append(laplacian_reduce(machine, gaussian[-1], torus))
+    bands = [laplacian_band(machine, fine, coarse, torus) for fine, coarse in pairwise(gaussian)]
+    return gaussian, [*bands, gaussian[-1]]
+
+
+def analyse(
+    machine: Machine,
+    pixels: NDArray[Any],
+    *,
+    orientations: int = 4,
+    sigma: float = 0.7,
+    filter_size: int = 3,
+    features: str = "luminance",
+    levels: int | None = None,
+    boundary: str = "torus",
+) -> Analysis:
+    """The first phase of the paper: bands and features of the sample at every level.
+
+    Parameters
+    ----------
+    machine : Machine
+    pixels : (rows, cols, channels) array
+    orientations, sigma, filter_size, features, levels, boundary
+        See `simdtex.methods.multires.Options`.
+
+    Returns
+    -------
+    Analysis
+
+    Raises
+    ------
+    ValueError
+        More levels than the sample has, or a sample of 2**31 values or more.
+
+    Notes
+    -----
+    Cost: 45 multiply-adds for every pixel and channel, and a third of filter_size**2 for every pixel and filter. Memory
+    on the device: 16 bytes for every pixel and channel (and luminance, where there is one beside them), 3 for every
+    pixel and feature.
+    """
+    rows, cols, channels = pixels.shape
+    seen = 1 if features == "luminance" else channels  # planes that features are made of
+    taps = bank(orientations, sigma, filter_size)
+    width = seen * (1 + len(taps))
+    if rows * cols * max(width, channels) >= 2**31:
+        raise ValueError(
+            f"a sample of {rows} rows x {cols} columns with {width} features is beyond 2**31 values; give a smaller one"
+        )
+    sample, torus = Stretched(pixels), boundary == "torus"
+    shapes = _level_shapes((rows, cols), levels)
+    machine.require(rows * cols * (16 * (channels + (seen < channels)) + 3 * width))
+
+    gaussian, bands = pyramid(machine, machine.put(sample.planes), len(shapes), torus)
+    guide = gaussian, bands
+    if seen < channels:
+        guide = pyramid(machine, machine.put(sample.luminance), len(shapes), torus)
+    measured, energy = [np.zeros((0 if len(shapes) > 1 else 1, width), np.int32)], [np.zeros(width)]
+    fits = [min(shape) >= filter_size for shape in shapes]
+    for level in range(1, len(shapes)):
+        responses = machine.put(taps if fits[level] else np.zeros_like(taps))  # 0 otherwise, (7)
+        measured.append(machine.get(filters(machine, guide[0][level], guide[1][level], responses, torus)))
+        energy.append(_energy(measured[-1]))
+    residue = slice(None, None, 1 + len(taps))
+    energy[-1][residue] = _energy(measured[-1][:, residue], about_mean=True)
+    if len(taps) and len(shapes) > 1 and not any(fits[1:]):
+        _log.warning(
+            "no level above the finest of a sample of %d rows x %d columns is as large as the filters, %d x %d: "
+            "candidates are compared by their bands alone",
+            *(*shapes[0], filter_size, filter_size),
+        )
+    return Analysis(sample, shapes, bands, machine.put(np.concatenate(measured)), np.array(energy), torus)
+
+
+def _level_shapes(shape: tuple[int, ...], levels: int | None) -> list[tuple[int, int]]:
+    """Rows and columns of every level, down to a single pixel or to so many levels."""
+    shapes = [(shape[0], shape[1])]
+    while max(shapes[-1]) > 1:
+        shapes.append(half(shapes[-1]))
+    if levels is not None and levels > len(shapes):
+        raise ValueError(f"levels={levels} is too many for this sample; give at most {len(shapes)}")
+    return shapes[:levels]
+
+
+def _energy(features: NDArray[np.int32], about_mean: bool = False) -> NDArray[np.float64]:
+    """Z (M,): the mean square of each column, or its variance, from sums in whole numbers."""
+    n = len(features)
+    squares, total = np.zeros((2, features.shape[1]), object)
+    for first in range(0, n, 2**20):  # the sum of so many squares fits 64 bits
+        block = features[first : first + 2**20].astype(np.int64)
+        squares += (block * block).sum(0).astype(object)
+        total += block.sum(0).astype(object)
+    if about_mean:
+        return np.array([(n * s - t * t) / n**2 for s, t in zip(squares, total, strict=True)])
+    return np.array([s / n for s in squares])

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What Heeger and Bergen keep of a texture: the histograms of its pixels and of its subbands, as sorted values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.machine import Machine
+from simdtex.methods.pyramid.pyramids import Transform
+
+Sorted = NDArray[np.int32]
+"""(bands, m): the values of each band in ascending order."""
+
+
+@dataclass(frozen=True)
+class Histograms:
+    """Those of one channel.
+
+    Attributes
+    ----------
+    pixels : (1, m) int32 array
+        Sorted.
+    subbands : list of (bands, m) int32 arrays
+        Sorted, in the order of the pyramid: `simdtex.methods.pyramid.pyramids.Transform.make`.
+    """
+
+    pixels: Sorted
+    subbands: list[Sorted]
+
+
+def histograms(machine: Machine, channel: NDArray[np.int32], *pyramids: Transform) -> Histograms:
+    """The histograms of a channel (rows, cols) and of its pyramids, one after another: analysis-pyr."""
+    picture = machine.put(channel[None])
+    subbands = [band for pyramid in pyramids for band in pyramid.make(picture)]
+    values = [np.asarray(machine.get(band)) for band in subbands]
+    return Histograms(np.sort(channel.reshape(1, -1)), [np.sort(band.reshape(len(band), -1)) for band in values])
+
+
+def average(parts: Sequence[Sorted], weights: Sequence[float], blend: str) -> Sorted:
+    """The average of some histograms, band by band.
+
+    Parameters
+    ----------
+    parts : sequence of (bands, m_i) int32 arrays
+        Sorted.
+    weights : sequence of float
+        Shares, not all 0.
+    blend : {"histograms", "quantiles"}
+        Average the counts of each value, as the paper says, or the values at each quantile.
+
+    Returns
+    -------
+    (bands, m) int32 array
+        Sorted; m is the largest m_i.
+    """
+    kept = [(part, float(weight)) for part, weight in zip(parts, weights, strict=True) if weight]
+    if len(kept) == 1:
+        return kept[0][0]
+    m = max(part.shape[1] for part, _ in kept)
+    total = sum(weight for _, weight in kept)
+    if blend == "quantiles":
+        mean = np.zeros((len(kept[0][0]), m))
+        for part, weight in kept:
+            mean += weight / total * part[:, (2 * np.arange(m) + 1) * part.shape[1] // (2 * m)]
+        return np.rint(mean).astype(np.int32)
+    shares = np.concatenate([np.full(part.shape[1], weight / total / part.shape[1]) for part, weight in kept])
+    values = np.concatenate([part for part, _ in kept], 1)
+    averaged = np.empty((len(values), m), np.int32)
+    for band, own in zip(averaged, values, strict=True):
+        order = np.argsort(own, kind="stable")
+        below = np.cumsum(shares[order])
+        at = np.searchsorted(below, (np.arange(m) + 0.5) / m * below[-1])
+        band[:] = own[order][np.minimum(at, own.size - 1)]
+    return averaged
+
+
+def averaged(textures: Sequence[Histograms], weights: Sequence[float], blend: str) -> Histograms:
+    """Two or more textures in one: the average of their histograms, see `average`."""
+    subbands = zip(*(texture.subbands for texture in textures), strict=True)
+    return Histograms(
+        average([texture.pixels for texture in textures], weights, blend),
+        [average(parts, weights, blend) for parts in subbands],
+    )
+
+
+def spliced(low: Histograms, high: Histograms, split: int) -> Histograms:
+    """The low frequencies of one texture, and its pixels, with the high frequencies of another.
+
+    Parameters
+    ----------
+    low, high : Histograms
+    split : int
+        Subbands that are taken from `high`, from the finest on.
+    """
+    return Histograms(low.pixels, [*high.subbands[:split], *low.subbands[split:]])

@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Mixtures of textures: section 5 of Heeger and Bergen (1995)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from numbers import Integral
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simdtex.envelope import check_shape, executed, with_channels_last
+from simdtex.io.image import check_sample
+from simdtex.machine import Machine
+from simdtex.methods.pyramid import algorithm as pyramid
+from simdtex.methods.pyramid.histograms import Histograms, Sorted, averaged, histograms, spliced
+from simdtex.methods.pyramid.palette import decorrelated
+from simdtex.methods.pyramid.palette import palette as colours_of
+from simdtex.model.stretched import Stretched
+from simdtex.options import one_of, real, whole
+from simdtex.random import as_seed
+from simdtex.run import Callback, Output, device_seconds
+
+__all__ = ["mix"]
+
+
+def mix(
+    samples: Sequence[ArrayLike],
+    shape: tuple[int, int],
+    *,
+    palette: int | None = None,
+    pattern: int | None = None,
+    average: Sequence[float] | None = None,
+    low: int | None = None,
+    high: int | None = None,
+    split: int | None = None,
+    blend: str = "histograms",
+    pixels: str = "palette",
+    channel_axis: int | None = None,
+    rng: int | np.random.Generator | None = None,
+    device: str | Machine | None = None,
+    callback: Callback | None = None,
+    full_output: bool = False,
+    **options: Any,
+) -> NDArray[Any] | tuple[NDArray[Any], Output]:
+    """A texture that looks a bit like each of several, by pyramid matching.
+
+    Its pattern is that of one sample (`pattern`), the average of several (`average`, the default), or the low
+    frequencies of one with the high ones of another (`low`, `high`). Its colours are those of its pattern, or of
+    another sample (`palette`).
+
+    Parameters
+    ----------
+    samples : sequence of (rows, cols) or, with `channel_axis`, three-dimensional arrays
+        One or more, of one type and any sizes. With `channel_axis`, grey ones may have two axes.
+    shape : (int, int)
+        Rows and columns of the output.
+    palette : int, optional
+        The sample, by number from 0, whose decorrelating transform the output is shown in.
+    pattern : int, optional
+        The sample whose subband histograms are matched.
+    average : sequence of float, optional
+        A weight for every sample, 0 or more. By default all weigh the same.
+    low, high : int, optional
+        The samples that low and high frequencies are taken from.
+    split : int, optional
+        With these, how many levels, from the finest on, are high frequencies; by default half of them.
+    blend : {"histograms", "quantiles"}
+        What is averaged: how often each value occurs, as the paper says, or the values at each quantile.
+    pixels : {"palette", "pattern"}
+        Where there is a palette, whose pixels the output's histogram is matched to.
+    channel_axis : int, optional
+        The axis that holds channels; None for grey samples.
+    rng, device, callback, full_output
+        As in `simdtex.synthesize`.
+    **options
+        See `simdtex.methods.pyramid.Options`; ``start`` is a picture to begin with in place of noise.
+
+    Returns
+    -------
+    image : array of the samples' type
+        `shape` plus the channel axis, where the samples have it.
+    output : simdtex.run.Output
+        Only with ``full_output=True``.
+
+    Raises
+    ------
+    ValueError, TypeError
+        What is wrong and what would be right, in one sentence.
+
+    Notes
+    -----
+    Cost: that of `simdtex.synthesize` with ``method="pyramid"``, and an analysis of every sample.
+
+    Examples
+    --------
+    >>> from skimage import data
+    >>> import simdtex
+    >>> brick, gravel = data.brick()[:64, :64], data.gravel()[:64, :64]
+    >>> simdtex.mix([brick, gravel], (96, 96), average=[1, 2], rng=1).shape
+    (96, 96)
+    """
+    one_of("blend", blend, ("histograms", "quantiles"))
+    one_of("pixels", pixels, ("palette", "pattern"))
+    size = check_shape(shape)
+    pictures = _checked(samples, channel_axis)
+    weights = _weights(len(pictures), pattern, average, low, high, split)
+    if palette is not None:
+        _check_number("palette", palette, len(pictures))
+    chosen = pyramid.make_options(**with_channels_last(options, channel_axis))
+    seed = as_seed(rng)
+
+    def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
+        began, worked = perf_counter(), machine.seconds
+        used = [i for i, weight in enumerate(weights) if weight] + ([] if palette is None else [palette])
+        levels = pyramid.number_of_levels(chosen, *size, *(side for i in used for side in pictures[i].shape[:2]))
+        blender = _Blender(machine, pictures, weights, palette, chosen, levels)
+        if low is not None and high is not None:
+            finest = _high_subbands(split, levels, chosen.pyramid)
+            found = blender.spliced(low, high, finest)
+        else:
+            found = blender.averaged(blend)
+        texture = blender.texture(found, palette if pixels == "palette" else None)
+        image, output = pyramid.synthesize_from(machine, texture, size, chosen, levels, seed, seen)
+        output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
+        return image, output
+
+    return executed(device, channel_axis, callback, full_output, run)
+
+
+class _Blender:
+    """The samples of a mixture as channels of one scale, and their histograms.
+
+    Samples that are blended are decorrelated together, so that their channels mean the same.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        pictures: list[NDArray[Any]],
+        weights: list[float],
+        palette: int | None,
+        options: pyramid.Options,
+        levels: int,
+    ) -> None:
+        self._weights = weights
+        self._used = [i for i, weight in enumerate(weights) if weight]
+        machine.require(max(p.shape[0] * p.shape[1] for p in pictures) * pyramid.MEMORY)
+        together = np.concatenate([p.reshape(-1, 1, p.shape[-1]) for p in pictures])
+        self._stretched = Stretched(together)
+        planes = _parted(self._stretched.planes, pictures)
+        decorrelate = options.color == "decorrelate"
+        blended = colours_of([planes[i] for i in self._used], [weights[i] for i in self._used], decorrelate)
+        self._palette = blended if palette is None else colours_of([planes[palette]], [1.0], decorrelate)
+        shown = [] if palette is None else [planes[palette]]
+        self._scale = decorrelated(
+            [*(planes[i] for i in self._used), *shown], [*[blended] * len(self._used), *[self._palette] * len(shown)]
+        )
+        transform = pyramid.transform(machine, options, levels, options.edges == "wrap")
+        self._found = {
+            i: [histograms(machine, channel, transform) for channel in channels]
+            for i, channels in zip(self._used, self._scale.channels, strict=False)
+        }
+
+    def averaged(self, blend: str) -> list[Histograms]:
+        """The average of the samples, channel by channel."""
+        weights = [self._weights[i] for i in self._used]
+        return [averaged(channel, weights, blend) for channel in zip(*self._found.values(), strict=True)]
+
+    def spliced(self, low: int, high: int, finest: int) -> list[Histograms]:
+        """The finest subbands of `high`, the others of `low`, and with them its pixels."""
+        return [spliced(a, b, finest) for a, b in zip(self._found[low], self._found[high], strict=True)]
+
+    def texture(self, found: list[Histograms], pixels_of: int | None) -> pyramid.Texture:
+        """What is to be matched; with the pixels of the palette where it is to give them."""
+        if pixels_of is not None:
+            own: list[Sorted] = [np.sort(c.reshape(1, -1)) for c in self._scale.channels[-1]]
+            found = [Histograms(pixels, one.subbands) for pixels, one in zip(own, found, strict=True)]
+        return pyramid.Texture(found, self._palette, self._scale, self._stretched)
+
+
+def _parted(planes: NDArray[np.int32], pictures: list[NDArray[Any]]) -> list[NDArray[np.int32]]:
+    """Stretched planes (C, pixels of all pictures, 1) as those of each picture (C, rows, cols)."""
+    sizes = [p.shape[0] * p.shape[1] for p in pictures]
+    parts = np.split(planes[..., 0], np.cumsum(sizes)[:-1], axis=1)
+    return [part.reshape(len(planes), *p.shape[:2]) for part, p in zip(parts, pictures, strict=True)]
+
+
+def _high_subbands(split: int | None, levels: int, kind: str) -> int:
+    """How many subbands of a pyramid are high frequencies."""
+    if split is None:
+        split = (levels + 1) // 2
+    if split > levels:
+        raise ValueError(f"split is {split} and the pyramids have {levels} levels; give at most that")
+    return split + (kind == "steerable")
+
+
+def _checked(samples: Sequence[ArrayLike], channel_axis: int | None) -> list[NDArray[Any]]:
+    """The samples as (rows, cols, channels), grey ones with as many channels as the others."""
+    if not isinstance(samples, Sequence):
+        what = "a single array" if isinstance(samples, np.ndarray) else f"of {type(samples).__name__}"
+        raise TypeError(f"samples is {what}; give a list of samples")
+    pictures = [check_sample(sample, None if np.ndim(sample) == 2 else channel_axis) for sample in samples]
+    if not pictures:
+        raise ValueError("there is no sample; give one or more")
+    channels = max(p.shape[-1] for p in pictures)
+    for number, p in enumerate(pictures):
+        if p.dtype != pictures[0].dtype:
+            raise TypeError(
+                f"sample {number} is of {p.dtype} and the first of {pictures[0].dtype}; convert them to one type"
+            )
+        if p.shape[-1] not in (1, channels):
+            raise ValueError(
+                f"sample {number} has {p.shape[-1]} channels and another {channels}; give all the same, or grey ones"
+            )
+    return [np.broadcast_to(p, (*p.shape[:2], channels)) for p in pictures]
+
+
+def _weights(
+    count: int,
+    pattern: int | None,
+    average: Sequence[float] | None,
+    low: int | None,
+    high: int | None,
+    split: int | None,
+) -> list[float]:
+    """The weight of every sample in the pattern."""
+    if (low is None) != (high is None):
+        raise ValueError("low and high go together; give both, or neither")
+    if (pattern is not None) + (average is not None) + (low is not None) > 1:
+        raise ValueError("a mixture has one pattern; give pattern, average, or low and high")
+    if split is not None and low is None:
+        raise ValueError("split parts low from high; give these two, or leave split out")
+    if split is not None:
+        whole("split", split, 0)
+    chosen = [(name, n) for name, n in (("pattern", pattern), ("low", low), ("high", high)) if n is not None]
+    for name, number in chosen:
+        _check_number(name, number, count)
+    if chosen:
+        return [float(i in [number for _, number in chosen]) for i in range(count)]
+    if average is not None and not isinstance(average, (Sequence, np.ndarray)):
+        raise TypeError(f"average is {average!r}; give a list of weights, one for each sample")
+    weights = [1.0] * count if average is None else list(average)
+    if len(weights) != count:
+        raise ValueError(f"average has {len(weights)} weights for {count} samples; give one for each")
+    for weight in weights:
+        real("a weight of average", weight, 0)
+    if not any(weights):
+        raise ValueError("all weights of average are 0; give one above 0")
+    return [float(weight) for weight in weights]
+
+
+def _check_number(name: str, number: Any, count: int) -> None:
+    if isinstance(number, bool) or not isinstance(number, Integral) or not 0 <= int(number) < count:
+        raise ValueError(f"{name} is {number!r}; give the number of a sample, 0 to {count - 1}")

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Colours without correlation, Heeger and Bergen's section 3.5: y = M (x - mean) with M = S^-1 U'."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.model.stretched import TOP
+
+FINE = 2**14
+"""Directions of axes are whole multiples of 2**-14, so that the last bit of a linear algebra library does not show."""
+
+INVERSE = 2**26
+"""And the way back of 2**-26."""
+
+BLOCK = 2**20
+"""Pixels that are summed together: products of so many fit 64 bits."""
+
+FLAT = 2.0**-12
+"""An axis whose standard deviation is less than this share of the largest one's is flat: it holds rounding only."""
+
+
+@dataclass(frozen=True)
+class Palette:
+    """The decorrelating transform of one or more pictures.
+
+    Attributes
+    ----------
+    mean : (C,) int64 array
+        On the stretched scale.
+    axes : (C, C) int64 array
+        U' in 2**-14: a row for each channel, that of the largest variance first.
+    deviations : (C,) float64 array
+        S: the standard deviation along each axis, in 2**-14 of the stretched scale; 0 where there is none.
+    """
+
+    mean: NDArray[np.int64]
+    axes: NDArray[np.int64]
+    deviations: NDArray[np.float64]
+
+    def decorrelated(self, planes: NDArray[np.int32]) -> NDArray[np.float64]:
+        """M (x - mean) of stretched planes (C, ...), of unit variance."""
+        rotated = np.tensordot(self.axes, planes - self.mean.reshape(-1, *(1,) * (planes.ndim - 1)), 1)
+        flat = self.deviations == 0
+        divisor = np.where(flat, 1.0, self.deviations).reshape(-1, *(1,) * (planes.ndim - 1))
+        return np.where(flat.reshape(divisor.shape), 0.0, rotated / divisor)
+
+    def restored(self, channels: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Stretched planes (C, ...) of channels of unit variance: M^-1 y + mean.
+
+        Flat axes have no part in it, so that grey stays grey to the bit. Sums are taken in the order of the channels,
+        so that no library of linear algebra changes a bit.
+        """
+        used = self.deviations > 0
+        along = self.axes[used] / FINE
+        back = np.rint(along.T @ np.linalg.inv(along @ along.T) * INVERSE) / INVERSE
+        planes = np.empty(channels.shape, np.int32)
+        for plane, row, mean in zip(planes, back, self.mean, strict=True):
+            total = np.zeros(plane.shape)
+            for weight, deviation, channel in zip(row, self.deviations[used], channels[used], strict=True):
+                total += weight * (deviation / FINE) * channel
+            plane[...] = np.clip(np.rint(total + mean), -(2**30), 2**30)
+        return planes
+
+
+def palette(pictures: Sequence[NDArray[np.int32]], weights: Sequence[float], decorrelate: bool = True) -> Palette:
+    """The transform that decorrelates some pictures taken together.
+
+    Parameters
+    ----------
+    pictures : sequence of (C, rows, cols) int32 arrays
+        Stretched, on one scale.
+    weights : sequence of float
+        The share that each picture has in mean and covariance.
+    decorrelate : bool
+        Otherwise channels stay as they are, only centred and of unit variance.
+
+    Notes
+    -----
+    The covariance is a matrix of exact sums in whole numbers, divided at the end.
+    """
+    shares = [float(weight) / float(sum(weights)) for weight in weights]
+    means = [picture.reshape(len(picture), -1).mean(1, dtype=np.float64) for picture in pictures]
+    mean = np.rint(sum(share * own for share, own in zip(shares, means, strict=True))).astype(np.int64)
+    channels = len(mean)
+    first, second = np.zeros(channels), np.zeros((channels, channels))
+    for share, picture in zip(shares, pictures, strict=True):
+        sums, products = _moments(picture, mean)
+        first, second = first + share * sums, second + share * products
+    covariance = second - first[:, None] * first
+    axes = np.eye(channels, dtype=np.int64) * FINE
+    if decorrelate and channels > 1:
+        u, _, _ = np.linalg.svd(covariance)  # C = U S^2 U'
+        u *= np.where(u[np.abs(u).argmax(0), np.arange(channels)] < 0, -1.0, 1.0)  # brighter is more
+        axes = np.rint(u.T * FINE).astype(np.int64)
+    variances = np.zeros(channels)
+    for i, j in np.ndindex(channels, channels):  # u' C u, in one order
+        variances += axes[:, i] * covariance[i, j] * axes[:, j]
+    deviations = np.sqrt(np.maximum(variances, 0.0))
+    deviations[deviations <= FLAT * deviations.max(initial=0.0)] = 0.0
+    return Palette(mean, axes, deviations)
+
+
+def _moments(picture: NDArray[np.int32], about: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Means of x and of x x' about some whole numbers, from sums in whole numbers."""
+    x = picture.reshape(len(picture), -1)
+    sums, products = np.zeros(len(x), object), np.zeros((len(x), len(x)), object)
+    for first in range(0, x.shape[1], BLOCK):
+        part = x[:, first : first + BLOCK] - about[:, None]
+        sums += part.sum(1).astype(object)
+        products += np.array([[(a * b).sum() for b in part] for a in part]).astype(object)
+    count = x.shape[1]
+    return (sums / count).astype(np.float64), (products / count).astype(np.float64)
+
+
+@dataclass(frozen=True)
+class Decorrelated:
+    """Pictures as decorrelated channels in whole numbers.
+
+    Attributes
+    ----------
+    channels : list of (C, rows, cols) int32 arrays
+        A picture each. The largest value in any of them, of either sign, is 2**20, or 0 in a flat channel.
+    spans : (C,) float64 array
+        The standard deviations that 2**20 stands for.
+    """
+
+    channels: list[NDArray[np.int32]]
+    spans: NDArray[np.float64]
+
+    def normalised(self, channels: NDArray[np.int32]) -> NDArray[np.float64]:
+        """Channels (C, ...) in standard deviations."""
+        return channels * (self.spans / TOP).reshape(-1, *(1,) * (channels.ndim - 1))
+
+
+def decorrelated(pictures: Sequence[NDArray[np.int32]], palettes: Sequence[Palette]) -> Decorrelated:
+    """Pictures (C, rows, cols) under a palette each, on one scale."""
+    normal = [own.decorrelated(picture) for own, picture in zip(palettes, pictures, strict=True)]
+    spans = np.array([max(float(np.abs(one[c]).max()) for one in normal) for c in range(len(normal[0]))])
+    scale = np.where(spans == 0, 0.0, TOP / np.where(spans == 0, 1.0, spans)).reshape(-1, 1, 1)
+    return Decorrelated([np.rint(one * scale).astype(np.int32) for one in normal], spans)

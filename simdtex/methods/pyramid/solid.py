@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Solid textures: section 4 of Heeger and Bergen (1995).
+
+The program is `simdtex.methods.pyramid.match_texture`; only the pyramids differ. A 2-D Laplacian pyramid of the sample
+is matched by the 3-D Laplacian pyramid of a block, and a steerable pyramid of the sample by those of all slices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import prod
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.machine import Machine
+from simdtex.machine.interface import Array
+from simdtex.methods.pyramid import algorithm as pyramid
+from simdtex.methods.pyramid.algorithm import (
+    VALUES,
+    Matcher,
+    Wanted,
+    analyse,
+    match_subbands,
+    match_texture,
+    number_of_levels,
+    transform,
+)
+from simdtex.ops.solid import solid_band, solid_collapse, solid_mean, solid_reduce, solid_turn
+from simdtex.options import build, one_of
+from simdtex.run import Callback, Output, device_seconds
+
+FAMILIES = {"x-y": ((0, 1, 2), (0, 1, 2)), "x-z": ((1, 0, 2), (1, 0, 2)), "y-z": ((2, 0, 1), (1, 2, 0))}
+"""Slices by name: the axes in the order slice, row, column, and the order that turns them back."""
+
+
+MEMORY = 240
+"""Bytes for each voxel on the device, at most (measured by benchmarks/pyramid_cost.py)."""
+
+
+@dataclass(frozen=True)
+class Options(pyramid.Options):
+    """The options of solid textures: those of the method ``pyramid``, and two more.
+
+    Parameters
+    ----------
+    solids : {"turns", "average"}
+        With ``pyramid="steerable"``: match the Laplacian pyramid of the block and then the steerable pyramids of each
+        family of slices in turn, each of what the one before has made; or, as the paper does, all four of the same
+        block, and average the four solids.
+    slices : {"together", "each"}
+        Match the histograms of a family's slices taken together, or, as the paper does, of every slice.
+
+    Notes
+    -----
+    The others are those of `simdtex.methods.pyramid.Options`; ``pyramid="laplacian"`` matches the 3-D Laplacian
+    pyramid alone.
+    """
+
+    solids: str = "turns"
+    slices: str = "together"
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        super().__post_init__()
+        one_of("solids", self.solids, ("turns", "average"))
+        one_of("slices", self.slices, ("each", "together"))
+
+
+def make_options(**given: Any) -> Options:
+    """Options from what the user gave; unknown names are a TypeError that lists the valid ones."""
+    return build(Options, "solid", given)
+
+
+def synthesize(
+    machine: Machine,
+    sample: NDArray[Any],
+    shape: tuple[int, int, int],
+    options: Options,
+    seed: int,
+    callback: Callback | None = None,
+) -> tuple[NDArray[Any], Output]:
+    """Analyse the sample and make a block of it.
+
+    Parameters
+    ----------
+    machine : Machine
+    sample : (rows, cols, channels) array
+    shape : (depth, rows, cols)
+        Of the block.
+    options : Options
+    seed : int
+    callback : callable, optional
+
+    Returns
+    -------
+    volume : (depth, rows, cols, channels) array
+        In the sample's type.
+    output : simdtex.run.Output
+
+    Notes
+    -----
+    Cost: 5000 multiply-adds and 25 sorted values for every voxel, channel and iteration, with four orientations.
+    """
+    began, worked = perf_counter(), machine.seconds
+    if prod(shape) * max(VALUES, sample.shape[-1]) >= 2**31:
+        size = " x ".join(str(n) for n in shape)
+        raise ValueError(f"a block of {size} is beyond 2**31 values; give a smaller size")
+    machine.require(prod(shape) * MEMORY)
+    levels, oriented = number_of_levels(options, *shape, *sample.shape[:2]), options.pyramid == "steerable"
+    wrap = options.edges == "wrap"
+    flat = transform(machine, replace(options, pyramid="laplacian"), levels, wrap)
+    steerable = [transform(machine, options, levels, wrap)] if oriented else []
+    texture = analyse(machine, sample, options, flat, *steerable)
+    slices = transform(machine, options, levels, torus=True)
+
+    def turn(block: Array, wanted: list[Wanted], matcher: Matcher, tell: Callable[[float], None]) -> Array:
+        block, of_block, of_slices = block.reshape(shape), wanted[: levels + 1], wanted[levels + 1 :]
+        solids = [_matched_block(machine, block, of_block, matcher)]
+        for number, (name, (axes, back)) in enumerate(FAMILIES.items() if oriented else ()):
+            machine.sync()
+            tell((1 + number) / (1 + len(FAMILIES)))
+            before = solids[-1] if options.solids == "turns" else block
+            synthesis_pyr = slices.make(solid_turn(machine, before, axes))
+            names = [f"{name} {band}" for band in slices.names]
+            matched = match_subbands(matcher, names, synthesis_pyr, of_slices, options.slices == "together")
+            solids.append(solid_turn(machine, slices.collapse(matched), back))
+            if options.solids == "turns":
+                del solids[0]
+        return solid_mean(machine, solids) if len(solids) > 1 else solids[0]
+
+    volume, output = match_texture(machine, texture, shape, turn, options, levels, seed, callback)
+    output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
+    return volume, output
+
+
+def _matched_block(machine: Machine, block: Array, wanted: list[Wanted], matcher: Matcher) -> Array:
+    """The 3-D Laplacian pyramid of a block, matched and collapsed."""
+    gaussian = [block]
+    while len(gaussian) < len(wanted):
+        gaussian.append(solid_reduce(machine, gaussian[-1], True))
+    bands = [solid_band(machine, fine, coarse, True) for fine, coarse in pairwise(gaussian)]
+    names = [*(f"solid level {level}" for level in range(len(bands))), "solid low"]
+    synthesis_pyr = [band.reshape((1, 1, *band.shape)) for band in [*bands, gaussian[-1]]]
+    matched = match_subbands(matcher, names, synthesis_pyr, wanted)
+    *fine, collapsed = (band.reshape(band.shape[2:]) for band in matched)
+    for band in reversed(fine):
+        collapsed = solid_collapse(machine, band, collapsed, True)
+    return collapsed
+
+
+def slices_of(volume: NDArray[Any], name: str) -> NDArray[Any]:
+    """A family of slices (slice, row, column, ...) of a volume (depth, rows, cols, ...)."""
+    axes = FAMILIES[name][0]
+    return np.transpose(volume, (*axes, *range(3, volume.ndim)))

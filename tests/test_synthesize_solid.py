@@ -1,0 +1,273 @@
+"""Solid textures: blocks whose slices look like a sample, along the axes and across them."""
+
+import numpy as np
+import plain_pyramid as plain
+import pytest
+from cases import REFERENCE, assert_same_bits, texture
+from scipy.ndimage import map_coordinates
+from scipy.stats import wasserstein_distance
+from skimage import data
+from tolerances import FAVOUR, SLICE_PIXELS, SLICE_SUBBANDS, SOLID_SEAM
+
+import simdtex
+from simdtex.methods.pyramid.pyramids import decompose
+from simdtex.methods.pyramid.solid import FAMILIES, slices_of
+
+SIDE = 32
+WAYS = {
+    "together": {"solids": "turns", "slices": "together"},
+    "each": {"solids": "turns", "slices": "each"},
+    "paper": {"solids": "average", "slices": "each"},
+}
+
+
+def solid(sample, shape, **options):
+    return simdtex.synthesize_solid(sample, shape, **({"rng": 3, "device": REFERENCE} | options))
+
+
+def sample_of(name):
+    return getattr(data, name)()[:64, :64]
+
+
+@pytest.fixture(scope="module")
+def blocks():
+    """Each kind of block, made once."""
+    made = {}
+
+    def block(name, way):
+        if (name, way) not in made:
+            made[name, way] = solid(sample_of(name), (SIDE,) * 3, **WAYS[way])
+        return made[name, way]
+
+    return block
+
+
+# -- bits, and the simplest rules -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("channels", "options"),
+    [
+        (None, {}),
+        (3, {}),
+        (None, {"solids": "average", "slices": "each", "orientations": 2}),
+        (None, {"pyramid": "laplacian", "match": "lookup"}),
+    ],
+    ids=str,
+)
+def test_a_device_has_the_references_bits(machine, channels, options):
+    sample, axis = texture((13, 12), channels), None if channels is None else -1
+    options |= {"channel_axis": axis, "iterations": 2}
+    made = solid(sample, (12, 10, 9), device=machine, **options)
+    assert_same_bits(made, solid(sample, (12, 10, 9), **options))
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("dtype", [np.uint8, np.float64, np.bool_])
+def test_a_multiple_of_the_sample_has_exactly_its_pixels(way, dtype):
+    sample = texture((8, 9), None, dtype)
+    made = solid(sample, (6, 8, 9), iterations=2, **WAYS[way])
+    assert_same_bits(np.sort(made, axis=None), np.sort(np.repeat(sample, 6)))
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 1), (1, 5, 7), (3, 1, 4), (5, 4, 1), (9, 10, 11)], ids=str)
+@pytest.mark.parametrize("kind", ["steerable", "laplacian"])
+def test_any_block_works(shape, kind):
+    sample = texture((16, 15), None, np.float32)
+    made = solid(sample, shape, pyramid=kind)
+    assert made.shape == shape
+    assert_same_bits(np.sort(made, axis=None), plain.quantiles(sample, made.size))
+
+
+@pytest.mark.parametrize("sample", [(1, 1), (2, 2), (1, 7)], ids=str)
+def test_any_sample_works(sample):
+    pixels = texture(sample)
+    made = solid(pixels, (5, 6, 7))
+    assert set(np.unique(made)) <= set(np.unique(pixels))
+
+
+def test_a_constant_gives_the_constant_and_grey_stays_grey():
+    assert (solid(np.full((8, 8), 7, np.uint8), (3, 4, 5)) == 7).all()
+    grey = np.repeat(texture((16, 16))[..., None], 3, -1)
+    made = solid(grey, (8, 9, 10), channel_axis=-1)
+    assert made.shape == (8, 9, 10, 3)
+    assert (made == made[..., :1]).all()
+    assert_same_bits(made[..., 0].copy(), solid(grey[..., 0], (8, 9, 10)))
+
+
+def test_channels_come_last_whatever_axis_the_sample_has_them_on():
+    sample = texture((12, 13), 3)
+    options = {"iterations": 1}
+    theirs = solid(sample, (6, 7, 8), channel_axis=-1, **options)
+    assert_same_bits(solid(np.moveaxis(sample, -1, 0), (6, 7, 8), channel_axis=0, **options), theirs)
+
+
+# -- statistics of slices -------------------------------------------------------------------------------------
+
+
+def moved(sample, made):
+    """The Wasserstein distance of two sets of values in standard deviations of the first."""
+    return wasserstein_distance(np.ravel(sample), np.ravel(made)) / np.std(sample)
+
+
+def of_subbands(sample, slices, boundary):
+    """The same of every subband, all slices of a family together; by subband, finest first."""
+    options = {"levels": 2, "device": REFERENCE}
+    middle = sample.mean()
+    own = decompose(sample - middle, **options)
+    theirs = decompose(np.moveaxis(slices, 0, -1) - middle, boundary=boundary, channel_axis=-1, **options)
+    low = own.subbands[-1] + own.offset
+    pairs = [*zip(own.subbands[:-1], theirs.subbands[:-1], strict=True), (low, theirs.subbands[-1] + theirs.offset)]
+    return [np.mean([moved(a, b) for a, b in zip(*pair, strict=True)]) for pair in pairs]
+
+
+def oblique(volume, count=20, side=40):
+    """Planes through a block at any angle, which goes on around; nearest voxels, so that no value is blended."""
+    rng, planes = np.random.default_rng(1), []
+    for _ in range(count):
+        across, down, _ = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        i, j = np.indices((side, side))
+        points = rng.uniform(0, SIDE, 3)[:, None, None] + across[:, None, None] * i + down[:, None, None] * j
+        planes.append(map_coordinates(volume, points, order=0, mode="grid-wrap"))
+    return np.array(planes)
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("name", ["gravel", pytest.param("grass", marks=pytest.mark.slow)])
+def test_slices_have_the_samples_statistics(blocks, name, way):
+    sample, block = sample_of(name), blocks(name, way)
+    for family in FAMILIES:
+        slices = slices_of(block, family)
+        each = [moved(sample, one) for one in slices]
+        assert np.mean(each) <= SLICE_PIXELS[way][0]
+        assert max(each) <= SLICE_PIXELS[way][1]
+        assert max(of_subbands(sample, slices, "torus")) <= SLICE_SUBBANDS[way]
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("name", ["gravel", pytest.param("grass", marks=pytest.mark.slow)])
+def test_oblique_slices_have_the_samples_statistics(blocks, name, way):
+    sample, planes = sample_of(name), oblique(blocks(name, way))
+    each = [moved(sample, one) for one in planes]
+    assert np.mean(each) <= SLICE_PIXELS["oblique"][0]
+    assert max(each) <= SLICE_PIXELS["oblique"][1]
+    high, *others = of_subbands(sample, planes, "open")
+    assert max(others) <= SLICE_SUBBANDS["oblique"]
+    assert high <= SLICE_SUBBANDS["oblique high"], "the nearest voxel has jumps of its own"
+
+
+def test_noise_of_the_same_pixels_has_not():
+    """Else the tests above would show nothing."""
+    sample, block = sample_of("gravel"), solid(sample_of("gravel"), (SIDE,) * 3, iterations=0)
+    assert max(of_subbands(sample, block, "torus")) > 3 * max(SLICE_SUBBANDS.values())
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_no_family_of_slices_is_favoured_by_much(blocks, way):
+    """Families come in turns, so that the last is nearest to the sample."""
+    sample, block = sample_of("gravel"), blocks("gravel", way)
+    means = [np.mean(of_subbands(sample, slices_of(block, family), "torus")) for family in FAMILIES]
+    assert max(means) - min(means) <= FAVOUR
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_block_has_no_seam_in_any_direction(blocks, way):
+    ratios = []
+    for name in ("gravel", "grass"):
+        block = blocks(name, way).astype(float)
+        for axis in range(3):
+            inside = abs(np.diff(block, axis=axis)).mean()
+            ratios.append(abs(block.take(0, axis) - block.take(-1, axis)).mean() / inside)
+    assert abs(np.mean(ratios) - 1) <= SOLID_SEAM / 2
+    assert max(abs(np.array(ratios) - 1)) <= 2 * SOLID_SEAM
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_histograms_come_closer_from_iteration_to_iteration(way):
+    _, output = solid(sample_of("gravel"), (16, 16, 16), full_output=True, **WAYS[way])
+    means = [np.mean(list(report["distances"].values())) for report in output.statistics["iterations"]]
+    assert means[4] < 0.6 * means[0]
+    names = list(output.statistics["iterations"][0]["distances"])
+    assert names[:2] == ["solid level 0", "solid low"]
+    assert {name.split()[0] for name in names} == {"solid", *FAMILIES, "pixels"}
+
+
+def test_families_are_all_slices_and_turn_back():
+    volume = np.arange(24).reshape(2, 3, 4)
+    assert (slices_of(volume, "x-y")[1] == volume[1]).all()
+    assert (slices_of(volume, "x-z")[2] == volume[:, 2]).all()
+    assert (slices_of(volume, "y-z")[3] == volume[:, :, 3]).all()
+    for axes, back in FAMILIES.values():
+        assert (volume.transpose(axes).transpose(back) == volume).all()
+
+
+# -- start, callback, errors ----------------------------------------------------------------------------------
+
+
+def test_a_start_is_followed():
+    sample = texture((16, 16))
+    layers = np.broadcast_to((np.arange(12) // 6)[:, None, None], (12, 12, 12))
+    made = solid(sample, (12, 12, 12), start=layers, iterations=0)
+    assert made[:6].max() <= made[6:].min()
+    whole = solid(sample, (12, 12, 12))
+    again = solid(sample, (12, 12, 12), start=whole, iterations=0)
+    assert abs(again.astype(int) - whole).max() <= 1, "it has all pixels already"
+
+
+@pytest.mark.parametrize("axis", [-1, 0])
+def test_a_start_has_the_blocks_axes_whatever_those_of_the_sample(axis):
+    """A block has its channels last; a grey one has none."""
+    sample = np.moveaxis(texture((12, 12), 3), -1, axis)
+    grey = texture((36, 6)).reshape(6, 6, 6)
+    colour = np.stack([grey, grey, grey], -1)
+    known = solid(texture((12, 12), 3), (6, 6, 6), start=colour, channel_axis=-1)
+    options = {"channel_axis": axis}
+    assert_same_bits(solid(sample, (6, 6, 6), start=colour, **options), known)
+    grey_start = solid(sample, (6, 6, 6), start=grey, **options)
+    assert_same_bits(grey_start, solid(texture((12, 12), 3), (6, 6, 6), start=grey, channel_axis=-1))
+
+
+def test_a_callback_sees_every_part_of_a_turn():
+    seen, shapes = [], set()
+
+    def callback(progress):
+        seen.append((progress.iteration, progress.fraction, progress.end_of_iteration))
+        shapes.add(progress.image().shape)
+
+    solid(texture((12, 12), 3), (6, 7, 8), channel_axis=-1, iterations=2, callback=callback)
+    assert shapes == {(6, 7, 8, 3)}
+    assert [f for _, f, _ in seen] == pytest.approx([k / 24 for k in range(1, 25)])
+    assert [i for i, _, _ in seen] == [1] * 12 + [2] * 12
+    assert [end for _, _, end in seen] == ([False] * 11 + [True]) * 2
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
+def test_what_a_callback_raises_passes_through(error):
+    def callback(progress):
+        raise error
+
+    with pytest.raises(error):
+        solid(texture((12, 11)), (3, 4, 5), callback=callback)
+
+
+@pytest.mark.parametrize(
+    ("shape", "options", "error", "words"),
+    [
+        ((4, 5), {}, ValueError, r"shape must be three whole numbers \(depth, rows, columns\), not \(4, 5\)"),
+        (5, {}, ValueError, "shape must be three whole numbers"),
+        ((3, 4, 5, 6), {}, ValueError, "shape must be three whole numbers"),
+        ((0, 4, 5), {}, ValueError, "depth of the block is 0; give 1 or more"),
+        ((4, 5, -1), {}, ValueError, "columns of the output is -1; give 1 or more|block"),
+        ((4.0, 5, 6), {}, TypeError, "depth of the block must be a whole number, not 4.0"),
+        ((2**11, 2**11, 2**11), {}, ValueError, "a block of 2048 x 2048 x 2048 is beyond 2"),
+        ((4, 5, 6), {"solids": "one"}, ValueError, "unknown solids 'one'; choose one of: turns, average"),
+        ((4, 5, 6), {"slices": "all"}, ValueError, "unknown slices 'all'; choose one of: each, together"),
+        ((4, 5, 6), {"alpha": 1}, TypeError, "unknown option 'alpha' of the method 'solid'; choose from: pyramid"),
+        ((4, 5, 6), {"levels": 3}, ValueError, "levels=3 is too many for a side of 4 pixels; give at most 2"),
+        ((4, 5, 6), {"start": np.zeros((5, 6))}, ValueError, r"start has shape \(5, 6\); give one of 4 x 5 x 6 pixels"),
+        ((4, 5, 6), {"match": "sort"}, ValueError, "unknown match"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(shape, options, error, words):
+    with pytest.raises(error, match=words):
+        solid(texture((9, 9)), shape, **options)
