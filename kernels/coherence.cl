@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma OPENCL FP_CONTRACT OFF
+#include "common/favour.h"
 #include "common/lanes.h"
 #include "common/lattice.h"
 
@@ -7,36 +8,29 @@
 #define BLOCK 64
 #endif
 
-// A preference for coherence, which the 1998 paper lacks: neighbour r of site s was taken from sample position
-// p_r, so p_r + (s - r) continues it; the squared distance of such a candidate is multiplied by `favour` =
-// 1 / (1 + coherence), once however many neighbours propose it. Neighbours that no relaxation has touched (t = 1) propose none.
+// The preference of common/favour.h, for distances that are kept.
 //
-// source     (H, W)                 pixel index in the sample of each site's source
-// reach      (N,), offsets (N, 2)   as in lcpdf.cl and neighbourhood.cl; both at the level's spacing
-// index_of   (h * w,)               position in the list of candidates, -1 where the pixel is none
-// distance   (blocks * BLOCK, P)    in and out; the sign bit marks what has been favoured
-// nearest    (blocks, P)            in and out
+// source   (H, W)                 pixel index in the sample of each site's source
+// offsets  (N, 2), reach (N,)     of the neighbours, on the lattice and in the sample
+// index_of (pixels,)              number of the candidate at a pixel of the sample, -1 where there is none
+// distance (blocks * BLOCK, P)    in and out; the sign bit marks what has been favoured
+// nearest  (blocks, P)            in and out
 // One work-item per site.
 __kernel void coherence(__global const int *restrict sites, const int S, const int P,
                         __global const int *restrict source, __global const ushort *restrict temperature,
-                        __global const int2 *restrict offsets, const int N, GRID, __global const int *restrict index_of,
-                        const int sample_rows, const int sample_cols, const float favour,
+                        __global const int2 *restrict offsets, const int N, const Lattice g, __global const int *restrict reach,
+                        __global const int *restrict index_of, const int pixels, const float favour,
                         __global float *restrict distance, __global float *restrict nearest LANES_ARG)
 {
     const int s = LANE;
     if (IDLE(s))
         return;
-    const int i = ROW_OF(sites[s]), j = COL_OF(sites[s]);
+    const int i = ROW_OF(g, sites[s]), j = COL_OF(g, sites[s]);
     for (int k = 0; k < N; ++k) {
-        const int2 o = offsets[k];
-        const int r = neighbour(i, j, o.x, o.y, HERE);
-        if (r < 0 || temperature[r] >= 1024)
+        const int r = neighbour(g, i, j, offsets[k].x, offsets[k].y);
+        if (r < 0 || temperature[r] >= UNTOUCHED)
             continue;
-        const int row = source[r] / sample_cols - o.x * spacing;
-        const int col = source[r] % sample_cols - o.y * spacing;
-        if (row < 0 || row >= sample_rows || col < 0 || col >= sample_cols)
-            continue;
-        const int p = index_of[row * sample_cols + col];
+        const int p = continuing(index_of, source[r], reach[k], pixels);
         if (p < 0)
             continue;
         const float d = distance[p * P + s];

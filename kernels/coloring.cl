@@ -11,22 +11,22 @@
 // cuts through the pattern, the later of two clashing sites stays uncoloured.
 //
 // offsets (N, 2); color (rows, cols) out. One work-item per site.
-__kernel void coloring_lattice(GRID, __global const int2 *restrict offsets, const int N, const int a, const int b,
+__kernel void coloring_lattice(const Lattice g, __global const int2 *restrict offsets, const int N, const int a, const int b,
                                const int c, __global int *restrict color)
 {
     const int site = get_global_id(0);
-    if (site >= rows * cols)
+    if (site >= g.rows * g.cols)
         return;
-    const int i = site / cols, j = site % cols;
+    const int i = site / g.cols, j = site % g.cols;
 #define COSET(i, j) (wrap((i) - (j) / c * b, a) * c + (j) % c)
     const int own = COSET(i, j);
     bool clash = false;
     for (int k = 0; k < N; ++k) {
         const int row = i + offsets[k].x, col = j + offsets[k].y;
-        if (row >= 0 && row < rows && col >= 0 && col < cols) // no seam in between, so another coset
+        if (row >= 0 && row < g.rows && col >= 0 && col < g.cols) // no seam in between, so another coset
             continue;
-        const int r = neighbour(i, j, offsets[k].x, offsets[k].y, FLAT);
-        clash = clash || (r >= 0 && r < site && COSET(r / cols, r % cols) == own);
+        const int r = neighbour(g, i, j, offsets[k].x, offsets[k].y);
+        clash = clash || (r >= 0 && r < site && COSET(r / g.cols, r % g.cols) == own);
     }
     color[site] = clash ? UNCOLORED : own;
 }
@@ -35,19 +35,19 @@ __kernel void coloring_lattice(GRID, __global const int2 *restrict offsets, cons
 // those of all its uncoloured neighbours takes the lowest colour that no neighbour has.
 //
 // color (rows, cols) in; next (rows, cols) out. One work-item per site.
-__kernel void coloring_greedy(GRID, __global const int2 *restrict offsets, const int N, const ulong seed,
+__kernel void coloring_greedy(const Lattice g, __global const int2 *restrict offsets, const int N, const ulong seed,
                               __global const int *restrict color, __global int *restrict next)
 {
     const int site = get_global_id(0);
-    if (site >= rows * cols)
+    if (site >= g.rows * g.cols)
         return;
     next[site] = color[site];
     if (color[site] != UNCOLORED)
         return;
-    const int i = site / cols, j = site % cols;
+    const int i = site / g.cols, j = site % g.cols;
     const uint own = draw4(seed, 0, 0, site, PURPOSE_COLOR, 0).x;
     for (int k = 0; k < N; ++k) {
-        const int r = neighbour(i, j, offsets[k].x, offsets[k].y, FLAT);
+        const int r = neighbour(g, i, j, offsets[k].x, offsets[k].y);
         if (r < 0 || color[r] != UNCOLORED)
             continue;
         const uint other = draw4(seed, 0, 0, r, PURPOSE_COLOR, 0).x;
@@ -57,7 +57,7 @@ __kernel void coloring_greedy(GRID, __global const int2 *restrict offsets, const
     for (int base = 0;; base += 32) { // 32 colours at a time
         uint taken = 0;
         for (int k = 0; k < N; ++k) {
-            const int r = neighbour(i, j, offsets[k].x, offsets[k].y, FLAT);
+            const int r = neighbour(g, i, j, offsets[k].x, offsets[k].y);
             const int other = r < 0 ? UNCOLORED : color[r];
             if (other >= base && other < base + 32)
                 taken |= 1u << (other - base);

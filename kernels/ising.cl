@@ -12,24 +12,24 @@
 
 // What a site becomes.
 inline uchar heat_bath(__global const uchar *spins, const int site, __global const int2 *restrict offsets, const int N,
-                       GRID, __global const uint *restrict chances, const ulong seed, const uint turn, const uint chain)
+                       const Lattice g, __global const uint *restrict chances, const ulong seed, const uint turn, const uint chain)
 {
-    const int i = ROW_OF(site), j = COL_OF(site);
+    const int i = ROW_OF(g, site), j = COL_OF(g, site);
     int members = 0, up = 0;
     for (int k = 0; k < N; ++k) {
-        const int r = neighbour(i, j, offsets[k].x, offsets[k].y, HERE);
+        const int r = neighbour(g, i, j, offsets[k].x, offsets[k].y);
         if (r < 0)
             continue;
         ++members;
         up += spins[r];
     }
-    return draw4(seed, 0, turn, site, PURPOSE_DRAW, chain).x < chances[members * (N + 1) + up];
+    return draw4(seed, 0, turn, place_of(g, i, j), PURPOSE_DRAW, chain).x < chances[members * (N + 1) + up];
 }
 
 // One step: what its sites become, old values read.
 // sites (S,); relaxed (chains, S)  out. One work-item per (site, seed, temperature).
 __kernel void ising_relax(__global const int *restrict sites, const int S, __global const uchar *restrict spins,
-                          const int stride, const int seeds, __global const int2 *restrict offsets, const int N, GRID,
+                          const int stride, const int seeds, __global const int2 *restrict offsets, const int N, const Lattice g,
                           __global const uint *restrict chances, const ulong seed, const uint turn,
                           __global uchar *restrict relaxed)
 {
@@ -37,7 +37,7 @@ __kernel void ising_relax(__global const int *restrict sites, const int S, __glo
     if (s >= S)
         return;
     const int chain = t * seeds + c;
-    relaxed[chain * S + s] = heat_bath(spins + chain * stride, sites[s], offsets, N, HERE,
+    relaxed[chain * S + s] = heat_bath(spins + chain * stride, sites[s], offsets, N, g,
                                        chances + t * (N + 1) * (N + 1), seed, turn, c);
 }
 
@@ -56,7 +56,7 @@ __kernel void ising_commit(__global const int *restrict sites, const int S, __gl
 // A run of steps of one site each, one after another; each sees what the one before it has made.
 // queue (Q, 2) the site and the turn of every step. One work-item per (seed, temperature).
 __kernel void ising_sequence(__global const int2 *restrict queue, const int Q, __global uchar *spins, const int stride,
-                             const int seeds, __global const int2 *restrict offsets, const int N, GRID,
+                             const int seeds, __global const int2 *restrict offsets, const int N, const Lattice g,
                              __global const uint *restrict chances, const ulong seed)
 {
     const int c = get_global_id(0), t = get_global_id(1);
@@ -64,6 +64,6 @@ __kernel void ising_sequence(__global const int2 *restrict queue, const int Q, _
         return;
     __global uchar *mine = spins + (t * seeds + c) * stride;
     for (int q = 0; q < Q; ++q)
-        mine[queue[q].x] = heat_bath(mine, queue[q].x, offsets, N, HERE, chances + t * (N + 1) * (N + 1), seed,
+        mine[queue[q].x] = heat_bath(mine, queue[q].x, offsets, N, g, chances + t * (N + 1) * (N + 1), seed,
                                      queue[q].y, c);
 }

@@ -7,15 +7,14 @@
 // Weights are whole numbers, zero below 2^-40 of the largest: common/parzen.h.
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/lanes.h"
+#include "common/lattice.h"
 #include "common/parzen.h"
 #include "common/philox.h"
 #include "common/vector.h"
+#include "common/weigh.h"
 
 #ifndef BLOCK
 #define BLOCK 64 // candidates to a block, each with its smallest distance
-#endif
-#ifndef STEP
-#define STEP 4 // candidates that are kept in registers together
 #endif
 
 // Equation (12): d_p for V sites and one block of candidates, neighbours in canonical order, channels inside.
@@ -26,7 +25,7 @@
 // reach      (N,)                         pixel offset in the sample of each neighbour
 // distance   (blocks * BLOCK, P)          out
 // nearest    (blocks, P)                  out: smallest d of each block
-// One work-item per (V sites, block). This loop is the cost of the whole program.
+// One work-item per (V sites, block).
 __kernel void lcpdf_distance(__global const float *restrict confidence, __global const float *restrict weighted,
                              const int N, const int P, __global const float *restrict sample, const int plane,
                              __global const int *restrict candidates, const int count,
@@ -40,26 +39,8 @@ __kernel void lcpdf_distance(__global const float *restrict confidence, __global
     {
         vec least = INFINITY;
         for (int p = block * BLOCK; p < (block + 1) * BLOCK; p += STEP) {
-            __global const float *y[STEP];
             vec d[STEP];
-#pragma unroll
-            for (int q = 0; q < STEP; ++q) {
-                y[q] = sample + candidates[p + q];
-                d[q] = 0.0f;
-            }
-            for (int k = 0; k < N; ++k) {
-                const int o = reach[k];
-                const vec u = LOAD(confidence + k * P + s);
-#pragma unroll
-                for (int c = 0; c < C; ++c) {
-                    const vec xu = LOAD(weighted + (k * C + c) * P + s);
-#pragma unroll
-                    for (int q = 0; q < STEP; ++q) {
-                        const vec e = fma((vec)(-y[q][c * plane + o]), u, xu);
-                        d[q] = fma(e, e, d[q]);
-                    }
-                }
-            }
+            weigh(confidence + s, weighted + s, N, P, sample, plane, candidates + p, reach, d);
 #pragma unroll
             for (int q = 0; q < STEP; ++q) {
                 const vec dq = p + q < count ? d[q] : (vec)INFINITY;
@@ -98,7 +79,7 @@ __kernel void lcpdf_draw(__global const float *restrict distance, __global const
                          const int blocks, const int S, const int P, const float scale,
                          __global const float *restrict sample, const int plane,
                          __global const int *restrict candidates, __global const int *restrict sites,
-                         const ulong seed, const uint level, const uint turn, __global const uint *restrict noise,
+                         const Lattice g, const ulong seed, const uint level, const uint turn, __global const uint *restrict noise,
                          const int radius, const int top, __global int *restrict choice,
                          __global ushort *restrict values LANES_ARG)
 {
@@ -110,7 +91,8 @@ __kernel void lcpdf_draw(__global const float *restrict distance, __global const
     ulong total = 0;
     FOR_CANDIDATES(p) total += MASS(p);
 
-    const uint4 bits = draw4(seed, level, turn, sites[s], PURPOSE_DRAW, 0);
+    const ulong place = place_of(g, ROW_OF(g, sites[s]), COL_OF(g, sites[s]));
+    const uint4 bits = draw4(seed, level, turn, place, PURPOSE_DRAW, 0);
     const ulong target = below(bits.x, bits.y, total);
     ulong sum = 0;
     int chosen = -1;
@@ -127,29 +109,9 @@ __kernel void lcpdf_draw(__global const float *restrict distance, __global const
     for (int c = 0; c < C; ++c) {
         int x = (int)sample[c * plane + from];
         if (radius >= 0)
-            x += step_from(noise, radius, x, top, draw4(seed, level, turn, sites[s], PURPOSE_DRAW, 1 + c).x);
+            x += step_from(noise, radius, x, top, draw4(seed, level, turn, place, PURPOSE_DRAW, 1 + c).x);
         values[c * S + s] = (ushort)x;
     }
-}
-
-// ICM over sample positions: the heaviest candidate, the lowest index where several are.
-__kernel void lcpdf_best(__global const float *restrict distance, __global const float *restrict nearest,
-                         const int blocks, const int S, const int P, __global const float *restrict sample,
-                         const int plane, __global const int *restrict candidates, __global int *restrict choice,
-                         __global ushort *restrict values LANES_ARG)
-{
-    const int s = LANE;
-    if (IDLE(s))
-        return;
-    const float smallest = smallest_of(nearest, blocks, P, s);
-    int p = 0;
-    while (nearest[p / BLOCK * P + s] > smallest)
-        p += BLOCK;
-    while (DISTANCE(p) > smallest)
-        ++p;
-    choice[s] = candidates[p];
-    for (int c = 0; c < C; ++c)
-        values[c * S + s] = (ushort)sample[c * plane + candidates[p]];
 }
 
 // f(x) for one grey level: the weights per grey level, smoothed by the kernel of equation (7), level 0 first.
@@ -284,7 +246,7 @@ __kernel void lcpdf_mode_vector(__global const float *restrict distance, __globa
 // window  (radius + 1,)   exp(-k^2 / 2h^2)
 // mass    (S, levels)     scratch: sum of the weights per grey level
 // table   (S, levels)     out: f(x)
-__kernel void lcpdf_table(__global const float *restrict distance, __global const float *restrict nearest,
+__kernel void lcpdf_density(__global const float *restrict distance, __global const float *restrict nearest,
                           const int blocks, const int S, const int P, const float scale,
                           __global const float *restrict sample, __global const int *restrict candidates,
                           __global const float *restrict window, const int radius, const int levels,

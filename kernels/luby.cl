@@ -23,21 +23,21 @@ __kernel void luby_priority(const int sites, const ulong seed, const uint level,
 
 // One round; equal priorities are decided by the higher index. state (rows, cols) in; next (rows, cols) out.
 // One work-item per site.
-__kernel void luby_round(GRID, __global const int2 *restrict offsets, const int N,
+__kernel void luby_round(const Lattice g, __global const int2 *restrict offsets, const int N,
                          __global const uint *restrict priority, __global const uchar *restrict state,
                          __global uchar *restrict next)
 {
     const int site = get_global_id(0);
-    if (site >= rows * cols)
+    if (site >= g.rows * g.cols)
         return;
     next[site] = state[site];
     if (state[site] != UNDECIDED)
         return;
-    const int i = site / cols, j = site % cols;
+    const int i = site / g.cols, j = site % g.cols;
     const uint own = priority[site];
     bool highest = true;
     for (int k = 0; k < N; ++k) {
-        const int r = neighbour(i, j, offsets[k].x, offsets[k].y, FLAT);
+        const int r = neighbour(g, i, j, offsets[k].x, offsets[k].y);
         if (r < 0 || state[r] == OUT)
             continue;
         if (state[r] == IN) {

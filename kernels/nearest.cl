@@ -7,6 +7,8 @@
 // Whoever is proved to lie beyond the best so far is skipped. Two facts make that exact: partial sums never fall, and a
 // sum in another order differs by less than SLACK. What survives is weighed again in the canonical order.
 #pragma OPENCL FP_CONTRACT OFF
+#include "common/distance.h"
+#include "common/favour.h"
 #include "common/lanes.h"
 #include "common/lattice.h"
 #include "common/vector.h"
@@ -17,6 +19,7 @@
 #ifndef STEP
 #define STEP 2 // vectors of candidates that are weighed together
 #endif
+#include "common/weigh.h"
 #ifndef CHECK
 #define CHECK 4 // neighbours between two looks at the bound
 #endif
@@ -51,7 +54,7 @@ inline float canonical(__global const float *site, __global const float *y, cons
         const float u = site[k * (1 + C)];
 #pragma unroll
         for (int c = 0; c < C; ++c) {
-            const float e = fma(-y[c * plane + reach[k]], u, site[k * (1 + C) + 1 + c]);
+            const float e = GAP(y[c * plane + reach[k]], u, site[k * (1 + C) + 1 + c]);
             d = fma(e, e, d);
         }
     }
@@ -74,8 +77,8 @@ inline float canonical(__global const float *site, __global const float *y, cons
 __kernel __attribute__((vec_type_hint(float4))) void
 nearest_begin(__global const int *restrict sites, const int S, const int N, __global const ushort *restrict values,
               __global const int *restrict source, __global const ushort *restrict temperature,
-              const int pixels, __global const int2 *restrict offsets, GRID,
-              __global const int *restrict index_of, const int sample_rows, const int sample_cols,
+              const int area, __global const int2 *restrict offsets, const Lattice g,
+              __global const int *restrict index_of, const int plane,
               __global const float *restrict sample, __global const int *restrict positions,
               __global const int *restrict reach, __global const int *restrict strip_reach,
               __global const int *restrict spread, const float favour,
@@ -87,8 +90,7 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
     const int s = LANE;
     if (IDLE(s))
         return;
-    const int i = ROW_OF(sites[s]), j = COL_OF(sites[s]);
-    const int plane = sample_rows * sample_cols;
+    const int i = ROW_OF(g, sites[s]), j = COL_OF(g, sites[s]);
     __global float *here = near + s * (N * (1 + C));
     __global int *list = terms + s * (N * WORDS); // until the terms come, the places that neighbours propose
     int held[BUCKETS + 1];
@@ -97,25 +99,21 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
     float16 feature = 0.0f;
     int hottest = 0;
     for (int k = 0; k < N; ++k) {
-        const int2 o = offsets[k];
-        const int r = neighbour(i, j, o.x, o.y, HERE);
-        const int t = r < 0 ? 1024 : temperature[r];
+        const int r = neighbour(g, i, j, offsets[k].x, offsets[k].y);
+        const int t = r < 0 ? UNTOUCHED : temperature[r];
         const float u = (float)(1024 - t) * 0x1p-10f;
         here[k * (1 + C)] = u;
         hottest = max(hottest, t);
         for (int c = 0; c < C; ++c) {
-            const float x = t < 1024 ? (float)values[c * pixels + r] : 0.0f;
+            const float x = t < UNTOUCHED ? (float)values[c * area + r] : 0.0f;
             here[k * (1 + C) + 1 + c] = x * u;
             feature = fma(vload16(k * C + c, axes), (float16)(x - middle), feature);
         }
         list[k] = -1;
-        if (t >= 1024)
+        if (t >= UNTOUCHED)
             continue;
         ++held[BUCKETS - 1 - ((1024 - t) * BUCKETS - 1) / 1024 + 1];
-        const int row = source[r] / sample_cols - o.x * spacing;
-        const int col = source[r] % sample_cols - o.y * spacing;
-        if (row >= 0 && row < sample_rows && col >= 0 && col < sample_cols)
-            list[k] = index_of[row * sample_cols + col];
+        list[k] = continuing(index_of, source[r], reach[k], plane);
     }
     certain[s] = (float)(1024 - hottest) * 0x1p-10f;
     vstore16(feature, s, features);
@@ -316,7 +314,7 @@ nearest_scan(const int S, const int N, __global const int *restrict terms, __glo
                     const vec xu = as_float(term[2 + c]);
 #pragma unroll
                     for (int q = 0; q < STEP; ++q) {
-                        const vec e = fma(-LOAD(y + c * size + o + q * V), u, xu);
+                        const vec e = GAP(LOAD(y + c * size + o + q * V), u, xu);
                         d[q] = fma(e, e, d[q]);
                     }
                 }
@@ -371,26 +369,8 @@ nearest_plain(__global const float *restrict confidence, __global const float *r
         ivec where = 0;
         const int end = (int)((long)blocks * (turn + 1) / split) * BLOCK;
         for (int p = (int)((long)blocks * turn / split) * BLOCK; p < end; p += STEP) {
-            __global const float *y[STEP];
             vec d[STEP];
-#pragma unroll
-            for (int q = 0; q < STEP; ++q) {
-                y[q] = sample + candidates[p + q];
-                d[q] = 0.0f;
-            }
-            for (int k = 0; k < N; ++k) {
-                const int o = reach[k];
-                const vec u = LOAD(confidence + k * P + s);
-#pragma unroll
-                for (int c = 0; c < C; ++c) {
-                    const vec xu = LOAD(weighted + (k * C + c) * P + s);
-#pragma unroll
-                    for (int q = 0; q < STEP; ++q) {
-                        const vec e = fma((vec)(-y[q][c * plane + o]), u, xu);
-                        d[q] = fma(e, e, d[q]);
-                    }
-                }
-            }
+            weigh(confidence + s, weighted + s, N, P, sample, plane, candidates + p, reach, d);
 #pragma unroll
             for (int q = 0; q < STEP; ++q) {
                 const ivec nearer = (d[q] < least) & (ivec)(p + q < count ? -1 : 0);

@@ -6,7 +6,7 @@
 // The neighbourhoods of the sites to relax, ready for the distance of equation (12).
 //
 // For site s and neighbour r = N_s[k]:  u = 1 - t_r  and  xu = x_r * (1 - t_r), exact in float32 because pixels
-// are whole numbers below 2^12 and temperatures whole multiples of 2^-10. A neighbour outside an open lattice has u = 0.
+// are integers below 2^12 and temperatures integer multiples of 2^-10. A neighbour outside an open lattice has u = 0.
 //
 // sites       (S,)        pixel index of each site
 // values      (C, H, W)   working grey levels
@@ -17,17 +17,17 @@
 // One work-item per (site, neighbour).
 __kernel void neighbourhood(__global const int *restrict sites, const int S, const int P,
                             __global const ushort *restrict values, __global const ushort *restrict temperature,
-                            const int channels, const int plane, __global const int2 *restrict offsets, const int N, GRID,
+                            const int channels, const int plane, __global const int2 *restrict offsets, const int N, const Lattice g,
                             __global float *restrict confidence, __global float *restrict weighted LANES_ARG)
 {
     const int s = LANE;
     if (s < 0 || s >= P)
         return;
-    const int site = s < S ? sites[s] : 0, i = ROW_OF(site), j = COL_OF(site);
+    const int site = s < S ? sites[s] : 0, i = ROW_OF(g, site), j = COL_OF(g, site);
     ALONG(k, N)
     {
         const int2 o = offsets[k];
-        const int r = s < S ? neighbour(i, j, o.x, o.y, HERE) : -1;
+        const int r = s < S ? neighbour(g, i, j, o.x, o.y) : -1;
         const float u = r < 0 ? 0.0f : (float)(1024 - temperature[r]) * 0x1p-10f;
         confidence[k * P + s] = u;
         for (int c = 0; c < channels; ++c)

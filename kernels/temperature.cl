@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include "common/cool.h"
 #include "common/lanes.h"
 #include "common/lattice.h"
 
-// Equation (13): t_s = max(0, (xi + sum of t_r over r in N_s) / |N_s|), in whole 1/1024, rounded down.
+// Equation (13), by itself: what sites cool to.
 // N_s holds the neighbours on the lattice: a neighbour outside an open lattice is no member.
 //
 // sites (S,), temperature (H, W) in 1/1024, offsets (N, 2), xi in 1/1024 (negative)
@@ -10,19 +11,19 @@
 // One work-item per site.
 __kernel void temperature(__global const int *restrict sites, const int S,
                           __global const ushort *restrict temperature, __global const int2 *restrict offsets,
-                          const int N, GRID, const int xi, __global ushort *restrict cooled LANES_ARG)
+                          const int N, const Lattice g, const int xi, __global ushort *restrict cooled LANES_ARG)
 {
     const int s = LANE;
     if (IDLE(s))
         return;
-    const int i = ROW_OF(sites[s]), j = COL_OF(sites[s]);
+    const int i = ROW_OF(g, sites[s]), j = COL_OF(g, sites[s]);
     int sum = xi, members = 0;
     for (int k = 0; k < N; ++k) {
-        const int r = neighbour(i, j, offsets[k].x, offsets[k].y, HERE);
+        const int r = neighbour(g, i, j, offsets[k].x, offsets[k].y);
         if (r < 0)
             continue;
         sum += temperature[r];
         ++members;
     }
-    cooled[s] = sum > 0 ? (ushort)(sum / members) : (ushort)0;
+    cooled[s] = cooled_to(sum, members);
 }

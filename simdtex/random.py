@@ -48,12 +48,16 @@ def philox(counter: list[NDArray[np.uint32]], key: tuple[int, int]) -> list[NDAr
 
 
 def draw4(seed: int, level: int, turn: Any, site: Any, purpose: int, attempt: Any = 0) -> list[NDArray[np.uint32]]:
-    """Four random 32-bit numbers per site, the counter being (site, turn, level and purpose, attempt)."""
-    site, attempt = np.broadcast_arrays(np.asarray(site), np.asarray(attempt))
+    """Four random 32-bit numbers per site, the counter being (site, turn, site and level and purpose, attempt).
+
+    A site's place has 48 bits: the lower 32 are the first word, the upper 16 stand above level and purpose in the
+    third.
+    """
+    site, attempt = np.broadcast_arrays(np.asarray(site, np.uint64), np.asarray(attempt))
     counter = [
-        site,
+        site & _LOW,
         np.full(site.shape, turn),
-        np.full(site.shape, level << 8 | purpose),
+        (site >> _SHIFT) << np.uint64(16) | np.uint64(level << 8 | purpose),
         attempt,
     ]
     return philox([np.asarray(c).astype(np.uint32) for c in counter], (seed & 0xFFFFFFFF, seed >> 32))

@@ -1,21 +1,27 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The lattice of one level, equations (10) and (11): sites (spacing * i, spacing * j) of a picture that is
-// `width` pixels wide, 0 <= i < rows, 0 <= j < cols. Images stay at full size; a level only reads through it.
+// The lattice of one level, equations (10) and (11): sites (spacing * i, spacing * j) of a picture that is `width`
+// pixels wide, 0 <= i < rows, 0 <= j < cols. Images stay at full size; a level only reads through it. Or a window of
+// such a lattice, which lies in a picture of its own, site by site.
 #ifndef SIMDTEX_LATTICE_H
 #define SIMDTEX_LATTICE_H
 
-// The numbers every lattice kernel takes, in this order. Where tile_rows > 0, the lattice is cut into tiles, and what lies
-// in another tile is read `elsewhere` pixels on, where an older picture stands; commit writes here only.
-#define GRID                                                                                                           \
-    const int rows, const int cols, const int spacing, const int width, const int torus, const int tile_rows,          \
-        const int tile_cols, const int elsewhere
-#define HERE rows, cols, spacing, width, torus, tile_rows, tile_cols, elsewhere
-#define FLAT rows, cols, 1, cols, torus, 0, 0, 0 // the level's grid as a lattice of its own
+// simdtex.model.lattice.LATTICE is the same; tests/test_level.py holds the one against the other.
+typedef struct {
+    int rows, cols;               // sites
+    int spacing, width;           // pixels from site to site, and to a row
+    int around_rows, around_cols; // whether rows and columns wrap around
+    int tile_rows, tile_cols;     // where > 0, what lies in another tile is read
+    int elsewhere;                // so many pixels on, where an older picture stands
+    int top, left;                // the first site's row and column in the whole lattice
+    int whole_rows, whole_cols;   // sites of the whole lattice
+    int step, whole_width;        // pixels of the whole picture from site to site, and to a row
+    int unused;
+} Lattice;
 
-// Pixel index of grid site (i, j).
-#define SITE(i, j) (((i) * width + (j)) * spacing)
-#define ROW_OF(site) ((site) / width / spacing)
-#define COL_OF(site) ((site) % width / spacing)
+// Pixel index of site (i, j), and back.
+#define SITE(g, i, j) (((i) * (g).width + (j)) * (g).spacing)
+#define ROW_OF(g, site) ((site) / (g).width / (g).spacing)
+#define COL_OF(g, site) ((site) % (g).width / (g).spacing)
 
 inline int wrap(const int i, const int n)
 {
@@ -25,20 +31,23 @@ inline int wrap(const int i, const int n)
     return k < 0 ? k + n : k;
 }
 
-// Pixel index of the neighbour of grid site (i, j) at grid offset (di, dj), equation (3).
-// -1 outside an open lattice, and where a small torus wraps the offset back onto the site itself.
-inline int neighbour(const int i, const int j, const int di, const int dj, GRID)
+// The place of site (i, j) in the whole picture, as a pixel index: what keys its random numbers.
+inline ulong place_of(const Lattice g, const int i, const int j)
 {
-    int k = i + di, l = j + dj;
-    if (torus) {
-        k = wrap(k, rows);
-        l = wrap(l, cols);
-    } else if (k < 0 || k >= rows || l < 0 || l >= cols)
+    const ulong row = wrap(g.top + i, g.whole_rows), col = wrap(g.left + j, g.whole_cols);
+    return (row * (ulong)g.whole_width + col) * (ulong)g.step;
+}
+
+// Pixel index of the neighbour of site (i, j) at offset (di, dj), equation (3). -1 outside an open lattice or a window,
+// and where a small torus wraps the offset back onto the site itself.
+inline int neighbour(const Lattice g, const int i, const int j, const int di, const int dj)
+{
+    const int k = g.around_rows ? wrap(i + di, g.rows) : i + di;
+    const int l = g.around_cols ? wrap(j + dj, g.cols) : j + dj;
+    if (k < 0 || k >= g.rows || l < 0 || l >= g.cols || (k == i && l == j))
         return -1;
-    if (k == i && l == j)
-        return -1;
-    const bool apart = tile_rows > 0 && (i / tile_rows != k / tile_rows || j / tile_cols != l / tile_cols);
-    return apart ? SITE(k, l) + elsewhere : SITE(k, l);
+    const bool apart = g.tile_rows > 0 && (i / g.tile_rows != k / g.tile_rows || j / g.tile_cols != l / g.tile_cols);
+    return apart ? SITE(g, k, l) + g.elsewhere : SITE(g, k, l);
 }
 
 #endif

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Philox4x32-10 (Salmon et al., SC 2011): 128 random bits as a pure function of a counter and a key.
-// Key: the 64-bit seed. Counter: (site, turn, level and purpose, attempt), so that no tile or
-// device changes a draw. The turn counts sweeps, or steps where a sweep may take a site twice.
+// Key: the 64-bit seed. Counter: (site, turn, site and level and purpose, attempt), so that no tile or device changes
+// a draw. A site is its place in the whole picture, 48 bits of it: the upper 16 stand above level and purpose. The turn
+// counts sweeps, or steps where a sweep may take a site twice.
 #ifndef SIMDTEX_PHILOX_H
 #define SIMDTEX_PHILOX_H
 
@@ -42,10 +43,11 @@ inline void philox8(ulong8 *x, ulong8 *y, ulong8 *z, ulong8 *w, uint2 key)
 #define PURPOSE_NOISE 5u
 #define PURPOSE_SEARCH 6u
 
-inline uint4 draw4(const ulong seed, const uint level, const uint turn, const uint site, const uint purpose,
+inline uint4 draw4(const ulong seed, const uint level, const uint turn, const ulong site, const uint purpose,
                    const uint attempt)
 {
-    return philox((uint4)(site, turn, level << 8 | purpose, attempt), (uint2)((uint)seed, (uint)(seed >> 32)));
+    const uint what = (uint)(site >> 32) << 16 | level << 8 | purpose;
+    return philox((uint4)((uint)site, turn, what, attempt), (uint2)((uint)seed, (uint)(seed >> 32)));
 }
 
 // A whole number 0 .. n-1 from 64 random bits; the bias is below n / 2^64.

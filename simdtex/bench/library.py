@@ -22,11 +22,14 @@ from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates
 from simdtex.ops import lcpdf
 from simdtex.ops.candidates import Sampled, Structure, candidates
-from simdtex.ops.coherence import coherence
+from simdtex.ops.coherence import coherence, continuing
+from simdtex.ops.commit import commit
 from simdtex.ops.filters import filters
 from simdtex.ops.neighbourhood import Field, Neighbourhoods, neighbourhood
+from simdtex.ops.relax import Everything, Relaxation, relax, relax_apart
 from simdtex.ops.sort import sort
 from simdtex.ops.steerable import steerable_join, steerable_split
+from simdtex.ops.temperature import temperature
 
 TABLE = 2**26
 """Values of the right factor of a matrix product that are made at a time."""
@@ -63,17 +66,18 @@ class Library(Reference):
         self._by: dict[Any, Any] = {
             lcpdf.distance: self.distance,
             coherence: self.coherence,
+            relax: self.relax,
+            relax_apart: self.relax_apart,
             candidates: self.candidates,
             filters: self.filters,
             steerable_split: self.split,
             steerable_join: self.join,
             sort: self.sort,
         }
-        self._named: dict[str, Any] = {"nearest": self.nearest}
 
     def run(self, operation: Operation[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Run the library's way of it, or the twin."""
-        own = self._by.get(operation) or self._named.get(operation.name)
+        own = self._by.get(operation)
         if own is None:
             return super().run(operation, *args, **kwargs)
         self.launches += 1
@@ -137,28 +141,38 @@ class Library(Reference):
     ) -> lcpdf.Distances:
         """As the twin does it, but only the favoured distances are touched."""
         r = grid.neighbours(sites, offsets)
-        row, col = np.divmod(field.source.ravel()[r], candidates.cols)
-        row, col = row - offsets[:, 0, None] * grid.spacing, col - offsets[:, 1, None] * grid.spacing
-        inside = (row >= 0) & (row < candidates.rows) & (col >= 0) & (col < candidates.cols)
-        relaxed = (r >= 0) & (field.temperature.ravel()[r] < 1024)
-        p = candidates.index_of[np.where(inside, row * candidates.cols + col, 0)]
-        k, s = np.nonzero(inside & relaxed & (p >= 0))
+        p = continuing(candidates, field.source.ravel()[r])
+        k, s = np.nonzero((r >= 0) & (field.temperature.ravel()[r] < 1024) & (p >= 0))
         distances.distance[p[k, s], s] *= favour  # one that is proposed twice is written twice, with the same value
         return distances
 
-    def nearest(
+    def relax_apart(
+        self, sites: NDArray[np.int32], field: Field, weighed: NDArray[np.int32], relaxation: Relaxation, turn: int
+    ) -> tuple[lcpdf.Relaxed, NDArray[np.uint16]]:
+        """The relaxation of the twin, but for the distances of the exact search."""
+        if not isinstance(relaxation.proposal, Everything):
+            return relax_apart.reference(sites, field, weighed, relaxation, turn)
+        grid, offsets, candidates = relaxation.grid, relaxation.offsets, relaxation.proposal.candidates
+        found = self.distance(neighbourhood.reference(sites, field, offsets, grid), candidates)
+        found = self.coherence(found, candidates, sites, field, offsets, grid, relaxation.favour)
+        numbers = np.arange(candidates.size)[:, None]
+        relaxed = relaxation.choice.taken(numbers, found, sites, relaxation, turn)
+        return relaxed, temperature.reference(sites, field, offsets, grid, relaxation.xi)
+
+    def relax(
         self,
         sites: NDArray[np.int32],
+        steps: NDArray[np.int64],
         field: Field,
-        offsets: NDArray[np.int32],
-        grid: Grid,
-        candidates: Candidates,
-        favour: np.float32,
-    ) -> lcpdf.Relaxed:
-        """A step of ICM over sample positions as one operation: the nearest candidate of every site."""
-        near = neighbourhood.reference(sites, field, offsets, grid)
-        found = self.coherence(self.distance(near, candidates), candidates, sites, field, offsets, grid, favour)
-        return lcpdf.best.reference(found, candidates)
+        weighed: NDArray[np.int32],
+        relaxation: Relaxation,
+        turn: int,
+    ) -> Field:
+        """Step after step."""
+        for begin, end in steps.tolist():
+            here = sites[begin:end]
+            field = commit.reference(field, here, *self.relax_apart(here, field, weighed, relaxation, turn))
+        return field
 
     # -- multires -------------------------------------------------------------------------------------------
 

@@ -142,9 +142,10 @@ def ising(
     grid, offsets = Grid(*size, torus=boundary == "torus"), neighbourhood_offsets(1)
     count = len(temperatures)
     chances = heat_bath_chances(temperatures, len(offsets))
-    run = _Run(machine, grid, machine.put(offsets), machine.put(chances), seed, schedule)
+    setting = schedules.Setting(machine, grid, offsets, 1, seed, 0)
+    run = _Run(setting, machine.put(offsets), machine.put(chances), schedule)
     spins = machine.put(np.tile(_first(size, seeds, seed, start), (count, 1, 1)))
-    state = schedule.init(machine, grid, offsets, 1, seed, 0)
+    state = schedule.init(setting)
 
     measured = np.empty((sweeps, 4, count * seeds))
     now = machine.get(spins)[:, : grid.height]
@@ -179,33 +180,32 @@ def ising(
 class _Run:
     """What stays the same throughout a run, and what it has done so far."""
 
-    machine: Machine
-    grid: Grid
+    setting: schedules.Setting
     offsets: Array
     chances: Array
-    seed: int
     schedule: schedules.Schedule
     steps: int = 0
     relaxations: int = 0
 
     def __post_init__(self) -> None:
-        self.everywhere = np.ones((self.grid.rows, self.grid.cols), bool)
+        self.machine, self.grid, self.seed = self.setting.machine, self.setting.grid, self.setting.seed
+        self.everywhere = schedules.Masked(self.grid)
 
     def sweep(self, spins: Array, state: Any) -> tuple[Array, Any]:
         """A sweep of the schedule."""
         queue: list[tuple[int, int]] = []
-        old = False
+        if self.schedule.tile:  # what tiles see of one another until the sweep ends
+            spins = snapshot(self.machine, spins, self.grid.height)
         while True:
-            state, info = self.schedule.step(state, lambda: self.everywhere)
-            self.steps += 1
-            self.relaxations += info.sites.size
-            if info.tile and not old:  # what tiles see of one another until the sweep ends
-                spins, old = snapshot(self.machine, self._flush(spins, queue), self.grid.height), True
-            if info.sites.size == 1 and not info.tile:
-                queue.append((int(info.sites[0]), info.turn))
-            elif info.sites.size:
-                spins = self._step(self._flush(spins, queue), info)
-            if info.last:
+            state, chosen = self.schedule.step(self.setting, state, self.everywhere)
+            for info in chosen.apart(self.machine):
+                self.steps += 1
+                self.relaxations += info.sites.size
+                if info.sites.size == 1 and not info.tile:
+                    queue.append((int(info.sites[0]), info.turn))
+                elif info.sites.size:
+                    spins = self._step(self._flush(spins, queue), info)
+            if chosen.last:
                 return self._flush(spins, queue), state
 
     def _step(self, spins: Array, info: schedules.Info) -> Array:

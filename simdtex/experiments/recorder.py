@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from simdtex.model.lattice import Grid
 from simdtex.run import Relaxing
-from simdtex.schedules import Active, Info, Schedule, Watched, neighbours_in
+from simdtex.schedules import Info, Schedule, Setting, Watched, neighbours_in
 
 __all__ = ["Noted", "Recorder", "Sweep"]
 
@@ -127,18 +127,16 @@ class Noted(Watched):
         self.claims: list[bool] = []
         self.levels: list[tuple[int, Grid, NDArray[np.int32], list[NDArray[np.int32]]]] = []
 
-    def init(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int) -> Any:
+    def init(self, setting: Setting) -> Any:
         """The schedule's own state."""
-        self.claims.append(bool(self.independent(grid, offsets)))
-        self.levels.append((level, grid, offsets, []))
-        return self.schedule.init(machine, grid, offsets, order, seed, level)
+        self.claims.append(bool(self.independent(setting.grid, setting.offsets)))
+        self.levels.append((setting.level, setting.grid, setting.offsets, []))
+        return self.schedule.init(setting)
 
-    def step(self, state: Any, active: Active) -> tuple[Any, Info]:
-        """The schedule's own step."""
-        state, info = self.schedule.step(state, active)
+    def look(self, setting: Setting, info: Info) -> None:
+        """Note a step."""
         if self.claims[-1] and len(info.sites) > 1:  # a site alone meets nobody
             self.levels[-1][3].append(info.sites)
-        return state, info
 
     def met(self) -> tuple[int, int, int] | None:
         """The level and two neighbours of a step that relaxed together where the schedule claims equation (14)."""

@@ -100,6 +100,10 @@ class Machine(Protocol):
         """A NumPy array with the contents of an array of this machine; waits for them."""
         ...
 
+    def part(self, array: Array, begin: int, end: int) -> Array:
+        """A copy of some elements of an array of this machine that has one axis."""
+        ...
+
     def emulate(self, array: ProcessorArray) -> Machine:
         """The same machine as a processor array."""
         ...
@@ -209,8 +213,8 @@ class Launcher(Machine, Protocol):
         """Enqueue a kernel, given as (file, name), over sites that relax together: common/lanes.h."""
         ...
 
-    def launch_groups(self, kernel: Any, bounds: NDArray[np.int64], *args: Any) -> None:
-        """Enqueue a kernel over groups of work-items one after another, from ``bounds[g]`` up to ``bounds[g + 1]``."""
+    def launch_groups(self, kernel: Any, groups: NDArray[np.int64], *args: Any) -> None:
+        """Enqueue a kernel over one group of work-items after another; (groups, 2), each its begin and end."""
         ...
 
     def launch_rounds(self, kernel: Any, size: int, rounds: int, *args: Any) -> None:

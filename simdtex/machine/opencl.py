@@ -8,7 +8,6 @@ import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
-from itertools import pairwise
 from math import gcd, prod
 from pathlib import Path
 from typing import Any
@@ -193,6 +192,15 @@ class OpenCL:
         """Fma of distances that a bound has spared so far."""
         return self.tally.spared
 
+    def part(self, array: Array, begin: int, end: int) -> Array:
+        """Some elements of an array of one axis, copied on the device."""
+        result = self.empty((end - begin,), array.dtype)
+        if result.size:
+            item = array.dtype.itemsize
+            size, offset = result.size * item, begin * item
+            cl.enqueue_copy(self.queue, result.data, array.data, byte_count=size, src_offset=offset)
+        return result
+
     def emulate(self, array: ProcessorArray) -> OpenCL:
         """The same device as a processor array: every launch has one work-item per PE."""
         emulated = copy(self)
@@ -310,15 +318,15 @@ class OpenCL:
         size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
         self._enqueue(kernel, size, *args, local=local, work=work)
 
-    def launch_groups(self, kernel: Any, bounds: NDArray[np.int64], *args: Any) -> None:
-        """Enqueue a kernel over groups of work-items one after another, from ``bounds[g]`` up to ``bounds[g + 1]``.
+    def launch_groups(self, kernel: Any, groups: NDArray[np.int64], *args: Any) -> None:
+        """Enqueue a kernel over groups of work-items one after another, from ``groups[g, 0]`` up to ``groups[g, 1]``.
 
         The kernel's second argument is the end of the group that it is launched for. The others are set once, so that a
         launch costs a few microseconds.
         """
         kernel.set_args(*(a.data if type(a) is DeviceArray else a for a in args))
         group = self.group if self.forced or self.info.kind == "gpu" else FEW
-        for begin, end in pairwise(bounds.tolist()):
+        for begin, end in groups.tolist():
             kernel.set_arg(1, np.int32(end))
             for first in range(begin, end, LONGEST):
                 size = -(-min(end - first, LONGEST) // group) * group

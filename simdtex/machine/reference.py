@@ -44,6 +44,10 @@ class Reference:
         """A copy."""
         return np.array(array)
 
+    def part(self, array: Array, begin: int, end: int) -> Array:
+        """A view."""
+        return array[begin:end]
+
     def emulate(self, array: ProcessorArray) -> Reference:
         """Nothing changes: there are no work-items here."""
         return self

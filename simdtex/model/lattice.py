@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import isqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,21 +44,56 @@ def check_order(order: Any) -> None:
         raise ValueError(f"order {order} has no neighbours; give 1 (4 neighbours) or more, say 8 or 18")
 
 
+LATTICE = np.dtype(
+    [
+        (name, np.int32)
+        for name in (
+            *("rows", "cols", "spacing", "width", "around_rows", "around_cols", "tile_rows", "tile_cols", "elsewhere"),
+            *("top", "left", "whole_rows", "whole_cols", "step", "whole_width", "unused"),
+        )
+    ],
+    align=True,
+)
+"""The struct ``Lattice`` of kernels/common/lattice.h."""
+
+
+class Part(NamedTuple):
+    """Where a window lies in its whole.
+
+    ``top``, ``left`` the row and column of its first site in the whole lattice; ``rows``, ``cols`` sites of the whole
+    lattice; ``step`` 2**level, pixels of the whole picture from site to site; ``width`` pixels to a row of it.
+    """
+
+    top: int
+    left: int
+    rows: int
+    cols: int
+    step: int
+    width: int
+
+
 @dataclass(frozen=True)
 class Grid:
-    """The lattice of one level within a picture, equation (10): sites (spacing i, spacing j).
+    """The lattice of one level within a picture, equation (10): sites (spacing i, spacing j); or a window of it.
 
     Parameters
     ----------
     height, width : int
-        The whole picture, in pixels.
+        The picture that holds it, in pixels.
     spacing : int
-        2**level.
+        Pixels of that picture from site to site: 2**level, or 1 in a window.
     torus : bool
-        Whether rows and columns wrap around.
+        Whether rows and columns of the whole wrap around.
     tile : (int, int), optional
         Rows and columns of tiles, in sites of the grid. Neighbours in another tile are then read from an older
         picture that stands `plane` pixels on (`simdtex.ops.snapshot`).
+    part : Part, optional
+        Where it lies in the whole, for a window that `window` has made.
+
+    Notes
+    -----
+    A site is known by its place in the whole: that place keys its random numbers, so a window relaxes as the same sites
+    of the whole do, as far as it holds their neighbourhoods. An address in a buffer keys nothing.
     """
 
     height: int
@@ -66,6 +101,7 @@ class Grid:
     spacing: int = 1
     torus: bool = True
     tile: tuple[int, int] | None = None
+    part: Part | None = None
 
     @property
     def rows(self) -> int:
@@ -79,19 +115,80 @@ class Grid:
 
     @property
     def plane(self) -> int:
-        """Pixels of the whole picture."""
+        """Pixels of the picture that holds it."""
         return self.height * self.width
 
+    @property
+    def within(self) -> Part:
+        """Where it lies in the whole; the whole lies in itself."""
+        return self.part or Part(0, 0, self.rows, self.cols, self.spacing, self.width)
+
+    @property
+    def step(self) -> int:
+        """Pixels of the whole picture, and of the sample, from site to site: 2**level."""
+        return self.within.step
+
+    @property
+    def around(self) -> tuple[bool, bool]:
+        """Whether rows, and columns, wrap around: on a torus, where the grid is as large as the whole."""
+        whole = self.within
+        return self.torus and self.rows == whole.rows, self.torus and self.cols == whole.cols
+
     @cached_property
-    def args(self) -> tuple[np.int32, ...]:
-        """The GRID arguments of a kernel (kernels/common/lattice.h)."""
-        numbers = (self.rows, self.cols, self.spacing, self.width, self.torus, *(self.tile or (0, 0)), self.plane)
-        return tuple(np.int32(n) for n in numbers)
+    def struct(self) -> np.void:
+        """The grid as kernels take it, of the type `LATTICE`."""
+        whole, numbers = self.within, np.zeros((), LATTICE)
+        for name, value in {
+            **{"rows": self.rows, "cols": self.cols, "spacing": self.spacing, "width": self.width},
+            **{"around_rows": self.around[0], "around_cols": self.around[1], "elsewhere": self.plane},
+            **dict(zip(("tile_rows", "tile_cols"), self.tile or (0, 0), strict=True)),
+            **{"top": whole.top, "left": whole.left, "whole_rows": whole.rows, "whole_cols": whole.cols},
+            **{"step": whole.step, "whole_width": whole.width},
+        }.items():
+            numbers[name] = value
+        struct: np.void = numbers[()]  # type: ignore[assignment]
+        return struct
+
+    def window(self, top: int, left: int, rows: int, cols: int) -> Grid:
+        """A window of this lattice, which lies in a picture of its own, site by site.
+
+        Parameters
+        ----------
+        top, left : int
+            Row and column of its first site. On a torus they may lie anywhere, and the window goes on across the seam.
+        rows, cols : int
+            Sites of the window, no more than the whole has.
+
+        Raises
+        ------
+        ValueError
+            It is larger than the whole or, on an open lattice, reaches beyond it.
+        """
+        whole = self.within
+        if not (0 < rows <= whole.rows and 0 < cols <= whole.cols):
+            raise ValueError(f"a window of {rows}x{cols} sites does not fit a lattice of {whole.rows}x{whole.cols}")
+        top, left = whole.top + top, whole.left + left
+        if self.torus:
+            top, left = top % whole.rows, left % whole.cols
+        elif not (0 <= top <= whole.rows - rows and 0 <= left <= whole.cols - cols):
+            raise ValueError("a window of an open lattice must lie in it")
+        return Grid(rows, cols, 1, self.torus, None, whole._replace(top=top, left=left))
+
+    @property
+    def whole(self) -> Grid:
+        """The lattice that this is a window of, site by site; itself where it is no window."""
+        return self.window(-self.within.top, -self.within.left, *self.within[2:4]) if self.part else self
 
     @property
     def flat(self) -> Grid:
         """The same sites as a lattice of their own, numbered 0 .. rows * cols - 1."""
         return Grid(self.rows, self.cols, 1, self.torus)
+
+    def cut(self, whole: NDArray[Any]) -> NDArray[Any]:
+        """The window's part of an array (..., rows, cols) over the whole lattice."""
+        row = (self.within.top + np.arange(self.rows)) % self.within.rows
+        col = (self.within.left + np.arange(self.cols)) % self.within.cols
+        return whole[..., row[:, None], col[None, :]]
 
     def sites(self) -> NDArray[np.int32]:
         """Pixel index of every site, (rows * cols,), row by row."""
@@ -100,12 +197,21 @@ class Grid:
         sites: NDArray[np.int32] = ((row + col) * np.int32(self.spacing)).ravel()
         return sites
 
+    def places(self, sites: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
+        """The pixel index in the whole picture of sites that are given by theirs here: what keys random numbers."""
+        whole = self.within
+        row, col = np.divmod(sites.astype(np.int64), self.width)
+        row = (whole.top + row // self.spacing) % whole.rows
+        col = (whole.left + col // self.spacing) % whole.cols
+        places: NDArray[np.int64] = (row * whole.width + col) * whole.step
+        return places
+
     def view(self, picture: NDArray[Any]) -> NDArray[Any]:
         """The sites of this grid as a view of a picture (..., H, W); older pictures below it do not show."""
         return picture[..., : self.height : self.spacing, :: self.spacing]
 
     def neighbours(self, sites: NDArray[np.int32], offsets: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Pixel index of each neighbour, (N, S); -1 outside an open lattice and for the site itself.
+        """Pixel index of each neighbour, (N, S); -1 outside an open lattice or a window, and for the site itself.
 
         Where there are tiles, `plane` is added to that of a neighbour in another tile.
         """
@@ -113,8 +219,9 @@ class Grid:
         col = sites % self.width // self.spacing
         k = row[None, :] + offsets[:, 0, None]
         m = col[None, :] + offsets[:, 1, None]
-        if self.torus:
-            k, m = k % self.rows, m % self.cols
+        around_rows, around_cols = self.around
+        k = k % self.rows if around_rows else k
+        m = m % self.cols if around_cols else m
         inside = (k >= 0) & (k < self.rows) & (m >= 0) & (m < self.cols)
         itself = (k == row) & (m == col)
         pixel = (k * self.width + m) * self.spacing

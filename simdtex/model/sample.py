@@ -132,6 +132,11 @@ class Sample:
         positions: NDArray[np.int32] = (row[:, None] * np.int32(self.cols) + col[None, :]).ravel()
         return positions
 
+    def reach(self, offsets: NDArray[np.int32], spacing: int) -> NDArray[np.int32]:
+        """Pixel offset of each neighbour, (N,), at a level whose sites are `spacing` pixels apart."""
+        reach: NDArray[np.int32] = (offsets @ np.array([self.cols, 1], np.int32) * np.int32(spacing)).astype(np.int32)
+        return reach
+
     def planes(self, machine: Any) -> Any:
         """The working levels as an array (C, rows * cols) of a machine, float32."""
         return machine.put(self.working.astype(np.float32))
@@ -150,12 +155,11 @@ class Sample:
         index_of = np.full(self.rows * self.cols, -1, np.int32)
         index_of[positions] = np.arange(positions.size, dtype=np.int32)
         padding = np.full(-positions.size % BLOCK, positions[0], np.int32)
-        reach = (offsets[:, 0] * np.int32(self.cols) + offsets[:, 1]) * np.int32(spacing)
         return Candidates(
             self.planes(machine) if planes is None else planes,
             machine.put(np.concatenate([positions, padding])),
             positions.size,
-            machine.put(reach.astype(np.int32)),
+            machine.put(self.reach(offsets, spacing)),
             machine.put(index_of),
             self.rows,
             self.cols,

@@ -13,6 +13,14 @@ from simdtex.ops.lcpdf import Distances
 from simdtex.ops.neighbourhood import Field
 
 
+def continuing(candidates: Candidates, source: NDArray[np.int32]) -> NDArray[np.int32]:
+    """The number of the candidate that continues the source of neighbour k, (N, S); -1 where there is none."""
+    p = source - candidates.reach[:, None]
+    inside = (p >= 0) & (p < candidates.index_of.size)
+    numbers: NDArray[np.int32] = np.where(inside, candidates.index_of[np.where(inside, p, 0)], -1)
+    return numbers
+
+
 def _reference(
     distances: Distances,
     candidates: Candidates,
@@ -23,13 +31,8 @@ def _reference(
     favour: np.float32,
 ) -> Distances:
     r = grid.neighbours(sites, offsets)
-    source = field.source.ravel()[r]
-    row = source // candidates.cols - offsets[:, 0, None] * grid.spacing
-    col = source % candidates.cols - offsets[:, 1, None] * grid.spacing
-    inside = (row >= 0) & (row < candidates.rows) & (col >= 0) & (col < candidates.cols)
-    relaxed = (r >= 0) & (field.temperature.ravel()[r] < 1024)
-    p = candidates.index_of[np.where(inside, row * candidates.cols + col, 0)]
-    k, s = np.nonzero(inside & relaxed & (p >= 0))
+    p = continuing(candidates, field.source.ravel()[r])
+    k, s = np.nonzero((r >= 0) & (field.temperature.ravel()[r] < 1024) & (p >= 0))
     coherent = np.zeros(distances.distance.shape, bool)
     coherent[p[k, s], s] = True
     d = distances.distance
@@ -50,8 +53,8 @@ def _launch(
         ("coherence", "coherence"),
         (sites.size,),
         *(sites, np.int32(sites.size), np.int32(distances.distance.shape[1])),
-        *(field.source, field.temperature, offsets, np.int32(offsets.shape[0]), *grid.args),
-        *(candidates.index_of, np.int32(candidates.rows), np.int32(candidates.cols), favour),
+        *(field.source, field.temperature, offsets, np.int32(offsets.shape[0]), grid.struct),
+        *(candidates.reach, candidates.index_of, np.int32(candidates.index_of.size), favour),
         *(distances.distance, distances.nearest),
         defines={"BLOCK": BLOCK},
     )

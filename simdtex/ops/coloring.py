@@ -34,7 +34,7 @@ def _lattice_launch(machine: Launcher, grid: Grid, offsets: Array, pattern: Subl
     machine.launch(
         machine.kernel("coloring", "coloring_lattice"),
         (colors.size,),
-        *(*grid.args, offsets, np.int32(offsets.shape[0]), *basis, colors),
+        *(grid.flat.struct, offsets, np.int32(offsets.shape[0]), *basis, colors),
     )
     return colors
 
@@ -67,7 +67,7 @@ def _greedy_round(grid: Grid, offsets: NDArray[np.int32], colors: NDArray[np.int
 def _greedy_launch(machine: Launcher, grid: Grid, offsets: Array, colors: Array, seed: int, rounds: int = 1) -> Array:
     one, other = machine.empty(colors.shape, np.int32), machine.empty(colors.shape, np.int32)
     kernel = machine.kernel("coloring", "coloring_greedy")
-    arguments = (*grid.args, offsets, np.int32(offsets.shape[0]), np.uint64(seed))
+    arguments = (grid.flat.struct, offsets, np.int32(offsets.shape[0]), np.uint64(seed))
     machine.launch_rounds(kernel, colors.size, 1, *arguments, colors, one)
     machine.launch_rounds(kernel, colors.size, rounds - 1, *arguments, one, other)
     return one if rounds % 2 else other

@@ -60,7 +60,7 @@ def _relax(
     r = grid.neighbours(sites, offsets)
     there = r >= 0
     up = np.where(there, spins.reshape(len(spins), -1)[:, r], 0).sum(1, dtype=np.intp)
-    bits = random.draw4(seed, 0, turn, sites, random.DRAW, chain)[0]
+    bits = random.draw4(seed, 0, turn, grid.places(sites), random.DRAW, chain)[0]
     relaxed: NDArray[np.uint8] = (bits < chances[temperature, there.sum(0), up]).astype(np.uint8)
     return relaxed
 
@@ -84,7 +84,7 @@ def _sequence(
 
 
 def _model(offsets: Array, grid: Grid, chances: Array, seed: int) -> tuple[Any, ...]:
-    return offsets, np.int32(offsets.shape[0]), *grid.args, chances, np.uint64(seed)
+    return offsets, np.int32(offsets.shape[0]), grid.struct, chances, np.uint64(seed)
 
 
 def _launch_relax(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The local conditional probability density function, equations (6) to (8) and (12), on the machine.
 
-`distance` gives d_p for every site and candidate; `draw`, `best`, `mode`, `mode_vector` and `table` are what
+`distance` gives d_p for every site and candidate; `draw`, `mode`, `mode_vector` and `density` are what
 relaxation and users take from it. The kernels are in ``kernels/lcpdf.cl``.
 """
 
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Operation, touching
+from simdtex.model.lattice import Grid
 from simdtex.model.sample import BLOCK, Candidates
 from simdtex.ops.arithmetic import exp32, fma32
 from simdtex.ops.neighbourhood import Neighbourhoods
@@ -144,6 +145,7 @@ def _draw_reference(
     distances: Distances,
     candidates: Candidates,
     sites: NDArray[np.int32],
+    grid: Grid,
     win: Window,
     noisy: bool,
     seed: int,
@@ -152,28 +154,52 @@ def _draw_reference(
 ) -> Relaxed:
     w = weights(distances.distance, win.scale)
     positions = candidates.positions[: candidates.size]
-    channels = len(candidates.pixels)
+    pixels = candidates.pixels[:, positions][..., None]
+    taken = drawn(w, pixels, grid.places(sites), win, noisy, seed, level, turn)
+    choice, places = positions[taken], grid.places(sites)
+    values = candidates.pixels[:, choice].astype(np.uint16)
     if noisy:
-        for c in range(channels):
-            _, mass = legal(candidates.pixels[c][positions], win)
-            w = np.where(w > 0, np.maximum(random.below(np.zeros_like(mass), mass, w.T).T, 1), 0)
-    cumulative = np.cumsum(w, 0, dtype=np.uint64)
-    lo, hi, *_ = random.draw4(seed, level, turn, sites, random.DRAW, 0)
-    target = random.below(lo, hi, cumulative[-1])
-    choice = positions[(cumulative > target).argmax(0)]
-    values = np.zeros((channels, sites.size), np.uint16)
-    for c in range(channels):
-        x = candidates.pixels[c][choice].astype(np.uint16)
-        values[c] = stepped(x, c, sites, win, seed, level, turn) if noisy else x
+        values = np.stack([stepped(x, c, places, win, seed, level, turn) for c, x in enumerate(values)])
     return Relaxed(choice, values)
 
 
+def drawn(
+    w: NDArray[np.uint64],
+    pixels: NDArray[Any],
+    places: NDArray[np.int64],
+    win: Window,
+    noisy: bool,
+    seed: int,
+    level: int,
+    turn: int,
+) -> NDArray[np.intp]:
+    """Which of the candidates each site draws, (S,): with a probability in proportion to its mass.
+
+    Parameters
+    ----------
+    w : (slots, S) uint64 array
+        Weights; with `noisy` times the share of the kernel around each pixel that is legal.
+    pixels : (C, slots, S or 1) array
+        Working grey levels of the candidates.
+    places : (S,) int64 array
+        Of the sites in the whole picture.
+    """
+    for plane in pixels if noisy else ():
+        _, mass = legal(plane, win)
+        mass = np.broadcast_to(mass, w.shape)
+        w = np.where(w > 0, np.maximum(random.below(np.zeros_like(mass), mass, w), 1), 0)
+    cumulative = np.cumsum(w, 0, dtype=np.uint64)
+    lo, hi, *_ = random.draw4(seed, level, turn, places, random.DRAW, 0)
+    taken: NDArray[np.intp] = (cumulative > random.below(lo, hi, cumulative[-1])).argmax(0)
+    return taken
+
+
 def stepped(
-    x: NDArray[np.uint16], c: int, sites: NDArray[np.int32], win: Window, seed: int, level: int, turn: int
+    x: NDArray[np.uint16], c: int, places: NDArray[np.int64], win: Window, seed: int, level: int, turn: int
 ) -> NDArray[np.uint16]:
     """Grey levels drawn from the kernel of equation (7) around those of channel c."""
     low, mass = legal(x, win)
-    bits = random.draw4(seed, level, turn, sites, random.DRAW, 1 + c)[0].astype(np.uint64)
+    bits = random.draw4(seed, level, turn, places, random.DRAW, 1 + c)[0].astype(np.uint64)
     u = low + ((bits * mass) >> np.uint64(32)).astype(np.uint32)
     step = np.searchsorted(win.noise, u, side="right") - win.radius
     return (x.astype(np.int64) + step).astype(np.uint16)
@@ -192,6 +218,7 @@ def _draw_launch(
     distances: Distances,
     candidates: Candidates,
     sites: Array,
+    grid: Grid,
     win: Window,
     noisy: bool,
     seed: int,
@@ -200,28 +227,16 @@ def _draw_launch(
 ) -> Relaxed:
     counters = (np.uint64(seed), np.uint32(level), np.uint32(turn))
     kernel = (machine.constant(win.noise), np.int32(win.radius if noisy else -1), np.int32(win.top))
-    return _take(machine, "draw", distances, candidates, win, sites, *counters, *kernel)
+    return _take(machine, "draw", distances, candidates, win, sites, grid.struct, *counters, *kernel)
 
 
 draw = Operation("draw", _draw_reference, _draw_launch)
 
 
-# -- iterated conditional modes -------------------------------------------------------------------------------
+# -- iterated conditional modes of a density ------------------------------------------------------------------
 
 
-def _best_reference(distances: Distances, candidates: Candidates) -> Relaxed:
-    choice = candidates.positions[distances.distance.argmin(0)]
-    return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
-
-
-def _best_launch(machine: Launcher, distances: Distances, candidates: Candidates) -> Relaxed:
-    return _take(machine, "best", distances, candidates, None)
-
-
-best = Operation("best", _best_reference, _best_launch)
-
-
-def _density(mass: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
+def smoothed(mass: NDArray[np.uint64], win: Window) -> NDArray[np.float32]:
     """f(x) = sum over v of mass[v] exp(-(x - v)^2 / 2h^2), (levels,), level 0 first."""
     levels = np.arange(mass.size)
     f = np.zeros(mass.size, np.float32)
@@ -241,7 +256,7 @@ def _mode_reference(distances: Distances, candidates: Candidates, win: Window) -
     for s in range(distances.sites):
         mass = np.zeros(256, np.uint64)
         np.add.at(mass, grey, w[:, s])
-        f = _density(mass, win)
+        f = smoothed(mass, win)
         mode = int(f.argmax())
         gap = abs(grey - mode)
         share = w[:, s].astype(np.float32) * win.gauss[np.minimum(gap, win.radius)]
@@ -290,22 +305,22 @@ mode_vector = Operation("mode_vector", _mode_vector_reference, _mode_vector_laun
 # -- the whole density -------------------------------------------------------------------------------
 
 
-def _table_reference(distances: Distances, candidates: Candidates, win: Window) -> NDArray[np.float32]:
+def _densities_reference(distances: Distances, candidates: Candidates, win: Window) -> NDArray[np.float32]:
     w = weights(distances.distance, win.scale)
     grey = candidates.pixels[0][candidates.positions[: candidates.size]].astype(np.int64)
     table = np.zeros((distances.sites, win.top + 1), np.float32)
     for s in range(distances.sites):
         mass = np.zeros(win.top + 1, np.uint64)
         np.add.at(mass, grey, w[:, s])
-        table[s] = _density(mass, win)
+        table[s] = smoothed(mass, win)
     return table
 
 
-def _table_launch(machine: Launcher, distances: Distances, candidates: Candidates, win: Window) -> Array:
+def _densities_launch(machine: Launcher, distances: Distances, candidates: Candidates, win: Window) -> Array:
     shape = (distances.sites, win.top + 1)
     mass, table = machine.empty(shape, np.uint64), machine.empty(shape, np.float32)
     machine.launch_sites(
-        ("lcpdf", "lcpdf_table"),
+        ("lcpdf", "lcpdf_density"),
         (distances.sites,),
         *_weighing(distances, win),
         *(candidates.pixels, candidates.positions, machine.constant(win.gauss)),
@@ -315,7 +330,7 @@ def _table_launch(machine: Launcher, distances: Distances, candidates: Candidate
     return table
 
 
-table = Operation("table", _table_reference, _table_launch)
+density = Operation("density", _densities_reference, _densities_launch)
 
 
 # -- what the launchers share ---------------------------------------------------------------------------------
@@ -330,11 +345,11 @@ def _plane(candidates: Candidates) -> np.int32:
     return np.int32(candidates.rows * candidates.cols)
 
 
-def _weighing(distances: Distances, win: Window | None) -> list[Any]:
+def _weighing(distances: Distances, win: Window) -> list[Any]:
     """The arguments that every kernel on distances begins with."""
     blocks, padded = distances.nearest.shape
     sizes = [np.int32(blocks), np.int32(distances.sites), np.int32(padded)]
-    return [distances.distance, distances.nearest, *sizes, *([win.scale] if win else [])]
+    return [distances.distance, distances.nearest, *sizes, win.scale]
 
 
 def _take(
@@ -342,7 +357,7 @@ def _take(
     name: str,
     distances: Distances,
     candidates: Candidates,
-    win: Window | None,
+    win: Window,
     *arguments: Any,
 ) -> Relaxed:
     """Launch a kernel that gives each site a source and a value."""

@@ -48,7 +48,7 @@ def _launch(
             machine.launch(
                 machine.kernel("luby", "luby_round"),
                 (sites,),
-                *(*grid.args, offsets, np.int32(offsets.shape[0]), priority, state, following),
+                *(grid.flat.struct, offsets, np.int32(offsets.shape[0]), priority, state, following),
             )
             state, following = following, state
         host = machine.get(state)

@@ -48,7 +48,7 @@ class Strip(NamedTuple):
     leaves: Callable[[], Leaves | None]
 
 
-def lay_out(
+def strip_of(
     machine: Machine, sample: Sample, offsets: NDArray[np.int32], spacing: int, phases: str, edges: str
 ) -> Strip:
     """The strip of a level's candidates: see `simdtex.model.sample.Sample.positions`."""
@@ -103,7 +103,8 @@ def _reference(
     near = neighbourhood.neighbourhood.reference(sites, field, offsets, grid)
     distances = lcpdf.distance.reference(near, candidates)
     distances = coherence.coherence.reference(distances, candidates, sites, field, offsets, grid, favour)
-    return lcpdf.best.reference(distances, candidates)
+    choice = candidates.positions[distances.distance.argmin(0)]
+    return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
 
 
 def _launch(
@@ -129,8 +130,8 @@ def _launch(
     machine.launch_sites(
         ("nearest", "nearest_begin"),
         (count,),
-        *(sites, i(count), i(neighbours), *field, i(prod(field.values.shape[1:])), offsets, *grid.args),
-        *(candidates.index_of, i(candidates.rows), i(candidates.cols)),
+        *(sites, i(count), i(neighbours), *field, i(prod(field.values.shape[1:])), offsets, grid.struct),
+        *(candidates.index_of, plane),
         *(candidates.pixels, candidates.positions, candidates.reach, strip.reach),
         *(machine.constant(_spread(strip.offsets)), favour, axes, f(leaves.middle if leaves else 0)),
         *(near, terms, used, features, least, where, certain),

@@ -50,7 +50,7 @@ def _launch(machine: Launcher, sites: Array, field: Field, offsets: Array, grid:
         ("neighbourhood", "neighbourhood"),
         (padded, neighbours),
         *(sites, np.int32(count), np.int32(padded), field.values, field.temperature),
-        *(np.int32(channels), np.int32(prod(field.values.shape[1:])), offsets, np.int32(neighbours), *grid.args),
+        *(np.int32(channels), np.int32(prod(field.values.shape[1:])), offsets, np.int32(neighbours), grid.struct),
         *(confidence, weighted),
         work=touching(sites, confidence, weighted),
     )

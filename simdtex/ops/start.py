@@ -13,7 +13,7 @@ from simdtex.ops.neighbourhood import Field
 
 
 def _reference(pixels: NDArray[np.float32], positions: NDArray[np.int32], grid: Grid, seed: int) -> Field:
-    lo, hi, *_ = random.draw4(seed, 0, 0, np.arange(grid.plane), random.START)
+    lo, hi, *_ = random.draw4(seed, 0, 0, grid.places(grid.sites()), random.START)
     shape = (grid.height, grid.width)
     source = positions[random.below(lo, hi, positions.size)].reshape(shape)
     return Field(pixels[:, source].astype(np.uint16), source, np.full(shape, 1024, np.uint16))
@@ -31,7 +31,7 @@ def _launch(machine: Launcher, pixels: Array, positions: Array, grid: Grid, seed
         machine.kernel("start", "start"),
         (grid.plane,),
         *(np.uint64(seed), pixels, np.int32(plane), np.int32(channels), positions),
-        *(np.int32(positions.size), np.int32(grid.plane), *field),
+        *(np.int32(positions.size), grid.struct, *field),
     )
     return field
 

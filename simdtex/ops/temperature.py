@@ -27,7 +27,7 @@ def _launch(machine: Launcher, sites: Array, field: Field, offsets: Array, grid:
         ("temperature", "temperature"),
         (sites.size,),
         *(sites, np.int32(sites.size), field.temperature, offsets, np.int32(offsets.shape[0])),
-        *(*grid.args, np.int32(xi), cooled),
+        *(grid.struct, np.int32(xi), cooled),
     )
     return cooled
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Parallel schedules: which sites relax together.
 
-A schedule is a pair of pure functions. ``init`` takes the lattice of a level and gives a state; ``step`` takes a
-state and gives the next one and an `Info` with the sites to relax now. The counters in the state key every
-random choice, so a schedule never depends on the device.
+A schedule is a pair of pure functions. ``init`` takes the `Setting` of a level and gives a state; ``step`` takes a
+state and which sites are `Active`, and gives the next state and an `Info` with the sites to relax now, in one step or
+several. The counters in the state key every random choice, so a schedule never depends on the device.
 """
 
 from __future__ import annotations
@@ -18,12 +18,11 @@ from simdtex.schedules.partition import (
     Coloring,
     FixedColoring,
     Partition,
-    Plan,
     Raster,
     Synchronous,
 )
 from simdtex.schedules.scattered import Luby, RandomScan, RandomSubset, Scattered
-from simdtex.schedules.schedule import Active, Checked, Info, Schedule, Watched, neighbours_in
+from simdtex.schedules.schedule import Active, Checked, Info, Masked, Schedule, Setting, Watched, neighbours_in
 
 __all__ = [
     "SCHEDULES",
@@ -35,13 +34,14 @@ __all__ = [
     "FixedColoring",
     "Info",
     "Luby",
+    "Masked",
     "Partition",
-    "Plan",
     "RandomScan",
     "RandomSubset",
     "Raster",
     "Scattered",
     "Schedule",
+    "Setting",
     "Synchronous",
     "Watched",
     "get",
@@ -83,11 +83,10 @@ def get(schedule: str | Schedule) -> Schedule:
         There is no such schedule; the sentence lists the valid names.
     """
     if not isinstance(schedule, str):
-        whole = all(callable(getattr(schedule, part, None)) for part in ("init", "step", "independent"))
-        if isinstance(schedule, type) or not whole or not isinstance(getattr(schedule, "name", None), str):
+        if isinstance(schedule, type) or not isinstance(schedule, Schedule) or not isinstance(schedule.name, str):
             raise TypeError(
-                "a schedule must be a name, or an object with a name, init, step and independent "
-                f"(not its class), not {schedule!r}"
+                "a schedule must be a name, or an object with name, tile, windows, independent, init and step "
+                f"(not its class; deriving from Partition or Scattered brings most of it), not {schedule!r}"
             )
         return schedule
     name, colon, parameter = schedule.partition(":")

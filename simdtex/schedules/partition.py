@@ -4,49 +4,29 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
+from simdtex.machine.interface import Machine
 from simdtex.model.lattice import Grid
 from simdtex.ops.coloring import coloring
 from simdtex.options import whole
-from simdtex.schedules.schedule import Active, Info
+from simdtex.schedules.schedule import Active, Info, Setting
 
 
 class State(NamedTuple):
     """What a partition carries.
 
-    ``place`` (sites,) the grid's sites, group after group and row by row within each; ``pixel`` (sites,) their pixel
-    indices; ``starts`` (groups + 1,) where each group begins among them; ``seed`` and ``level`` key the groups' order;
-    ``sweep`` sweeps begun so far; ``sites`` the present sweep's pixel indices, group after group; ``ends`` where each
-    group ends in them; ``done`` groups that were relaxed.
+    ``sites`` (sites,) int32 the pixel indices of the lattice, group after group and row by row within each; ``starts``
+    (groups + 1,) int64 where each group begins among them, and where the last one ends; ``sweep`` sweeps begun so far.
     """
 
-    place: NDArray[np.int32]
-    pixel: NDArray[np.int32]
+    sites: NDArray[np.int32]
     starts: NDArray[np.int64]
-    seed: int
-    level: int
     sweep: int
-    sites: NDArray[np.int32]
-    ends: NDArray[np.int64]
-    done: int
-
-
-class Plan(NamedTuple):
-    """A whole sweep that is known beforehand.
-
-    ``sites`` (S,) int32 pixel indices, one step's after the other; ``bounds`` (steps + 1,) where each begins in them,
-    and where the last ends; ``turn`` keys the random numbers of all of them.
-    """
-
-    sites: NDArray[np.int32]
-    bounds: NDArray[np.int64]
-    turn: int
 
 
 class Partition:
@@ -56,56 +36,37 @@ class Partition:
     shuffled = False
     """Whether the groups come in a fresh random order each sweep, or always in their own."""
     tile: tuple[int, int] | None = None
+    windows = False
 
-    def __init_subclass__(cls) -> None:
-        """A subclass with steps of its own has no sweeps that are known beforehand, unless it says them."""
-        if "step" in cls.__dict__ and "sweep" not in cls.__dict__:
-            cls.sweep = None  # type: ignore[assignment, method-assign]
-
-    def groups(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """(rows, cols) whole numbers from 0: the group of each site."""
+    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
+        """(rows, cols) integers from 0: the group of each site of a whole lattice."""
         raise NotImplementedError
 
-    def init(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int) -> State:
-        """Lay out the groups, once a level."""
-        group = np.ravel(self.groups(machine, grid, offsets, order, seed))
+    def init(self, setting: Setting) -> State:
+        """Lay out the groups, once a level; those of a window are cut out of the whole lattice's."""
+        machine, grid, offsets, order, seed, _ = setting
+        group = self.groups(machine, grid.whole, offsets, order, seed)
         if group.min() < 0 or group.max() >= group.size:  # numbers with wide gaps
-            group = np.unique(group, return_inverse=True)[1]
-        few = group.astype(np.uint16) if group.max() < 2**16 else group  # sorts in linear time
-        place = np.argsort(few, kind="stable").astype(np.int32)
-        starts = np.concatenate([[0], np.cumsum(np.bincount(group))])
-        nothing = np.zeros(0, np.int32)
-        return State(place, grid.sites()[place], starts, seed, level, 0, nothing, np.zeros(0, np.int64), 0)
+            group = np.unique(group, return_inverse=True)[1].reshape(group.shape)
+        count = int(group.max()) + 1
+        group = np.ravel(grid.cut(group) if grid.part else group)
+        few = group.astype(np.uint16) if count <= 2**16 else group  # sorts in linear time
+        place = np.argsort(few, kind="stable")
+        starts = np.concatenate([[0], np.cumsum(np.bincount(group, minlength=count))])
+        return State(grid.sites()[place], starts, 0)
 
-    def step(self, state: State, active: Active) -> tuple[State, Info]:
-        """The next group that has active sites; a sweep goes by what was active when it began."""
-        if state.done == state.ends.size:
-            state = self._begin(state, active().ravel())
-        begin = int(state.ends[state.done - 1]) if state.done else 0
-        sites = state.sites[begin : int(state.ends[state.done])]
-        state = state._replace(done=state.done + 1)
-        return state, Info(sites, state.sweep, state.done == state.ends.size, self.tile)
-
-    def sweep(self, state: State, active: Active) -> tuple[State, Plan]:
-        """All steps of the next sweep in one go."""
-        state = self._begin(state, active().ravel())
-        return state._replace(done=state.ends.size), Plan(state.sites, np.concatenate([[0], state.ends]), state.sweep)
-
-    def _begin(self, state: State, active: NDArray[np.bool_]) -> State:
-        sweep = state.sweep + 1
-        groups = state.starts.size - 1
+    def step(self, setting: Setting, state: State, active: Active) -> tuple[State, Info]:
+        """All groups that have active sites; a sweep goes by what was active when it began."""
+        sweep, groups = state.sweep + 1, state.starts.size - 1
         turn = np.arange(groups)
         if self.shuffled:
             first, at = divmod(sweep, AHEAD)
-            turn = _orders(state.seed, state.level, first * AHEAD, groups)[at]
-        wanted = active[state.place]
-        sites = state.pixel if wanted.all() else state.pixel[wanted]
-        counts = [np.count_nonzero(wanted[begin:end]) for begin, end in pairwise(state.starts.tolist())]
-        bounds = np.concatenate([[0], np.cumsum(counts)]).tolist()
-        parts = [sites[bounds[g] : bounds[g + 1]] for g in turn.tolist() if bounds[g + 1] > bounds[g]]
-        parts = parts or [sites]  # an empty sweep is one empty group
-        ends = np.cumsum([part.size for part in parts])
-        return state._replace(sweep=sweep, sites=np.concatenate(parts), ends=ends, done=0)
+            turn = _orders(setting.seed, setting.level, first * AHEAD, groups)[at]
+        sites, starts = active.among(state.sites, state.starts)
+        steps = np.stack([starts[:-1], starts[1:]], 1)[turn]
+        steps = steps[steps[:, 1] > steps[:, 0]]
+        steps = steps if len(steps) else np.zeros((1, 2), np.int64)  # an empty sweep is one empty group
+        return state._replace(sweep=sweep), Info(sites, sweep, True, self.tile, steps)
 
 
 AHEAD = 32
@@ -128,12 +89,13 @@ class Coloring(Partition):
 
     name = "coloring"
     shuffled = True
+    windows = True
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Always."""
         return True
 
-    def groups(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
+    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """Colours; O(sites x (neighbours + colours))."""
         colors: NDArray[Any] = coloring(machine, grid, offsets, order, seed)
         return colors
@@ -159,13 +121,14 @@ class Checkerboard(Partition):
     """
 
     name = "checkerboard"
+    windows = True
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Whether every neighbour is of the other colour."""
         even = not grid.torus or all(n == 1 or n % 2 == 0 for n in (grid.rows, grid.cols))
         return even and bool((offsets.sum(1) % 2 == 1).all())
 
-    def groups(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
+    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """Row plus column, odd or even."""
         colors: NDArray[Any] = np.indices((grid.rows, grid.cols)).sum(0) % 2
         return colors
@@ -179,12 +142,13 @@ class Synchronous(Partition):
     """
 
     name = "synchronous"
+    windows = True
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Only on a lattice without neighbours."""
         return neighbourless(grid)
 
-    def groups(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
+    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """One for all."""
         return np.zeros((grid.rows, grid.cols), np.int64)
 
@@ -202,7 +166,7 @@ class Raster(Partition):
         """Always."""
         return True
 
-    def groups(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
+    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """Each site its own."""
         return np.arange(grid.rows * grid.cols).reshape(grid.rows, grid.cols)
 
@@ -231,7 +195,7 @@ class Block(Partition):
         assert self.tile is not None
         return grid.rows <= self.tile[0] and grid.cols <= self.tile[1]
 
-    def groups(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
+    def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """The place within the tile."""
         assert self.tile is not None
         row, col = np.indices((grid.rows, grid.cols))

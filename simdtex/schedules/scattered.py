@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,51 +13,42 @@ from simdtex import random
 from simdtex.model.lattice import Grid
 from simdtex.ops.luby import luby
 from simdtex.schedules.partition import neighbourless
-from simdtex.schedules.schedule import Active, Info
+from simdtex.schedules.schedule import Active, Info, Setting
 
 
 class State(NamedTuple):
     """What a random choice carries.
 
-    ``machine``, ``grid``, ``offsets``, ``pixel`` the lattice, as `Schedule.init` was given it, and the pixel index
-    of its sites; ``seed`` and ``level`` key the choice, ``steps`` counts it; ``left`` relaxations that are left of
-    the present sweep; ``mask`` and ``wanting`` what was active last, and its sites.
+    ``steps`` counts the choices and keys them; ``left`` relaxations that are left of the present sweep.
     """
 
-    machine: Any
-    grid: Grid
-    offsets: Any
-    pixel: NDArray[np.int32]
-    seed: int
-    level: int
     steps: int = 0
     left: int = 0
-    mask: NDArray[np.bool_] | None = None
-    wanting: NDArray[np.int64] | None = None
 
 
 class Scattered:
     """A random choice among the sites that are active now; a subclass says how."""
 
     name: str
+    tile: tuple[int, int] | None = None
+    windows = False
 
-    def choose(self, state: State, wanting: NDArray[np.int64], active: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """Sites of the grid out of those that want relaxing."""
+    def choose(self, setting: Setting, steps: int, active: Active) -> NDArray[np.int64]:
+        """Numbers of sites out of those that are active; there are some."""
         raise NotImplementedError
 
-    def init(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int) -> State:
+    def init(self, setting: Setting) -> State:
         """Nothing is decided beforehand."""
-        return State(machine, grid, machine.put(offsets), grid.sites(), seed, level)
+        return State()
 
-    def step(self, state: State, active: Active) -> tuple[State, Info]:
+    def step(self, setting: Setting, state: State, active: Active) -> tuple[State, Info]:
         """Choose; the sweep ends with as many relaxations as sites were active when it began."""
-        mask = active()
-        wanting = state.wanting if mask is state.mask else np.flatnonzero(mask)
-        assert wanting is not None
-        state = state._replace(steps=state.steps + 1, left=state.left or wanting.size, mask=mask, wanting=wanting)
-        chosen = self.choose(state, wanting, mask) if wanting.size else wanting
-        left = max(0, state.left - chosen.size) if wanting.size else 0
-        return state._replace(left=left), Info(state.pixel[chosen], state.steps, not left)
+        wanting, steps = active.numbers().size, state.steps + 1
+        chosen = self.choose(setting, steps, active) if wanting else active.numbers()
+        left = max(0, (state.left or wanting) - chosen.size) if wanting else 0
+        row, col = np.divmod(chosen, setting.grid.cols)
+        sites = ((row * setting.grid.width + col) * setting.grid.spacing).astype(np.int32)
+        return State(steps, left), Info(sites, steps, not left)
 
 
 class Luby(Scattered):
@@ -73,11 +64,11 @@ class Luby(Scattered):
         """Always."""
         return True
 
-    def choose(self, state: State, wanting: NDArray[np.int64], active: NDArray[np.bool_]) -> NDArray[np.int64]:
+    def choose(self, setting: Setting, steps: int, active: Active) -> NDArray[np.int64]:
         """By the rounds of Luby, on the machine."""
-        mask = state.machine.put(active.astype(np.uint8))
-        chosen = luby(state.machine, state.grid, state.offsets, mask, state.seed, state.level, state.steps)
-        return np.flatnonzero(chosen)
+        machine, grid, offsets, _, seed, level = setting
+        mask = machine.put(active.mask().astype(np.uint8))
+        return np.flatnonzero(luby(machine, grid, machine.put(offsets), mask, seed, level, steps))
 
 
 class RandomSubset(Scattered):
@@ -102,9 +93,10 @@ class RandomSubset(Scattered):
         """Only on a lattice without neighbours."""
         return neighbourless(grid)
 
-    def choose(self, state: State, wanting: NDArray[np.int64], active: NDArray[np.bool_]) -> NDArray[np.int64]:
+    def choose(self, setting: Setting, steps: int, active: Active) -> NDArray[np.int64]:
         """Toss a coin for each."""
-        bits = random.draw4(state.seed, state.level, state.steps, wanting, random.SCHEDULE)[0]
+        wanting = active.numbers()
+        bits = random.draw4(setting.seed, setting.level, steps, wanting, random.SCHEDULE)[0]
         return wanting[bits < self.p * 2.0**32]
 
 
@@ -121,10 +113,11 @@ class RandomScan(Scattered):
         """Always."""
         return True
 
-    def choose(self, state: State, wanting: NDArray[np.int64], active: NDArray[np.bool_]) -> NDArray[np.int64]:
+    def choose(self, setting: Setting, steps: int, active: Active) -> NDArray[np.int64]:
         """One of them."""
-        first, at = divmod(state.steps, AHEAD)
-        lo, hi = (bits[at : at + 1] for bits in _ahead(state.seed, state.level, first * AHEAD))
+        wanting = active.numbers()
+        first, at = divmod(steps, AHEAD)
+        lo, hi = (bits[at : at + 1] for bits in _ahead(setting.seed, setting.level, first * AHEAD))
         return wanting[random.below(lo, hi, wanting.size)]
 
 

@@ -3,51 +3,157 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.machine.interface import Array, Machine
 from simdtex.model.lattice import Grid
 
-Active = Callable[[], NDArray[np.bool_]]
-"""``active()`` tells, per site of the grid (rows, cols), whether it wants relaxing now; its array never changes."""
+
+class Setting(NamedTuple):
+    """What stays the same throughout a level.
+
+    ``machine`` what executes operations; ``grid`` the lattice, or a window of it; ``offsets`` (N, 2) int32, and
+    ``order``, of the neighbourhood; ``seed`` and ``level`` the keys of random choices.
+    """
+
+    machine: Machine
+    grid: Grid
+    offsets: NDArray[np.int32]
+    order: int
+    seed: int
+    level: int
+
+
+class Active(Protocol):
+    """Which sites want relaxing now."""
+
+    def mask(self) -> NDArray[np.bool_]:
+        """Whether each site does, (rows, cols), on the host."""
+        ...
+
+    def numbers(self) -> NDArray[np.int64]:
+        """The numbers, row cols + column, of those that do, in ascending order, on the host."""
+        ...
+
+    def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+        """Those of a list of pixel indices, group after group.
+
+        Parameters
+        ----------
+        sites : (S,) array
+            Pixel indices; an array that a schedule's state keeps, so that a machine may keep its own copy of it.
+        starts : (groups + 1,) array
+            Where each group begins in them, and where the last one ends.
+
+        Returns
+        -------
+        (active,) int32 array, of NumPy or of the machine
+            The active ones in their order.
+        (groups + 1,) array
+            Where each group begins among those, and where the last one ends.
+        """
+        ...
+
+
+class Masked:
+    """Sites that are active by a mask, which does not change.
+
+    Parameters
+    ----------
+    grid : Grid
+    mask : (rows, cols) bool array, optional
+        None: all are.
+    """
+
+    def __init__(self, grid: Grid, mask: NDArray[np.bool_] | None = None) -> None:
+        self._grid = grid
+        self._mask = np.ones((grid.rows, grid.cols), bool) if mask is None else mask
+
+    def mask(self) -> NDArray[np.bool_]:
+        """As given."""
+        return self._mask
+
+    @cached_property
+    def _numbers(self) -> NDArray[np.int64]:
+        return np.flatnonzero(self._mask)
+
+    def numbers(self) -> NDArray[np.int64]:
+        """Found once."""
+        return self._numbers
+
+    def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+        """In NumPy."""
+        if self._mask.all():
+            return sites, starts
+        plane = np.zeros(self._grid.plane, bool)
+        plane[self._grid.sites()] = self._mask.ravel()
+        wanted = plane[sites]
+        return sites[wanted], np.concatenate([[0], np.cumsum(wanted)])[starts]
 
 
 class Info(NamedTuple):
-    """What a step decided.
+    """What a step decided, or several that are known beforehand.
 
-    ``sites`` (S,) int32 pixel indices that relax together, none of them twice. ``turn`` keys the random numbers of
-    their relaxation: no site is ever relaxed twice under the same. ``last`` whether a sweep ends with this step.
-    ``tile`` None, or (rows, cols) of tiles that relax on their own: neighbours in another tile are then read as they
-    were when the sweep began.
+    ``sites`` (S,) int32 pixel indices, an array of NumPy or of the machine. ``turn`` keys the random numbers of their
+    relaxation: no site is ever relaxed twice under the same. ``last`` whether a sweep ends with this. ``tile`` None, or
+    (rows, cols) of tiles that relax on their own: neighbours in another tile are then read as they were when the sweep
+    began. ``steps`` None where all sites relax together, or (steps, 2) int64: those from ``steps[0, 0]`` to
+    ``steps[0, 1]`` - 1 relax together, then those of ``steps[1]``, and so on.
     """
 
-    sites: NDArray[np.int32]
+    sites: Array
     turn: int
     last: bool
     tile: tuple[int, int] | None = None
+    steps: NDArray[np.int64] | None = None
+
+    @property
+    def ranges(self) -> NDArray[np.int64]:
+        """``steps``, also where there is one."""
+        return np.array([[0, self.sites.size]], np.int64) if self.steps is None else self.steps
+
+    def apart(self, machine: Machine) -> Iterator[Info]:
+        """The same step by step, the sites on the host."""
+        sites, ranges = np.asarray(machine.get(self.sites)), self.ranges.tolist()
+        for number, (begin, end) in enumerate(ranges, 1):
+            yield Info(sites[begin:end], self.turn, self.last and number == len(ranges), self.tile)
 
 
+@runtime_checkable
 class Schedule(Protocol):
     """A parallel schedule: which sites relax together.
 
-    ``init`` and ``step`` are pure functions: whatever a schedule remembers is in its state, an immutable value of
-    any type, and every random choice comes from the counters of `simdtex.random.draw4`.
+    ``init`` and ``step`` are pure functions: whatever a schedule remembers is in its state, a tuple of plain arrays and
+    numbers, and every random choice comes from the counters of `simdtex.random.draw4`.
+
+    Attributes
+    ----------
+    name : str
+    tile : (int, int) or None
+        Rows and columns of tiles that relax on their own, as in `Info`.
+    windows : bool
+        Whether a window of a lattice relaxes in the same sets as the same sites of the whole, in the same order; then
+        it has the whole's bits, except within a sweep's reach of its edges: steps times the neighbourhood's radius.
     """
 
     name: str
+    tile: tuple[int, int] | None
+    windows: bool
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Whether every step's sites are i.i.d. in the sense of equation (14) on this lattice."""
         ...
 
-    def init(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int) -> Any:
+    def init(self, setting: Setting) -> Any:
         """The state before the first sweep of a level."""
         ...
 
-    def step(self, state: Any, active: Active) -> tuple[Any, Info]:
+    def step(self, setting: Setting, state: Any, active: Active) -> tuple[Any, Info]:
         """The next state, and what to relax now."""
         ...
 
@@ -74,12 +180,26 @@ class Watched:
 
     def __init__(self, schedule: Schedule) -> None:
         self.schedule = schedule
-        self.name = schedule.name
-        self.tile = getattr(schedule, "tile", None)
+        self.name, self.tile, self.windows = schedule.name, schedule.tile, schedule.windows
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """As the schedule says."""
         return self.schedule.independent(grid, offsets)
+
+    def init(self, setting: Setting) -> Any:
+        """The schedule's own state."""
+        return self.schedule.init(setting)
+
+    def step(self, setting: Setting, state: Any, active: Active) -> tuple[Any, Info]:
+        """The schedule's own step, once it has been looked at."""
+        state, info = self.schedule.step(setting, state, active)
+        for one in info.apart(setting.machine):
+            self.look(setting, one)
+        return state, info
+
+    def look(self, setting: Setting, info: Info) -> None:
+        """Look at a step."""
+        raise NotImplementedError
 
 
 class Checked(Watched):
@@ -95,24 +215,17 @@ class Checked(Watched):
     schedule claims independence and two of its sites are neighbours. Cost: O(sites x neighbours) a step, on the host.
     """
 
-    def init(self, machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int, level: int) -> Any:
-        """The schedule's own state, the lattice to check against, and whether the schedule claims independence."""
-        inner = self.schedule.init(machine, grid, offsets, order, seed, level)
-        return inner, grid, offsets, self.independent(grid, offsets)
-
-    def step(self, state: Any, active: Active) -> tuple[Any, Info]:
-        """The schedule's own step, once it has been checked."""
-        inner, grid, offsets, claims = state
-        inner, info = self.schedule.step(inner, active)
+    def look(self, setting: Setting, info: Info) -> None:
+        """Raise where the step breaks what the schedule claims."""
+        grid, offsets = setting.grid, setting.offsets
         if np.unique(info.sites).size != info.sites.size:
             raise RuntimeError(f"the schedule {self.name} relaxes a site twice in one step")
         if not np.isin(info.sites, grid.sites()).all():
             raise RuntimeError(f"the schedule {self.name} relaxes sites that are not of the level's lattice")
-        met = neighbours_in(grid, offsets, info.sites) if claims else None
+        met = neighbours_in(grid, offsets, info.sites) if self.independent(grid, offsets) else None
         if met:
             here, there = (divmod(site, grid.width) for site in met)
             raise RuntimeError(
                 f"the schedule {self.name} claims independent sites, but {here} and {there} are neighbours "
                 "and relax together: equation (14)"
             )
-        return (inner, grid, offsets, claims), info

@@ -1,426 +1,209 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Nonparametric multiscale Markov random field: Algorithm 1 of Paget and Longstaff (1998).
 
-`synthesize` is the algorithm, step by step; `_relax` is its body, steps 6.2.2.1 to 6.2.2.3. The numbers in
-the comments are the algorithm's own.
+`anneal` is the algorithm, `sweep` the body of its loop, and the numbers in the comments are the algorithm's own. A step
+of 6.2.2 is said first and executed at once (`simdtex.ops.relax`): the sites of a step know nothing of one another, so a
+device relaxes them in one launch. Whatever watches a run stands outside (observers.py).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from functools import partial
-from itertools import pairwise
-from math import log2, prod
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import schedules
-from simdtex.machine import Machine
-from simdtex.machine.interface import Array
-from simdtex.maspar.accounting import Account
-from simdtex.maspar.array import parse_array
-from simdtex.methods.mrf.meter import Meter
-from simdtex.methods.mrf.options import PRESETS, Options, make_options
-from simdtex.model.lattice import Grid, neighbourhood_offsets
-from simdtex.model.sample import Candidates, Sample
-from simdtex.ops import lcpdf
-from simdtex.ops.coherence import coherence
+from simdtex.methods.mrf.level import Level, Run, State, Warm, parts
+from simdtex.model.lattice import Grid
+from simdtex.ops import active
 from simdtex.ops.commit import commit
-from simdtex.ops.nearest import lay_out, nearest
-from simdtex.ops.neighbourhood import Field, neighbourhood
-from simdtex.ops.search import Rule, Table, search, search_apart, table
+from simdtex.ops.neighbourhood import Field
+from simdtex.ops.relax import Relaxation, relax, relax_apart
 from simdtex.ops.snapshot import snapshot
 from simdtex.ops.start import start
-from simdtex.ops.temperature import temperature
-from simdtex.options import within_32_bits
-from simdtex.run import Callback, Output, Relaxing, Stage, device_seconds
-
-__all__ = ["PRESETS", "Options", "check_fit", "make_options", "synthesize"]
-
-ENOUGH = 64
-"""Candidates that the sample must still have at the coarsest of the default levels."""
-
-FEW = 1024
-"""Candidates up to which coherent search weighs all of them in its own kernel."""
-
-TOGETHER = 2**16
-"""Sites that coherent search relaxes between two looks at the clock."""
 
 
-@dataclass(frozen=True)
-class _Run:
-    """What stays the same throughout a run."""
+class Info(NamedTuple):
+    """What a sweep did.
 
-    machine: Machine
-    emulated: bool
-    sample: Sample
-    planes: Array
-    shape: tuple[int, int]
-    offsets: NDArray[np.int32]
-    options: Options
-    schedule: schedules.Schedule
-    seed: int
-    levels: int
-    account: Account
-    callback: Callback | None
+    ``level`` and ``number``, the sweep within it, from 1; ``phase`` ``"relax"`` while temperatures are above 0, then
+    ``"free"``; ``left`` the mean temperature at its beginning, 0 to 1; ``chosen`` what the schedule decided;
+    ``ended`` whether the level ends with it.
+    """
+
+    level: int
+    number: int
+    phase: str
+    left: float
+    chosen: list[schedules.Info]
+    ended: bool
 
 
-class _Level(NamedTuple):
-    """What the relaxation of one level needs; equations (10) and (11)."""
+class Part(NamedTuple):
+    """Where a sweep stands: told several times a second.
+
+    ``number``, ``phase``, ``left`` as of `Info`; ``steps`` and ``relaxed`` steps and sites of the sweep that are done;
+    ``wanted`` sites that were active when it began; ``last`` whether it ends here; ``field`` the arrays over sites.
+    """
 
     number: int
-    grid: Grid
-    offsets: Array
-    candidates: Candidates
-    window: lcpdf.Window
-    relaxation: str
-    coherent: _Coherent | None
-    strip: Any = None
-
-    @property
-    def weighed(self) -> int:
-        """Most candidates that a site weighs."""
-        return self.coherent.table.slots if self.coherent else self.candidates.size
+    phase: str
+    left: float
+    steps: int
+    relaxed: int
+    wanted: int
+    last: bool
+    field: Field
 
 
-class _Coherent(NamedTuple):
-    """What coherent search of a level needs beside that; ``ahead``: the schedule's sweeps can run in place."""
-
-    table: Table
-    rule: Rule
-    weighed: Array
-    ahead: bool
+Watch = Callable[[Level, Part], Any]
+"""Called after every part of a sweep."""
 
 
-def synthesize(
-    machine: Machine,
-    pixels: NDArray[Any],
-    shape: tuple[int, int],
-    options: Options,
-    seed: int,
-    callback: Callback | None = None,
-) -> tuple[NDArray[Any], Output]:
-    """Algorithm 1: nonparametric multiscale MRF texture synthesis.
+def anneal(run: Run, state: State | None = None, watch: Watch | None = None) -> Iterator[tuple[Level, State, Info]]:
+    """Algorithm 1, sweep by sweep.
 
     Parameters
     ----------
-    machine : Machine
-        What executes the steps.
-    pixels : (rows, cols, channels) array
-        Y, the sample.
-    shape : (int, int)
-        Rows and columns of X, the output.
-    options : Options
-    seed : int
-        Key of every random number.
-    callback : callable, optional
-        Called with a `simdtex.run.Relaxing` after every piece of a step.
+    run : Run
+        Its ``levels`` are M of step 1.
+    state : State, optional
+        What another run of the same kind has come to, to go on from there.
+    watch : callable, optional
+        Called within sweeps.
+
+    Yields
+    ------
+    level, state, info
+        After every sweep. The next one uses up the state's arrays.
+    """
+    state = begin(run) if state is None else state  # 2, 5
+    for number in reversed(range(state.level + 1)):  # 6
+        level = run.level(number)  # 3, 4, 6.1
+        if state.schedule is None or state.level != number:
+            state = enter(level, state)
+        while state.warm:  # 6.2
+            state, info = sweep(level, state, watch=watch)
+            yield level, state, info._replace(ended=not (state.warm or run.options.free_sweeps))
+        while state.free < run.options.free_sweeps:
+            state, info = sweep(level, state, free=True, watch=watch)
+            yield level, state, info._replace(ended=state.free == run.options.free_sweeps)
+
+
+def begin(run: Run) -> State:
+    """The state before the first level: every site a pixel of the sample at random (2), at temperature 1 (5)."""
+    everywhere = run.machine.put(run.sample.positions(np.zeros((1, 2), np.int32), 1))
+    field = start(run.machine, run.planes, everywhere, Grid(*run.shape), run.seed)
+    return State(*field, schedule=None, level=run.levels - 1)
+
+
+def enter(level: Level, state: State) -> State:
+    """The state at the beginning of a level: sites kept from the level above have t = 0, all others t = 1."""
+    warm, heat = active.survey(level.machine, level.grid, state.temperature)
+    return State(*state.field, level.schedule.init(level.setting), level.number, warm=warm, heat=heat)
+
+
+def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None = None) -> tuple[State, Info]:
+    """Steps 6.2.1 and 6.2.2 until about as many sites have been relaxed as were active: a sweep of the schedule.
+
+    Parameters
+    ----------
+    level : Level
+    state : State
+        Its arrays are used up.
+    free : bool
+        Whether all sites are active, instead of those that are warmer than 0.
+    watch : callable, optional
+        Called after every part of the sweep.
 
     Returns
     -------
-    image : (rows, cols, channels) array
-        In the sample's type.
-    output : simdtex.run.Output
-        Source map, temperatures, stages and statistics.
-
-    Notes
-    -----
-    Cost: sweeps x sites x candidates x |N| x channels x 2 fma, about 7 sweeps a level; with coherent search some 7
-    candidates instead of all. Memory on the device, in bytes: 18 + 2 channels per output pixel (24 + 4 channels with
-    the schedule ``block``), 14 channels + 4 similar + 151 per pixel of the sample with its margin, and the machine's
-    scratch memory or, if that is more, 65 per candidate. On the host: about 50 per output pixel.
+    state : State
+    info : Info
     """
-    options = options.resolved()
-    offsets = neighbourhood_offsets(options.order)
-    levels = _number_of_levels(pixels.shape[:2], offsets, shape, options)  # 1
-    margin = int(offsets.max()) * 2 ** (levels - 1) if options.edges != "whole" else 0
-    sample = Sample(pixels, pixels.shape[-1] * len(offsets), margin)
-    schedule = schedules.get(options.schedule)
-    _check_memory(machine, sample, shape, options.similar, copies=2 if getattr(schedule, "tile", None) else 1)
-    if options.check_schedule:
-        schedule = schedules.Checked(schedule)
-    planes = sample.planes(machine)
-    array = parse_array(options.array or "maspar-mp1-16k", options.mapping)
-    emulated = bool(options.array) and options.emulate
-    machine = machine.emulate(array) if emulated else machine
-    account = Account(array, packed=options.array is None)
-    launches, worked = machine.launches, machine.seconds
-    run = _Run(machine, emulated, sample, planes, shape, offsets, options, schedule, seed, levels, account, callback)
-    meter = Meter(_expected_work(run))
-    stages = []
-
-    everywhere = machine.put(sample.positions(np.zeros((1, 2), np.int32), 1))
-    field = start(machine, planes, everywhere, Grid(*shape), seed)  # 2, 5
-    for number in reversed(range(levels)):  # 6
-        level, spared = _level(run, number), machine.spared  # 3, 4, 6.1
-        meter.begin(number, level.grid, level.candidates.size, level.weighed)
-        words = sample.channels + 1 + bool(options.coherence)  # of a neighbour: pixel, temperature, source
-        account.begin(level.grid, offsets, level.weighed, sample.channels, words)
-        state = schedule.init(machine, level.grid, offsets, options.order, seed, number)
-        while (temperatures := _temperatures(run, level, field)).any():  # 6.2
-            field, state = _sweep(run, level, field, state, temperatures, "relax", meter)
-        for _ in range(options.free_sweeps):
-            field, state = _sweep(run, level, field, state, temperatures, "free", meter)
-        stages.append(Stage(number, _picture(run, level, field)))
-        meter.end(machine.spared - spared, _weighed(run, level))
-
-    values, source, temperatures = (Grid(*shape).view(machine.get(plane)) for plane in field)
-    image = sample.picture(values, source)
-    statistics = {
-        "device": machine.name,
-        "seed": seed,
-        "options": {f.name: getattr(options, f.name) for f in fields(Options)}
-        | {"levels": levels, "schedule": schedule.name},
-        "seconds": meter.seconds,
-        "device_seconds": device_seconds(machine, worked),
-        "accounting": account.report() | {"emulated": emulated, "launches": machine.launches - launches},
-        "levels": meter.reports,
-    }
-    return image, Output(sample.place(source), temperatures / 1024, stages, statistics)
+    sites = level.grid.rows * level.grid.cols
+    left = 0.0 if free else state.heat / (1024 * sites)
+    told = Part(state.cooling + state.free + 1, "free" if free else "relax", left, 0, 0, 0, False, state.field)
+    told = told._replace(wanted=sites if free else state.warm)
+    field, memory = exchanged(level, state.field), state.schedule
+    all_chosen: list[schedules.Info] = []
+    while not (all_chosen and all_chosen[-1].last):
+        warm = Warm(level, field.temperature, free)
+        memory, chosen = level.schedule.step(level.setting, memory, warm)  # 6.2.1
+        relaxation = Relaxation(  # 6.2.2
+            grid=level.grid,
+            offsets=level.offsets,
+            proposal=level.proposal,  # 6.2.2.1 the LCPDF, equations (6) and (12), of these candidates
+            favour=level.favour,
+            choice=level.choice,  # 6.2.2.2 a draw from it, or its mode
+            xi=level.xi,  # 6.2.2.3 the temperature, equation (13)
+            seed=level.setting.seed,
+            level=level.number,
+        )
+        for part in relaxed(level, field, chosen, relaxation, told):
+            told = part
+            if watch:
+                watch(level, told)
+        field = told.field
+        all_chosen.append(chosen)
+    hot, heat = active.survey(level.machine, level.grid, field.temperature)
+    done = {"cooling": state.cooling + (not free), "free": state.free + free}
+    info = Info(level.number, told.number, told.phase, left, all_chosen, False)
+    return State(*field, memory, level.number, **done, warm=hot, heat=heat), info
 
 
-def _level(run: _Run, number: int) -> _Level:
-    """Define the lattice, the candidates and the bandwidth of a level."""
-    options, sample, offsets = run.options, run.sample, run.offsets
-    grid = Grid(*run.shape, 2**number, options.boundary == "torus")
-    candidates = sample.candidates(run.machine, offsets, grid.spacing, options.phases, options.edges, run.planes)
-    dimensions = sample.channels * (len(offsets) + 1)
-    h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, candidates.size, dimensions)
-    by_draw = number == run.levels - 1 and options.coarsest == "gibbs"
-    relaxation = "gibbs" if by_draw else options.relaxation
-    window = lcpdf.window(h, sample.top)
-    level = _Level(number, grid, run.machine.put(offsets), candidates, window, relaxation, None)
-    level = level._replace(coherent=_coherent(run, level)) if options.search == "coherent" else level
-    if level.coherent:
-        return level
-    return level._replace(strip=lay_out(run.machine, sample, offsets, grid.spacing, options.phases, options.edges))
+def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Relaxation, told: Part) -> Iterator[Part]:
+    """Step 6.2.2 for the sites of one step after another, in parts that do not take long."""
+    machine, seen = level.machine, told
 
+    def part(field: Field, sites: int, steps: int, last: bool) -> Part:
+        machine.sync(level.work * sites)
+        steps, sites = seen.steps + steps, seen.relaxed + sites
+        return seen._replace(steps=steps, relaxed=sites, last=last and chosen.last, field=field)
 
-def _coherent(run: _Run, level: _Level) -> _Coherent | None:
-    """Lay out coherent search; None where all of many candidates are to be weighed: exact search is made for that."""
-    options, grid = run.options, level.grid
-    exhaustive = level.number == run.levels - 1 or level.candidates.size <= options.exhaustive
-    if exhaustive and level.candidates.size > FEW:
-        return None
-    how = {"suggesting": options.suggesting, "similar": options.similar, "chance": options.chance}
-    working = run.sample.working
-    laid = table(run.machine, level.candidates, working, run.offsets, grid.spacing, **how, exhaustive=exhaustive)
-    gibbs, noisy = level.relaxation == "gibbs", options.pixel == "density"
-    rule = Rule(_favour(options), _xi(options), level.window, gibbs, noisy, run.seed, level.number)
-    weighed = run.machine.put(np.zeros(run.shape, np.int32))
-    in_place = run.schedule.independent(grid, run.offsets) and not getattr(run.schedule, "tile", None)
-    ahead = callable(getattr(run.schedule, "sweep", None)) and not run.emulated and in_place
-    return _Coherent(laid, rule, weighed, ahead)
-
-
-def _favour(options: Options) -> np.float32:
-    return np.float32(1 / (1 + (options.coherence or 0)))
-
-
-def _xi(options: Options) -> int:
-    return min(-1, round(options.xi * 1024))
-
-
-def _weighed(run: _Run, level: _Level) -> tuple[int, int] | None:
-    """Candidates that a level's relaxations have weighed, and the fma of each; None where they have weighed all."""
-    if not level.coherent:
-        return None
-    weighed = level.grid.view(run.machine.get(level.coherent.weighed))
-    return int(weighed.sum(dtype=np.int64)), 2 * len(run.offsets) * run.sample.channels
-
-
-def _sweep(
-    run: _Run,
-    level: _Level,
-    field: Field,
-    state: Any,
-    temperatures: NDArray[np.uint16],
-    phase: str,
-    meter: Meter,
-) -> tuple[Field, Any]:
-    """Relax about as many sites as have t > 0, or, in the phase ``"free"``, as there are: a sweep of the schedule."""
-    machine, schedule = run.machine, run.schedule
-    everywhere = np.ones(temperatures.shape, bool)
-
-    def active() -> NDArray[np.bool_]:
-        return _temperatures(run, level, field) > 0 if phase == "relax" else everywhere
-
-    left = float(temperatures.mean()) / 1024 if phase == "relax" else 0.0
-    sweep = meter.sweep(phase, left)
-    wanted, relaxed = int((temperatures > 0).sum()) if phase == "relax" else everywhere.size, 0
-    neighbours, channels = len(run.offsets), run.sample.channels
-    weighed = level.weighed
-    stores = not level.coherent and _stores(run.options, level)
-    size = machine.chunk(weighed, neighbours, channels, stores)
-    where = {"level": level.number, "sweep": sweep, "phase": phase, "temperature_left": left}
-    if level.coherent and level.coherent.ahead:
-        now = temperatures > 0 if phase == "relax" else everywhere
-        return _sweep_ahead(run, level, field, state, now, meter, where)
-    old = False
-    while True:
-        state, info = schedule.step(state, active)  # 6.2.1
-        grid = replace(level.grid, tile=info.tile)
-        if info.tile and not old:  # what tiles see of one another until the sweep ends
-            field, old = Field(*(snapshot(machine, plane, grid.height) for plane in field)), True
-        where["step"] = meter.step()
-        run.account.step(info.sites)
-        outcomes: list[Any] = []
-        for part, sites in machine.pieces(info.sites, grid, size):  # 6.2.2
-            if outcomes:
-                _tell(run, level, field, meter, where, False)
-            outcomes.append((part, _relax(run, part, level, grid, field, sites, info.turn)))
-            work = 2 * weighed * neighbours * channels * len(sites)
-            machine.sync(work)
-            relaxed += len(sites)
-            meter.add(len(sites), 0 if level.coherent else work, min(1.0, relaxed / wanted))
-        for part, outcome in outcomes:  # no site sees another of its step
-            field = commit(part, field, *outcome)
-        _tell(run, level, field, meter, where, info.last)
-        if info.last:
-            return field, state
-
-
-def _sweep_ahead(
-    run: _Run, level: _Level, field: Field, state: Any, active: NDArray[np.bool_], meter: Meter, where: dict[str, Any]
-) -> tuple[Field, Any]:
-    """A whole sweep of coherent search in place: the schedule knows its steps beforehand and keeps equation (14)."""
-    assert level.coherent
-    machine, (laid, rule, weighed, _) = run.machine, level.coherent
-    state, plan = run.schedule.sweep(state, lambda: active)  # type: ignore[attr-defined]
-    sites, steps = machine.put(plan.sites), len(plan.bounds) - 1
-    work = 2 * laid.slots * len(run.offsets) * run.sample.channels
-    together = max(1, steps * TOGETHER // max(1, plan.sites.size))
-    for first in range(0, steps, together):
-        bounds = plan.bounds[first : first + together + 1]
-        field = search(machine, sites, bounds, field, weighed, laid, level.offsets, level.grid, rule, plan.turn)
-        if run.account.packed:
-            run.account.packed_steps(np.diff(bounds))
-        else:
-            for begin, end in pairwise(bounds.tolist()):
-                run.account.step(plan.sites[begin:end])
-        relaxed = int(bounds[-1] - bounds[0])
-        machine.sync(work * relaxed)
-        where["step"] = meter.step(len(bounds) - 1)
-        meter.add(relaxed, 0, int(bounds[-1]) / max(1, plan.sites.size))
-        _tell(run, level, field, meter, where, int(bounds[-1]) == plan.sites.size)
-    return field, state
-
-
-def _relax(
-    run: _Run, machine: Machine, level: _Level, grid: Grid, field: Field, sites: NDArray[np.int32], turn: int
-) -> tuple[Array, lcpdf.Relaxed, Array]:
-    """Steps 6.2.2.1 to 6.2.2.3 for sites that relax together: the sites, what they take, and how warm they are."""
-    options = run.options
-    number, _, offsets, candidates, window, relaxation, coherent, _ = level
-    here = machine.put(sites)
-    if coherent:
-        table, rule, weighed, _ = coherent
-        return here, *search_apart(machine, here, field, weighed, table, offsets, grid, rule, turn)
-    if not _stores(options, level):
-        relaxed = nearest(machine, here, field, offsets, grid, candidates, level.strip, _favour(options))
-    else:
-        near = neighbourhood(machine, here, field, offsets, grid)  # 6.2.2.1
-        distances = lcpdf.distance(machine, near, candidates)
-        if options.coherence:
-            distances = coherence(machine, distances, candidates, here, field, offsets, grid, _favour(options))
-        density = options.pixel == "density"
-        if relaxation == "gibbs":  # 6.2.2.2
-            relaxed = lcpdf.draw(machine, distances, candidates, here, window, density, run.seed, number, turn)
-        elif run.sample.channels == 1 and window.top == 255:
-            relaxed = lcpdf.mode(machine, distances, candidates, window)
-        else:
-            relaxed = lcpdf.mode_vector(machine, distances, candidates, window)
-    cooled = temperature(machine, here, field, offsets, grid, _xi(options))  # 6.2.2.3
-    return here, relaxed, cooled
-
-
-def _stores(options: Options, level: _Level) -> bool:
-    """Whether a step takes more of its distances than the least."""
-    return level.relaxation == "gibbs" or options.pixel == "density"
-
-
-def _tell(run: _Run, level: _Level, field: Field, meter: Meter, where: dict[str, Any], last: bool) -> None:
-    if run.callback:
-        image, warmth = partial(_picture, run, level, field), partial(_warmth, run, level, field)
-        now: dict[str, Any] = {"end_of_sweep": last, "fraction": meter.fraction, "image": image, "temperature": warmth}
-        run.callback(Relaxing(levels=run.levels, **where, **now))
-
-
-def _temperatures(run: _Run, level: _Level, field: Field) -> NDArray[np.uint16]:
-    return np.ascontiguousarray(level.grid.view(run.machine.get(field.temperature)))
-
-
-def _warmth(run: _Run, level: _Level, field: Field) -> NDArray[np.float64]:
-    return _temperatures(run, level, field) / np.float64(1024)
-
-
-def _picture(run: _Run, level: _Level, field: Field) -> NDArray[Any]:
-    """Read the level's picture back, in the sample's type."""
-    values, source = run.machine.get(field.values), run.machine.get(field.source)
-    return run.sample.picture(level.grid.view(values), level.grid.view(source))
-
-
-def _expected_work(run: _Run) -> dict[int, tuple[float, float]]:
-    """Relaxations times candidates that cooling and free sweeps of each level should take, as measured at xi = -1.
-
-    The coarsest level takes about 0.6 |N| sweeps, the others relax each of their new sites about 6 times.
-    """
-    work = {}
-    for number in range(run.levels):
-        grid, options = Grid(*run.shape, 2**number), run.options
-        coarsest = number == run.levels - 1
-        sweeps = min(1024, 1 - 0.6 * len(run.offsets) / options.xi) if coarsest else 6 * 0.75
-        candidates = run.sample.positions(run.offsets, grid.spacing, options.phases, options.edges).size
-        if options.search == "coherent" and not coarsest and candidates > options.exhaustive:
-            own = min(options.suggesting, len(run.offsets)) + 1
-            candidates = min(candidates, own * (1 + options.similar) + max(1, options.chance))
-        sites = grid.rows * grid.cols * candidates
-        work[number] = (sites * sweeps, float(sites * options.free_sweeps))
-    return work
-
-
-def _number_of_levels(
-    sample: tuple[int, ...], offsets: NDArray[np.int32], shape: tuple[int, int], options: Options
-) -> int:
-    """M, checked against the sample's rows and columns and against M <= 1 + log2(min(Mx, My))."""
-    check_fit(sample, int(offsets.max()), options.order)
-    step = 1 if options.phases == "all" else 2
-
-    def candidates(levels: int) -> int:
-        spacing = 2 ** (levels - 1)
-        margin = 0 if options.edges != "whole" else 2 * int(offsets.max()) * spacing
-        return prod(max(0, n - margin) // (spacing if step == 2 else 1) for n in sample)
-
-    most = 1 + int(log2(min(*shape, *sample)))
-    while most > 1 and not candidates(most):
-        most -= 1
-    if options.levels is None:
-        levels = 1
-        reach = 2 * int(offsets.max()) * 2  # of a neighbourhood at the next level
-        while levels < most and candidates(levels + 1) >= ENOUGH and min(shape) > reach * 2 ** (levels - 1):
-            levels += 1
-        return levels
-    if options.levels > most:
-        raise ValueError(f"levels={options.levels} is too many for this sample, output and order; give at most {most}")
-    return options.levels
-
-
-def check_fit(sample: tuple[int, ...], radius: int, order: int) -> None:
-    """Raise unless the sample holds one whole neighbourhood at least."""
-    side = min(sample)
-    if side > 2 * radius:
+    if level.in_place:
+        sites = machine.put(chosen.sites) if isinstance(chosen.sites, np.ndarray) else chosen.sites
+        done = 0
+        for ranges, steps in parts(chosen.ranges, level.at_once):
+            field = relax(machine, sites, ranges, field, level.weighed, relaxation, chosen.turn)
+            seen = part(field, int((ranges[:, 1] - ranges[:, 0]).sum()), steps - done, steps == len(chosen.ranges))
+            done = steps
+            yield seen
         return
-    largest = ((side - 1) // 2 + 1) ** 2 - 1 if side > 2 else 0
-    raise ValueError(
-        f"a neighbourhood of order {order} does not fit the sample of {sample[0]} rows x {sample[1]} columns; "
-        + (f"the largest order that fits is {largest}" if largest else "give at least 3x3 pixels")
-    )
+    for step in chosen.apart(machine):
+        outcomes: list[Any] = []
+        pieces = list(machine.pieces(step.sites, level.grid, level.at_once))
+        for number, (masked, some) in enumerate(pieces, 1):  # no site sees another of its step
+            here = masked.put(some)
+            outcomes.append((masked, here, *relax_apart(masked, here, field, level.weighed, relaxation, chosen.turn)))
+            if number < len(pieces):
+                seen = part(field, some.size, number == 1, False)
+                yield seen
+        for masked, here, taken, cooled in outcomes:
+            field = commit(masked, field, here, taken, cooled)
+        seen = part(field, pieces[-1][1].size if pieces else 0, len(pieces) < 2, step.last)
+        yield seen
 
 
-def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], similar: int, copies: int) -> None:
-    pixels, channels = shape[0] * shape[1], sample.channels
-    within_32_bits(shape, channels * copies)
-    field = copies * (6 + 2 * channels)
-    machine.require(pixels * (12 + field) + sample.rows * sample.cols * (14 * channels + 151 + 4 * similar))
+def exchanged(level: Level, field: Field) -> Field:
+    """The field with an older copy below it, which other tiles see until the sweep ends, where there are tiles."""
+    if not level.schedule.tile:
+        return field
+    return Field(*(snapshot(level.machine, plane, level.grid.height) for plane in field))
+
+
+def picture(run: Run, grid: Grid, field: Field) -> NDArray[Any]:
+    """Read the picture of a level back, in the sample's type."""
+    values, source = run.machine.get(field.values), run.machine.get(field.source)
+    return run.sample.picture(grid.view(values), grid.view(source))
+
+
+def warmth(run: Run, grid: Grid, field: Field) -> NDArray[np.float64]:
+    """Read the temperatures of a level back, 0 to 1."""
+    found: NDArray[np.float64] = np.ascontiguousarray(grid.view(run.machine.get(field.temperature))) / np.float64(1024)
+    return found
+
+
+__all__ = ["Info", "Part", "Watch", "anneal", "begin", "enter", "picture", "sweep", "warmth"]

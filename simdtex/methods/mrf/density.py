@@ -72,7 +72,7 @@ def lcpdf_at(
         near = neighbourhood(machine, here, field, device_offsets, grid)
         distances = lcpdf.distance(machine, near, candidates)
         if estimator == "parzen":
-            density = machine.get(lcpdf.table(machine, distances, candidates, window)).astype(np.float64)
+            density = machine.get(lcpdf.density(machine, distances, candidates, window)).astype(np.float64)
             rows.append(density / np.cumsum(density, 1)[:, -1:])
         else:
             counts = machine.get(histogram(machine, distances, candidates, levels))

@@ -71,9 +71,11 @@ class Meter:
 
     def end(self, skipped: int, weighed: tuple[int, int] | None = None) -> None:
         """End the level: so many fma were skipped, or so many candidates weighed at so many fma."""
+        report = self.reports[-1]
+        report["weighed"] = float(report["candidates"])
         if weighed is not None:
-            self.reports[-1]["weighed"] = weighed[0] / self.reports[-1]["relaxations"]
-            self.reports[-1]["fma"] += weighed[0] * weighed[1]
+            report["weighed"] = weighed[0] / report["relaxations"]
+            report["fma"] += weighed[0] * weighed[1]
         self.reports[-1]["skipped"] = skipped
         self.reports[-1]["seconds"] = time.perf_counter() - self._level_began
         self._ended += sum(self._expected[self.reports[-1]["level"]])

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What stays the same for all relaxations of a level. simdtex.ops.level.LEVEL is the same; tests/test_level.py holds the
+// one against the other.
+#ifndef SIMDTEX_LEVEL_H
+#define SIMDTEX_LEVEL_H
+#include "common/lattice.h"
+
+typedef struct {
+    Lattice lattice;
+    ulong seed;                   // keys of random numbers
+    uint level;
+    int area;                     // pixels to a channel of the field
+    int neighbours;               // N
+    int pixels;                   // of the sample with its margin
+    int candidates;               // of the level
+    int suggesting;               // nearest neighbours whose sources suggest a candidate
+    int similar;                  // candidates more for each of these
+    int chance;                   // candidates at random
+    int plane, down;              // of the sample with its columns side by side: pixels to a channel, and to a row
+    int first, pitch, size;       // of the strip: the first candidate, pixels to a row, and to a channel
+    int strip_rows, strip_cols;   // rows and columns of candidates
+    float favour;                 // 1 / (1 + coherence)
+    float scale;                  // 1 / 2h^2 of equation (7)
+    int radius;                   // of its kernel over grey levels; -1 where a pixel is the sample's own
+    int top;                      // highest legal grey level
+    int draws;                    // whether a site draws or takes the mode
+    int xi;                       // of equation (13), in 1/1024
+    int unused;
+} Level;
+
+#endif

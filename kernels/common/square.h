@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The square around a neighbourhood, row by row in cells of 16 lanes, and the distance of one candidate summed over it.
+//
+// The sum has one order: lane n takes the columns n, n + 16, ... of the square, row by row, channels inside; then lanes n
+// and n + 8 are added, n and n + 4, n and n + 2, n and n + 1.
+#ifndef SIMDTEX_SQUARE_H
+#define SIMDTEX_SQUARE_H
+#include "common/distance.h"
+#include "common/lattice.h"
+
+#ifndef RADIUS
+#define RADIUS 4 // of the neighbourhood
+#endif
+#define SIDE (2 * RADIUS + 1)
+#define CHUNKS ((SIDE + 15) / 16)
+#define CELLS (SIDE * CHUNKS)
+
+// Lines a = 0 .. SIDE - 1 about line `at` of `count`, as parts of a pixel index; -1 beyond an end that does not wrap.
+inline void lines_around(const int at, const int count, const int wraps, const int stride, __private int *line)
+{
+    for (int a = 0; a < SIDE; ++a) {
+        int k = at + a - RADIUS;
+        while (wraps && k < 0)
+            k += count;
+        while (wraps && k >= count)
+            k -= count;
+        line[a] = k < 0 || k >= count ? -1 : k * stride;
+    }
+}
+
+#if V == 1
+inline float folded(__private float *a)
+{
+    for (int half_ = 8; half_; half_ /= 2)
+        for (int n = 0; n < half_; ++n)
+            a[n] += a[n + half_];
+    return a[0];
+}
+#define SQUARE float u[CELLS * 16], xu[CELLS * C * 16]
+#define U(cell, lane) u[(cell) * 16 + (lane)]
+#define XU(cell, c, lane) xu[((cell) * C + (c)) * 16 + (lane)]
+#define SQUARE_ARG __private const float *u, __private const float *xu
+#else
+inline float folded(const float16 a)
+{
+    const float8 b = a.lo + a.hi;
+    const float4 c = b.lo + b.hi;
+    const float2 d = c.lo + c.hi;
+    return d.x + d.y;
+}
+#define SQUARE float16 u[CELLS], xu[CELLS * C]
+#define U(cell, lane) ((__private float *)(u + (cell)))[lane]
+#define XU(cell, c, lane) ((__private float *)(xu + (cell) * C + (c)))[lane]
+#define SQUARE_ARG __private const float16 *u, __private const float16 *xu
+
+// Every first or second of what follows p, 16 of them.
+inline float16 spread(__global const ushort *p, const int spacing)
+{
+    return convert_float16(spacing == 1 ? vload16(0, p) : (ushort16)(vload16(0, p).even, vload16(1, p).even));
+}
+#endif
+
+// Equation (12): d of the candidate at place q of `levels`, the sample whose rows are `down` apart.
+inline float distance_in_lanes(const int q, SQUARE_ARG, __global const ushort *restrict levels, const int plane,
+                               const int down)
+{
+    __global const ushort *y = levels + q - RADIUS * down - RADIUS;
+#if V == 1
+    float d[16];
+    for (int n = 0; n < 16; ++n)
+        d[n] = 0.0f;
+    for (int cell = 0; cell < CELLS; ++cell)
+        for (int c = 0; c < C; ++c)
+            for (int n = 0; n < 16; ++n) {
+                const float un = u[cell * 16 + n];
+                if (un == 0.0f) // would add 0
+                    continue;
+                const float yn = (float)y[c * plane + cell / CHUNKS * down + cell % CHUNKS * 16 + n];
+                const float e = GAP(yn, un, xu[(cell * C + c) * 16 + n]);
+                d[n] = fma(e, e, d[n]);
+            }
+#else
+    float16 d = 0.0f;
+#pragma unroll
+    for (int cell = 0; cell < CELLS; ++cell)
+#pragma unroll
+        for (int c = 0; c < C; ++c) {
+            const float16 yn = convert_float16(vload16(0, y + c * plane + cell / CHUNKS * down + cell % CHUNKS * 16));
+            const float16 e = GAP(yn, u[cell], xu[cell * C + c]);
+            d = fma(e, e, d);
+        }
+#endif
+    return folded(d);
+}
+
+#endif

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Step 6.2.2 of Algorithm 1 in one kernel: the relaxation of a site, the sites of a step in parallel. The steps are
+//
+//   6.2.2.1  gather the neighbourhood of s, propose candidates, and weigh them by equation (12);
+//   6.2.2.2  choose one of them: ICM the nearest, the Gibbs sampler a draw from the LCPDF, equation (7);
+//   6.2.2.3  cool the site, equation (13).
+//
+// There are two proposers. relax_all proposes every candidate of a level that has few of them (-D ALL: at most so many);
+// for levels that have more, lcpdf.cl and nearest.cl do the same with the same bits. relax_list proposes a few.
+//
+// What relaxes together are the sites first .. S - 1 of a list, one work-item each, and it does so in place, since no two
+// of them are neighbours. -D APART writes to new_values (C, S), new_source and new_temperature (S,) instead.
+//
+// sites    (S,)         pixel index of each site
+// values (C, area), source (area,), temperature (area,)   the field
+// offsets  (N, 2)       of the neighbours, canonical order
+// reach    (N,)         pixel offset of each in the sample
+// index_of (pixels,)    number of the candidate at a pixel of the sample, -1 where there is none
+// positions (count,)    pixel index of each candidate
+// noise                 the kernel of equation (7) over grey levels, as in lcpdf.cl
+#pragma OPENCL FP_CONTRACT OFF
+#ifdef ALL
+#define LEVEL float
+#else
+#define LEVEL ushort
+#endif
+#include "common/lanes.h"
+#include "common/vector.h"
+#include "common/choose.h"
+#include "common/cool.h"
+#include "common/distance.h"
+#include "common/favour.h"
+#include "common/propose.h"
+#include "common/square.h"
+
+#ifdef APART
+#define NEW(name) new_##name
+#define PLACE(s, site) s
+#define STRIDE(S, g) S
+#else
+#define NEW(name) name
+#define PLACE(s, site) site
+#define STRIDE(S, g) g.area
+#endif
+
+#ifdef ALL
+#ifndef N
+#define N 60 // neighbours
+#endif
+#ifndef STEP
+#define STEP 4 // vectors of candidates in registers together
+#endif
+
+// strip       (C, size)  the sample's pixels of this level, row by row: candidates that follow one another side by side
+// strip_reach (N,)       pixel offset of each neighbour there
+__kernel __attribute__((vec_type_hint(vec))) void
+relax_all(__global const int *restrict sites, const int S, __global ushort *values, __global int *source,
+                        __global ushort *temperature, const Level g, __global const int2 *restrict offsets,
+                        __global const int *restrict reach, __global const int *restrict index_of,
+                        __global const int *restrict positions, __global const float *restrict strip,
+                        __global const int *restrict strip_reach, __global const uint *restrict noise, const uint turn,
+                        __global ushort *restrict new_values, __global int *restrict new_source,
+                        __global ushort *restrict new_temperature LANES_ARG)
+{
+    const int s = LANE;
+    if (IDLE(s))
+        return;
+    const int site = sites[s], i = ROW_OF(g.lattice, site), j = COL_OF(g.lattice, site);
+    const ulong place = place_of(g.lattice, i, j);
+
+    // 6.2.2.1: the neighbourhood, and which candidates continue a neighbour's source.
+    float u[N], xu[N * C];
+    int list[N], m = 0, sum = g.xi, members = 0;
+    ulong seen = 0;
+    for (int k = 0; k < N; ++k) {
+        const int r = neighbour(g.lattice, i, j, offsets[k].x, offsets[k].y);
+        const int t = r < 0 ? UNTOUCHED : temperature[r];
+        u[k] = (float)(1024 - t) * 0x1p-10f;
+        for (int c = 0; c < C; ++c)
+            xu[k * C + c] = r < 0 ? 0.0f : (float)values[c * g.area + r] * u[k];
+        sum += r < 0 ? 0 : t;
+        members += r < 0 ? 0 : 1;
+        if (t < UNTOUCHED)
+            m = proposed(continuing(index_of, source[r], reach[k], g.pixels), list, m, &seen);
+    }
+
+    // All candidates, V side by side, neighbours in canonical order; the last of a row are overwritten by the next row's.
+    float d[ALL + V];
+    const int wide = (g.strip_cols + V - 1) / V;
+    for (int b = 0; b < g.strip_rows * wide; b += STEP) {
+        __global const float *y[STEP];
+        vec sums[STEP];
+#pragma unroll
+        for (int q = 0; q < STEP; ++q) {
+            const int n = min(b + q, g.strip_rows * wide - 1);
+            y[q] = strip + g.first + n / wide * g.pitch + n % wide * V;
+            sums[q] = 0.0f;
+        }
+        for (int k = 0; k < N; ++k)
+#pragma unroll
+            for (int c = 0; c < C; ++c)
+#pragma unroll
+                for (int q = 0; q < STEP; ++q) {
+                    const vec e = GAP(LOAD(y[q] + c * g.size + strip_reach[k]), (vec)u[k], (vec)xu[k * C + c]);
+                    sums[q] = fma(e, e, sums[q]);
+                }
+#pragma unroll
+        for (int q = 0; q < STEP; ++q) {
+            const int n = min(b + q, g.strip_rows * wide - 1);
+            STORE(sums[q], d + n / wide * g.strip_cols + n % wide * V);
+        }
+    }
+    for (int k = 0; k < m; ++k)
+        d[list[k]] *= g.favour;
+
+    // 6.2.2.2
+#define NUMBER(k) (k)
+#define PIXEL(k) (g.first + (k) / g.strip_cols * g.pitch + (k) % g.strip_cols)
+    CHOOSE(chosen, g, d, g.candidates, strip, g.size, noise, turn, place)
+    const int out = PLACE(s, site), step = STRIDE(S, g);
+    for (int c = 0; c < C; ++c)
+        NEW(values)[c * step + out] = (ushort)grey_level(g, (int)strip[c * g.size + PIXEL(chosen)], c, noise, turn, place);
+    NEW(source)[out] = positions[chosen];
+    NEW(temperature)[out] = cooled_to(sum, members); // 6.2.2.3
+}
+
+#else
+#ifndef SLOTS
+#define SLOTS 64 // candidates that a site may have
+#endif
+
+// The candidates are, in this order and each of them once,
+//
+//   1. p_r + (s - r), where the sample continues the source p_r of neighbour r, r one of the `suggesting` nearest
+//      neighbours that a relaxation has touched (t < 1);
+//   2. the present source of s;
+//   3. the K positions of the sample most similar to each of those so far;
+//   4. `chance` positions at random, and one where there would be none at all.
+//
+// disc    (CELLS, 16)  1 on the neighbourhood, 0 elsewhere
+// at      (count,)     place of each candidate in `levels`
+// levels  (C, plane)   grey levels of the sample, columns apart by the level's step side by side
+// similar (count, K)   numbers of the candidates most similar to each
+// weighed (area,)      in and out: candidates that each site has weighed so far
+__kernel void relax_list(__global const int *restrict sites, const int S, __global ushort *values, __global int *source,
+                         __global ushort *temperature, const Level g, __global const int2 *restrict offsets,
+                         __global const int *restrict reach, __global const int *restrict index_of,
+                         __global const int *restrict positions, __global const float *restrict disc,
+                         __global const int *restrict at, __global const ushort *restrict levels,
+                         __global const int *restrict similar, __global const uint *restrict noise,
+                         __global int *restrict weighed, const uint turn, __global ushort *restrict new_values,
+                         __global int *restrict new_source, __global ushort *restrict new_temperature LANES_ARG)
+{
+    const int s = LANE;
+    if (IDLE(s))
+        return;
+    const Lattice h = g.lattice;
+    const int site = sites[s], line = site / h.width, i = line / h.spacing, j = (site - line * h.width) / h.spacing;
+    const ulong place = place_of(h, i, j);
+
+    // 6.2.2.1: the neighbourhood, and the sum of equation (13). Vectors also read what is no neighbour, which others may
+    // be writing, and multiply it by 0.
+    int row[SIDE], col[SIDE];
+    lines_around(i, h.rows, h.around_rows, h.width * h.spacing, row);
+    lines_around(j, h.cols, h.around_cols, h.spacing, col);
+#ifdef TILES
+#define ELSEWHERE(a, b)                                                                                                \
+    (row[a] / (h.width * h.spacing) / h.tile_rows != i / h.tile_rows || col[b] / h.spacing / h.tile_cols != j / h.tile_cols \
+         ? h.elsewhere                                                                                                 \
+         : 0)
+#else
+#define ELSEWHERE(a, b) 0
+#endif
+#define NEIGHBOUR(a, b)                                                                                                \
+    (row[a] < 0 || col[b] < 0 || row[a] + col[b] == site ? -1 : row[a] + col[b] + ELSEWHERE(a, b))
+    SQUARE;
+    int sum = g.xi, members = 0;
+#if V > 1
+    if (h.spacing <= 2 && !h.tile_rows && h.rows >= SIDE && j >= RADIUS &&
+        (j - RADIUS + 16 * CHUNKS) * h.spacing <= h.width) {
+        float16 heat = 0.0f, inside = 0.0f; // integers below 2^24, so in any order
+        for (int a = 0; a < SIDE; ++a)
+            for (int k = 0; k < CHUNKS; ++k) {
+                const int cell = a * CHUNKS + k, from = max(row[a], 0) + (j - RADIUS + 16 * k) * h.spacing;
+                const float16 in = row[a] < 0 ? (float16)0.0f : vload16(cell, disc);
+                const float16 t = spread(temperature + from, h.spacing);
+                u[cell] = (1024.0f - t) * 0x1p-10f * in;
+                for (int c = 0; c < C; ++c)
+                    xu[cell * C + c] = spread(values + c * g.area + from, h.spacing) * u[cell];
+                heat += t * in;
+                inside += in;
+            }
+        sum += (int)folded(heat);
+        members = (int)folded(inside);
+    } else
+#endif
+    {
+        for (int cell = 0; cell < CELLS; ++cell)
+            for (int n = 0; n < 16; ++n) {
+                U(cell, n) = 0.0f;
+                for (int c = 0; c < C; ++c)
+                    XU(cell, c, n) = 0.0f;
+            }
+        for (int k = 0; k < g.neighbours; ++k) {
+            const int a = offsets[k].x + RADIUS, b = offsets[k].y + RADIUS;
+            const int r = NEIGHBOUR(a, b);
+            if (r < 0)
+                continue;
+            const int t = temperature[r], cell = a * CHUNKS + b / 16, n = b % 16;
+            sum += t;
+            ++members;
+            const float ur = (float)(1024 - t) * 0x1p-10f;
+            U(cell, n) = ur;
+            for (int c = 0; c < C; ++c)
+                XU(cell, c, n) = (float)values[c * g.area + r] * ur;
+        }
+    }
+
+    // The list.
+    int list[SLOTS], m = 0;
+    ulong seen = 0;
+    for (int k = 0; k < g.suggesting; ++k) {
+        const int r = NEIGHBOUR(offsets[k].x + RADIUS, offsets[k].y + RADIUS);
+        if (r >= 0 && temperature[r] < UNTOUCHED)
+            m = proposed(continuing(index_of, source[r], reach[k], g.pixels), list, m, &seen);
+    }
+    const int suggested = m;
+    m = proposed(index_of[source[site]], list, m, &seen);
+    const int own = m;
+    for (int k = 0; k < own; ++k)
+        for (int n = 0; n < g.similar; ++n)
+            m = proposed(similar[list[k] * g.similar + n], list, m, &seen);
+    const int draws = max(g.chance, m == 0 ? 1 : 0);
+    for (int k = 0; k < draws; k += 4) {
+        const uint4 bits = draw4(g.seed, g.level, turn, place, PURPOSE_SEARCH, k / 4);
+        const uint word[4] = {bits.x, bits.y, bits.z, bits.w};
+        for (int n = 0; n < 4 && k + n < draws; ++n)
+            m = proposed((int)((ulong)word[n] * (uint)g.candidates >> 32), list, m, &seen);
+    }
+    float d[SLOTS];
+    for (int k = 0; k < m; ++k)
+        d[k] = distance_in_lanes(at[list[k]], u, xu, levels, g.plane, g.down) * (k < suggested ? g.favour : 1.0f);
+
+    // 6.2.2.2
+#define NUMBER(k) list[k]
+#define PIXEL(k) at[list[k]]
+    CHOOSE(chosen, g, d, m, levels, g.plane, noise, turn, place)
+    const int out = PLACE(s, site), step = STRIDE(S, g);
+    for (int c = 0; c < C; ++c)
+        NEW(values)[c * step + out] = (ushort)grey_level(g, (int)levels[c * g.plane + PIXEL(chosen)], c, noise, turn, place);
+    NEW(source)[out] = positions[list[chosen]];
+    NEW(temperature)[out] = cooled_to(sum, members); // 6.2.2.3
+    weighed[site] += m;
+}
+#endif

@@ -1,0 +1,314 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What Algorithm 1 works on: the run, its levels, and the state that goes from sweep to sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from math import log2, prod
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex import schedules
+from simdtex.machine.interface import Array, Machine
+from simdtex.methods.mrf.options import Options
+from simdtex.model.lattice import Grid
+from simdtex.model.sample import Sample
+from simdtex.ops import active, lcpdf
+from simdtex.ops.neighbourhood import Field
+from simdtex.ops.relax import Choice, Everything, Listed, everything, listed
+from simdtex.schedules import Setting
+
+ENOUGH = 64
+"""Candidates that the sample must still have at the coarsest of the default levels."""
+
+TOGETHER = 2**16
+"""Sites that one kernel relaxes between two looks at the clock."""
+
+
+class State(NamedTuple):
+    """Everything that a run needs to go on between two sweeps: plain arrays and numbers.
+
+    Attributes
+    ----------
+    values : (C, H, W) uint16 array
+        Working grey levels x.
+    source : (H, W) int32 array
+        The source map: pixel index in the sample, its margin included.
+    temperature : (H, W) uint16 array
+        t in 1/1024.
+    schedule : tuple of arrays and numbers
+        The schedule's own state; None before the level has begun.
+    level : int
+        The present level, 0 the finest.
+    cooling, free : int
+        Sweeps of the level done: while it cooled, and after that.
+    warm, heat : int
+        Sites of the level that are warmer than 0, and the sum of their temperatures in 1/1024.
+
+    Notes
+    -----
+    During a run the arrays are those of the machine, and a sweep uses up the arrays that it is given; `off` makes a
+    copy that holds no machine, and `on` puts one on a machine.
+    """
+
+    values: Array
+    source: Array
+    temperature: Array
+    schedule: Any
+    level: int
+    cooling: int = 0
+    free: int = 0
+    warm: int = 0
+    heat: int = 0
+
+    @property
+    def field(self) -> Field:
+        """The arrays over sites."""
+        return Field(*self[:3])
+
+    def off(self, machine: Machine) -> State:
+        """The same with arrays of NumPy, to be kept."""
+        values, source, temperature = (np.array(machine.get(array)) for array in self.field)
+        return self._replace(values=values, source=source, temperature=temperature)
+
+    def on(self, machine: Machine) -> State:
+        """The same with arrays of a machine, to go on with."""
+        values, source, temperature = (machine.put(array) for array in self.field)
+        return self._replace(values=values, source=source, temperature=temperature)
+
+
+class Lists:
+    """A schedule's lists of sites as a machine holds them: each is put there once."""
+
+    def __init__(self, machine: Machine) -> None:
+        self._machine = machine
+        self._known: dict[int, tuple[NDArray[np.int32], Array, Array, NDArray[np.int64]]] = {}
+
+    def of(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, Array, NDArray[np.int64]]:
+        """The list on the machine, where its stretches begin, and which of them begin its groups."""
+        if id(sites) not in self._known:
+            begins, firsts = active.stretches(starts)
+            put = self._machine.put
+            self._known[id(sites)] = sites, put(sites), put(begins), firsts
+        return self._known[id(sites)][1:]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What stays the same throughout a run."""
+
+    machine: Machine
+    sample: Sample
+    planes: Array
+    shape: tuple[int, int]
+    offsets: NDArray[np.int32]
+    options: Options
+    schedule: schedules.Schedule
+    seed: int
+    levels: int
+    emulated: bool
+    weighed: Array
+
+    def grid(self, number: int) -> Grid:
+        """The lattice of a level, equation (10)."""
+        return Grid(*self.shape, 2**number, self.options.boundary == "torus")
+
+    def level(self, number: int, window: tuple[int, int, int, int] | None = None) -> Level:
+        """Define the lattice, the neighbourhood, the candidates and the bandwidth of a level: (8), (10) and (11).
+
+        Parameters
+        ----------
+        number : int
+            0 is the finest.
+        window : (int, int, int, int), optional
+            Row and column of the first site, rows and columns of a window of the lattice; the state's arrays then hold
+            that alone, site by site. None: the whole lattice, in pictures of the output's size.
+        """
+        options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
+        grid = self.grid(number).window(*window) if window else self.grid(number)
+        where = (machine, sample, self.planes, offsets, grid.step, options.phases, options.edges)
+        coarsest = number == self.levels - 1
+        size = sample.positions(offsets, grid.step, options.phases, options.edges).size
+        proposal: Everything | Listed
+        if options.search == "exact" or coarsest or size <= options.exhaustive:
+            proposal = everything(*where)
+        else:
+            few = (options.suggesting, options.similar, options.chance)
+            proposal = listed(*where, *few)
+        dimensions = sample.channels * (len(offsets) + 1)
+        h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, size, dimensions)  # (8)
+        draws = options.relaxation == "gibbs" or (coarsest and options.coarsest == "gibbs")
+        independent = self.schedule.independent(grid, offsets)
+        return Level(
+            number=number,
+            setting=Setting(machine, grid, offsets, options.order, self.seed, number),
+            grid=replace(grid, tile=self.schedule.tile),
+            offsets=machine.put(offsets),
+            schedule=self.schedule,
+            proposal=proposal,
+            choice=Choice(draws, options.pixel == "density", lcpdf.window(h, sample.top)),
+            favour=np.float32(1 / (1 + (options.coherence or 0))),
+            xi=min(-1, round(options.xi * 1024)),
+            in_place=independent and not self.schedule.tile and not self.emulated,
+            weighed=machine.put(np.zeros((grid.height, grid.width), np.int32)) if window else self.weighed,
+            lists=Lists(machine),
+        )
+
+
+@dataclass(frozen=True)
+class Level:
+    """What stays the same throughout a level.
+
+    Attributes
+    ----------
+    number : int
+        l of Algorithm 1, 0 the finest.
+    setting : simdtex.schedules.Setting
+        What its schedule is told.
+    grid : Grid
+        The lattice, or a window of it with its origin in the whole.
+    offsets : (N, 2) int32 array of the machine
+        The neighbourhood, equation (11), in sites of the grid.
+    schedule : simdtex.schedules.Schedule
+    proposal : Everything or Listed
+        Which candidates a site weighs.
+    choice : simdtex.ops.relax.Choice
+        What it takes of them.
+    favour : float32
+        1 / (1 + coherence).
+    xi : int
+        Of equation (13), in 1/1024.
+    in_place : bool
+        Whether the sites of a step may be written while others of it are read: none is another's neighbour.
+    weighed : (H, W) int32 array of the machine
+        Counts the candidates that each site has weighed.
+    """
+
+    number: int
+    setting: Setting
+    grid: Grid
+    offsets: Array
+    schedule: schedules.Schedule
+    proposal: Everything | Listed
+    choice: Choice
+    favour: np.float32
+    xi: int
+    in_place: bool
+    weighed: Array
+    lists: Lists = field(repr=False)
+
+    @property
+    def machine(self) -> Machine:
+        """What executes the steps."""
+        return self.setting.machine
+
+    @property
+    def work(self) -> int:
+        """Fma of a relaxation at most: 2 for every candidate, neighbour and channel."""
+        channels = self.proposal.candidates.pixels.shape[0]
+        return 2 * self.proposal.slots * len(self.setting.offsets) * int(channels)
+
+    @property
+    def at_once(self) -> int:
+        """Sites that are relaxed between two looks at the clock, as far as scratch memory holds what they need."""
+        channels, neighbours = int(self.proposal.candidates.pixels.shape[0]), len(self.setting.offsets)
+        stores = isinstance(self.proposal, Everything) and (self.choice.draws or self.choice.density)
+        most = self.machine.chunk(self.proposal.slots, neighbours, channels, stores)
+        return max(most, TOGETHER) if isinstance(self.proposal, Listed) and self.in_place else most
+
+
+class Warm:
+    """The sites that are warmer than 0 now; or all, in a free sweep.
+
+    Parameters
+    ----------
+    level : Level
+    temperature : (H, W) uint16 array of the machine
+    free : bool
+    """
+
+    def __init__(self, level: Level, temperature: Array, free: bool) -> None:
+        self._level, self._temperature, self._free = level, temperature, free
+
+    def mask(self) -> NDArray[np.bool_]:
+        """Read back from the machine."""
+        grid = self._level.grid
+        if self._free:
+            return np.ones((grid.rows, grid.cols), bool)
+        return np.asarray(grid.view(self._level.machine.get(self._temperature)) > 0)
+
+    def numbers(self) -> NDArray[np.int64]:
+        """Read back from the machine."""
+        grid = self._level.grid
+        return np.arange(grid.rows * grid.cols) if self._free else np.flatnonzero(self.mask())
+
+    def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
+        """Found on the machine."""
+        here, begins, firsts = self._level.lists.of(sites, starts)
+        if self._free:
+            return here, starts
+        return active.among(self._level.machine, here, begins, firsts, self._temperature)
+
+
+def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int64], int]]:
+    """Steps in parts of `most` sites or fewer, and how many of the steps are done after each.
+
+    Parameters
+    ----------
+    ranges : (steps, 2) int64 array
+        Where each step's sites begin and end in a list.
+    most : int
+        A step of more sites is cut; several steps of fewer go together.
+    """
+    held: list[tuple[int, int]] = []
+    sites = 0
+    for number, (begin, end) in enumerate(ranges.tolist()):
+        for first in range(begin, max(end, begin + 1), most):
+            last = min(end, first + most)
+            if held and sites + last - first > most:
+                yield np.array(held, np.int64), number
+                held, sites = [], 0
+            held.append((first, last))
+            sites += last - first
+    yield np.array(held, np.int64), len(ranges)
+
+
+def number_of_levels(
+    sample: tuple[int, ...], offsets: NDArray[np.int32], shape: tuple[int, int], options: Options
+) -> int:
+    """M, checked against the sample's rows and columns and against M <= 1 + log2(min(Mx, My))."""
+    check_fit(sample, int(offsets.max()), options.order)
+    step = 1 if options.phases == "all" else 2
+
+    def candidates(levels: int) -> int:
+        spacing = 2 ** (levels - 1)
+        margin = 0 if options.edges != "whole" else 2 * int(offsets.max()) * spacing
+        return prod(max(0, n - margin) // (spacing if step == 2 else 1) for n in sample)
+
+    most = 1 + int(log2(min(*shape, *sample)))
+    while most > 1 and not candidates(most):
+        most -= 1
+    if options.levels is None:
+        levels = 1
+        reach = 2 * int(offsets.max()) * 2  # of a neighbourhood at the next level
+        while levels < most and candidates(levels + 1) >= ENOUGH and min(shape) > reach * 2 ** (levels - 1):
+            levels += 1
+        return levels
+    if options.levels > most:
+        raise ValueError(f"levels={options.levels} is too many for this sample, output and order; give at most {most}")
+    return options.levels
+
+
+def check_fit(sample: tuple[int, ...], radius: int, order: int) -> None:
+    """Raise unless the sample holds one whole neighbourhood at least."""
+    side = min(sample)
+    if side > 2 * radius:
+        return
+    largest = ((side - 1) // 2 + 1) ** 2 - 1 if side > 2 else 0
+    raise ValueError(
+        f"a neighbourhood of order {order} does not fit the sample of {sample[0]} rows x {sample[1]} columns; "
+        + (f"the largest order that fits is {largest}" if largest else "give at least 3x3 pixels")
+    )

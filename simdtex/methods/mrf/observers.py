@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What watches a run of Algorithm 1: progress, counts, stages, and what it would cost on a processor array."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from simdtex.maspar.accounting import Account
+from simdtex.maspar.array import parse_array
+from simdtex.methods.mrf.algorithm import Info, Part, picture, warmth
+from simdtex.methods.mrf.level import Level, Run, State
+from simdtex.methods.mrf.meter import Meter
+from simdtex.ops import active
+from simdtex.ops.relax import Listed
+from simdtex.run import Callback, Relaxing, Stage
+
+
+class Observer:
+    """Sees every part of a sweep and every sweep's end, and changes nothing.
+
+    Parameters
+    ----------
+    run : Run
+    callback : callable, optional
+        Called with a `simdtex.run.Relaxing` after every part of a sweep.
+
+    Attributes
+    ----------
+    stages : list of Stage
+        Each level's picture at its end.
+    meter : Meter
+    account : Account
+    """
+
+    def __init__(self, run: Run, callback: Callback | None) -> None:
+        options = run.options
+        self.stages: list[Stage] = []
+        self.meter = Meter(expected_work(run))
+        array = parse_array(options.array or "maspar-mp1-16k", options.mapping)
+        self.account = Account(array, packed=options.array is None)
+        self._run, self._callback = run, callback
+        self._level: Level | None = None
+        self._seen: Part | None = None
+        self._spared = self._weighed = 0
+
+    def part(self, level: Level, told: Part) -> None:
+        """Count a part of a sweep, and tell of it."""
+        if level is not self._level:
+            self._begin(level)
+        if self._seen is None or told.number != self._seen.number:
+            self.meter.sweep(told.phase, told.left)
+            self._seen = None
+        steps = told.steps - (self._seen.steps if self._seen else 0)
+        sites = told.relaxed - (self._seen.relaxed if self._seen else 0)
+        self._seen = told
+        step = self.meter.step(steps)
+        fma = 0 if isinstance(level.proposal, Listed) else level.work * sites
+        self.meter.add(sites, fma, min(1.0, told.relaxed / max(1, told.wanted)))
+        if self._callback:
+            self._callback(
+                Relaxing(
+                    level=level.number,
+                    levels=self._run.levels,
+                    fraction=self.meter.fraction,
+                    image=partial(picture, self._run, level.grid, told.field),
+                    sweep=told.number,
+                    step=step,
+                    phase=told.phase,
+                    temperature_left=told.left,
+                    end_of_sweep=told.last,
+                    temperature=partial(warmth, self._run, level.grid, told.field),
+                )
+            )
+
+    def sweep(self, level: Level, state: State, info: Info) -> None:
+        """Count what a sweep would cost on an array; at a level's end, keep its picture."""
+        for chosen in info.chosen:
+            if self.account.packed:
+                self.account.packed_steps(np.diff(chosen.ranges)[:, 0])
+            else:
+                for step in chosen.apart(level.machine):
+                    self.account.step(step.sites)
+        if info.ended:
+            self._end(level, state)
+
+    def _begin(self, level: Level) -> None:
+        self._level, self._seen, self._spared = level, None, level.machine.spared
+        candidates, slots = level.proposal.candidates.size, level.proposal.slots
+        channels, coherence = self._run.sample.channels, bool(self._run.options.coherence)
+        self.meter.begin(level.number, level.grid, candidates, slots)
+        words = channels + 1 + coherence  # of a neighbour: pixel, temperature, source
+        self.account.begin(level.setting.grid, level.setting.offsets, slots, channels, words)
+
+    def _end(self, level: Level, state: State) -> None:
+        weighed: tuple[int, int] | None = None
+        if isinstance(level.proposal, Listed):
+            before, self._weighed = self._weighed, active.total(level.machine, level.grid, level.weighed)
+            weighed = self._weighed - before, level.work // level.proposal.slots
+        self.stages.append(Stage(level.number, picture(self._run, level.grid, state.field)))
+        self.meter.end(level.machine.spared - self._spared, weighed)
+
+
+def expected_work(run: Run) -> dict[int, tuple[float, float]]:
+    """Relaxations times candidates that cooling and free sweeps of each level should take, as measured at xi = -1.
+
+    The coarsest level takes about 0.6 |N| sweeps, the others relax each of their new sites about 6 times.
+    """
+    work = {}
+    for number in range(run.levels):
+        grid, options = run.grid(number), run.options
+        coarsest = number == run.levels - 1
+        sweeps = min(1024, 1 - 0.6 * len(run.offsets) / options.xi) if coarsest else 6 * 0.75
+        candidates = run.sample.positions(run.offsets, grid.spacing, options.phases, options.edges).size
+        if options.search == "coherent" and not coarsest and candidates > options.exhaustive:
+            own = min(options.suggesting, len(run.offsets)) + 1
+            candidates = min(candidates, own * (1 + options.similar) + max(1, options.chance))
+        sites = grid.rows * grid.cols * candidates
+        work[number] = (sites * sweeps, float(sites * options.free_sweeps))
+    return work

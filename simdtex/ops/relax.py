@@ -1,0 +1,417 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Step 6.2.2 of Algorithm 1: the relaxation of a site, for all sites of a step in parallel.
+
+A `Relaxation` says how a site relaxes: its neighbourhood, which candidates are proposed (`Everything` or `Listed`),
+what is chosen of them, and how it cools. `relax` does so in place, step after step; `relax_apart` leaves the field as
+it is. The twins compose the parts one after another. A device does the same in one kernel, ``kernels/relax.cl``, or,
+where it has to weigh more candidates than a work-item can keep, in several.
+"""
+
+from __future__ import annotations
+
+from math import prod
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex import random
+from simdtex.machine.interface import Array, Launcher, Machine, Operation
+from simdtex.model.lattice import Grid
+from simdtex.model.sample import Candidates, Sample
+from simdtex.ops import lcpdf
+from simdtex.ops.arithmetic import fma32
+from simdtex.ops.coherence import coherence, continuing
+from simdtex.ops.commit import commit
+from simdtex.ops.lcpdf import Distances, Relaxed, Window
+from simdtex.ops.level import constants
+from simdtex.ops.nearest import Strip, nearest, strip_of
+from simdtex.ops.neighbourhood import Field, neighbourhood
+from simdtex.ops.similar import most_similar
+from simdtex.ops.temperature import temperature
+
+LANES = 16
+"""Partial sums of a distance of `Listed`: one for each column, modulo 16, of the square around a neighbourhood."""
+
+KEPT = 1024
+"""Distances that a work-item can keep; where there are more candidates, several kernels weigh them."""
+
+
+# -- proposers: step 6.2.2.1 --------------------------------------------------------------------------------------
+
+
+class Everything(NamedTuple):
+    """The exact search: every candidate of the level is proposed.
+
+    ``strip`` their pixels laid out row by row.
+    """
+
+    candidates: Candidates
+    strip: Strip
+
+    @property
+    def slots(self) -> int:
+        """Candidates that a site weighs."""
+        return self.candidates.size
+
+    def weighed(
+        self, sites: NDArray[np.int32], field: Field, relaxation: Relaxation, turn: int
+    ) -> tuple[NDArray[np.int64], Distances]:
+        """Numbers (slots, 1) of the candidates, and their distances, favoured where they continue a neighbour."""
+        near = neighbourhood.reference(sites, field, relaxation.offsets, relaxation.grid)
+        found = lcpdf.distance.reference(near, self.candidates)
+        where = (sites, field, relaxation.offsets, relaxation.grid)
+        found = coherence.reference(found, self.candidates, *where, relaxation.favour)
+        return np.arange(self.slots)[:, None], found
+
+
+class Listed(NamedTuple):
+    """The coherent search: a few candidates are proposed, those that neighbours suggest and some more.
+
+    ``at`` (n,) int32 the candidates' places in ``levels`` (C, plane) uint16, the sample's working levels with the
+    columns that are a level's step apart side by side; ``down`` from one row of the lattice to the next there;
+    ``disc`` (side, columns) float32, 1 on the neighbourhood; ``similar`` (n, K) int32, the candidates most similar to
+    each, (1, 1) where ``likes`` K is 0; ``suggesting`` nearest neighbours that suggest; ``chance`` candidates at
+    random.
+    """
+
+    candidates: Candidates
+    at: Array
+    levels: Array
+    down: int
+    disc: Array
+    similar: Array
+    likes: int
+    suggesting: int
+    chance: int
+
+    @property
+    def slots(self) -> int:
+        """Most candidates that a site weighs."""
+        few = (self.suggesting + 1) * (1 + self.likes) + max(1, self.chance)
+        return int(min(few, self.candidates.size))
+
+    def weighed(
+        self, sites: NDArray[np.int32], field: Field, relaxation: Relaxation, turn: int
+    ) -> tuple[NDArray[np.int64], Distances]:
+        """Numbers (slots, S) of the candidates, -1 past the last, and their distances, infinity there."""
+        r = relaxation.grid.neighbours(sites, relaxation.offsets)
+        numbers, suggested = self._list(sites, r, field, relaxation, turn)
+        d = self._distances(numbers, r, field, relaxation.offsets)
+        return numbers, Distances(np.where(suggested, d * relaxation.favour, d), None, sites.size)
+
+    def _list(
+        self, sites: NDArray[np.int32], r: NDArray[np.int32], field: Field, relaxation: Relaxation, turn: int
+    ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """The numbers, and which of them neighbours suggest."""
+        numbers = np.full((self.slots + 1, sites.size), -1)  # one more for what is listed already
+        size = np.zeros(sites.size, np.int64)
+
+        def add(number: NDArray[np.integer[Any]]) -> None:
+            new = (number >= 0) & ~(numbers == number).any(0)
+            numbers[size[new], np.flatnonzero(new)] = number[new]
+            size[new] += 1
+
+        touched = (r >= 0) & (field.temperature.ravel()[r] < 1024)
+        suggestions = np.where(touched, continuing(self.candidates, field.source.ravel()[r]), -1)
+        for suggestion in suggestions[: self.suggesting]:
+            add(suggestion)
+        suggested = np.arange(self.slots)[:, None] < size
+        add(self.candidates.index_of[field.source.ravel()[sites]])
+        own = size.copy()
+        for k in range(own.max() if self.likes else 0):
+            for like in self.similar[np.maximum(numbers[k], 0)].T:
+                add(np.where(k < own, like, -1))
+        draws, places = np.maximum(self.chance, size == 0), relaxation.grid.places(sites)
+        for k in range(draws.max()):
+            word = random.draw4(relaxation.seed, relaxation.level, turn, places, random.SEARCH, k // 4)[k % 4]
+            number = (word.astype(np.uint64) * np.uint64(self.candidates.size)) >> np.uint64(32)
+            add(np.where(k < draws, number.astype(np.int64), -1))
+        return numbers[:-1], suggested
+
+    def _distances(
+        self, numbers: NDArray[np.int64], r: NDArray[np.int32], field: Field, offsets: NDArray[np.int32]
+    ) -> NDArray[np.float32]:
+        """Equation (12) for each candidate, (slots, S), infinity where there is none; summed as the kernel does."""
+        u = np.where(r < 0, np.float32(0), (1024 - field.temperature.ravel()[r].astype(np.float32)) / np.float32(1024))
+        radius = int(offsets.max())
+        d = np.zeros((LANES, *numbers.shape), np.float32)
+        for k in np.lexsort((offsets[:, 1], offsets[:, 0])):
+            row, col = offsets[k]
+            apart = row * self.down + col
+            for x, y in zip(field.values.reshape(len(field.values), -1), self.levels, strict=True):
+                e = (x[r[k]] - y[self.at[np.maximum(numbers, 0)] + apart].astype(np.float32)) * u[k]
+                lane = (col + radius) % LANES
+                d[lane] = fma32(e, e, d[lane])
+        while len(d) > 1:
+            d = d[: len(d) // 2] + d[len(d) // 2 :]
+        return np.where(numbers < 0, np.float32(np.inf), d[0])
+
+
+def everything(
+    machine: Machine,
+    sample: Sample,
+    planes: Array,
+    offsets: NDArray[np.int32],
+    step: int,
+    phases: str,
+    edges: str,
+) -> Everything:
+    """Lay out what the exact search needs of a level, whose sites are ``step`` pixels of the sample apart."""
+    candidates = sample.candidates(machine, offsets, step, phases, edges, planes)
+    return Everything(candidates, strip_of(machine, sample, offsets, step, phases, edges))
+
+
+def listed(
+    machine: Machine,
+    sample: Sample,
+    planes: Array,
+    offsets: NDArray[np.int32],
+    step: int,
+    phases: str,
+    edges: str,
+    suggesting: int,
+    similar: int,
+    chance: int,
+) -> Listed:
+    """Lay out what the coherent search needs of a level, whose sites are ``step`` pixels of the sample apart."""
+    candidates = sample.candidates(machine, offsets, step, phases, edges, planes)
+    radius, rows, cols = int(offsets.max()), sample.rows, sample.cols
+    side, columns = 2 * radius + 1, -(-(2 * radius + 1) // LANES) * LANES
+    disc = np.zeros((side, columns), np.float32)
+    disc[tuple((offsets + radius).T)] = 1
+    wide = -(-cols // step)
+    around = ((0, 0), (0, 0), (0, wide * step - cols))
+    working = np.pad(sample.working.reshape(-1, rows, cols), around, mode="edge").reshape(-1, rows, wide, step)
+    levels = working.swapaxes(2, 3).reshape(len(working), -1)
+    positions = sample.positions(offsets, step, phases, edges)
+    row, col = np.divmod(positions, np.int32(cols))
+    at = (row * np.int32(step) + col % np.int32(step)) * np.int32(wide) + col // np.int32(step)
+    likes = min(similar, candidates.size - 1)
+    reach = sample.reach(offsets, step)
+    return Listed(
+        candidates,
+        machine.put(at),
+        machine.put(np.pad(levels, ((0, 0), (0, columns)))),  # whole vectors are read at the end, too
+        step * step * wide,
+        machine.put(disc),
+        most_similar(machine, sample, positions, reach, candidates, likes),
+        likes,
+        min(suggesting, len(offsets)),
+        chance,
+    )
+
+
+# -- what is chosen: step 6.2.2.2 ---------------------------------------------------------------------------------
+
+
+class Choice(NamedTuple):
+    """What a site takes of its candidates.
+
+    ``draws`` whether it draws from the LCPDF, or takes its mode; ``density`` whether that is the Parzen density over
+    grey levels, or one over the sample's pixels; ``window`` of equation (7).
+    """
+
+    draws: bool
+    density: bool
+    window: Window
+
+    def taken(
+        self,
+        numbers: NDArray[np.int64],
+        distances: Distances,
+        sites: NDArray[np.int32],
+        relaxation: Relaxation,
+        turn: int,
+    ) -> Relaxed:
+        """What each site takes, in NumPy."""
+        candidates, d = relaxation.proposal.candidates, distances.distance
+        if self.density and not self.draws:
+            grey = len(candidates.pixels) == 1 and self.window.top == 255
+            mode = lcpdf.mode if grey else lcpdf.mode_vector
+            found: Relaxed = mode.reference(distances, candidates, self.window)
+            return found
+        keys, places = (relaxation.seed, relaxation.level, turn), relaxation.grid.places(sites)
+        if self.draws:
+            w = lcpdf.weights(d, self.window.scale)
+            pixels = candidates.pixels[:, candidates.positions[np.maximum(numbers, 0)]]
+            slot = lcpdf.drawn(w, pixels, places, self.window, self.density, *keys)
+            chosen = np.broadcast_to(numbers, d.shape)[slot, np.arange(sites.size)]
+        else:
+            chosen = np.where(d == d.min(0), numbers, candidates.size).min(0)
+        choice = candidates.positions[chosen]
+        values = candidates.pixels[:, choice].astype(np.uint16)
+        if self.draws and self.density:
+            values = np.stack([lcpdf.stepped(x, c, places, self.window, *keys) for c, x in enumerate(values)])
+        return Relaxed(choice, values)
+
+
+# -- the relaxation ---------------------------------------------------------------------------------------------------
+
+
+class Relaxation(NamedTuple):
+    """How a site relaxes.
+
+    ``grid``, ``offsets`` its lattice and neighbourhood; ``proposal`` the candidates; ``favour`` 1 / (1 + coherence),
+    by which the distance of those is multiplied that continue a neighbour's source; ``choice`` what it takes of them;
+    ``xi`` of equation (13) in 1/1024; ``seed`` and ``level`` the keys of its random numbers.
+    """
+
+    grid: Grid
+    offsets: Array
+    proposal: Everything | Listed
+    favour: np.float32
+    choice: Choice
+    xi: int
+    seed: int
+    level: int
+
+    @property
+    def fused(self) -> bool:
+        """Whether a device relaxes a site in one kernel."""
+        if isinstance(self.proposal, Listed):
+            return True
+        return self.proposal.slots <= KEPT and (self.choice.draws or not self.choice.density)
+
+    @property
+    def stores(self) -> bool:
+        """Whether a device that relaxes in several kernels keeps all distances."""
+        return self.choice.draws or self.choice.density
+
+
+def _apart_reference(
+    sites: NDArray[np.int32], field: Field, weighed: NDArray[np.int32], relaxation: Relaxation, turn: int
+) -> tuple[Relaxed, NDArray[np.uint16]]:
+    numbers, distances = relaxation.proposal.weighed(sites, field, relaxation, turn)  # 6.2.2.1
+    relaxed = relaxation.choice.taken(numbers, distances, sites, relaxation, turn)  # 6.2.2.2
+    cooled = temperature.reference(sites, field, relaxation.offsets, relaxation.grid, relaxation.xi)  # 6.2.2.3
+    if isinstance(relaxation.proposal, Listed):
+        weighed.ravel()[sites] += (numbers >= 0).sum(0).astype(np.int32)
+    return relaxed, cooled
+
+
+def _reference(
+    sites: NDArray[np.int32],
+    steps: NDArray[np.int64],
+    field: Field,
+    weighed: NDArray[np.int32],
+    relaxation: Relaxation,
+    turn: int,
+) -> Field:
+    most = max(1, 2**20 // relaxation.proposal.slots)
+    for begin, end in steps.tolist():
+        pieces = [sites[first : min(end, first + most)] for first in range(begin, end, most)]
+        done = [_apart_reference(here, field, weighed, relaxation, turn) for here in pieces]
+        for here, (relaxed, cooled) in zip(pieces, done, strict=True):
+            field = commit.reference(field, here, relaxed, cooled)
+    return field
+
+
+def _launch(
+    machine: Launcher,
+    sites: Array,
+    steps: NDArray[np.int64],
+    field: Field,
+    weighed: Array,
+    relaxation: Relaxation,
+    turn: int,
+) -> Field:
+    if relaxation.fused:
+        name, defines, arguments = _fused(machine, sites, field, weighed, relaxation, turn)
+        kernel = machine.kernel("relax", name, **defines)
+        machine.launch_groups(kernel, steps, *arguments, field.values, field.source, field.temperature)
+        return field
+    for begin, end in steps.tolist():
+        here = machine.part(sites, begin, end)
+        relaxed, cooled = _apart_launch(machine, here, field, weighed, relaxation, turn)
+        field = commit(machine, field, here, relaxed, cooled)
+    return field
+
+
+def _apart_launch(
+    machine: Launcher, sites: Array, field: Field, weighed: Array, relaxation: Relaxation, turn: int
+) -> tuple[Relaxed, Array]:
+    if not relaxation.fused:
+        return _staged(machine, sites, field, relaxation, turn)
+    relaxed = Relaxed(machine.empty((sites.size,), np.int32), machine.empty((len(field.values), sites.size), np.uint16))
+    cooled = machine.empty((sites.size,), np.uint16)
+    name, defines, arguments = _fused(machine, sites, field, weighed, relaxation, turn)
+    machine.launch_sites(
+        ("relax", name),
+        (sites.size,),
+        *arguments,
+        relaxed.values,
+        relaxed.choice,
+        cooled,
+        defines=defines | {"APART": 1},
+    )
+    return relaxed, cooled
+
+
+def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxation, turn: int) -> tuple[Relaxed, Array]:
+    """The exact search in several kernels: of many candidates, or for the mode of a density."""
+    grid, offsets, proposal, choice = relaxation.grid, relaxation.offsets, relaxation.proposal, relaxation.choice
+    assert isinstance(proposal, Everything)
+    candidates, window = proposal.candidates, choice.window
+    if not relaxation.stores:
+        relaxed = nearest(machine, sites, field, offsets, grid, candidates, proposal.strip, relaxation.favour)
+    else:
+        near = neighbourhood(machine, sites, field, offsets, grid)
+        distances = lcpdf.distance(machine, near, candidates)
+        if relaxation.favour != 1:
+            distances = coherence(machine, distances, candidates, sites, field, offsets, grid, relaxation.favour)
+        if choice.draws:
+            keys = (choice.density, relaxation.seed, relaxation.level, turn)
+            relaxed = lcpdf.draw(machine, distances, candidates, sites, grid, window, *keys)
+        elif len(candidates.pixels) == 1 and window.top == 255:
+            relaxed = lcpdf.mode(machine, distances, candidates, window)
+        else:
+            relaxed = lcpdf.mode_vector(machine, distances, candidates, window)
+    return relaxed, temperature(machine, sites, field, offsets, grid, relaxation.xi)
+
+
+def _fused(
+    machine: Launcher, sites: Array, field: Field, weighed: Array, relaxation: Relaxation, turn: int
+) -> tuple[str, dict[str, int], list[Any]]:
+    """The kernel for it, its -D constants, and its arguments but for what it writes."""
+    grid, offsets, proposal, choice = relaxation.grid, relaxation.offsets, relaxation.proposal, relaxation.choice
+    candidates, window = proposal.candidates, choice.window
+    level: dict[str, Any] = {
+        **{"seed": relaxation.seed, "level": relaxation.level, "area": prod(field.source.shape)},
+        **{"neighbours": offsets.shape[0], "pixels": candidates.index_of.size, "candidates": candidates.size},
+        **{"favour": relaxation.favour, "scale": window.scale, "top": window.top, "draws": choice.draws},
+        **{"radius": window.radius if choice.density else -1, "xi": relaxation.xi},
+    }
+    common = (offsets, candidates.reach, candidates.index_of, candidates.positions)
+    noise, key = machine.constant(window.noise), np.uint32(turn)
+    defines = {"C": len(field.values), "V": machine.vector} | ({"TILES": 1} if grid.tile else {})
+    own: list[Any]
+    if isinstance(proposal, Everything):
+        strip = proposal.strip
+        level |= {"first": strip.first, "pitch": strip.pitch, "size": strip.pixels.shape[1]}
+        level |= {"strip_rows": strip.rows, "strip_cols": strip.cols}
+        whole = next(n for n in (64, 256, KEPT) if proposal.slots <= n)  # so that few programs serve all
+        defines |= {"ALL": whole, "N": offsets.shape[0], "STEP": machine.step}
+        name, own = "relax_all", [strip.pixels, strip.reach, noise, key]
+    else:
+        level |= {"plane": proposal.levels.shape[1], "down": proposal.down}
+        level |= {"suggesting": proposal.suggesting, "similar": proposal.likes, "chance": proposal.chance}
+        defines |= {"RADIUS": proposal.disc.shape[0] // 2, "SLOTS": -(-proposal.slots // 64) * 64}
+        name = "relax_list"
+        own = [proposal.disc, proposal.at, proposal.levels, proposal.similar, noise, weighed, key]
+    arguments = [sites, np.int32(sites.size), *field, constants(grid, **level), *common, *own]
+    return name, defines, arguments
+
+
+relax = Operation("relax", _reference, _launch)
+"""``relax(machine, sites, steps, field, weighed, relaxation, turn)``: relax the sites ``steps[0, 0]`` to ``steps[0,
+1]``
+- 1 of a list together, then those of ``steps[1]``, and so on, in place; no two that relax together may be neighbours.
+
+``steps`` (steps, 2) int64; ``weighed`` (H, W) int32 counts the candidates that each site has weighed, of `Listed`.
+Cost: candidates weighed x |N| x C x 2 fma.
+"""
+
+relax_apart = Operation("relax", _apart_reference, _apart_launch)
+"""``relax_apart(machine, sites, field, weighed, relaxation, turn)``: what sites that relax together become, (Relaxed,
+temperatures), the field as it was; any sites may."""
