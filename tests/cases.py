@@ -11,7 +11,9 @@ from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
 from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
+from simdtex.ops.nearest import strip_of
 from simdtex.ops.neighbourhood import Field, neighbourhood
+from simdtex.schedules import Setting
 
 REFERENCE = Reference()
 
@@ -40,6 +42,11 @@ def texture(shape, channels=None, dtype=np.uint8, seed=0):
     return (picture * 3 - 1).astype(dtype)
 
 
+def setting(grid, order=2, seed=1, level=0, machine=REFERENCE):
+    """What a schedule is told of a level."""
+    return Setting(machine, grid, neighbourhood_offsets(order), order, seed, level)
+
+
 class Problem(NamedTuple):
     """A field half-way through a relaxation: everything in NumPy arrays."""
 
@@ -57,6 +64,9 @@ class Problem(NamedTuple):
 
     def candidates(self, machine):
         return self.sample.candidates(machine, self.offsets, self.grid.spacing, self.phases, self.edges)
+
+    def strip(self, machine):
+        return strip_of(machine, self.sample, self.offsets, self.grid.spacing, self.phases, self.edges)
 
     def on(self, machine):
         """Sites, field and offsets as arrays of a machine."""
@@ -123,7 +133,7 @@ def problem(
     rng = np.random.default_rng(seed)
     offsets = neighbourhood_offsets(order)
     pixels = texture(sample_shape, channels, dtype, seed)
-    margin = int(offsets.max()) * spacing if edges != "whole" else 0
+    margin = int(offsets.max()) * spacing
     sample = Sample(pixels, channels * len(offsets), margin)
     grid = Grid(*shape, spacing, torus)
     row, col = np.indices(shape)

@@ -76,9 +76,10 @@ def test_being_neighbours_is_mutual(height, width, spacing, order, torus):
     assert pairs == {(r, s) for s, r in pairs}
 
 
-def test_the_arguments_of_a_kernel():
-    assert Grid(7, 9, 2, False).args == (4, 5, 2, 9, 0, 0, 0, 63)
-    assert all(isinstance(n, np.int32) for n in Grid(7, 9).args)
+def test_what_a_kernel_is_told():
+    assert Grid(7, 9, 2, False).struct.tolist() == (4, 5, 2, 9, 0, 0, 0, 0, 63, 0, 0, 4, 5, 2, 9, 0)
+    window = Grid(20, 30, 2, True, (3, 4)).window(-2, 7, 10, 6)
+    assert window.struct.tolist() == (10, 6, 1, 6, 1, 0, 0, 0, 60, 8, 7, 10, 15, 2, 30, 0)
 
 
 def vectors(pattern, reach=12):

@@ -10,6 +10,7 @@ from scipy.stats import chisquare
 from tolerances import LCPDF, NEAR_TIE, SIGNIFICANCE
 
 import simdtex
+from simdtex.model.lattice import Grid
 from simdtex.ops import lcpdf
 
 VARIANTS = [
@@ -236,7 +237,8 @@ def draw_many(machine, p, win, noisy, strength=0.0):
     p = p._replace(sites=np.repeat(p.sites[:1], DRAWS))
     found, candidates = p.distances(machine, strength)
     numbers = machine.put(np.arange(DRAWS, dtype=np.int32))
-    drawn = [host(machine, lcpdf.draw(machine, found, candidates, numbers, win, noisy, seed, 1, 3)) for seed in SEEDS]
+    how = (found, candidates, numbers, Grid(1, DRAWS), win, noisy)
+    drawn = [host(machine, lcpdf.draw(machine, *how, seed, 1, 3)) for seed in SEEDS]
     choice, values = (np.concatenate(a, -1) for a in zip(*drawn, strict=True))
     return choice, values
 
@@ -361,10 +363,8 @@ def test_draws_are_legal_where_half_of_the_kernel_is_not():
 def relaxed(machine, p, name, bandwidth, strength, noisy=True):
     found, candidates = p.distances(machine, strength)
     win, _ = p.window(bandwidth)
-    if name == "draw":
-        arguments = (machine.put(p.sites), win, noisy, 2**63 + 11, 3, 2)
-    else:
-        arguments = () if name == "best" else (win,)
+    drawn = (machine.put(p.sites), p.grid, win, noisy, 2**63 + 11, 3, 2)
+    arguments = drawn if name == "draw" else (win,)
     return host(machine, getattr(lcpdf, name)(machine, found, candidates, *arguments))
 
 
@@ -408,25 +408,6 @@ def test_the_mode_of_a_texture(seed):
     assert compared >= 10
 
 
-@given(problems(max_order=5), strengths)
-@settings(max_examples=25)
-def test_the_best_is_the_nearest_candidate_the_first_of_several(p, strength):
-    choice, values = relaxed(REFERENCE, p, "best", 1.0, strength)
-    found, _ = p.distances(REFERENCE, strength)
-    for s in range(p.sites.size):
-        column = found.distance[:, s].tolist()
-        row, col = p.positions()[column.index(min(column))]
-        assert choice[s] == row * p.sample.cols + col
-        assert values[:, s].tolist() == [channel[row, col] for channel in p.padded()]
-
-
-def test_the_best_of_equals_is_the_first(machine):
-    p = problem(1, temperatures="one", sample_shape=(15, 15))
-    for m in (REFERENCE, machine):
-        choice, _ = relaxed(m, p, "best", 1.0, 0.0)
-        assert set(choice.tolist()) == {int(p.candidates(REFERENCE).positions[0])}
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_the_mode_of_a_vector_is_the_densest_of_the_heaviest(seed):
     p = problem(seed, order=1, channels=3, shape=(7, 8), count=8)
@@ -451,7 +432,7 @@ def test_the_mode_of_a_vector_is_the_densest_of_the_heaviest(seed):
 @given(p=problems(channels=(1,)), bandwidth=bandwidths, strength=strengths)
 @settings(max_examples=15)
 def test_grey_relaxations_of_a_device_have_the_references_bits(machine, p, bandwidth, strength):
-    for name in ("draw", "best", "mode_vector", *(["mode"] if p.sample.top == 255 else [])):
+    for name in ("draw", "mode_vector", *(["mode"] if p.sample.top == 255 else [])):
         theirs = relaxed(REFERENCE, p, name, bandwidth, strength)
         assert_same_bits(relaxed(machine, p, name, bandwidth, strength), theirs)
     theirs = relaxed(REFERENCE, p, "draw", bandwidth, strength, noisy=False)
@@ -461,7 +442,7 @@ def test_grey_relaxations_of_a_device_have_the_references_bits(machine, p, bandw
 @given(p=problems(channels=(2, 3)), bandwidth=bandwidths, strength=strengths)
 @settings(max_examples=15)
 def test_vector_relaxations_of_a_device_have_the_references_bits(machine, p, bandwidth, strength):
-    for name in ("draw", "best", "mode_vector"):
+    for name in ("draw", "mode_vector"):
         theirs = relaxed(REFERENCE, p, name, bandwidth, strength)
         assert_same_bits(relaxed(machine, p, name, bandwidth, strength), theirs)
 
@@ -469,7 +450,7 @@ def test_vector_relaxations_of_a_device_have_the_references_bits(machine, p, ban
 @pytest.mark.parametrize("options", [{"vector": 1}, {"vector": 4}, {"work_group": 3}], **ids)
 def test_the_shape_of_a_launch_changes_no_bit(cl_device, options):
     p = problem(7, order=5, shape=(9, 10), sample_shape=(17, 16), count=53)
-    for name in ("draw", "best", "mode", "mode_vector"):
+    for name in ("draw", "mode", "mode_vector"):
         theirs = relaxed(REFERENCE, p, name, 1.0, 1.0)
         assert_same_bits(relaxed(opencl(cl_device, **options), p, name, 1.0, 1.0), theirs)
 
@@ -483,6 +464,6 @@ def test_draws_near_the_ends_of_the_levels_have_the_references_bits(machine):
 
     def run(m):
         found, candidates = p.distances(m)
-        return host(m, lcpdf.draw(m, found, candidates, m.put(p.sites), win, True, 5, 0, 1))
+        return host(m, lcpdf.draw(m, found, candidates, m.put(p.sites), p.grid, win, True, 5, 0, 1))
 
     assert_same_bits(run(machine), run(REFERENCE))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from cases import REFERENCE, problem, texture
 from scipy.stats import chisquare
+from test_relax import relaxation
 from tolerances import FFT, MATRIX_PRODUCT, SIGNIFICANCE
 
 import simdtex
@@ -55,8 +56,9 @@ def test_coherence_favours_the_same_candidates_once():
 def test_a_step_as_one_operation_takes_the_nearest():
     given = problem(5, order=8, sample_shape=(16, 15))
     exact, candidates = given.distances(REFERENCE, 1.0)
-    sites, field, offsets = given.on(LIBRARY)
-    relaxed = LIBRARY.nearest(sites, field, offsets, given.grid, given.candidates(LIBRARY), np.float32(0.5))
+    sites, field, _ = given.on(LIBRARY)
+    rule = relaxation(LIBRARY, given, exhaustive=True)
+    relaxed, _ = LIBRARY.relax_apart(sites, field, np.zeros(0, np.int32), rule, 1)
     chosen = candidates.index_of[relaxed.choice]
     distance = exact.distance[chosen, np.arange(sites.size)]
     assert (distance - exact.distance.min(0) < MATRIX_PRODUCT * len(given.offsets) * 255**2).all()
@@ -134,7 +136,7 @@ def test_candidates_are_drawn_one_like_the_other(monkeypatch):
 @pytest.mark.parametrize(
     ("method", "needs"),
     [
-        ("mrf", {"distance", "coherence"}),
+        ("mrf", {"relax"}),
         ("multires", {"filters", "candidates"}),
         ("pyramid", {"split", "join", "sort"}),
     ],
@@ -145,7 +147,7 @@ def test_jobs_use_the_libraries(method, needs):
     made = simdtex.synthesize(sample, (20, 28), method=method, rng=1, device=machine, **options)
     assert made.shape == (20, 28)
     assert method == "multires" or np.isin(made, sample).all()
-    assert needs <= set(machine.used) or (method == "mrf" and {"nearest"} <= set(machine.used))
+    assert needs <= set(machine.used)
 
 
 def test_distances_choose_as_the_reference_does_where_nothing_is_near_a_tie():

@@ -24,7 +24,9 @@ FORMS = [
 def run(machine, p, strength=1.0):
     sites, field, offsets = p.on(machine)
     favour = np.float32(1 / (1 + strength))
-    return host(machine, nearest(machine, sites, field, offsets, p.grid, p.candidates(machine), favour))
+    return host(
+        machine, nearest(machine, sites, field, offsets, p.grid, p.candidates(machine), p.strip(machine), favour)
+    )
 
 
 @given(problems(max_order=5), strengths)

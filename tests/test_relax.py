@@ -1,6 +1,4 @@
-"""Coherent search: candidates that neighbours suggest, weighed in one kernel."""
-
-import itertools
+"""The relaxation of a site: candidates that neighbours suggest, or all of them, weighed in one kernel or in several."""
 
 import numpy as np
 import plain
@@ -14,29 +12,34 @@ from simdtex.machine.opencl import OpenCL
 from simdtex.ops import lcpdf
 from simdtex.ops.coloring import coloring
 from simdtex.ops.commit import commit
-from simdtex.ops.neighbourhood import Field, neighbourhood
-from simdtex.ops.search import Rule, most_similar, search, search_apart, table
+from simdtex.ops.relax import Choice, Relaxation, everything, listed, relax, relax_apart
 from simdtex.schedules import Coloring
 
-PLAIN = {"suggesting": 12, "similar": 0, "chance": 4, "exhaustive": False}
+PLAIN = {"suggesting": 12, "similar": 0, "chance": 4}
 
 
-def laid_out(machine, p, **options):
-    working = p.sample.working
-    return table(machine, p.candidates(machine), working, p.offsets, p.grid.spacing, **PLAIN | options)
+def proposal(machine, p, exhaustive=False, **options):
+    """The coherent search's proposer; `exhaustive`: the exact one's."""
+    where = (machine, p.sample, p.sample.planes(machine), p.offsets, p.grid.step, p.phases, p.edges)
+    return everything(*where) if exhaustive else listed(*where, **PLAIN | options)
 
 
-def rule(p, gibbs=False, noisy=False, coherence=1.0, level=0):
+def relaxation(machine, p, gibbs=False, noisy=False, coherence=1.0, level=0, **options):
     window, _ = p.window(0.5)
-    return Rule(np.float32(1 / (1 + coherence)), -1024, window, gibbs, noisy, 2**33 + 5, level)
+    favour, choice = np.float32(1 / (1 + coherence)), Choice(gibbs, noisy, window)
+    proposed = proposal(machine, p, **options)
+    return Relaxation(p.grid, machine.put(p.offsets), proposed, favour, choice, -1024, 2**33 + 5, level)
 
 
-def apart(machine, p, turn=3, gibbs=False, noisy=False, coherence=1.0, **options):
+def counter(machine, p):
+    return machine.put(np.zeros(p.field.source.shape, np.int32))
+
+
+def apart(machine, p, turn=3, **how):
     """What the problem's sites become, and how many candidates each weighed."""
-    sites, field, offsets = p.on(machine)
-    weighed = machine.put(np.zeros(p.field.source.shape, np.int32))
-    laid, how = laid_out(machine, p, **options), rule(p, gibbs, noisy, coherence)
-    relaxed, cooled = search_apart(machine, sites, field, weighed, laid, offsets, p.grid, how, turn)
+    sites, field, _ = p.on(machine)
+    weighed = counter(machine, p)
+    relaxed, cooled = relax_apart(machine, sites, field, weighed, relaxation(machine, p, **how), turn)
     return host(machine, [relaxed.choice, relaxed.values, cooled, weighed])
 
 
@@ -94,7 +97,9 @@ def test_a_device_has_the_references_bits(machine, p, form):
 
 
 @pytest.mark.parametrize("options", [{"vector": 1}, {"vector": 1, "work_group": 64}, {"work_group": 3}], ids=str)
-@pytest.mark.parametrize("form", [{"similar": 3, "gibbs": True}, {"exhaustive": True}], ids=str)
+@pytest.mark.parametrize(
+    "form", [{"similar": 3, "gibbs": True}, {"exhaustive": True}, {"exhaustive": True, "gibbs": True}], ids=str
+)
 def test_the_shape_of_a_launch_changes_no_bit(cl_device, options, form):
     p = problem(5, order=8, channels=3, shape=(11, 33), count=150, edges="reflect")
     assert_same_bits(apart(opencl(cl_device, **options), p, **form), apart(REFERENCE, p, **form))
@@ -129,8 +134,8 @@ def test_where_all_is_known_the_distance_is_that_of_the_exact_search():
     """A whole number then, in any order of its terms: so are the choices of an exhaustive search."""
     p = problem(7, order=8, temperatures="zero", edges="reflect", shape=(12, 13))
     found, candidates = p.distances(REFERENCE, 1.0)
-    choice, *_ = apart(REFERENCE, p, exhaustive=True, suggesting=24)
-    assert_same_bits(choice, lcpdf.best(REFERENCE, found, candidates).choice)
+    choice, *_ = apart(REFERENCE, p, exhaustive=True)
+    assert_same_bits(choice, candidates.positions[found.distance.argmin(0)])
 
 
 def test_an_exhaustive_draw_has_the_probabilities_of_the_exact_one():
@@ -147,58 +152,41 @@ def test_an_exhaustive_draw_has_the_probabilities_of_the_exact_one():
     assert chi2 < 3 * often.sum() + 10
 
 
-def test_similar_candidates_are_the_nearest_neighbourhoods(machine):
-    p = problem(9, order=5, channels=2, edges="reflect", sample_shape=(8, 7))
-    reach = plain.offsets(p.order)
-    positions, (a, b) = p.positions(), p.padded()
-    patches = np.array([[plane[i + di, j + dj] for di, dj in reach for plane in (a, b)] for i, j in positions], float)
-    d = ((patches[:, None] - patches[None]) ** 2).sum(-1)
-    np.fill_diagonal(d, np.inf)
-    expected = np.argsort(d, 1, kind="stable")[:, :3]
-    for m in (REFERENCE, machine):
-        assert_same_bits(np.asarray(m.get(laid_out(m, p, similar=3).similar)), expected.astype(np.int32))
-
-
-def test_similar_candidates_come_in_pieces(machine):
-    p = problem(10, order=2, edges="reflect", sample_shape=(11, 12))
-    candidates, (_, _, offsets) = p.candidates(machine), p.on(machine)
-    found = machine.put(np.full((candidates.size, 2), -1, np.int32))
-    field = Field(*(machine.put(a) for a in p.field))
-    near = neighbourhood(machine, machine.put(p.sites), field, offsets, p.grid)
-    some = lcpdf.distance(machine, near, candidates)._replace(sites=5)
-    filled = np.asarray(machine.get(most_similar(machine, some, candidates, 40, found)))
-    assert (filled[40:45] >= 0).all()
-    assert (np.delete(filled, range(40, 45), 0) == -1).all()
-
-
 @pytest.mark.parametrize("longest", [16, 2**17])
-def test_a_sweep_in_place_is_step_after_step(machine, monkeypatch, longest):
+@pytest.mark.parametrize("how", [{}, {"exhaustive": True}, {"exhaustive": True, "gibbs": True}], ids=str)
+def test_steps_in_place_are_step_after_step(machine, monkeypatch, longest, how):
     """In pieces, too, where a step has more sites than a launch may."""
     monkeypatch.setattr("simdtex.machine.opencl.LONGEST", longest)
     p = problem(11, order=4, shape=(20, 24), edges="reflect")
     colors = coloring(REFERENCE, p.grid, p.offsets, p.order).ravel()
     sites = np.argsort(colors, kind="stable").astype(np.int32)
     bounds = np.concatenate([[0], np.cumsum(np.bincount(colors))])
+    steps = np.stack([bounds[:-1], bounds[1:]], 1)[::-1]
     after = {}
     for m in (REFERENCE, machine):
-        _, field, offsets = p.on(m)
-        weighed, laid = m.put(np.zeros(p.field.source.shape, np.int32)), laid_out(m, p)
-        field = search(m, m.put(sites), bounds, field, weighed, laid, offsets, p.grid, rule(p), 3)
+        _, field, _ = p.on(m)
+        weighed = counter(m, p)
+        field = relax(m, m.put(sites), steps, field, weighed, relaxation(m, p, **how), 3)
         after[m.name] = host(m, [*field, weighed])
     first, second = after.values()
     assert_same_bits(first, second)
 
-    _, field, offsets = p.on(REFERENCE)
-    laid, weighed = laid_out(REFERENCE, p), np.zeros(p.field.source.shape, np.int32)
-    for begin, end in itertools.pairwise(bounds):
+    _, field, _ = p.on(REFERENCE)
+    weighed, rule = counter(REFERENCE, p), relaxation(REFERENCE, p, **how)
+    for begin, end in steps:
         here = sites[begin:end]
-        field = commit(
-            REFERENCE,
-            field,
-            here,
-            *search_apart(REFERENCE, here, field, weighed, laid, offsets, p.grid, rule(p), 3),
-        )
+        field = commit(REFERENCE, field, here, *relax_apart(REFERENCE, here, field, weighed, rule, 3))
     assert_same_bits(first, [*field, weighed])
+
+
+@pytest.mark.parametrize("how", [{}, {"gibbs": True}, {"gibbs": True, "noisy": True}], ids=str)
+def test_few_candidates_in_one_kernel_are_many_in_several(machine, monkeypatch, how):
+    """The exact search has the same bits in either form."""
+    p = problem(14, order=8, channels=2, shape=(11, 13), edges="reflect", sample_shape=(9, 13))
+    one = apart(machine, p, exhaustive=True, **how)
+    monkeypatch.setattr("simdtex.ops.relax.KEPT", 10)
+    assert not relaxation(machine, p, exhaustive=True, **how).fused
+    assert_same_bits(apart(machine, p, exhaustive=True, **how), one)
 
 
 def test_a_site_that_nothing_suggests_for_weighs_one_candidate_at_random():
@@ -229,14 +217,17 @@ def test_a_schedule_that_is_watched_changes_no_bit(cl_device):
 
 def test_a_partition_with_steps_of_its_own_takes_them(cl_device):
     class Reversed(Coloring):
-        """Colours in the opposite order of columns within a step, which changes nothing but goes through `step`."""
+        """Sites in the opposite order within a step, which changes nothing but goes through `step`."""
 
         steps = 0
 
-        def step(self, state, active):
-            self.steps += 1
-            state, info = super().step(state, active)
-            return state, info._replace(sites=info.sites[::-1].copy())
+        def step(self, setting, state, active):
+            state, info = super().step(setting, state, active)
+            here = [step.sites[::-1] for step in info.apart(setting.machine)]
+            self.steps += len(here)
+            ends = np.cumsum([sites.size for sites in here])
+            steps = np.stack([ends - [sites.size for sites in here], ends], 1)
+            return state, info._replace(sites=np.concatenate(here), steps=steps)
 
     own = Reversed()
     machine = opencl(cl_device)

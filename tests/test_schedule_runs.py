@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, texture
+from cases import REFERENCE, assert_same_bits, setting, texture
 from test_schedules import CLAIMS, Told
 
 import simdtex
 from simdtex import schedules
 from simdtex.machine.reference import Reference
-from simdtex.model.lattice import Grid, neighbourhood_offsets
-from simdtex.schedules import get
+from simdtex.model.lattice import Grid
+from simdtex.schedules import Info, Masked, get
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "reference" / "schedules.rst"
 every = pytest.mark.parametrize("name", CLAIMS)
@@ -77,20 +77,19 @@ class Apart:
 
     def __init__(self, schedule):
         self.schedule, self.name = schedule, f"apart {schedule.name}"
+        self.tile, self.windows = schedule.tile, False
 
     def independent(self, grid, offsets):
         return True
 
-    def init(self, machine, grid, offsets, order, seed, level):
-        return self.schedule.init(machine, grid, offsets, order, seed, level), None, 0
+    def init(self, setting):
+        return self.schedule.init(setting)
 
-    def step(self, state, active):
-        inner, info, done = state
-        if not done:
-            inner, info = self.schedule.step(inner, active)
-        left = max(0, len(info.sites) - done - 1)
-        sites = info.sites[left : left + 1]
-        return (inner, info, done + 1 if left else 0), info._replace(sites=sites, last=info.last and not left)
+    def step(self, setting, state, active):
+        state, info = self.schedule.step(setting, state, active)
+        sites = np.concatenate([step.sites[::-1] for step in info.apart(setting.machine)])
+        single = np.arange(sites.size)[:, None] + np.array([0, 1])
+        return state, info._replace(sites=sites, steps=single if sites.size else None)
 
 
 @forms
@@ -186,13 +185,10 @@ def test_the_schedule_of_the_page_works(machine):
     for relaxation in ("icm", "gibbs"):
         ours = run(wavefront, relaxation, (9, 11), machine, check_schedule=True, boundary="open")
         assert_same_bits(ours, run("raster", relaxation, (9, 11), boundary="open"))
-    offsets = neighbourhood_offsets(2)
-    state, steps = wavefront.init(REFERENCE, Grid(6, 8, 1, False), offsets, 2, 1, 0), 0
-    last = False
-    while not last:
-        state, info = wavefront.step(state, lambda: np.ones((6, 8), bool))
-        steps, last = steps + 1, info.last
-    assert steps == 5 * 2 + 8
+    grid = Grid(6, 8, 1, False)
+    state = wavefront.init(setting(grid))
+    _, info = wavefront.step(setting(grid), state, Masked(grid))
+    assert len(info.ranges) == 5 * 2 + 8
 
 
 # -- what is counted ------------------------------------------------------------------------------------------
@@ -203,17 +199,18 @@ class Recorded:
 
     def __init__(self, schedule):
         self.schedule, self.name, self.notes = schedule, schedule.name, []
+        self.tile, self.windows = schedule.tile, schedule.windows
 
     def independent(self, grid, offsets):
         return self.schedule.independent(grid, offsets)
 
-    def init(self, *arguments):
+    def init(self, setting):
         self.notes.append([])
-        return self.schedule.init(*arguments)
+        return self.schedule.init(setting)
 
-    def step(self, state, active):
-        state, info = self.schedule.step(state, active)
-        self.notes[-1].append((len(info.sites), info.last))
+    def step(self, setting, state, active):
+        state, info = self.schedule.step(setting, state, active)
+        self.notes[-1] += [(len(step.sites), step.last) for step in info.apart(setting.machine)]
         return state, info
 
 
@@ -262,8 +259,10 @@ def test_progress_counts_every_step_and_ends_every_sweep_once(name):
         recorded, seen, told = watched(name, seed)
         for level, notes in zip(told["levels"], recorded.notes, strict=True):
             here = [progress for progress in seen if progress.level == level["level"]]
-            assert [progress.step for progress in here] == list(range(1, len(notes) + 1))
-            assert [progress.end_of_sweep for progress in here] == [last for _, last in notes]
+            steps = [progress.step for progress in here]
+            assert steps == sorted(steps) and steps[-1] == len(notes)
+            ends = [number for number, (_, last) in enumerate(notes, 1) if last]
+            assert [progress.step for progress in here if progress.end_of_sweep] == ends
             fractions = [progress.fraction for progress in here]
             assert fractions == sorted(fractions) and fractions[-1] <= 1
 
@@ -273,16 +272,17 @@ class Late:
 
     def __init__(self, schedule):
         self.schedule, self.name, self.independent = schedule, "late", schedule.independent
+        self.tile, self.windows = schedule.tile, False
 
-    def init(self, *arguments):
-        return self.schedule.init(*arguments), None
+    def init(self, setting):
+        return self.schedule.init(setting), False
 
-    def step(self, state, active):
+    def step(self, setting, state, active):
         inner, ended = state
         if ended:
-            return (inner, None), ended._replace(sites=ended.sites[:0])
-        inner, info = self.schedule.step(inner, active)
-        return (inner, info if info.last else None), info._replace(last=False)
+            return (inner, False), Info(np.zeros(0, np.int32), 0, True)
+        inner, info = self.schedule.step(setting, inner, active)
+        return (inner, info.last), info._replace(last=False)
 
 
 def test_a_sweep_may_end_with_a_step_of_no_site(machine):
@@ -290,7 +290,6 @@ def test_a_sweep_may_end_with_a_step_of_no_site(machine):
     assert_same_bits(run(Late(get("coloring")), device=machine, callback=seen.append), expected("coloring", "icm"))
     for level in (1, 0):
         here = [progress for progress in seen if progress.level == level]
-        assert [progress.step for progress in here] == list(range(1, len(here) + 1))
         assert [progress.sweep for progress in here if progress.end_of_sweep] == list(range(1, here[-1].sweep + 1))
 
 

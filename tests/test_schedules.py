@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 import plain
 import pytest
-from cases import REFERENCE, assert_same_bits
+from cases import REFERENCE, assert_same_bits, setting
 from scipy import stats
 
 from simdtex import schedules
 from simdtex.model.lattice import Grid, neighbourhood_offsets
-from simdtex.schedules import SCHEDULES, Checked, Info, get, neighbours_in
+from simdtex.schedules import SCHEDULES, Checked, Info, Masked, get, neighbours_in
 
 
 class Claim(NamedTuple):
@@ -82,13 +82,14 @@ def everywhere(grid):
 def walk(schedule, grid, sweeps=1, *, order=2, seed=1, level=0, mask=None, machine=REFERENCE):
     """What the steps of each sweep decided; all sites active where nothing else is said."""
     mask = everywhere(grid) if mask is None else mask
-    state = schedule.init(machine, grid, neighbourhood_offsets(order), order, seed, level)
+    told_of = setting(grid, order, seed, level, machine)
+    state, active = schedule.init(told_of), Masked(grid, mask)
     told = []
     for _ in range(sweeps):
         infos = []
         while not (infos and infos[-1].last):
-            state, info = schedule.step(state, lambda: mask)
-            infos.append(info)
+            state, info = schedule.step(told_of, state, active)
+            infos.extend(info.apart(machine))
             assert len(infos) < 5000, "a sweep ends"
         told.append(infos)
     return told
@@ -96,7 +97,7 @@ def walk(schedule, grid, sweeps=1, *, order=2, seed=1, level=0, mask=None, machi
 
 def plainly(told):
     """The same in numbers that can be compared."""
-    return [[(info.sites.tolist(), info.turn, info.last, info.tile) for info in infos] for infos in told]
+    return [[(info.sites.tolist(), info.turn, info.last) for info in infos] for infos in told]
 
 
 def frozen(value):
@@ -130,16 +131,18 @@ def clash(grid, order, sites):
 @pytest.mark.parametrize("grid", [Grid(5, 6), Grid(9, 7, 2, False)], ids=str)
 def test_a_step_is_a_pure_function_of_the_state(name, grid):
     schedule, mask = get(name), everywhere(grid)
-    state = schedule.init(REFERENCE, grid, neighbourhood_offsets(2), 2, 1, 0)
+    told_of = setting(grid)
+    state = schedule.init(told_of)
     for n in range(40):
         if n % 7 == 6:  # as sites cool
             mask = mask & (np.random.default_rng(n).random(mask.shape) < 0.8)
         before, seen = frozen(state), mask.copy()
-        one, first = schedule.step(state, lambda mask=mask: mask)
-        two, second = get(name).step(state, lambda mask=mask: mask.copy())
+        one, first = schedule.step(told_of, state, Masked(grid, mask))
+        two, second = get(name).step(told_of, state, Masked(grid, mask.copy()))
         assert frozen(one) == frozen(two)
         assert_same_bits(first.sites, second.sites)
-        assert first[1:] == second[1:]
+        assert_same_bits(first.ranges, second.ranges)
+        assert first[1:3] == second[1:3]
         assert frozen(state) == before
         assert_same_bits(mask, seen)
         state = one
@@ -203,7 +206,8 @@ def test_every_site_gets_its_turn_until_none_is_active(name, grid):
     """Each site wants one to three relaxations, and is counted when it has been relaxed, as a temperature is."""
     schedule, pixel = get(name), grid.sites()
     wants = np.random.default_rng(3).integers(1, 4, pixel.size)
-    state = schedule.init(REFERENCE, grid, neighbourhood_offsets(2), 2, 1, 0)
+    told_of = setting(grid)
+    state = schedule.init(told_of)
     sweeps = 0
     while (wants > 0).any():
         sweeps += 1
@@ -211,12 +215,12 @@ def test_every_site_gets_its_turn_until_none_is_active(name, grid):
         begun, last = wants > 0, False
         while not last:
             active = wants > 0
-            state, info = schedule.step(state, lambda active=active: active.reshape(grid.rows, grid.cols))
+            state, info = schedule.step(told_of, state, Masked(grid, active.reshape(grid.rows, grid.cols)))
             allowed = begun if CLAIMS[name].partition else active
             relaxed = np.isin(pixel, info.sites)
             assert not (relaxed & ~allowed).any()
             wants, last = wants - relaxed, info.last
-    state, info = schedule.step(state, lambda: ~everywhere(grid))
+    state, info = schedule.step(told_of, state, Masked(grid, ~everywhere(grid)))
     assert (info.sites.size, info.last) == (0, True)
 
 
@@ -318,10 +322,11 @@ def test_random_scan_takes_any_active_site_with_the_same_probability():
 def test_random_subset_takes_each_site_with_its_probability(p):
     grid, steps = Grid(4, 5), 600
     schedule = get(f"random-subset:{p}")
-    state = schedule.init(REFERENCE, grid, neighbourhood_offsets(2), 2, 1, 0)
+    told_of = setting(grid)
+    state = schedule.init(told_of)
     chosen = np.zeros((steps, 20), int)
     for row in chosen:
-        state, info = schedule.step(state, lambda: np.ones((4, 5), bool))
+        state, info = schedule.step(told_of, state, Masked(grid))
         row[info.sites] = 1
     assert stats.binomtest(int(chosen.sum()), chosen.size, p).pvalue > 0.01
     assert min(stats.binomtest(int(n), steps, p).pvalue for n in chosen.sum(0)) > 0.01 / 20, "each site"
@@ -334,7 +339,7 @@ def test_raster_and_block_go_row_by_row():
     assert [sites for sites, *_ in plainly(walk(get("raster"), grid))[0]] == [[site] for site in range(24)]
     steps = [sites for sites, *_ in plainly(walk(get("block:2x3"), grid))[0]]
     assert steps == [[s, s + 3, s + 12, s + 15] for s in (0, 1, 2, 6, 7, 8)]
-    assert plainly(walk(get("block:9x9"), Grid(13, 11, 2)))[0][:3] == [([s], 1, False, (9, 9)) for s in (0, 2, 4)]
+    assert plainly(walk(get("block:9x9"), Grid(13, 11, 2)))[0][:3] == [([s], 1, False) for s in (0, 2, 4)]
 
 
 def test_a_tile_may_be_far_larger_than_any_lattice():
@@ -359,7 +364,7 @@ def test_groups_of_ones_own_may_have_any_numbers():
 class Told:
     """A schedule that says what it is told to, and then ends the sweep."""
 
-    name = "told"
+    name, tile, windows = "told", None, False
 
     def __init__(self, sites, claim=True):
         self.sites, self.claim = np.asarray(sites, np.int32), claim
@@ -367,10 +372,10 @@ class Told:
     def independent(self, grid, offsets):
         return self.claim
 
-    def init(self, machine, grid, offsets, order, seed, level):
+    def init(self, setting):
         return 0
 
-    def step(self, state, active):
+    def step(self, setting, state, active):
         return state + 1, Info(self.sites, state, True)
 
 

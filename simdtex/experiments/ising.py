@@ -201,7 +201,7 @@ class _Run:
             for info in chosen.apart(self.machine):
                 self.steps += 1
                 self.relaxations += info.sites.size
-                if info.sites.size == 1 and not info.tile:
+                if info.sites.size == 1 and not self.schedule.tile:
                     queue.append((int(info.sites[0]), info.turn))
                 elif info.sites.size:
                     spins = self._step(self._flush(spins, queue), info)
@@ -210,7 +210,7 @@ class _Run:
 
     def _step(self, spins: Array, info: schedules.Info) -> Array:
         """Relax the sites of a step, every old value read before the first new one is written."""
-        machine, grid = self.machine, replace(self.grid, tile=info.tile)
+        machine, grid = self.machine, replace(self.grid, tile=self.schedule.tile)
         most = max(1, AT_ONCE // spins.shape[0])
         relaxed = []
         for k in range(0, info.sites.size, most):

@@ -66,7 +66,7 @@ class Partition:
         steps = np.stack([starts[:-1], starts[1:]], 1)[turn]
         steps = steps[steps[:, 1] > steps[:, 0]]
         steps = steps if len(steps) else np.zeros((1, 2), np.int64)  # an empty sweep is one empty group
-        return state._replace(sweep=sweep), Info(sites, sweep, True, self.tile, steps)
+        return state._replace(sweep=sweep), Info(sites, sweep, True, steps)
 
 
 AHEAD = 32

@@ -100,16 +100,14 @@ class Info(NamedTuple):
     """What a step decided, or several that are known beforehand.
 
     ``sites`` (S,) int32 pixel indices, an array of NumPy or of the machine. ``turn`` keys the random numbers of their
-    relaxation: no site is ever relaxed twice under the same. ``last`` whether a sweep ends with this. ``tile`` None, or
-    (rows, cols) of tiles that relax on their own: neighbours in another tile are then read as they were when the sweep
-    began. ``steps`` None where all sites relax together, or (steps, 2) int64: those from ``steps[0, 0]`` to
+    relaxation: no site is ever relaxed twice under the same. ``last`` whether a sweep ends with this. ``steps`` None
+    where all sites relax together, or (steps, 2) int64: those from ``steps[0, 0]`` to
     ``steps[0, 1]`` - 1 relax together, then those of ``steps[1]``, and so on.
     """
 
     sites: Array
     turn: int
     last: bool
-    tile: tuple[int, int] | None = None
     steps: NDArray[np.int64] | None = None
 
     @property
@@ -119,9 +117,10 @@ class Info(NamedTuple):
 
     def apart(self, machine: Machine) -> Iterator[Info]:
         """The same step by step, the sites on the host."""
-        sites, ranges = np.asarray(machine.get(self.sites)), self.ranges.tolist()
+        sites = self.sites if isinstance(self.sites, np.ndarray) else machine.get(self.sites)
+        ranges = self.ranges.tolist()
         for number, (begin, end) in enumerate(ranges, 1):
-            yield Info(sites[begin:end], self.turn, self.last and number == len(ranges), self.tile)
+            yield Info(sites[begin:end], self.turn, self.last and number == len(ranges))
 
 
 @runtime_checkable
@@ -135,7 +134,8 @@ class Schedule(Protocol):
     ----------
     name : str
     tile : (int, int) or None
-        Rows and columns of tiles that relax on their own, as in `Info`.
+        Rows and columns of tiles that relax on their own: neighbours in another tile are read as they were when the
+        sweep began. None: the latest values are read.
     windows : bool
         Whether a window of a lattice relaxes in the same sets as the same sites of the whole, in the same order; then
         it has the whole's bits, except within a sweep's reach of its edges: steps times the neighbourhood's radius.
