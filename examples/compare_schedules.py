@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Swap the parallel schedule, one of your own too, and see what it does: python compare_schedules.py [FOLDER]."""
+"""Compare parallel schedules, also one of your own, and see what they do: python compare_schedules.py [FOLDER]."""
 
 import argparse
 import tempfile
@@ -20,7 +20,7 @@ folder = args.folder or Path(tempfile.mkdtemp(prefix="simdtex-"))
 
 
 class Wavefront(Partition):
-    """Raster order, but all sites at once that do not wait for one another."""
+    """Raster order, but all sites that do not wait for one another relax at once."""
 
     name = "wavefront"
 

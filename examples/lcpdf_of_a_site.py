@@ -2,7 +2,7 @@
 """How likely a picture's pixels are, given their neighbours: python lcpdf_of_a_site.py [FOLDER] [--size 128].
 
 Half of the picture is grass, like the sample, and half is gravel. Where the model knows the texture, a pixel tends to
-be likely; surprise.png shows -log P of every pixel, dark where it is likely.
+be likely; surprise.png shows -log P of every pixel, which is dark where the pixel is likely.
 """
 
 import argparse

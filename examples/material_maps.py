@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A texture with height and normal maps that match it: python material_maps.py [FOLDER] [--size 256].
 
-The maps are made from the sample here, for want of measured ones. What matters is that they lie over the sample:
-the source map arranges anything that does.
+The maps are made from the sample here, because there are no measured ones. They only need to lie over the sample: the
+source map arranges any such map.
 """
 
 import argparse

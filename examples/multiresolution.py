@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Gravel by multiresolution sampling, at several thresholds: python multiresolution.py [FOLDER] [--size 256].
 
-The threshold alpha says how alike two places must be to be exchanged. sheet.png shows what it does,
-candidates.png among how many candidates each pixel of each level was drawn: the more, the brighter.
+The threshold alpha says how alike two places must be to be exchanged. sheet.png shows what it does, and
+candidates.png shows among how many candidates each pixel of each level was drawn: the more, the brighter.
 """
 
 import argparse
@@ -36,7 +36,7 @@ for alpha in ("auto", 0, 0.1, 0.2, 0.4):
     pictures.append((f"alpha {used:g} (auto)" if alpha == "auto" else f"alpha {used:g}", texture))
 contact_sheet(pictures, folder / "sheet.png", columns=3)
 
-# The last of them level by level; brightness is the logarithm of the number of candidates.
+# The last of them is shown level by level; brightness is the logarithm of the number of candidates.
 most = np.log(max(2, max(stage.candidates.max() for stage in output.stages)))
 maps = [
     (f"level {stage.level}", enlarged(heat(np.log(stage.candidates) / most), shape, 2**stage.level))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Stone by pyramid matching, flat, solid and mixed: python stone_block.py [FOLDER] [--size 128].
 
-flat.png is a larger picture of the grain, iterations.png how noise becomes it, solid.png a block of it
-with a ball carved out, mixed.png the grain in the colours of wood.
+flat.png is a larger picture of the grain, iterations.png shows how noise becomes grain, solid.png shows a block of it
+with a ball carved out, and mixed.png shows the grain in the colours of wood.
 """
 
 import argparse
@@ -31,7 +31,7 @@ pictures = []
 
 
 def keep(progress):
-    """Each iteration's picture."""
+    """Keep each iteration's picture."""
     if progress.end_of_iteration:
         pictures.append((progress.caption, progress.image()))
 
