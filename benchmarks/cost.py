@@ -22,9 +22,12 @@ import samples
 
 import simdtex
 from simdtex.methods import mrf
+from simdtex.methods.mrf.algorithm import anneal, rule
+from simdtex.methods.mrf.synthesis import laid_out
 from simdtex.ops import lcpdf
 from simdtex.ops.commit import commit
 from simdtex.ops.neighbourhood import Field, neighbourhood
+from simdtex.ops.relax import relax_apart
 
 PEAK = """
 __kernel void peak(__global float16 *out)
@@ -99,48 +102,36 @@ def peak(machine):
 
 
 def states(machine, pixels, order):
-    """Arguments of relaxations at the finest level: of its third sweep, which is warm, and of its first free one."""
-    found, begun, relax, sweep = {}, [], mrf._relax, mrf._sweep
-
-    def noted(run, level, field, state, temperatures, phase, meter):
-        begun[:] = [*begun, phase] if level.number == 0 else []
-        return sweep(run, level, field, state, temperatures, phase, meter)
-
-    def copied(run, there, level, grid, field, sites, turn):
-        phase = begun[-1] if len(begun) > 2 else None
-        if phase and phase not in found:
-            found[phase] = (run, there, level, grid, Field(*(there.put(there.get(array)) for array in field)))
-        return relax(run, there, level, grid, field, sites, turn)
-
-    mrf._relax, mrf._sweep = copied, noted
-    axis = -1 if pixels.ndim == 3 else None
-    try:
-        simdtex.synthesize(pixels, (256, 256), rng=1, order=order, search="exact", device=machine, channel_axis=axis)
-    finally:
-        mrf._relax, mrf._sweep = relax, sweep
-    rng = np.random.default_rng(1)
-    for phase, arguments in found.items():
-        warm = machine.get(arguments[4].temperature).ravel() > 0
-        sites = np.flatnonzero(warm) if phase == "relax" else np.arange(warm.size)
-        some = np.sort(rng.choice(sites, min(len(sites), 3264), replace=False)).astype(np.int32)
-        found[phase] = (*arguments, some, 1)
-    return found
+    """Level and field at the finest level: before its third sweep, which is warm, and before its first free one."""
+    sample = pixels if pixels.ndim == 3 else pixels[..., None]
+    run = laid_out(machine, sample, (256, 256), mrf.Options(order=order, search="exact"), 1)
+    found = {}
+    for level, state, _ in anneal(run):
+        if level.number == 0 and (state.cooling == 2 or not state.warm):
+            phase = "relax" if state.warm else "free"
+            found.setdefault(phase, (level, state.off(machine).on(machine).field))
+        if len(found) == 2:
+            return found
 
 
-def steps(machine, arguments):
+def steps(machine, phase, level, field):
     """Fma per second at the peak, in the distances alone, in the step without skipping and with it; the share skipped.
 
     A step that skips is given the fma of one that does not.
     """
-    run, _, level, grid, field, sites, turn = arguments
-    candidates, neighbours, channels = level.candidates, len(run.offsets), run.sample.channels
-    fma = 2 * len(sites) * candidates.size * neighbours * channels
+    rng, temperature = np.random.default_rng(1), machine.get(field.temperature).ravel()
+    sites = np.flatnonzero(temperature > 0) if phase == "relax" else np.arange(temperature.size)
+    sites = np.sort(rng.choice(sites, min(len(sites), 3264), replace=False)).astype(np.int32)
+    candidates, offsets, relaxation = level.proposal.candidates, level.setting.offsets, rule(level)
+    channels = len(field.values)
+    fma = 2 * len(sites) * candidates.size * len(offsets) * channels
 
     def pieces(stored):
-        size = machine.chunk(candidates.size, neighbours, channels, stored)
-        return [sites[i : i + size] for i in range(0, len(sites), size)]
+        size = machine.chunk(candidates.size, len(offsets), channels, stored)
+        return [machine.put(sites[i : i + size]) for i in range(0, len(sites), size)]
 
-    near = [neighbourhood(machine, machine.put(some), field, level.offsets, grid) for some in pieces(True)]
+    near = [neighbourhood(machine, some, field, level.offsets, level.grid) for some in pieces(True)]
+    parts = pieces(False)
 
     def distances():
         for some in near:
@@ -148,8 +139,8 @@ def steps(machine, arguments):
 
     def whole(skip):  # what it commits goes into copies, so that every repeat finds the same state
         machine.skip = skip
-        for some in pieces(False):
-            commit(machine, after, *mrf._relax(run, machine, level, grid, field, some, turn))
+        for some in parts:
+            commit(machine, after, some, *relax_apart(machine, some, field, level.weighed, relaxation, 1))
 
     after = Field(*(machine.put(machine.get(array)) for array in field))
     chains, in_chains = peak(machine)
@@ -178,8 +169,8 @@ def main():
             rate = f"{fma / seconds / most:.2f} of the peak of {most / 1e9:.0f} GFMA/s"
             print(f"{job}: {seconds:5.1f} s, {rate}, first progress after {first:.1f} s, peak memory {memory:.0f} MiB")
     for name, pixels in every.items():
-        for phase, arguments in states(machine, pixels, options.order).items():
-            (most, *rates), skipped = steps(machine, arguments)
+        for phase, found in states(machine, pixels, options.order).items():
+            (most, *rates), skipped = steps(machine, phase, *found)
             shares = ", ".join(
                 f"{what} {rate / most:.2f}"
                 for what, rate in zip(("distances", "plain", "skipping"), rates, strict=True)

@@ -132,17 +132,7 @@ def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None
     while not (all_chosen and all_chosen[-1].last):
         warm = Warm(level, field.temperature, free)
         memory, chosen = level.schedule.step(level.setting, memory, warm)  # 6.2.1
-        relaxation = Relaxation(  # 6.2.2
-            grid=level.grid,
-            offsets=level.offsets,
-            proposal=level.proposal,  # 6.2.2.1 the LCPDF, equations (6) and (12), of these candidates
-            favour=level.favour,
-            choice=level.choice,  # 6.2.2.2 a draw from it, or its mode
-            xi=level.xi,  # 6.2.2.3 the temperature, equation (13)
-            seed=level.setting.seed,
-            level=level.number,
-        )
-        for part in relaxed(level, field, chosen, relaxation, told):
+        for part in relaxed(level, field, chosen, told):  # 6.2.2
             told = part
             if watch:
                 watch(level, told)
@@ -154,9 +144,23 @@ def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None
     return State(*field, memory, level.number, **done, warm=hot, heat=heat), info
 
 
-def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Relaxation, told: Part) -> Iterator[Part]:
+def rule(level: Level) -> Relaxation:
+    """How a site of the level relaxes: what happens to all sites of a step in parallel."""
+    return Relaxation(
+        grid=level.grid,
+        offsets=level.offsets,
+        proposal=level.proposal,  # 6.2.2.1 the LCPDF, equations (6) and (12), of these candidates
+        favour=level.favour,
+        choice=level.choice,  # 6.2.2.2 a draw from it, or its mode
+        xi=level.xi,  # 6.2.2.3 the temperature, equation (13)
+        seed=level.setting.seed,
+        level=level.number,
+    )
+
+
+def relaxed(level: Level, field: Field, chosen: schedules.Info, told: Part) -> Iterator[Part]:
     """Step 6.2.2 for the sites of one step after another, in parts that do not take long."""
-    machine, seen = level.machine, told
+    machine, relaxation, seen = level.machine, rule(level), told
 
     def part(field: Field, sites: int, steps: int, last: bool) -> Part:
         machine.sync(level.work * sites)

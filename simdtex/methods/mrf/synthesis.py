@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -70,11 +69,10 @@ def synthesize(
     values, source, temperatures = (Grid(*shape).view(machine.get(plane)) for plane in state.field)
     image = run.sample.picture(values, source)
     meter, account = observer.meter, observer.account
-    chosen = {f.name: getattr(run.options, f.name) for f in fields(Options)}
     statistics = {
         "device": machine.name,
         "seed": seed,
-        "options": chosen | {"levels": run.levels, "schedule": run.schedule.name},
+        "options": vars(run.options) | {"levels": run.levels, "schedule": run.schedule.name},
         "seconds": meter.seconds,
         "device_seconds": device_seconds(machine, worked),
         "accounting": account.report() | {"emulated": run.emulated, "launches": machine.launches - launches},

@@ -1,0 +1,172 @@
+"""The core: what kernels are told of a level, the state between sweeps, and the algorithm's steps in a default run."""
+
+import pickle
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyopencl as cl
+import pytest
+from cases import REFERENCE, assert_same_bits, opencl, texture
+
+import simdtex
+from simdtex.methods import mrf
+from simdtex.methods.mrf.algorithm import anneal, begin, enter, sweep
+from simdtex.methods.mrf.level import parts
+from simdtex.methods.mrf.synthesis import laid_out
+from simdtex.model.lattice import LATTICE, Grid
+from simdtex.ops.level import LEVEL, constants
+
+FOLDER = Path(simdtex.__file__).parent / "methods" / "mrf"
+
+
+def fields(dtype, prefix=""):
+    """Dotted name -> offset of every number in a struct."""
+    found = {}
+    for name, (kind, offset, *_) in dtype.fields.items():
+        inner = fields(kind, f"{prefix}{name}.") if kind.fields else {f"{prefix}{name}": 0}
+        found |= {key: offset + inside for key, inside in inner.items()}
+    return found
+
+
+@pytest.mark.parametrize(("kind", "dtype"), [("Lattice", LATTICE), ("Level", LEVEL)])
+def test_a_struct_is_the_same_on_the_host_and_on_a_device(machine, kind, dtype):
+    """Each number stands at the same offset, and nothing else stands there."""
+    lines = "".join(
+        f"out[{n}] = (int)((__private char *)&v.{name} - (__private char *)&v);"
+        for n, name in enumerate(fields(dtype), 1)
+    )
+    source = (
+        f'#include "common/level.h"\n__kernel void look({kind} v, __global int *out) {{ out[0] = sizeof v; {lines} }}'
+    )
+    kernel = cl.Kernel(cl.Program(machine.context, source).build(machine.include), "look")
+    out = machine.put(np.zeros(1 + len(fields(dtype)), np.int32))
+    machine.launch(kernel, (1,), np.zeros((), dtype)[()], out)
+    told = machine.get(out).tolist()
+    assert told == [dtype.itemsize, *fields(dtype).values()]
+
+
+def test_a_struct_names_its_numbers_as_the_header_does():
+    header = Path(simdtex.__file__).parent.parent / "kernels" / "common" / "level.h"
+    if not header.is_file():
+        pytest.skip("the kernels are not beside the package")
+    for file, kind, dtype in (("lattice.h", "Lattice", LATTICE), ("level.h", "Level", LEVEL)):
+        text = (header.parent / file).read_text()
+        body = re.search(rf"typedef struct {{(.*?)}} {kind};", text, re.DOTALL)[1]
+        body = re.sub(r"//.*", "", body)
+        names = [n.strip() for line in body.split(";") for n in re.sub(r"^\s*\w+\s", "", line).split(",") if n.strip()]
+        assert tuple(names) == dtype.names
+
+
+def test_what_a_kernel_is_told_of_a_level():
+    told = constants(Grid(5, 7, 2), seed=2**63, favour=0.5, xi=-1024)
+    assert (told["lattice"]["rows"], told["lattice"]["cols"]) == (3, 4)
+    assert (told["seed"], told["favour"], told["xi"], told["radius"]) == (2**63, np.float32(0.5), -1024, 0)
+
+
+@pytest.mark.parametrize("most", [1, 3, 4, 10, 1000])
+def test_the_parts_of_a_sweep_hold_all_sites_in_order(most):
+    ranges = np.array([[0, 4], [9, 10], [4, 4], [4, 9], [10, 21]])
+    found, done = list(parts(ranges, most)), 0
+    for here, steps in found:
+        assert len(here) > 0
+        assert (here[:, 1] - here[:, 0]).sum() <= most
+        assert done <= steps
+        done = steps
+    assert done == len(ranges)
+    flat = [n for here, _ in found for first, last in here.tolist() for n in range(first, last)]
+    assert flat == [n for first, last in ranges.tolist() for n in range(first, last)]
+
+
+# -- the state ------------------------------------------------------------------------------------------------
+
+
+def prepared(machine, shape=(20, 23), sample_shape=(24, 25), **options):
+    given = {"order": 2, "levels": 3} | options
+    return laid_out(machine, texture(sample_shape, seed=3)[..., None], shape, mrf.Options(**given), 5)
+
+
+def plain(value):
+    """Whether a value is made of arrays of NumPy and numbers alone."""
+    if isinstance(value, tuple):
+        return all(map(plain, value))
+    return value is None or isinstance(value, (np.ndarray, int))
+
+
+@pytest.mark.parametrize("schedule", ["coloring", "luby", "block:3x4"])
+@pytest.mark.parametrize("search", ["coherent", "exact"])
+def test_a_run_goes_on_from_any_state_on_another_machine(cl_device, schedule, search):
+    machine = opencl(cl_device)
+    run = prepared(machine, schedule=schedule, search=search)
+    whole = [state.off(machine) for _, state, _ in anneal(run)]
+    assert len({(state.level, state.cooling, state.free) for state in whole}) == len(whole) > 10
+    for number in (0, 3, len(whole) // 2, len(whole) - 2):
+        assert plain(whole[number])
+        kept = pickle.loads(pickle.dumps(whole[number]))
+        for other in (opencl(cl_device, work_group=16, vector=4), REFERENCE):
+            again = prepared(other, schedule=schedule, search=search)
+            after = [state.off(other) for _, state, _ in anneal(again, kept.on(other))]
+            assert [state[4:] for state in after] == [state[4:] for state in whole[number + 1 :]]
+            assert_same_bits(after[-1].field, whole[-1].field)
+
+
+def test_a_state_tells_what_is_left():
+    run = prepared(REFERENCE)
+    for level, state, info in anneal(run):
+        t = level.grid.view(state.temperature)
+        assert (state.warm, state.heat) == ((t > 0).sum(), t.sum(dtype=int))
+        assert info.phase == "relax" or not state.warm
+        assert info.number == state.cooling + state.free
+        assert info.ended == (not state.warm and state.free == run.options.free_sweeps)
+
+
+def test_a_sweep_says_where_it_stands():
+    run = prepared(REFERENCE, search="exact")
+    level, told = run.level(2), []
+    state, info = sweep(level, enter(level, begin(run)), watch=lambda level, part: told.append(part))
+    assert [part.last for part in told] == [False] * (len(told) - 1) + [True]
+    assert told[-1].steps == sum(len(chosen.ranges) for chosen in info.chosen)
+    assert told[-1].relaxed == told[-1].wanted == level.grid.rows * level.grid.cols
+    assert (info.level, info.number, info.phase, info.left) == (2, 1, "relax", 1.0)
+    assert state.cooling == 1
+
+
+# -- beside the paper --------------------------------------------------------------------------------------------
+
+STEPS = ("1", "2", "3", "4", "5", "6", "6.1", "6.2", "6.2.1", "6.2.2", "6.2.2.1", "6.2.2.2", "6.2.2.3")
+MARK = re.compile(r"#\s+((?:\d(?:\.\d)*)(?:, \d(?:\.\d)*)*)(?=\s|$)")
+
+
+def marked():
+    """Step of Algorithm 1 -> the lines, (file, number), that bear its number in a comment."""
+    found = {}
+    for path in sorted(FOLDER.glob("*.py")):
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            mark = MARK.search(line)
+            for step in mark[1].split(", ") if mark else ():
+                found.setdefault(step, []).append((str(path), number))
+    return found
+
+
+@pytest.mark.parametrize("device", ["reference", "device"])
+def test_every_step_of_algorithm_1_stands_on_a_line_that_a_default_run_executes(request, device):
+    machine = REFERENCE if device == "reference" else opencl(request.getfixturevalue("any_device"))
+    executed = set()
+
+    def look(frame, event, argument):
+        if not frame.f_code.co_filename.startswith(str(FOLDER)):
+            return None
+        executed.add((frame.f_code.co_filename, frame.f_lineno))
+        return look
+
+    before = sys.gettrace()
+    sys.settrace(look)
+    try:
+        simdtex.synthesize(texture((32, 33)), (24, 25), rng=1, device=machine)
+    finally:
+        sys.settrace(before)
+    lines = marked()
+    assert set(lines) == set(STEPS)
+    missed = {step: where for step, where in lines.items() if not set(where) <= executed}
+    assert not missed
