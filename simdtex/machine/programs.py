@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import warnings
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -39,14 +40,13 @@ def build(context: cl.Context, source: str, options: list[str]) -> Any:
         path = _place(context.devices[0], source, options)
         binary = _recall(path) if path else None
         if binary is not None:
-            try:
+            with suppress(cl.Error):  # one of a runtime that is gone is built anew
                 return cl.Program(context, context.devices, [binary]).build(options)
-            except cl.Error:
-                pass  # of a runtime that is gone: build it anew
         program = cl.Program(context, source).build(options)
         if path:
-            binary = program.get_info(cl.program_info.BINARIES)[0]
-            cache.keep(path, hashlib.sha256(binary).digest() + binary)
+            with suppress(cl.Error):  # a runtime without a compiler for binaries is none the worse for it
+                binary = program.get_info(cl.program_info.BINARIES)[0]
+                cache.keep(path, hashlib.sha256(binary).digest() + binary)
         return program
 
 
