@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """More of a texture from a sample of it, by parallel relaxation on any OpenCL device."""
 
-from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
 
-from simdtex.machine import open_machine
-from simdtex.machine.devices import DeviceError, devices
-from simdtex.methods.pyramid.mixtures import mix
-from simdtex.run import Output, Progress
-from simdtex.synthesis import lcpdf, suggest_alpha, synthesize, synthesize_solid
+if TYPE_CHECKING:
+    from simdtex.machine import open_machine
+    from simdtex.machine.devices import DeviceError, devices
+    from simdtex.methods.pyramid.mixtures import mix
+    from simdtex.run import Output, Progress
+    from simdtex.synthesis import lcpdf, suggest_alpha, synthesize, synthesize_solid
 
-__version__ = version("simdtex")
+    __version__: str
 
 __all__ = [
     "DeviceError",
@@ -23,3 +24,36 @@ __all__ = [
     "synthesize",
     "synthesize_solid",
 ]
+
+_HOMES = {
+    "DeviceError": "simdtex.machine.devices",
+    "Output": "simdtex.run",
+    "Progress": "simdtex.run",
+    "devices": "simdtex.machine.devices",
+    "lcpdf": "simdtex.synthesis",
+    "mix": "simdtex.methods.pyramid.mixtures",
+    "open_machine": "simdtex.machine",
+    "suggest_alpha": "simdtex.synthesis",
+    "synthesize": "simdtex.synthesis",
+    "synthesize_solid": "simdtex.synthesis",
+}
+"""Where the public names live; each is loaded when it is asked for first, so that the command line starts at once."""
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        found: Any = version("simdtex")
+    elif name in _HOMES:
+        from importlib import import_module
+
+        found = getattr(import_module(_HOMES[name]), name)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = found  # the next time it is found without this function
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__, "__version__"})

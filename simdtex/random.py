@@ -89,10 +89,10 @@ def as_seed(rng: Any = None) -> int:
     """
     if rng is None:
         return secrets.randbits(64)
-    if isinstance(rng, np.random.Generator):
-        return int(rng.integers(0, 2**64, dtype=np.uint64))
     if isinstance(rng, (int, np.integer)) and not isinstance(rng, bool):
         if 0 <= int(rng) < 2**64:
             return int(rng)
         raise ValueError(f"the seed {rng} is out of range; give a whole number from 0 to 2**64 - 1")
+    if isinstance(rng, np.random.Generator):  # asked last: numpy loads this part of itself when it is named first
+        return int(rng.integers(0, 2**64, dtype=np.uint64))
     raise TypeError(f"rng must be None, a whole number or a numpy.random.Generator, not {type(rng).__name__}")

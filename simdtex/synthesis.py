@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from math import isqrt
 from typing import Any, Literal, overload
 
@@ -12,17 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex.envelope import check_shape, executed, with_channels_last
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, open_machine
-from simdtex.methods import mrf, multires, pyramid
-from simdtex.methods.mrf.density import lcpdf_at
-from simdtex.methods.multires.analysis import analyse
-from simdtex.methods.pyramid import solid
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
 from simdtex.options import one_of, real, whole
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
-METHODS: dict[str, Any] = {"mrf": mrf, "multires": multires, "pyramid": pyramid}
+METHODS = ("mrf", "multires", "pyramid")
+"""The packages of `simdtex.methods`; each is loaded when it is asked for first."""
 
 
 @overload
@@ -111,11 +109,12 @@ def synthesize(
     one_of("method", method, METHODS)
     pixels = check_sample(sample, channel_axis)
     size = check_shape(shape)
-    chosen = METHODS[method].make_options(**with_channels_last(options, channel_axis))
+    package = import_module(f"simdtex.methods.{method}")
+    chosen = package.make_options(**with_channels_last(options, channel_axis))
     seed = as_seed(rng)
 
     def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
-        result: tuple[NDArray[Any], Output] = METHODS[method].synthesize(machine, pixels, size, chosen, seed, seen)
+        result: tuple[NDArray[Any], Output] = package.synthesize(machine, pixels, size, chosen, seed, seen)
         return result
 
     return executed(device, channel_axis, callback, full_output, run)
@@ -179,6 +178,8 @@ def synthesize_solid(
     >>> block.shape
     (16, 24, 32)
     """
+    from simdtex.methods.pyramid import solid
+
     pixels = check_sample(sample, channel_axis)
     size = _check_block(shape)
     chosen = solid.make_options(**options)
@@ -193,7 +194,7 @@ def synthesize_solid(
 def suggest_alpha(
     sample: ArrayLike,
     *,
-    target: float = multires.Options.target,
+    target: float | None = None,
     channel_axis: int | None = None,
     device: str | Machine | None = None,
     **options: Any,
@@ -204,9 +205,9 @@ def suggest_alpha(
     ----------
     sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
         As in `synthesize`.
-    target : float
+    target : float, optional
         Candidates that a pixel of the coarser half of the levels is to have on average, 1 or more. At 1 there is
-        nothing to choose, and the sample is tiled; the more, the less of its order is kept.
+        nothing to choose, and the sample is tiled; the more, the less of its order is kept. None takes the method's.
     channel_axis : int, optional
         As in `synthesize`.
     device : str, optional
@@ -238,11 +239,14 @@ def suggest_alpha(
     >>> simdtex.suggest_alpha(gravel, target=1.2) < simdtex.suggest_alpha(gravel, target=2)
     True
     """
+    from simdtex.methods import multires
+    from simdtex.methods.multires.analysis import analyse
+
     pixels = check_sample(sample, channel_axis)
     for name in ("alpha", "thresholds"):
         if name in options:
             raise TypeError(f"suggest_alpha finds alpha; leave {name} out")
-    chosen = multires.make_options(target=target, **options)
+    chosen = multires.make_options(**({} if target is None else {"target": target}), **options)
     machine = open_machine(device)
     return multires.suggest_alpha(machine, analyse(machine, pixels, **chosen.analysis), chosen)
 
@@ -301,6 +305,9 @@ def lcpdf(
     -----
     Cost: S x sample pixels x neighbours x 2 fma, and 12 S x levels bytes for a piece of the sites.
     """
+    from simdtex.methods.mrf import check_fit
+    from simdtex.methods.mrf.density import lcpdf_at
+
     whole("levels", levels, 2)
     if levels > 4096:
         raise ValueError(f"levels is {levels}; give 4096 or fewer")
@@ -315,7 +322,7 @@ def lcpdf(
         most = 1 + isqrt(2**33 // len(offsets))
         raise ValueError(f"levels is {levels}; give at most {most} for order {order}")
     grey = Sample.of_levels(y, levels)
-    mrf.check_fit(y.shape, int(offsets.max()), order)
+    check_fit(y.shape, int(offsets.max()), order)
 
     machine = open_machine(device)
     grid, t = Grid(x.shape[0], x.shape[1], 1, boundary == "torus"), _check_temperature(temperature, x.shape)

@@ -19,14 +19,15 @@ import simdtex
 from simdtex import cli
 from simdtex.cli.common import given
 from simdtex.io.image import write
+from simdtex.methods import mrf, multires, pyramid
 from simdtex.methods.mrf import PRESETS
 from simdtex.methods.pyramid import solid
-from simdtex.synthesis import METHODS
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = sorted(path for path in (ROOT / "docs").rglob("*.rst") if "_build" not in path.parts)
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
+METHODS = {"mrf": mrf, "multires": multires, "pyramid": pyramid}
 OF_COMMANDS = {"sheet": METHODS["multires"], "mix": METHODS["pyramid"], "solid": solid}
 REFERENCE = "\n".join(
     (ROOT / "docs" / "reference" / name).read_text(encoding="utf-8")
@@ -120,7 +121,7 @@ def test_readme_command_runs(any_device, material, line):
 )
 def test_documented_command_parses(page, line):
     _, command, *words = shlex.split(line)
-    context = cli.main.commands[command].make_context(command, words)
+    context = cli.load(command).make_context(command, words)
     method = (
         METHODS[context.params["method"]] if "method" in context.params else OF_COMMANDS.get(command, METHODS["mrf"])
     )
@@ -191,7 +192,7 @@ def documented(program):
 
 @pytest.mark.parametrize("name", sorted(cli.main.commands))
 def test_every_option_of_the_command_line_is_documented(name):
-    command = cli.main.commands[name]
+    command = cli.load(name)
     options = {o for p in command.params if isinstance(p, click.Option) for o in (*p.opts, *p.secondary_opts)}
     assert f"simdtex {name}\n" in REFERENCE
     if options:
@@ -202,7 +203,7 @@ def test_every_option_of_the_command_line_is_documented(name):
 def test_every_option_of_a_method_is_on_the_command_line_and_in_the_docstrings(method):
     options = METHODS[method].Options
     names = set(options.__dataclass_fields__)
-    assert names <= {p.name for p in cli.main.commands["synth"].params}
+    assert names <= {p.name for p in cli.load("synth").params}
     described = set(re.findall(r"^    (\w+) : ", options.__doc__, re.MULTILINE))
     assert described == names
     assert names <= set(re.findall(r"``(\w+)``", simdtex.synthesize.__doc__))
@@ -210,7 +211,7 @@ def test_every_option_of_a_method_is_on_the_command_line_and_in_the_docstrings(m
 
 def test_every_option_of_solids_and_mixtures_is_on_the_command_line_and_in_the_docstrings():
     names = set(solid.Options.__dataclass_fields__)
-    assert names <= {p.name for p in cli.main.commands["solid"].params}
+    assert names <= {p.name for p in cli.load("solid").params}
     assert names <= set(re.findall(r"``(\w+)``", simdtex.synthesize_solid.__doc__))
     own = names - set(METHODS["pyramid"].Options.__dataclass_fields__)
     assert set(re.findall(r"^    (\w+) : ", solid.Options.__doc__, re.MULTILINE)) == own
@@ -222,7 +223,7 @@ def test_every_option_of_solids_and_mixtures_is_on_the_command_line_and_in_the_d
         "full_output",
         "channel_axis",
     }
-    assert names - {"options"} <= {p.name for p in cli.main.commands["mix"].params}
+    assert names - {"options"} <= {p.name for p in cli.load("mix").params}
 
 
 @pytest.mark.parametrize("method", METHODS)

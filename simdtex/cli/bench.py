@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 import click
-from rich.console import Console
 
 from simdtex.cli.common import plainly
 
@@ -30,6 +29,8 @@ def bench(device: str | None, quick: bool, path: Path | None, folder: Path | Non
     Everything is measured in one run and compared in ratios: with the device's own limits, with the NumPy reference,
     and with a program of library code (BLAS, FFTs, k-d trees) on as many threads. Leave the machine alone meanwhile.
     """
+    from rich.console import Console
+
     from simdtex.bench import run as benchmark
     from simdtex.bench import sizes
     from simdtex.io.image import atomic_path, check_writable

@@ -13,10 +13,6 @@ from typing import Any
 
 import click
 from click.core import ParameterSource
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-from simdtex.methods import mrf, multires, pyramid
 
 Command = Callable[..., None]
 
@@ -41,28 +37,45 @@ def plainly(command: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
-DEFAULTS, MULTIRES, PYRAMID = mrf.Options(), multires.Options(), pyramid.Options()
+@functools.cache
+def _defaults() -> dict[str, Any]:
+    """Each method's options as they are by default, by the method's name."""
+    from simdtex.methods import mrf, multires, pyramid
 
-DEVICE = click.option(
+    return {"mrf": mrf.Options(), "multires": multires.Options(), "pyramid": pyramid.Options()}
+
+
+class Option(click.Option):
+    """An option whose help names defaults, as ``{mrf.order}``: the methods load only where it is shown."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """The names of the option, and its help."""
+        self.help = self.help and self.help.format(**_defaults())
+        return super().get_help_record(ctx)
+
+
+option = functools.partial(click.option, cls=Option)
+
+DEVICE = option(
     "--device",
     metavar="TEXT",
     help="Part of a device's name or platform, an index of `simdtex devices`, or `reference`. "
     "Default: SIMDTEX_DEVICE, else a GPU, else a CPU.",
 )
 
-SEED = click.option("--seed", type=int, help="Same seed, same picture on every device.  [a fresh one, printed]")
-PROFILE = click.option("--profile", is_flag=True, help="Print what each kernel took, and what was left to the host.")
-QUIET = click.option("-q", "--quiet", is_flag=True, help="No progress bar and no summary.")
-LEVELS = click.option("--levels", type=int, help="Of the multigrid, or of the pyramid.  [as many as the sample feeds]")
-BOUNDARY = click.option("--boundary", help=f"mrf, multires: torus (the result tiles) or open.  [{DEFAULTS.boundary}]")
+SEED = option("--seed", type=int, help="Same seed, same picture on every device.  [a fresh one, printed]")
+PROFILE = option("--profile", is_flag=True, help="Print what each kernel took, and what was left to the host.")
+QUIET = option("-q", "--quiet", is_flag=True, help="No progress bar and no summary.")
+LEVELS = option("--levels", type=int, help="Of the multigrid, or of the pyramid.  [as many as the sample feeds]")
+BOUNDARY = option("--boundary", help="mrf, multires: torus (the result tiles) or open.  [{mrf.boundary}]")
 
 _EDGES = {
-    "mrf": f"auto, reflect or whole: candidates at the sample's edge.  [{DEFAULTS.edges}]",
-    "pyramid": f"reflect or wrap: how the sample goes on beyond its edge.  [{PYRAMID.edges}]",
+    "mrf": "auto, reflect or whole: candidates at the sample's edge.  [{mrf.edges}]",
+    "pyramid": "reflect or wrap: how the sample goes on beyond its edge.  [{pyramid.edges}]",
 }
 _ORIENTATIONS = {
-    "multires": f"of edge and line filters.  [{MULTIRES.orientations}]",
-    "pyramid": f"1, 2, 4 or 6, of the steerable pyramid.  [{PYRAMID.orientations}]",
+    "multires": "of edge and line filters.  [{multires.orientations}]",
+    "pyramid": "1, 2, 4 or 6, of the steerable pyramid.  [{pyramid.orientations}]",
 }
 
 
@@ -80,6 +93,8 @@ def opened(device: str | None, profile: bool) -> Any:
 
 def print_profile(statistics: dict[str, Any]) -> None:
     """Print the profile of a run, in lines of full length where no terminal breaks them."""
+    from rich.console import Console
+
     from simdtex.report.profile import render
 
     render(statistics, Console(width=None if sys.stdout.isatty() else 200))
@@ -87,65 +102,53 @@ def print_profile(statistics: dict[str, Any]) -> None:
 
 def stages_option(what: str) -> Callable[[Command], Command]:
     """``--stages``, which writes these pictures."""
-    return click.option("--stages", type=click.Path(path_type=Path), metavar="DIR", help=f"Write {what} as pictures.")
+    return option("--stages", type=click.Path(path_type=Path), metavar="DIR", help=f"Write {what} as pictures.")
 
 
 def _shared(name: str, texts: dict[str, str], *methods: str, **kinds: Any) -> Callable[[Command], Command]:
     """An option that means something to each of these methods."""
-    return click.option(name, help=" ".join(f"{method}: {texts[method]}" for method in methods), **kinds)
+    return option(name, help=" ".join(f"{method}: {texts[method]}" for method in methods), **kinds)
 
 
 _MRF_OPTIONS = (
-    click.option("--preset", help="mrf: default, or paper: the 1998 rules to the letter."),
-    click.option(
-        "--order", type=int, help=f"mrf: neighbours within sqrt(order): 8 has 24, 18 has 60.  [{DEFAULTS.order}]"
-    ),
-    click.option("--relaxation", help=f"mrf: icm (the mode) or gibbs (a draw).  [{DEFAULTS.relaxation}]"),
-    click.option(
-        "--bandwidth", type=float, help=f"mrf: of the Parzen kernel, in units of h_opt.  [{DEFAULTS.bandwidth}]"
-    ),
-    click.option(
+    option("--preset", help="mrf: default, or paper: the 1998 rules to the letter."),
+    option("--order", type=int, help="mrf: neighbours within sqrt(order): 8 has 24, 18 has 60.  [{mrf.order}]"),
+    option("--relaxation", help="mrf: icm (the mode) or gibbs (a draw).  [{mrf.relaxation}]"),
+    option("--bandwidth", type=float, help="mrf: of the Parzen kernel, in units of h_opt.  [{mrf.bandwidth}]"),
+    option(
         "--coherence", type=float, help="mrf: preference for continuing a neighbour's source.  [exact 1, coherent 0.2]"
     ),
-    click.option("--xi", type=float, help=f"mrf: cooling, below 0; further down is faster.  [{DEFAULTS.xi}]"),
-    click.option(
+    option("--xi", type=float, help="mrf: cooling, below 0; further down is faster.  [{mrf.xi}]"),
+    option(
         "--free-sweeps",
         type=int,
-        help=f"mrf: sweeps over all sites after a level's equilibrium.  [{DEFAULTS.free_sweeps}]",
+        help="mrf: sweeps over all sites after a level's equilibrium.  [{mrf.free_sweeps}]",
     ),
-    click.option("--pixel", help=f"mrf: source (pixels of the sample) or density (grey levels).  [{DEFAULTS.pixel}]"),
-    click.option("--phases", help=f"mrf: decimated or all: candidates at coarse levels.  [{DEFAULTS.phases}]"),
-    click.option("--coarsest", help=f"mrf: gibbs or same: how the coarsest level relaxes.  [{DEFAULTS.coarsest}]"),
-    click.option(
-        "--search", help=f"mrf: exact (all candidates), coherent (a few, much faster) or auto.  [{DEFAULTS.search}]"
-    ),
-    click.option(
-        "--suggesting", type=int, help=f"mrf, coherent: nearest neighbours that suggest one.  [{DEFAULTS.suggesting}]"
-    ),
-    click.option("--similar", type=int, help=f"mrf, coherent: candidates like each of these.  [{DEFAULTS.similar}]"),
-    click.option("--chance", type=int, help=f"mrf, coherent: candidates at random.  [{DEFAULTS.chance}]"),
-    click.option(
-        "--exhaustive", type=int, help=f"mrf, coherent: levels of so few candidates weigh all.  [{DEFAULTS.exhaustive}]"
-    ),
+    option("--pixel", help="mrf: source (pixels of the sample) or density (grey levels).  [{mrf.pixel}]"),
+    option("--phases", help="mrf: decimated or all: candidates at coarse levels.  [{mrf.phases}]"),
+    option("--coarsest", help="mrf: gibbs or same: how the coarsest level relaxes.  [{mrf.coarsest}]"),
+    option("--search", help="mrf: exact (all candidates), coherent (a few, much faster) or auto.  [{mrf.search}]"),
+    option("--suggesting", type=int, help="mrf, coherent: nearest neighbours that suggest one.  [{mrf.suggesting}]"),
+    option("--similar", type=int, help="mrf, coherent: candidates like each of these.  [{mrf.similar}]"),
+    option("--chance", type=int, help="mrf, coherent: candidates at random.  [{mrf.chance}]"),
+    option("--exhaustive", type=int, help="mrf, coherent: levels of so few candidates weigh all.  [{mrf.exhaustive}]"),
 )
 
 _MULTIRES_OPTIONS = (
-    click.option("--sigma", type=float, help=f"multires: of the filters, in pixels.  [{MULTIRES.sigma}]"),
-    click.option("--filter-size", type=int, help=f"multires: rows of a filter, odd.  [{MULTIRES.filter_size}]"),
-    click.option("--features", help=f"multires: of the luminance or of all channels.  [{MULTIRES.features}]"),
-    click.option("--phase", help=f"multires: match or free: candidates among siblings.  [{MULTIRES.phase}]"),
+    option("--sigma", type=float, help="multires: of the filters, in pixels.  [{multires.sigma}]"),
+    option("--filter-size", type=int, help="multires: rows of a filter, odd.  [{multires.filter_size}]"),
+    option("--features", help="multires: of the luminance or of all channels.  [{multires.features}]"),
+    option("--phase", help="multires: match or free: candidates among siblings.  [{multires.phase}]"),
 )
 
 
 _THRESHOLD_OPTIONS = (
-    click.option(
-        "--alpha", metavar="FLOAT|auto", help=f"multires: threshold; more is freer, auto finds one.  [{MULTIRES.alpha}]"
+    option(
+        "--alpha", metavar="FLOAT|auto", help="multires: threshold; more is freer, auto finds one.  [{multires.alpha}]"
     ),
-    click.option(
-        "--beta", type=float, help=f"multires: stricter at high frequencies, alpha / k^beta.  [{MULTIRES.beta:g}]"
-    ),
-    click.option("--target", type=float, help=f"multires: mean candidates for --alpha auto.  [{MULTIRES.target}]"),
-    click.option(
+    option("--beta", type=float, help="multires: stricter at high frequencies, alpha / k^beta.  [{multires.beta:g}]"),
+    option("--target", type=float, help="multires: mean candidates for --alpha auto.  [{multires.target}]"),
+    option(
         "--thresholds",
         type=click.Path(path_type=Path),
         metavar="FILE",
@@ -158,16 +161,16 @@ def _pyramid_options(start: str, prefix: str = "") -> list[Callable[[Command], C
     """Those of ``pyramid`` that no other method has; `start` is ``"METAVAR: What to begin with"``."""
     metavar, begin = start.split(": ")
 
-    def option(name: str, text: str, **kinds: Any) -> Callable[[Command], Command]:
-        return click.option(name, help=prefix + text[0].lower() + text[1:] if prefix else text, **kinds)
+    def named(name: str, text: str, **kinds: Any) -> Callable[[Command], Command]:
+        return option(name, help=prefix + text[0].lower() + text[1:] if prefix else text, **kinds)
 
     return [
-        option("--pyramid", f"steerable or laplacian: whose histograms are matched.  [{PYRAMID.pyramid}]"),
-        option("--iterations", f"Times that all are matched, 0 or more.  [{PYRAMID.iterations}]", type=int),
-        option("--match", f"rank (exact) or lookup (the paper's tables).  [{PYRAMID.match}]"),
-        option("--bins", f"Of these tables, 2 to 4096.  [{PYRAMID.bins}]", type=int),
-        option("--color", f"decorrelate or channels: the colours that are matched.  [{PYRAMID.color}]"),
-        option("--start", f"{begin} to begin with.  [noise]", type=click.Path(path_type=Path), metavar=metavar),
+        named("--pyramid", "steerable or laplacian: whose histograms are matched.  [{pyramid.pyramid}]"),
+        named("--iterations", "Times that all are matched, 0 or more.  [{pyramid.iterations}]", type=int),
+        named("--match", "rank (exact) or lookup (the paper's tables).  [{pyramid.match}]"),
+        named("--bins", "Of these tables, 2 to 4096.  [{pyramid.bins}]", type=int),
+        named("--color", "decorrelate or channels: the colours that are matched.  [{pyramid.color}]"),
+        named("--start", f"{begin} to begin with.  [noise]", type=click.Path(path_type=Path), metavar=metavar),
     ]
 
 
@@ -205,9 +208,9 @@ def pyramid_options(start: str) -> Callable[[Command], Command]:
     """Those of a command that runs nothing but ``pyramid``; `start` is ``"METAVAR: What to begin with"``."""
     return _with(
         *_pyramid_options(start),
-        click.option("--levels", type=int, help="Of the pyramids.  [as many as leave 8 pixels a side]"),
-        click.option("--orientations", type=int, help=_ORIENTATIONS["pyramid"]),
-        click.option("--edges", help=_EDGES["pyramid"]),
+        option("--levels", type=int, help="Of the pyramids.  [as many as leave 8 pixels a side]"),
+        option("--orientations", type=int, help=_ORIENTATIONS["pyramid"]),
+        option("--edges", help=_EDGES["pyramid"]),
     )
 
 
@@ -307,18 +310,26 @@ def progress_bar(quiet: bool) -> Iterator[Callable[[float, str, str], None]]:
     Yields ``show(fraction, doing, job)``: the share of the whole that is done, what is being done now, and the job that
     this is part of, empty where there is only one.
     """
-    console = Console(stderr=True, quiet=quiet)
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal) as bar:
-        task = bar.add_task("starting", total=1.0)
+    if quiet or not sys.stderr.isatty():
         last = ""
 
-        def show(fraction: float, doing: str, job: str = "") -> None:
+        def tell(fraction: float, doing: str, job: str = "") -> None:
             nonlocal last
-            bar.update(task, completed=fraction, description=", ".join(part for part in (job, doing) if part))
-            if job != last and not quiet and not console.is_terminal:
+            if job != last and not quiet:
                 click.echo(job, err=True)
             last = job
+
+        yield tell
+        return
+    from rich.console import Console  # only where a bar is drawn: it takes long to load
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=1.0)
+
+        def show(fraction: float, doing: str, job: str = "") -> None:
+            bar.update(task, completed=fraction, description=", ".join(part for part in (job, doing) if part))
 
         yield show
 
@@ -333,9 +344,11 @@ def watching(
 
     `limits` are black and white in their pictures.
     """
-    from simdtex.report.stages import StageWriter
+    writer = None
+    if stages:
+        from simdtex.report.stages import StageWriter
 
-    writer = StageWriter(stages, limits=limits) if stages else None
+        writer = StageWriter(stages, limits=limits)
     try:
         with progress_bar(quiet) as show:
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import sys
 
 import click
-from rich.console import Console
 
 from simdtex.cli.common import plainly
 
@@ -15,6 +14,8 @@ from simdtex.cli.common import plainly
 @plainly
 def devices() -> None:
     """List every OpenCL device, whether it works, and which one would be chosen."""
+    from rich.console import Console
+
     from simdtex.machine.devices import render
 
     render(Console(width=None if sys.stdout.isatty() else 200))

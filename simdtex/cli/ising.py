@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.console import Console
 
 from simdtex.cli.common import DEVICE, command_line, plainly, progress_bar
 
@@ -57,6 +56,8 @@ def ising(
     quiet: bool,
 ) -> None:
     """Relax Ising spins by each schedule and compare with the exact energy and magnetisation."""
+    from rich.console import Console
+
     from simdtex import schedules as known
     from simdtex.experiments.estimates import findings
     from simdtex.experiments.ising import check, ising

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.console import Console
 
-from simdtex.cli.common import DEFAULTS, DEVICE, command_line, given, mrf_options, plainly, progress_bar
+from simdtex.cli.common import DEVICE, command_line, given, mrf_options, plainly, progress_bar
+from simdtex.methods.mrf import Options
 from simdtex.schedules import TOGETHER
 
 
@@ -37,7 +37,7 @@ from simdtex.schedules import TOGETHER
 @click.option("--size", default="96x96", show_default=True, metavar="WIDTHxHEIGHT", help="Of each output.")
 @mrf_options
 @click.option("--array", default="maspar-mp1-16k", show_default=True, help="Processor array to count on, or ROWSxCOLS.")
-@click.option("--mapping", default=DEFAULTS.mapping, show_default=True, help="Or hierarchical: pixels onto the array.")
+@click.option("--mapping", default=Options.mapping, show_default=True, help="Or hierarchical: pixels onto the array.")
 @click.option("--emulate", is_flag=True, help="Run as on the array too, which takes longer.")
 @DEVICE
 @click.option("-q", "--quiet", is_flag=True, help="No progress and no table.")
@@ -57,6 +57,8 @@ def schedules(
 
     Without SAMPLE it is 128x128 pixels of the brick of scikit-image.
     """
+    from rich.console import Console
+
     from simdtex import schedules as known
     from simdtex.experiments.comparison import compare
     from simdtex.io import image

@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import click
-from rich.console import Console
 
 from simdtex.cli.common import (
-    DEFAULTS,
     DEVICE,
     PROFILE,
     QUIET,
@@ -22,6 +20,7 @@ from simdtex.cli.common import (
     last_iteration,
     method_options,
     opened,
+    option,
     output_shape,
     plainly,
     print_profile,
@@ -43,18 +42,16 @@ from simdtex.cli.common import (
     help="mrf: Paget and Longstaff 1998. multires: De Bonet 1997. pyramid: Heeger and Bergen 1995.",
 )
 @method_options
-@click.option(
+@option(
     "--schedule",
     help="mrf: which sites relax together: coloring, coloring-fixed, luby, checkerboard, synchronous, "
-    f"random-subset[:P], raster, random-scan or block[:ROWSxCOLS].  [{DEFAULTS.schedule}]",
+    "random-subset[:P], raster, random-scan or block[:ROWSxCOLS].  [{mrf.schedule}]",
 )
 @click.option("--check-schedule", is_flag=True, default=None, help="mrf: check equation (14) at every step.")
 @click.option(
     "--array", metavar="ROWSxCOLS", help="mrf: run on a processor array, or maspar-mp1-1k to -16k.  [sites are packed]"
 )
-@click.option(
-    "--mapping", help=f"mrf: cut-and-stack or hierarchical: how pixels lie on the array.  [{DEFAULTS.mapping}]"
-)
+@option("--mapping", help="mrf: cut-and-stack or hierarchical: how pixels lie on the array.  [{mrf.mapping}]")
 @click.option(
     "--emulate/--no-emulate", default=None, help="mrf: launch one work-item per PE, or only account for the array."
 )
@@ -90,8 +87,6 @@ def synth(
 ) -> None:
     """Make more of the texture SAMPLE."""
     from simdtex.io import image
-    from simdtex.model import source_map as maps
-    from simdtex.report.accounting import render
     from simdtex.synthesis import synthesize
 
     if accounting and method != "mrf":
@@ -105,6 +100,8 @@ def synth(
     shape = output_shape(size, pixels, begin)
     channels = 1 if picture.channel_axis is None else pixels.shape[-1]
     image.check_writable(output, pixels.dtype, channels)
+    if source_map or also:
+        from simdtex.model import source_map as maps
     if source_map:
         image.check_writable(source_map, suffixes=maps.SOURCE_SUFFIXES)
     others = [_other_map(text, (height, width)) for text in also]
@@ -146,6 +143,10 @@ def synth(
     if profile:
         print_profile(run.statistics)
     if accounting:
+        from rich.console import Console
+
+        from simdtex.report.accounting import render
+
         render(run.statistics["accounting"], Console())
 
 

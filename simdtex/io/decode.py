@@ -10,10 +10,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import imagecodecs
 import numpy as np
 import PIL.Image
-import tifffile
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
@@ -74,6 +72,8 @@ def _read_pillow(data: bytes) -> Array:
 
 
 def _read_png16(data: bytes) -> Array:
+    import imagecodecs  # here and below: a picture that needs the library waits for it, and no other
+
     pixels: Array = imagecodecs.png_decode(data)
     if pixels.ndim == 3 and pixels.shape[2] in (2, 4):
         pixels = _without_opaque_alpha(pixels)
@@ -82,6 +82,8 @@ def _read_png16(data: bytes) -> Array:
 
 
 def _read_tiff(data: bytes) -> Array:
+    import tifffile
+
     with _quiet("tifffile"), tifffile.TiffFile(io.BytesIO(data)) as tiff:
         page = tiff.pages.first
         if not isinstance(page, tifffile.TiffPage):

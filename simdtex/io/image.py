@@ -21,10 +21,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import imagecodecs
 import numpy as np
 import PIL.Image
-import tifffile
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io.decode import decode, native
@@ -410,7 +408,9 @@ def _encode(path: Path, suffix: str, pixels: Array) -> None:
     if suffix == ".npy":
         with path.open("wb") as file:  # np.save would add its own suffix to a name in capitals
             np.save(file, pixels, allow_pickle=False)
-    elif suffix == ".png":
+    elif suffix == ".png" and pixels.dtype == np.uint16:
+        import imagecodecs  # here and below: a picture that needs the library waits for it, and no other
+
         path.write_bytes(imagecodecs.png_encode(pixels))
     elif suffix in (".tif", ".tiff"):
         _write_tiff(path, pixels)
@@ -422,6 +422,8 @@ def _encode(path: Path, suffix: str, pixels: Array) -> None:
 
 
 def _write_tiff(path: Path, pixels: Array) -> None:
+    import tifffile
+
     channels = 1 if pixels.ndim == 2 else pixels.shape[2]
     colours = 3 if channels in (3, 4) else 1
     tifffile.imwrite(

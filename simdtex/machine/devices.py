@@ -10,7 +10,6 @@ right bits: runtimes that enumerate, but cannot build, are common.
 
 from __future__ import annotations
 
-import argparse
 import functools
 import os
 import platform
@@ -372,6 +371,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     A simulator counts only where SIMDTEX_DEVICE names it.
     """
+    import argparse
+
     parser = argparse.ArgumentParser(prog="python -m simdtex.machine.devices", description="List devices.")
     parser.add_argument("--ensure", action="store_true", help="print nothing, only exit 0 or 1")
     if not parser.parse_args(argv).ensure:

@@ -12,7 +12,6 @@ import subprocess
 import sys
 import tempfile
 import textwrap
-import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -128,12 +127,11 @@ def failure(handle: cl.Device) -> str:
     """Build and run a tiny program, once; return why the device is not usable, or nothing."""
     import pyopencl
 
+    from simdtex.machine.programs import build
+
     try:
-        with warnings.catch_warnings():
-            # Intel's runtime writes a build log even for a clean build.
-            warnings.simplefilter("ignore", pyopencl.CompilerWarning)
-            context = pyopencl.Context([handle])
-            program = pyopencl.Program(context, _SOURCE).build(["-cl-std=CL1.2"])
+        context = pyopencl.Context([handle])
+        program = build(context, _SOURCE, ["-cl-std=CL1.2"])
         queue = pyopencl.CommandQueue(context)
         host = np.full(64, 1 + 2.0**-12, np.float32)
         flags = pyopencl.mem_flags

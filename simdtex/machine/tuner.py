@@ -9,8 +9,6 @@ names another folder; SIMDTEX_TUNE=0 takes the defaults and leaves the folder al
 from __future__ import annotations
 
 import json
-import os
-import tempfile
 import time
 import warnings
 from collections.abc import Callable
@@ -18,13 +16,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import platformdirs
 import pyopencl as cl
 
+from simdtex.machine.cache import FOLDER, SWITCH, folder, keep
 from simdtex.machine.forms import Form, default, others
 from simdtex.machine.opencl import OpenCL
 
-FOLDER, SWITCH = "SIMDTEX_CACHE", "SIMDTEX_TUNE"
+__all__ = ["FILE", "FOLDER", "SWITCH", "Form", "choose", "default", "others", "probe", "tune"]
+
 FILE = "tuning.json"
 SCHEMA = 1
 """To be raised when the loop changes, so that old choices are not taken."""
@@ -104,42 +103,31 @@ def choose(machine: OpenCL) -> Form:
 
 def tune(machine: OpenCL) -> None:
     """Give a machine the form that its device does best: the one remembered, or one measured now."""
-    if os.environ.get(SWITCH) == "0":
+    place = folder()
+    if place is None:
         return
-    folder = Path(os.environ.get(FOLDER) or platformdirs.user_cache_dir("simdtex"))
     info = machine.info
     key = " | ".join([str(SCHEMA), info.platform, info.name, info.version, info.driver, str(info.compute_units)])
-    form = _recall(folder, key)
+    form = _recall(place / FILE, key)
     if form is None:
         form = choose(machine)
-        _remember(folder, key, form)
+        keep(place / FILE, json.dumps(_read(place / FILE) | {key: form._asdict()}, indent=1).encode())
     machine.take(form)
 
 
-def _read(folder: Path) -> dict[str, Any]:
+def _read(path: Path) -> dict[str, Any]:
     try:
-        known = json.loads((folder / FILE).read_text(encoding="utf-8"))
+        known = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
     return known if isinstance(known, dict) else {}
 
 
-def _recall(folder: Path, key: str) -> Form | None:
+def _recall(path: Path, key: str) -> Form | None:
     """The remembered form; None where there is none, or none that can be."""
     try:
-        form = Form(**_read(folder).get(key, {}))
+        form = Form(**_read(path).get(key, {}))
         legal = form.vector in (1, 4, 8, 16) and form.step in (1, 2, 4, 8, 16) and form.group in (16, 64, 128, 256)
     except TypeError:
         return None
     return form if legal else None
-
-
-def _remember(folder: Path, key: str, form: Form) -> None:
-    """Write the file anew beside the old one and put it in its place; a folder that cannot be written is let be."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=folder, suffix=".tmp", delete=False) as file:
-            json.dump(_read(folder) | {key: form._asdict()}, file, indent=1)
-        os.replace(file.name, folder / FILE)
-    except OSError:
-        return

@@ -115,7 +115,8 @@ def _moves(
         there = np.ones(count, bool) if torus else (to >= 0) & (to < count)
         way = array._axis(to % count * spacing, length, pes)[1] - pe
         way = (way + pes // 2) % pes - pes // 2  # the shorter way around
-        pairs = np.stack(np.divmod(np.unique(layer[there] * (2 * pes) + way[there] + pes), 2 * pes))
+        different = set((layer[there] * (2 * pes) + way[there] + pes).tolist())  # np.unique would load numpy.ma for it
+        pairs = np.stack(np.divmod(np.array(sorted(different), np.int64), 2 * pes))
         pairs[1] -= pes
         first = np.searchsorted(pairs[0], pairs[0])  # of the pairs of the same layer
         number = np.arange(pairs.shape[1]) - first

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A program that every process builds, kept as its binary.
+
+Most runtimes, or pyopencl for them, look a program up by its text before they compile it. PoCL first reads a megabyte
+of its own headers, a twentieth of a second for any program. Its binary loads in a thousandth; but it makes PoCL compile
+every kernel once more, for work-groups of any size, which pays only for a tiny program that all processes build.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pyopencl as cl
+
+from simdtex.machine import cache
+
+POCL = "Portable Computing Language"
+FOLDER = "programs"
+"""Of the cache folder."""
+
+
+def build(context: cl.Context, source: str, options: list[str]) -> Any:
+    """Build a program that includes nothing for the one device of a context, from what was kept where there is that.
+
+    Returns
+    -------
+    pyopencl.Program
+
+    Raises
+    ------
+    pyopencl.Error
+        With the compiler's words.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", cl.CompilerWarning)  # Intel's runtime has a log even for a clean build
+        path = _place(context.devices[0], source, options)
+        binary = _recall(path) if path else None
+        if binary is not None:
+            with suppress(cl.Error):  # one of a runtime that is gone is built anew
+                return cl.Program(context, context.devices, [binary]).build(options)
+        program = cl.Program(context, source).build(options)
+        if path:
+            with suppress(cl.Error):  # a runtime without a compiler for binaries is none the worse for it
+                binary = program.get_info(cl.program_info.BINARIES)[0]
+                cache.keep(path, hashlib.sha256(binary).digest() + binary)
+        return program
+
+
+def _place(device: cl.Device, source: str, options: list[str]) -> Path | None:
+    """Where the binary is kept; None where it is not."""
+    platform = device.platform
+    folder = cache.folder() if platform.name == POCL else None
+    if folder is None:
+        return None
+    told = [platform.version, device.name, device.version, device.driver_version, *options, source]
+    return folder / FOLDER / hashlib.sha256("\0".join(told).encode()).hexdigest()
+
+
+def _recall(path: Path) -> bytes | None:
+    """The binary that was kept, if it is whole: a runtime need not survive any other."""
+    try:
+        data = path.read_bytes()
+    except OSError:
+        return None
+    return data[32:] if hashlib.sha256(data[32:]).digest() == data[:32] else None

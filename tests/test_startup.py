@@ -1,0 +1,121 @@
+"""What starting costs: nothing is imported that is not needed, and the public names are there all the same."""
+
+import json
+import os
+import subprocess
+import sys
+
+import click
+import numpy as np
+import pytest
+
+import simdtex
+from simdtex import cli
+from simdtex.io.image import write
+from simdtex.machine import cache, programs, runtimes
+
+HEAVY = {"pyopencl", "scipy", "skimage", "matplotlib", "tifffile", "imagecodecs", "jinja2", "nrrd", "emcee", "rich"}
+PUBLIC = {
+    *("DeviceError", "Output", "Progress", "devices", "lcpdf", "mix", "open_machine", "suggest_alpha", "synthesize"),
+    *("synthesize_solid", "__version__"),
+}
+COMMAND_LINE = """
+from simdtex.cli import main
+try:
+    main({words})
+except SystemExit:
+    pass
+"""
+
+
+def imported(code):
+    """The top packages that a process of its own has imported after this code."""
+    told = f"{code}\nimport json, sys\nprint(json.dumps(sorted({{name.partition('.')[0] for name in sys.modules}})))"
+    result = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True, timeout=120)
+    return set(json.loads(result.stdout.splitlines()[-1]))
+
+
+@pytest.mark.parametrize("words", [["--help"], ["--version"], ["nonsense"]])
+def test_the_command_line_answers_without_numpy(words):
+    assert not imported(COMMAND_LINE.format(words=words)) & {*HEAVY, "numpy", "PIL"}
+
+
+def test_the_package_is_imported_without_numpy():
+    assert not imported("import simdtex; dir(simdtex); simdtex.__version__") & {*HEAVY, "numpy", "PIL"}
+
+
+@pytest.mark.parametrize("command", ["synth", "solid", "mix", "sheet", "schedules"])
+def test_the_help_of_a_command_needs_no_heavy_module(command):
+    assert not imported(COMMAND_LINE.format(words=[command, "--help"])) & HEAVY
+
+
+def test_an_8_bit_picture_is_read_and_written_by_pillow_alone(tmp_path):
+    path = tmp_path / "grey.png"
+    write(path, np.arange(256, dtype=np.uint8).reshape(16, 16))
+    code = f"from simdtex.io.image import read, write; write({str(path)!r}, read({str(path)!r}).pixels)"
+    assert not imported(code) & HEAVY
+
+
+def test_a_whole_run_on_the_reference_needs_no_heavy_module(tmp_path):
+    path, out = str(tmp_path / "grey.png"), str(tmp_path / "more.png")
+    write(path, np.arange(256, dtype=np.uint8).reshape(16, 16))
+    words = ["synth", path, "-o", out, "--size", "8", "--order", "2", "--seed", "1", "--device", "reference"]
+    assert not imported(COMMAND_LINE.format(words=words)) & HEAVY
+    assert os.path.exists(out)
+
+
+def test_every_public_name_is_there():
+    assert set(dir(simdtex)) >= PUBLIC
+    assert set(simdtex.__all__) == PUBLIC - {"__version__"}
+    assert set(simdtex._HOMES) == set(simdtex.__all__)
+    for name in PUBLIC:
+        assert getattr(simdtex, name) is not None
+    assert callable(simdtex.devices)
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = simdtex.nonsense
+
+
+@pytest.mark.parametrize("name", sorted(cli.COMMANDS))
+def test_the_list_of_commands_says_what_their_own_help_says(name):
+    command = cli.load(name)
+    assert isinstance(command, click.Command)
+    assert command.name == name
+    assert cli.main.commands[name].get_short_help_str(200) == command.get_short_help_str(200)
+
+
+@pytest.fixture
+def kept(tmp_path, monkeypatch):
+    """A cache folder of the test's own, and a device forgotten."""
+    monkeypatch.setenv(cache.FOLDER, str(tmp_path))
+    monkeypatch.delenv(cache.SWITCH)
+    runtimes.failure.cache_clear()
+    yield tmp_path / programs.FOLDER
+    runtimes.failure.cache_clear()
+
+
+@pytest.mark.parametrize("content", [None, b"", b"\0" * 100])
+def test_the_program_of_the_probe_is_kept_for_pocl(cl_device, kept, monkeypatch, content):
+    on_pocl = cl_device.platform == programs.POCL
+    assert runtimes.failure(cl_device.handle) == ""
+    files = list(kept.glob("*"))
+    assert len(files) == on_pocl
+    for path in files:
+        whole = path.read_bytes()
+        if content is not None:
+            path.write_bytes(content)
+        runtimes.failure.cache_clear()
+        assert runtimes.failure(cl_device.handle) == ""
+        assert len(path.read_bytes()) == len(whole), "what was broken is written anew"
+
+
+def test_a_kept_program_must_give_the_right_bits_all_the_same(cl_device, kept, monkeypatch):
+    monkeypatch.setattr(runtimes, "_SOURCE", runtimes._SOURCE.replace("fma(a[i], a[i], -", "(a[i] * 2.0f -"))
+    for _ in range(2):
+        runtimes.failure.cache_clear()
+        assert "wrong answer" in runtimes.failure(cl_device.handle)
+
+
+def test_nothing_is_kept_where_the_folder_is_to_be_left_alone(cl_device, kept, monkeypatch):
+    monkeypatch.setenv(cache.SWITCH, "0")
+    assert runtimes.failure(cl_device.handle) == ""
+    assert not kept.exists()
