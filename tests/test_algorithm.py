@@ -23,7 +23,7 @@ DENSITY = {"pixel": "density", "order": 1, "xi": -4.0, "free_sweeps": 1}
 CASES = {
     "defaults": ((9, 10), None, np.uint8, (3, 4), {}),
     "default-levels-by-candidates": ((16, 17), None, np.uint8, (18, 17), {"order": 1}),
-    "default-levels-by-output": ((17, 16), None, np.uint8, (10, 8), {"order": 2}),
+    "default-levels-by-output": ((32, 33), None, np.uint8, (10, 8), {"order": 2}),
     "default-levels-whole": ((20, 19), None, np.uint8, (11, 9), {"order": 2, "edges": "whole", "phases": "all"}),
     "paper": ((12, 11), None, np.uint8, (8, 9), {"preset": "paper", "order": 2}),
     "paper-icm": ((12, 11), None, np.uint8, (5, 6), {"preset": "paper", "order": 1, "relaxation": "icm", "xi": -4.0}),
@@ -56,7 +56,7 @@ CASES = {
     "few-three-levels": ((13, 14), None, np.uint8, (11, 10), FEW | {"levels": 3, "edges": "reflect"}),
     "few-exhaustive": ((13, 14), None, np.float32, (9, 10), FEW | {"levels": 3, "exhaustive": 50}),
     "few-same": ((12, 11), None, np.uint8, (8, 9), FEW | {"coarsest": "same"}),
-    "few-gibbs": ((12, 11), None, np.uint16, (8, 9), FEW | {"relaxation": "gibbs", "bandwidth": 0.5}),
+    "few-gibbs": ((12, 11), None, np.uint16, (8, 9), FEW | {"relaxation": "gibbs", "bandwidth": 0.5, "suggesting": 2}),
     "few-gibbs-density": ((10, 9), 2, np.uint8, (7, 8), FEW | {"relaxation": "gibbs", "pixel": "density", "chance": 6}),
     "all-of-many": ((35, 31), None, np.float32, (5, 6), {"order": 2, "levels": 1, "coarsest": "same"}),
     "seam": ((9, 9), None, np.uint8, (7, 11), {"search": "exact", "order": 5, "levels": 1, "xi": -8.0}),
@@ -102,6 +102,29 @@ def test_a_run_is_algorithm_1(name):
 @pytest.mark.parametrize("name", ON_A_DEVICE)
 def test_a_run_on_a_device_is_algorithm_1(machine, name):
     assert_same_bits(run(*CASES[name], machine)[0], plainly(*CASES[name]))
+
+
+CLOSE = {"order": 8, "relaxation": "gibbs", "bandwidth": 0.0005, "coherence": 0.0, "xi": -8.0}
+"""Candidates that differ in equally many values of two levels differ by rounding alone; so narrow a Gaussian tells."""
+SUMS = {
+    "exact": {"search": "exact", "levels": 1},
+    "all": {"search": "coherent", "levels": 1},
+    "few": {"search": "coherent", "levels": 2, "exhaustive": 0},
+}
+
+
+@pytest.mark.parametrize("how", SUMS)
+def test_sums_have_their_order(monkeypatch, how):
+    sample = np.random.default_rng(5).integers(0, 2, (12, 11, 3)).astype(np.float32)
+    given = CLOSE | SUMS[how]
+    image, output = simdtex.synthesize(
+        sample, (7, 8), channel_axis=-1, rng=SEED, device=REFERENCE, full_output=True, **given
+    )
+    plainly = plain_mrf.synthesize(sample, (7, 8), SEED, **given)
+    assert_same_bits([image, output.source, output.temperature], plainly)
+    if how == "all":  # else the equality shows nothing of the order
+        monkeypatch.setattr(plain_mrf, "ALL_IN_LANES", not plain_mrf.ALL_IN_LANES)
+        assert (plain_mrf.synthesize(sample, (7, 8), SEED, **given)[1] != output.source).any()
 
 
 def test_the_plain_loops_have_the_engines_defaults_and_presets():
