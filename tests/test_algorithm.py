@@ -1,0 +1,259 @@
+"""Whole runs of the method ``mrf`` are Algorithm 1 in plain loops, to the byte; and every option matters."""
+
+import functools
+from dataclasses import fields
+
+import numpy as np
+import plain_mrf
+import pytest
+from cases import REFERENCE, assert_same_bits, opencl, texture
+
+import simdtex
+from simdtex import schedules
+from simdtex.methods.mrf import PRESETS, Options
+
+SEED = 2**40 + 3
+
+EXACT = {"search": "exact", "order": 2, "levels": 2}
+FEW = {"search": "coherent", "order": 2, "levels": 2, "exhaustive": 0}
+"""Coherent search that weighs a few candidates at every level but the coarsest."""
+DENSITY = {"pixel": "density", "order": 1, "xi": -4.0, "free_sweeps": 1}
+
+# sample shape, channels, type, output shape, options
+CASES = {
+    "defaults": ((9, 10), None, np.uint8, (3, 4), {}),
+    "default-levels-by-candidates": ((16, 17), None, np.uint8, (18, 17), {"order": 1}),
+    "default-levels-by-output": ((32, 33), None, np.uint8, (10, 8), {"order": 2}),
+    "default-levels-whole": ((20, 19), None, np.uint8, (11, 9), {"order": 2, "edges": "whole", "phases": "all"}),
+    "paper": ((12, 11), None, np.uint8, (8, 9), {"preset": "paper", "order": 2}),
+    "paper-icm": ((12, 11), None, np.uint8, (5, 6), {"preset": "paper", "order": 1, "relaxation": "icm", "xi": -4.0}),
+    "exact": ((12, 11), None, np.uint8, (8, 9), EXACT),
+    "exact-order-8": ((14, 12), None, np.uint8, (9, 8), EXACT | {"order": 8, "xi": -4.0}),
+    "exact-three-levels": ((13, 14), None, np.uint8, (11, 10), EXACT | {"levels": 3, "phases": "all"}),
+    "exact-colour": ((10, 11), 3, np.uint8, (8, 7), EXACT | {"boundary": "open"}),
+    "exact-16-bit": ((10, 11), None, np.uint16, (8, 9), EXACT | {"order": 5, "coherence": 0.5}),
+    "exact-float32": ((10, 11), None, np.float32, (9, 8), EXACT | {"coarsest": "same", "edges": "whole"}),
+    "exact-reflect": ((20, 20), None, np.uint8, (8, 8), EXACT | {"order": 1, "edges": "reflect", "coherence": 0}),
+    "exact-auto-whole": ((20, 20), None, np.uint8, (8, 8), EXACT | {"order": 1, "levels": 1, "free_sweeps": 3}),
+    "gibbs": ((12, 11), None, np.uint8, (8, 9), EXACT | {"relaxation": "gibbs"}),
+    "gibbs-wide": ((12, 11), None, np.uint16, (8, 9), EXACT | {"relaxation": "gibbs", "bandwidth": 0.6}),
+    "gibbs-density": ((10, 11), None, np.uint8, (8, 7), DENSITY | {"relaxation": "gibbs", "bandwidth": 1.0}),
+    "gibbs-density-colour": ((9, 8), 3, np.uint8, (6, 7), DENSITY | {"relaxation": "gibbs", "boundary": "open"}),
+    "gibbs-density-16-bit": ((9, 10), 2, np.uint16, (7, 6), DENSITY | {"relaxation": "gibbs", "levels": 2}),
+    "gibbs-density-float32": ((10, 9), None, np.float32, (7, 8), DENSITY | {"relaxation": "gibbs", "bandwidth": 0.4}),
+    "density": ((9, 10), None, np.uint8, (6, 7), DENSITY | {"levels": 2, "bandwidth": 0.3}),
+    "density-colour": ((6, 7), 3, np.uint8, (4, 5), DENSITY | {"coarsest": "same", "bandwidth": 0.6}),
+    "density-16-bit": ((8, 9), None, np.uint16, (5, 6), DENSITY | {"levels": 2, "bandwidth": 0.5}),
+    "few": ((12, 11), None, np.uint8, (8, 9), FEW),
+    "few-colour": ((10, 11), 3, np.uint8, (8, 7), FEW | {"order": 5, "boundary": "open"}),
+    "few-order-18": ((11, 10), None, np.uint8, (6, 7), FEW | {"order": 18, "xi": -16.0}),
+    "few-16-bit": ((12, 11), None, np.uint16, (9, 8), FEW | {"order": 8, "xi": -4.0, "coherence": 1.5}),
+    "few-float32": ((12, 11), None, np.float32, (8, 9), FEW | {"order": 5, "edges": "whole", "xi": -2.5}),
+    "few-suggest": ((12, 13), None, np.uint8, (8, 9), FEW | {"order": 8, "suggesting": 3, "chance": 1, "xi": -4.0}),
+    "few-similar": ((10, 11), None, np.uint8, (8, 9), FEW | {"similar": 2, "chance": 0}),
+    "few-similar-all-phases": ((9, 8), 2, np.float32, (7, 9), FEW | {"similar": 3, "chance": 5, "phases": "all"}),
+    "few-chance": ((12, 11), None, np.uint8, (8, 9), FEW | {"chance": 9, "coherence": 0, "free_sweeps": 0}),
+    "few-three-levels": ((13, 14), None, np.uint8, (11, 10), FEW | {"levels": 3, "edges": "reflect"}),
+    "few-exhaustive": ((13, 14), None, np.float32, (9, 10), FEW | {"levels": 3, "exhaustive": 50}),
+    "few-same": ((12, 11), None, np.uint8, (8, 9), FEW | {"coarsest": "same"}),
+    "few-gibbs": ((12, 11), None, np.uint16, (8, 9), FEW | {"relaxation": "gibbs", "bandwidth": 0.5, "suggesting": 2}),
+    "few-gibbs-density": ((10, 9), 2, np.uint8, (7, 8), FEW | {"relaxation": "gibbs", "pixel": "density", "chance": 6}),
+    "all-of-many": ((35, 31), None, np.float32, (5, 6), {"order": 2, "levels": 1, "coarsest": "same"}),
+    "seam": ((9, 9), None, np.uint8, (7, 11), {"search": "exact", "order": 5, "levels": 1, "xi": -8.0}),
+    "a-row": ((9, 8), None, np.uint8, (1, 13), {"order": 2}),
+    **{
+        f"{schedule}-{how}": ((9, 10), None, np.uint8, (8, 9), options | {"schedule": schedule})
+        for schedule in ("coloring-fixed", "synchronous", "checkerboard", "block:3x4", "luby", "random-subset:0.3")
+        for how, options in (("exact", EXACT | {"levels": 1, "xi": -2.0}), ("few", FEW))
+    },
+    **{
+        f"{schedule}-{how}": ((9, 8), None, np.uint8, (6, 5), options | {"schedule": schedule})
+        for schedule in ("raster", "random-scan")
+        for how, options in (("exact", EXACT | {"levels": 1, "xi": -4.0}), ("few", FEW))
+    },
+    "block": ((9, 8), None, np.uint8, (3, 17), {"schedule": "block", "order": 1, "levels": 1}),
+    "random-subset": ((9, 10), None, np.uint8, (8, 9), FEW | {"schedule": "random-subset", "boundary": "open"}),
+}
+
+ON_A_DEVICE = ("exact-colour", "paper", "few-similar", "few-gibbs-density")
+
+
+def run(sample_shape, channels, dtype, shape, options, device=REFERENCE):
+    """Image, sources, temperatures and statistics of a run of the engine."""
+    sample, axis = texture(sample_shape, channels, dtype, 5), None if channels is None else -1
+    image, output = simdtex.synthesize(
+        sample, shape, channel_axis=axis, rng=SEED, device=device, full_output=True, **options
+    )
+    return [image, output.source, output.temperature], output.statistics
+
+
+def plainly(sample_shape, channels, dtype, shape, options):
+    """The same of the plain loops, but the statistics."""
+    sample = texture(sample_shape, channels or 1, dtype, 5)
+    image, source, temperature = plain_mrf.synthesize(sample, shape, SEED, **options)
+    return [image if channels else image[..., 0], source, temperature]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_run_is_algorithm_1(name):
+    assert_same_bits(run(*CASES[name])[0], plainly(*CASES[name]))
+
+
+@pytest.mark.parametrize("name", ON_A_DEVICE)
+def test_a_run_on_a_device_is_algorithm_1(machine, name):
+    assert_same_bits(run(*CASES[name], machine)[0], plainly(*CASES[name]))
+
+
+CLOSE = {"order": 8, "relaxation": "gibbs", "bandwidth": 0.0005, "coherence": 0.0, "xi": -8.0}
+"""Candidates that differ by the same few amounts differ in the rounding alone; so narrow a Gaussian tells."""
+# The sample's grey levels and channels, and options.
+SUMS = {
+    "exact": (3, 1, {"search": "exact", "levels": 1}),
+    "all": (2, 3, {"search": "coherent", "levels": 1}),
+    "few": (3, 1, {"search": "coherent", "levels": 2, "exhaustive": 0, "chance": 60}),
+}
+
+
+@pytest.mark.parametrize("how", SUMS)
+def test_sums_have_their_order(monkeypatch, how):
+    greys, channels, given = SUMS[how]
+    sample = np.random.default_rng(5).integers(0, greys, (12, 11, channels)).astype(np.float32)
+    image, output = simdtex.synthesize(
+        sample, (7, 8), channel_axis=-1, rng=SEED, device=REFERENCE, full_output=True, **CLOSE | given
+    )
+    plainly = plain_mrf.synthesize(sample, (7, 8), SEED, **CLOSE | given)
+    assert_same_bits([image, output.source, output.temperature], plainly)
+    if how == "all":  # else the equality shows nothing of the order
+        monkeypatch.setattr(plain_mrf, "ALL_IN_LANES", not plain_mrf.ALL_IN_LANES)
+        assert (plain_mrf.synthesize(sample, (7, 8), SEED, **CLOSE | given)[1] != output.source).any()
+
+
+def test_the_plain_loops_have_the_engines_defaults_and_presets():
+    assert {f.name: f.default for f in fields(Options)} == plain_mrf.DEFAULTS | NO_BYTE
+    assert {name: plain_mrf.DEFAULTS | preset for name, preset in PRESETS.items()} == {
+        "default": plain_mrf.DEFAULTS,
+        "paper": plain_mrf.DEFAULTS | plain_mrf.PAPER,
+    }
+
+
+def test_the_cases_give_every_option():
+    given = {option for *_, options in CASES.values() for option in options}
+    assert given == {"preset", *plain_mrf.DEFAULTS}
+
+
+# -- every option matters -------------------------------------------------------------------------------------
+
+NO_BYTE = {"check_schedule": False, "array": None, "mapping": "cut-and-stack", "emulate": True}
+"""Options that change no byte, with their defaults: where a run is accounted for, and what is checked."""
+
+# For each option: what else is given, and two values of which each gives another output.
+CHANGES = {
+    "order": [(EXACT, 2, 5), (FEW, 2, 4)],
+    "levels": [({"order": 2}, 1, 2), ({"order": 2, "search": "exact"}, 2, 3)],
+    "relaxation": [(EXACT, "icm", "gibbs"), (FEW, "icm", "gibbs")],
+    "bandwidth": [
+        (FEW, 0.15, 1.0),
+        (EXACT, 0.15, 1.0),
+        (EXACT | {"relaxation": "gibbs", "coarsest": "same"}, 0.5, 1.0),
+        (FEW | {"relaxation": "gibbs", "coarsest": "same"}, 0.5, 1.0),
+        (DENSITY | {"coarsest": "same"}, 0.15, 1.0),
+    ],
+    "coherence": [(EXACT, None, 0.0), (FEW, None, 1.0), (FEW, None, 0.0), (FEW | {"relaxation": "gibbs"}, None, 3.0)],
+    "xi": [(EXACT, -1.0, -4.0), (FEW, -1.0, -4.0), (FEW, -1.0, -1.1)],
+    "free_sweeps": [(EXACT, 2, 0), (FEW, 2, 0), (FEW | {"relaxation": "gibbs"}, 2, 1)],
+    "pixel": [(EXACT, "source", "density"), (FEW | {"relaxation": "gibbs"}, "source", "density")],
+    "phases": [(EXACT, "decimated", "all"), (FEW, "decimated", "all")],
+    "edges": [
+        (EXACT, "auto", "whole"),
+        (FEW, "auto", "whole"),
+        (EXACT | {"order": 1, "levels": 1}, "auto", "reflect"),
+        (FEW | {"order": 1}, "auto", "reflect"),
+    ],
+    "coarsest": [(EXACT, "gibbs", "same"), (FEW, "gibbs", "same"), (DENSITY, "gibbs", "same")],
+    "schedule": [(EXACT, "coloring", other) for other in [*schedules.SCHEDULES][1:]]
+    + [(FEW, "coloring", other) for other in [*schedules.SCHEDULES][1:]],
+    "boundary": [(EXACT, "torus", "open"), (FEW, "torus", "open")],
+    "search": [
+        ({"order": 2, "levels": 2}, "auto", "exact"),
+        ({"order": 2, "levels": 2, "relaxation": "gibbs"}, "auto", "coherent"),
+        ({"order": 2, "levels": 2, "coherence": 1.0}, "coherent", "exact"),
+    ],
+    "suggesting": [(FEW, 24, 1), (FEW | {"order": 5}, 3, 4), (FEW | {"relaxation": "gibbs"}, 24, 2)],
+    "similar": [(FEW, 0, 1), (FEW, 2, 3), (FEW | {"relaxation": "gibbs"}, 0, 2)],
+    "chance": [(FEW, 4, 0), (FEW, 4, 5), (FEW | {"relaxation": "gibbs"}, 4, 0)],
+    "exhaustive": [({"order": 2, "levels": 2}, 64, 400), ({"order": 2, "levels": 2}, 306, 305)],
+}
+
+
+@functools.cache
+def _outcome(options):
+    return run((20, 19), None, np.uint8, (9, 10), dict(options))
+
+
+def outcome(**options):
+    """Image, sources and temperatures, and statistics, of a run with these options."""
+    return _outcome(tuple(sorted(options.items())))
+
+
+@pytest.mark.parametrize("name", [f.name for f in fields(Options)])
+def test_every_option_changes_the_output(name):
+    """An option that is new here wants an entry in `CHANGES`, or in `NO_BYTE` and a test of what it does."""
+    assert (name in CHANGES) != (name in NO_BYTE)
+    for others, one, other in CHANGES.get(name, []):
+        (image, source, _), _ = outcome(**others | {name: one})
+        (changed, elsewhere, _), _ = outcome(**others | {name: other})
+        assert not (np.array_equal(image, changed) and np.array_equal(source, elsewhere)), (others, one, other)
+
+
+class Liar(schedules.Synchronous):
+    """Says that no two neighbours relax together, where all do."""
+
+    def independent(self, grid, offsets):
+        """Whatever the lattice."""
+        return True
+
+
+def test_check_schedule_finds_neighbours_that_relax_together():
+    given = {**EXACT, "schedule": Liar()}
+    run((9, 8), None, np.uint8, (6, 5), given)
+    with pytest.raises(RuntimeError, match="equation \\(14\\)"):
+        run((9, 8), None, np.uint8, (6, 5), given | {"check_schedule": True})
+    assert_same_bits(outcome(**EXACT)[0], outcome(**EXACT, check_schedule=True)[0])
+
+
+def account(others, **options):
+    """What a run costs on an array; its bytes are those of a run on none."""
+    arrays, statistics = outcome(**others, **options)
+    assert_same_bits(arrays, outcome(**others)[0])
+    assert statistics["options"].items() >= options.items()
+    return statistics["accounting"]
+
+
+@pytest.mark.parametrize("others", [EXACT, FEW], ids=["exact", "few"])
+def test_an_array_and_its_mapping_change_the_account_alone(others):
+    packed = account(others)
+    tiled, layered = (account(others, array="4x4", mapping=how) for how in ("hierarchical", "cut-and-stack"))
+    assert {each["sites"] for each in (packed, tiled, layered)} == {packed["sites"]}
+    assert packed["routed"] > 0 == packed["moved"]
+    for each, how in ((tiled, "hierarchical"), (layered, "cut-and-stack")):
+        assert (each["array"], each["mapping"], each["layers"]) == ("4x4", how, 9)
+        assert each["moved"] > 0 == each["routed"]
+    assert tiled["moved"] != layered["moved"]
+    assert tiled["passes"] != layered["passes"]
+
+
+@pytest.mark.parametrize("others", [EXACT, FEW], ids=["exact", "few"])
+def test_emulate_says_how_an_array_is_launched_and_changes_no_byte(others):
+    assert account(others, array="4x4")["emulated"] is True
+    assert account(others, array="4x4", emulate=False)["emulated"] is False
+    assert account(others)["emulated"] is False
+
+
+def test_emulation_launches_an_item_for_each_pe(any_device):
+    """Packed, a step is one launch; on 16 PEs it is one for each 16 sites or so."""
+    case = CASES["exact"][:-1]
+    packed, emulated = (
+        run(*case, EXACT | {"array": "4x4", "emulate": emulate}, opencl(any_device)) for emulate in (False, True)
+    )
+    assert_same_bits(packed[0], emulated[0])
+    assert emulated[1]["accounting"]["launches"] > packed[1]["accounting"]["launches"]

@@ -1,0 +1,118 @@
+"""A floor under the figures of quality: what the method ``mrf`` made of three textures when they were last measured.
+
+Means over the seeds 1 and 2, of pictures as large as their sample. A figure may be worse by `MARGIN`, about two
+standard deviations of such a mean over other seeds: a change that only draws other numbers stays above the floor, one
+that makes poorer pictures does not. After a change that is meant to alter pictures, measure anew: run this file.
+"""
+
+import functools
+
+import numpy as np
+import pytest
+from cases import opencl
+from skimage import data
+
+import simdtex
+from simdtex.experiments.quality import Quality, measure
+
+SIDE = {"default": 128, "exact": 96}
+SEEDS = 1, 2
+SAMPLES = "brick", "grass", "gravel"
+FIGURES = "plausibility", "coverage", "copying", "histogram_distance", "source_share"
+
+MARGIN = {"plausibility": 0.05, "coverage": 0.13, "copying": 0.1, "histogram_distance": 0.1, "source_share": 0.2}
+
+# In the order of FIGURES.
+MEASURED = {
+    ("brick", "default"): (0.110, 0.221, 0.277, 0.138, 0.332),
+    ("grass", "default"): (0.187, 0.226, 0.589, 0.043, 0.753),
+    ("gravel", "default"): (0.195, 0.294, 0.610, 0.060, 0.613),
+    ("brick", "exact"): (0.128, 0.184, 0.196, 0.124, 0.451),
+    ("grass", "exact"): (0.230, 0.304, 0.581, 0.026, 0.686),
+    ("gravel", "exact"): (0.242, 0.290, 0.490, 0.085, 0.628),
+}
+SEARCHES = {"default": "auto", "exact": "exact"}
+
+
+@functools.cache
+def texture(name, search):
+    return getattr(data, name)()[: SIDE[search], : SIDE[search]]
+
+
+def figures(name, search, device, **options):
+    """The mean of each figure over the seeds."""
+    sample, found = texture(name, search), []
+    for seed in SEEDS:
+        image, output = simdtex.synthesize(
+            sample, sample.shape, search=SEARCHES[search], rng=seed, device=device, full_output=True, **options
+        )
+        found.append(measure(sample, image, output.source))
+    return {figure: float(np.mean([getattr(each, figure) for each in found])) for figure in FIGURES}
+
+
+def below_the_floor(name, search, found):
+    """The figures that are worse than measured by more than the margin; those that a picture lacks are not."""
+    worse = set()
+    for figure, once in zip(FIGURES, MEASURED[name, search], strict=True):
+        now = getattr(found, figure) if isinstance(found, Quality) else found[figure]
+        sign = -1 if figure == "source_share" else 1  # the only one of which more is better
+        if now is not None and sign * (now - once) > MARGIN[figure]:
+            worse.add(figure)
+    return worse
+
+
+@pytest.mark.parametrize(("name", "search"), MEASURED)
+def test_quality_stays_above_the_floor(any_device, name, search):
+    found = figures(name, search, opencl(any_device))
+    assert not below_the_floor(name, search, found), found
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_a_hasty_relaxation_falls_below_the_floor(any_device, name):
+    """One sweep for each site: the floor is high enough to tell."""
+    found = figures(name, "default", opencl(any_device), xi=-1000.0, free_sweeps=0)
+    assert "plausibility" in below_the_floor(name, "default", found), found
+
+
+def scattered(sample):
+    """The sample's pixels at random: the right grey levels in no arrangement."""
+    return np.random.default_rng(1).permutation(sample.ravel()).reshape(sample.shape)
+
+
+def shifted(sample):
+    """The sample itself, moved around a torus."""
+    return np.roll(sample, (40, 50), (0, 1))
+
+
+def patch(sample):
+    """A corner of the sample over and over: plausible, but most of the sample is missing."""
+    rows, cols = sample.shape
+    return np.tile(sample[: rows // 4, : cols // 4], (4, 4))
+
+
+def dark(sample):
+    """The sample at three quarters of its brightness."""
+    return (sample * 0.75).astype(np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("made", "worse"),
+    [
+        (scattered, {"plausibility", "coverage"}),
+        (shifted, {"copying"}),
+        (patch, {"coverage"}),
+        (dark, {"histogram_distance"}),
+    ],
+)
+@pytest.mark.parametrize("name", SAMPLES)
+def test_what_is_no_synthesis_falls_below_the_floor(name, made, worse):
+    for search in SEARCHES:
+        sample = texture(name, search)
+        found = measure(sample, made(sample))
+        assert worse <= below_the_floor(name, search, found), (search, found)
+
+
+if __name__ == "__main__":
+    for name, search in MEASURED:
+        row = figures(name, search, None)
+        print(name, search, [round(value, 3) for value in row.values()])
