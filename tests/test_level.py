@@ -68,14 +68,14 @@ def test_what_a_kernel_is_told_of_a_level():
 @pytest.mark.parametrize("most", [1, 3, 4, 10, 1000])
 def test_the_parts_of_a_sweep_hold_all_sites_in_order(most):
     ranges = np.array([[0, 4], [9, 10], [4, 4], [4, 9], [10, 21]])
-    found, done = list(parts(ranges, most)), 0
-    for here, steps in found:
+    found = list(parts(ranges, most))
+    for here, _, _ in found:
         assert len(here) > 0
         assert (here[:, 1] - here[:, 0]).sum() <= most
-        assert done <= steps
-        done = steps
-    assert done == len(ranges)
-    flat = [n for here, _ in found for first, last in here.tolist() for n in range(first, last)]
+    begun = [steps for _, steps, _ in found]
+    assert begun == sorted(begun) and begun[-1] == len(ranges)
+    assert [last for _, _, last in found] == [False] * (len(found) - 1) + [True]
+    flat = [n for here, *_ in found for first, last in here.tolist() for n in range(first, last)]
     assert flat == [n for first, last in ranges.tolist() for n in range(first, last)]
 
 

@@ -178,7 +178,7 @@ def test_a_schedule_that_lies_is_stopped(machine, sites, words):
 
 
 def test_the_schedule_of_the_page_works(machine):
-    code = re.search(r"For example, .*::\n\n((?:(?:   .*)?\n)+)", PAGE.read_text(encoding="utf-8"))[1]
+    code = re.search(r"This example is .*::\n\n((?:(?:   .*)?\n)+)", PAGE.read_text(encoding="utf-8"))[1]
     names = {}
     exec(textwrap.dedent(code), names)
     wavefront = names["Wavefront"]()

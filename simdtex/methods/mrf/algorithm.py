@@ -44,8 +44,9 @@ class Info(NamedTuple):
 class Part(NamedTuple):
     """Where a sweep stands: told several times a second.
 
-    ``number``, ``phase``, ``left`` as of `Info`; ``steps`` and ``relaxed`` steps and sites of the sweep that are done;
-    ``wanted`` sites that were active when it began; ``last`` whether it ends here; ``field`` the arrays over sites.
+    ``number``, ``phase``, ``left`` as of `Info`; ``steps`` of the sweep that have begun, and ``relaxed`` sites that
+    are done; ``wanted`` sites that were active when it began; ``last`` whether it ends here; ``field`` the arrays over
+    sites.
     """
 
     number: int
@@ -169,11 +170,11 @@ def relaxed(level: Level, field: Field, chosen: schedules.Info, told: Part) -> I
 
     if level.in_place:
         sites = machine.put(chosen.sites) if isinstance(chosen.sites, np.ndarray) else chosen.sites
-        done = 0
-        for ranges, steps in parts(chosen.ranges, level.at_once):
+        before = 0
+        for ranges, begun, last in parts(chosen.ranges, level.at_once):
             field = relax(machine, sites, ranges, field, level.weighed, relaxation, chosen.turn)
-            seen = part(field, int((ranges[:, 1] - ranges[:, 0]).sum()), steps - done, steps == len(chosen.ranges))
-            done = steps
+            seen = part(field, int((ranges[:, 1] - ranges[:, 0]).sum()), begun - before, last)
+            before = begun
             yield seen
         return
     for step in chosen.apart(machine):

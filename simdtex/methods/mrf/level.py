@@ -253,8 +253,8 @@ class Warm:
         return active.among(self._level.machine, here, begins, firsts, self._temperature)
 
 
-def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int64], int]]:
-    """Steps in parts of `most` sites or fewer, and how many of the steps are done after each.
+def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int64], int, bool]]:
+    """Steps in parts of `most` sites or fewer; how many of the steps have begun with each; and whether it is the last.
 
     Parameters
     ----------
@@ -264,16 +264,16 @@ def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int
         A step of more sites is cut; several steps of fewer go together.
     """
     held: list[tuple[int, int]] = []
-    sites = 0
-    for number, (begin, end) in enumerate(ranges.tolist()):
+    sites = begun = 0
+    for number, (begin, end) in enumerate(ranges.tolist(), 1):
         for first in range(begin, max(end, begin + 1), most):
             last = min(end, first + most)
             if held and sites + last - first > most:
-                yield np.array(held, np.int64), number
+                yield np.array(held, np.int64), begun, False
                 held, sites = [], 0
             held.append((first, last))
-            sites += last - first
-    yield np.array(held, np.int64), len(ranges)
+            sites, begun = sites + last - first, number
+    yield np.array(held, np.int64), begun, True
 
 
 def number_of_levels(

@@ -8,7 +8,7 @@ level. Numbers in parentheses are the paper's equations. Level 0 is the finest.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import inf, prod
 from numbers import Real
 from time import perf_counter
@@ -117,7 +117,7 @@ class Options:
     def analysis(self) -> dict[str, Any]:
         """Those that bear on the analysis."""
         names = ("orientations", "sigma", "filter_size", "features", "levels", "boundary")
-        return {name: getattr(self, name) for name in names}
+        return {name: vars(self)[name] for name in names}
 
 
 def make_options(**given: Any) -> Options:
@@ -302,7 +302,7 @@ def resample(
     statistics = {
         "device": machine.name,
         "seed": seed,
-        "options": {f.name: getattr(options, f.name) for f in fields(Options)} | used,
+        "options": vars(options) | used,
         "seconds": perf_counter() - began,
         "device_seconds": device_seconds(machine, worked),
         "levels": record.reports,

@@ -9,7 +9,7 @@ and with other histograms.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import prod
 from time import perf_counter
 from typing import Any
@@ -368,7 +368,7 @@ def match_texture(
         image = texture.own[machine.get(match_ranks(machine, order, ranks)).reshape(*shape, 1)]
     else:
         image = texture.image(read())
-    kept = {f.name: getattr(options, f.name) for f in fields(options) if f.name != "start"}
+    kept = {name: value for name, value in vars(options).items() if name != "start"}
     statistics = {
         "device": machine.name,
         "seed": seed,
