@@ -34,13 +34,16 @@ __kernel void coloring_lattice(const Lattice g, __global const int2 *restrict of
 // One round of parallel greedy colouring (Jones and Plassmann): an uncoloured site whose priority is above
 // those of all its uncoloured neighbours takes the lowest colour that no neighbour has.
 //
-// color (rows, cols) in; next (rows, cols) out. One work-item per site.
-__kernel void coloring_greedy(const Lattice g, __global const int2 *restrict offsets, const int N, const ulong seed,
+// bare (S,) sites that had no colour at first; color (rows, cols) in; next (rows, cols) out, where it differs at these sites
+// alone. One work-item per site of the list.
+__kernel void coloring_greedy(const Lattice g, __global const int *restrict bare, const int S,
+                              __global const int2 *restrict offsets, const int N, const ulong seed,
                               __global const int *restrict color, __global int *restrict next)
 {
-    const int site = get_global_id(0);
-    if (site >= g.rows * g.cols)
+    const int s = get_global_id(0);
+    if (s >= S)
         return;
+    const int site = bare[s];
     next[site] = color[site];
     if (color[site] != UNCOLORED)
         return;

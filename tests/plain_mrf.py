@@ -20,7 +20,7 @@ from plain_schedules import below, schedule, words
 
 from simdtex import random
 
-ALL_IN_LANES = True
+ALL_IN_LANES = False
 """Whether coherent search sums in lanes also where it weighs all candidates, or then in canonical order."""
 
 IN_ITS_OWN_KERNEL = 1024

@@ -127,7 +127,7 @@ def test_a_device_is_timed_with_and_without_a_profile(any_device):
     machine = OpenCL(any_device, profile=True)
     case = measure(machine, MRF, repeats=2)
     assert 0 < case["phases"]["cold"]["busy"] < case["busy"]
-    assert {kernel["name"] for kernel in case["kernels"]} >= {"relax_all", "relax_list", "start"}
+    assert {kernel["name"] for kernel in case["kernels"]} >= {"relax_all", "start"}
     before = machine.log.seconds
     plain = measure(Reference(), MRF)
     assert (plain["busy"], plain["kernels"], plain["phases"]["warm"]["busy"]) == (None, None, None)

@@ -155,9 +155,10 @@ def test_each_kernel_has_its_twins_bits(machine):
             assert_same_bits(machine.get(lattice_coloring(machine, grid, on_device, pattern)), colors)
             bare = np.full((rows, cols), UNCOLORED, np.int32)
             for start in (colors, bare):
-                once = greedy_coloring(REFERENCE, grid, offsets, start, seed)
+                left = np.flatnonzero(start == UNCOLORED).astype(np.int32)
+                once = greedy_coloring(REFERENCE, grid, offsets, left, start, seed)
                 assert (once == UNCOLORED).sum() < max(1, (start == UNCOLORED).sum())
-                again = greedy_coloring(machine, grid, on_device, machine.put(start), seed)
+                again = greedy_coloring(machine, grid, on_device, machine.put(left), machine.put(start), seed)
                 assert_same_bits(machine.get(again), once)
 
 
@@ -166,9 +167,9 @@ def test_more_than_32_colours_are_told_apart(machine):
     offsets = neighbourhood_offsets(32)
     colors = np.full((7, 7), UNCOLORED, np.int32)
     theirs = colors
-    ours = machine.put(colors)
+    ours, every = machine.put(colors), np.arange(49, dtype=np.int32)
     for _ in range(49):
-        theirs = greedy_coloring(REFERENCE, Grid(7, 7), offsets, theirs, 1)
-        ours = greedy_coloring(machine, Grid(7, 7), machine.put(offsets), ours, 1)
+        theirs = greedy_coloring(REFERENCE, Grid(7, 7), offsets, every, theirs, 1)
+        ours = greedy_coloring(machine, Grid(7, 7), machine.put(offsets), machine.put(every), ours, 1)
     assert sorted(theirs.ravel().tolist()) == list(range(49))
     assert_same_bits(machine.get(ours), theirs)

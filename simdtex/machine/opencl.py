@@ -38,7 +38,14 @@ OUT_OF_MEMORY = (
 )
 
 FEW = 4
-"""Work-items to a work-group of a processor where each has much to do: a small group of sites still feeds all cores."""
+"""Work-items to a work-group of a CPU where each has much to do: a small group of sites still feeds all cores."""
+
+MANY = 1024
+"""Sites from which on a work-group has as many work-items as elsewhere."""
+
+TOGETHER = ("active", "coloring", "start")
+"""Files whose kernels need no -D constant and serve every run of ``mrf``: one program, since each costs some 50 ms to
+load on PoCL."""
 
 LONGEST = 2**17
 """Work-items of a launch over a group: a multiple of every work-group size, and no long launch."""
@@ -262,10 +269,11 @@ class OpenCL:
     def kernel(self, file: str, function: str, /, **defines: int | str) -> Any:
         """A kernel of ``kernels/FILE.cl``, compiled once for these -D constants."""
         options = " ".join(f"-D {key}={value}" for key, value in sorted(defines.items()))
-        key = (file, function, options)
+        files = TOGETHER if file in TOGETHER and not defines else (file,)
+        key = (" ".join(files), function, options)
         if key not in self._kernels:
             if key[::2] not in self._programs:
-                self._programs[key[::2]] = self._build(file, options)
+                self._programs[key[::2]] = self._build(files, options)
             self._kernels[key] = cl.Kernel(self._programs[key[::2]], function)
         return self._kernels[key]
 
@@ -274,8 +282,8 @@ class OpenCL:
         """The compiler option that finds the kernels' headers."""
         return ["-I", str(kernel_folder())]
 
-    def _build(self, file: str, options: str) -> Any:
-        source = (kernel_folder() / f"{file}.cl").read_text(encoding="utf-8")
+    def _build(self, files: tuple[str, ...], options: str) -> Any:
+        source = "\n".join((kernel_folder() / f"{file}.cl").read_text(encoding="utf-8") for file in files)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", cl.CompilerWarning)
             return cl.Program(self.context, source).build([*options.split(), *self.include])
@@ -325,8 +333,9 @@ class OpenCL:
         launch costs a few microseconds.
         """
         kernel.set_args(*(a.data if type(a) is DeviceArray else a for a in args))
-        group = self.group if self.forced or self.info.kind == "gpu" else FEW
+        fixed = self.forced or self.info.kind == "gpu"
         for begin, end in groups.tolist():
+            group = self.group if fixed or end - begin >= MANY else FEW
             kernel.set_arg(1, np.int32(end))
             for first in range(begin, end, LONGEST):
                 size = -(-min(end - first, LONGEST) // group) * group

@@ -43,7 +43,12 @@ lattice_coloring = Operation("lattice_coloring", _lattice_reference, _lattice_la
 
 
 def _greedy_reference(
-    grid: Grid, offsets: NDArray[np.int32], colors: NDArray[np.int32], seed: int, rounds: int = 1
+    grid: Grid,
+    offsets: NDArray[np.int32],
+    bare: NDArray[np.int32],
+    colors: NDArray[np.int32],
+    seed: int,
+    rounds: int = 1,
 ) -> NDArray[np.int32]:
     for _ in range(rounds):
         colors = _greedy_round(grid, offsets, colors, seed)
@@ -64,16 +69,19 @@ def _greedy_round(grid: Grid, offsets: NDArray[np.int32], colors: NDArray[np.int
     return new.reshape(colors.shape)
 
 
-def _greedy_launch(machine: Launcher, grid: Grid, offsets: Array, colors: Array, seed: int, rounds: int = 1) -> Array:
-    one, other = machine.empty(colors.shape, np.int32), machine.empty(colors.shape, np.int32)
+def _greedy_launch(
+    machine: Launcher, grid: Grid, offsets: Array, bare: Array, colors: Array, seed: int, rounds: int = 1
+) -> Array:
+    one, other = (machine.part(colors.reshape(-1), 0, colors.size).reshape(colors.shape) for _ in range(2))
     kernel = machine.kernel("coloring", "coloring_greedy")
-    arguments = (grid.flat.struct, offsets, np.int32(offsets.shape[0]), np.uint64(seed))
-    machine.launch_rounds(kernel, colors.size, 1, *arguments, colors, one)
-    machine.launch_rounds(kernel, colors.size, rounds - 1, *arguments, one, other)
-    return one if rounds % 2 else other
+    arguments = (grid.flat.struct, bare, np.int32(bare.size), offsets, np.int32(offsets.shape[0]), np.uint64(seed))
+    machine.launch_rounds(kernel, bare.size, rounds, *arguments, one, other)
+    return other if rounds % 2 else one
 
 
 greedy_coloring = Operation("greedy_coloring", _greedy_reference, _greedy_launch)
+"""``greedy_coloring(machine, grid, offsets, bare, colors, seed, rounds)``: ``bare`` (S,) int32 lists the sites of
+``colors`` (rows, cols) that have none."""
 
 
 def coloring(machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int = 0) -> Any:
@@ -104,8 +112,8 @@ def coloring(machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, s
     assert best is not None  # a square pattern always exists in the plane
     colors = lattice_coloring(machine, grid, device_offsets, best)
     result = machine.get(colors)
-    while (result == UNCOLORED).any():
-        colors = greedy_coloring(machine, grid, device_offsets, colors, seed, ROUNDS)
+    while (bare := np.flatnonzero(result.ravel() == UNCOLORED).astype(np.int32)).size:
+        colors = greedy_coloring(machine, grid, device_offsets, machine.put(bare), colors, seed, ROUNDS)
         result = machine.get(colors)
     used = np.bincount(result.ravel()) > 0
     if grid.torus and used.sum() > best.index:
