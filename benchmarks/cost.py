@@ -79,7 +79,7 @@ def output_of(*arguments):
 
 
 def seconds_of(functions, machine, repeats=7):
-    """The median seconds of each, taken in turn: a shared processor's speed comes and goes."""
+    """The median seconds of each, taken in turn: a shared CPU's speed comes and goes."""
     seconds = []
     for _ in range(repeats + 1):
         seconds.append([])

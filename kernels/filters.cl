@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "common/border.h"
 
-// Local texture measures of one level, De Bonet's equation (7), in whole numbers: F^0 is the band, F^j = G * f_j.
+// Local texture measures of one level, De Bonet's equation (7), in integers: F^0 is the band, F^j = G * f_j.
 //
 // picture   (planes, rows, cols)                   G
 // band      (planes, rows, cols)                   L

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 
 // Heat-bath relaxation of Ising spins: a site turns up with the probability 1 / (1 + exp(-2 S / T)), where S is the sum
-// of its neighbours' spins -1 and +1. The host has rounded the probability to whole 2^-32, so that a draw is one
-// comparison of whole numbers.
+// of its neighbours' spins -1 and +1. The host has rounded the probability to integers of 2^-32, so that a draw is one
+// comparison of integers.
 //
 // Chains are independent copies of the lattice: `seeds` of them at each temperature, temperature after temperature.
 // spins (chains, H, W) 0 or 1, or (chains, 2 H, W) with an older picture below; `stride` pixels from chain to chain

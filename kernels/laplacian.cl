@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "common/border.h"
 
-// The Laplacian pyramid of Burt and Adelson in whole numbers, De Bonet's equations (5) and (6). The Gaussian is
+// The Laplacian pyramid of Burt and Adelson in integers, De Bonet's equations (5) and (6). The Gaussian is
 // (1, 4, 6, 4, 1) / 16 in each direction. Every level is rounded, so a band and what it was taken from add up exactly.
 // Pictures are (planes, rows, cols); one work-item per pixel and plane.
 

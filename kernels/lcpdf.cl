@@ -4,7 +4,7 @@
 //
 //   P(x) ~ sum_p w_p exp(-|x - y_p|^2 / 2h^2),   w_p = exp(-d_p / 2h^2),   d_p = sum_r ((x_r - y_r)(1 - t_r))^2
 //
-// Weights are whole numbers, zero below 2^-40 of the largest: common/parzen.h.
+// Weights are integers, zero below 2^-40 of the largest: common/parzen.h.
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/lanes.h"
 #include "common/lattice.h"

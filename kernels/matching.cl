@@ -3,7 +3,7 @@
 // Histogram matching, Heeger and Bergen's match-histogram: every segment of a picture takes the histogram of a target,
 // `each` segments in a row the same one. By rank: the k-th smallest value becomes the value of that rank in the target.
 // By lookup, as in the paper: through the segment's cdf, in equal bins over its own range, then through the target's
-// inverse cdf in a table. All in whole numbers.
+// inverse cdf in a table. All in integers.
 //
 // values, out (segments, n); order (segments, n) from sort.cl; targets (T, m) sorted; tables (T, bins + 1)
 // Where runs of a segment are gone through, work-item r takes run r % runs of segment r / runs, `length` values long.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "common/border.h"
 
-// Solid textures, Heeger and Bergen section 5: the Laplacian pyramid of a block in whole numbers, the block turned so
+// Solid textures, Heeger and Bergen section 4: the Laplacian pyramid of a block in integers, the block turned so
 // that its slices lie the other way, and the mean of several blocks. The Gaussian is (1, 4, 6, 4, 1) / 16 in each
 // direction. Every level is rounded, so a band and what it was taken from add up exactly.
 // Around a torus an odd number of slices, rows or columns is folded as in fold.cl: every second one goes around twice and

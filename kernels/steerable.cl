@@ -2,9 +2,9 @@
 #include "common/border.h"
 #include "common/vector.h"
 
-// The steerable pyramid of Simoncelli and Freeman in whole numbers: pictures are split into bands by small filters, and
+// The steerable pyramid of Simoncelli and Freeman in integers: pictures are split into bands by small filters, and
 // joined from bands by the same filters turned by 180 degrees. A sum is made in float32, over terms, bands, tap rows
-// and tap columns in this order, each step an fma; the end result is rounded to a whole number. Taps are multiples of
+// and tap columns in this order, each step an fma; the end result is rounded to an integer. Taps are multiples of
 // 2^-24, which the twin relies on.
 //
 // Pictures are (planes, rows, cols). They are filtered in pieces: rows first_row .. of planes first .., of one or several
@@ -25,7 +25,7 @@ typedef int ivec;
 typedef JOIN(int, V) ivec;
 #endif
 
-// V adjacent whole numbers of a row, or as many as it has left.
+// V adjacent integers of a row, or as many as it has left.
 inline void store_row(const vec sum, const int left, __global int *restrict to)
 {
     const ivec whole = TO_INT(sum);

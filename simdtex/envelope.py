@@ -60,11 +60,11 @@ def restored(image: NDArray[Any], channel_axis: int | None) -> NDArray[Any]:
 
 
 def check_shape(shape: Any, least: int = 1) -> tuple[int, int]:
-    """The rows and columns of an output; raises unless they are two whole numbers of at least `least`."""
+    """The rows and columns of an output; raises unless they are two integers of at least `least`."""
     try:
         rows, cols = shape
     except (TypeError, ValueError):
-        raise ValueError(f"shape must be two whole numbers (rows, columns), not {shape!r}") from None
+        raise ValueError(f"shape must be two integers (rows, columns), not {shape!r}") from None
     whole("rows of the output", rows, least)
     whole("columns of the output", cols, least)
     return int(rows), int(cols)

@@ -40,9 +40,9 @@ def true_or_false(name: str, value: Any) -> None:
 
 
 def whole(name: str, value: Any, least: int) -> None:
-    """Raise unless the value is a whole number of at least `least`."""
+    """Raise unless the value is an integer of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, Integral):
-        raise TypeError(f"{name} must be a whole number, not {value!r}")
+        raise TypeError(f"{name} must be an integer, not {value!r}")
     if value < least:
         raise ValueError(f"{name} is {value}; give {least} or more")
 
@@ -71,7 +71,7 @@ def real_array(name: str, value: Any) -> NDArray[Any]:
 def _finite(value: Real) -> bool:
     try:
         return isfinite(value)
-    except OverflowError:  # a whole number beyond the largest double
+    except OverflowError:  # an integer beyond the largest double
         return False
 
 

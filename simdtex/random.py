@@ -64,7 +64,7 @@ def draw4(seed: int, level: int, turn: Any, site: Any, purpose: int, attempt: An
 
 
 def below(lo: NDArray[np.uint32], hi: NDArray[np.uint32], n: Any) -> NDArray[np.uint64]:
-    """Whole numbers 0 .. n-1 from 64 random bits: the high half of the 128-bit product with n."""
+    """Integers 0 .. n-1 from 64 random bits: the high half of the 128-bit product with n."""
     lo, hi, n = lo.astype(np.uint64), hi.astype(np.uint64), np.asarray(n, np.uint64)
     n_lo, n_hi = n & _LOW, n >> _SHIFT
     carry = (lo * n_lo) >> _SHIFT
@@ -92,7 +92,7 @@ def as_seed(rng: Any = None) -> int:
     if isinstance(rng, (int, np.integer)) and not isinstance(rng, bool):
         if 0 <= int(rng) < 2**64:
             return int(rng)
-        raise ValueError(f"the seed {rng} is out of range; give a whole number from 0 to 2**64 - 1")
+        raise ValueError(f"the seed {rng} is out of range; give an integer from 0 to 2**64 - 1")
     if isinstance(rng, np.random.Generator):  # asked last: numpy loads this part of itself when it is named first
         return int(rng.integers(0, 2**64, dtype=np.uint64))
-    raise TypeError(f"rng must be None, a whole number or a numpy.random.Generator, not {type(rng).__name__}")
+    raise TypeError(f"rng must be None, an integer or a numpy.random.Generator, not {type(rng).__name__}")

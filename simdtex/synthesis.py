@@ -91,8 +91,10 @@ def synthesize(
 
     Notes
     -----
-    Cost of ``mrf``: about 14 fma for every output pixel, sample pixel, neighbour and channel; nearly all of it at the
-    finest level, since each coarser one has a quarter of the sites and of the candidates. ``multires``: some hundred
+    Cost of ``mrf``: by default some 100 fma for every output pixel, neighbour and channel, whatever the sample's size,
+    since a site weighs about seven candidates. With ``search="exact"`` it is about 14 fma for every output pixel, sample
+    pixel, neighbour and channel, less what is proved to be needless; nearly all of it at the finest level, since each
+    coarser one has a quarter of the sites and of the candidates. ``multires``: some hundred
     comparisons for every output pixel, growing slowly with the sample and quickly with alpha. ``pyramid``: some 1700
     multiply-adds and 8 sorted values for every output pixel, channel and iteration, whatever the sample's size. Memory
     grows with output pixels plus sample pixels, never with their product.
@@ -268,11 +270,11 @@ def lcpdf(
 
     Parameters
     ----------
-    image : (rows, cols) array of whole numbers, 0 .. levels - 1
+    image : (rows, cols) array of integers, 0 .. levels - 1
         x, whose neighbourhoods are looked at.
-    sample : (rows, cols) array of whole numbers, 0 .. levels - 1
+    sample : (rows, cols) array of integers, 0 .. levels - 1
         y, which the density is estimated from.
-    sites : (S, 2) array of whole numbers
+    sites : (S, 2) array of integers
         (row, column) of the sites s.
     order : int
         o of equation (3).
@@ -333,7 +335,7 @@ def _check_block(shape: Any) -> tuple[int, int, int]:
     try:
         depth, rows, cols = shape
     except (TypeError, ValueError):
-        raise ValueError(f"shape must be three whole numbers (depth, rows, columns), not {shape!r}") from None
+        raise ValueError(f"shape must be three integers (depth, rows, columns), not {shape!r}") from None
     whole("depth of the block", depth, 1)
     rows, cols = check_shape((rows, cols))
     return int(depth), rows, cols
@@ -344,7 +346,7 @@ def _check_grey(name: str, array: ArrayLike, levels: int) -> NDArray[np.int64]:
     if a.ndim != 2 or not a.size:
         raise ValueError(f"{name} must be a (rows, cols) array that is not empty, not shape {a.shape}")
     if not np.issubdtype(a.dtype, np.integer) and a.dtype != np.bool_:
-        raise TypeError(f"{name} must hold whole numbers 0 to {levels - 1}, not {a.dtype}")
+        raise TypeError(f"{name} must hold integers 0 to {levels - 1}, not {a.dtype}")
     if a.min() < 0 or a.max() >= levels:
         raise ValueError(f"{name} holds {a.min()} to {a.max()}, beyond 0 to {levels - 1}; give levels or rescale it")
     return a.astype(np.int64)

@@ -98,7 +98,7 @@ def vector_density(distances, values, h, at):
 
 
 def cooled(temperature, site, order, spacing, torus, xi):
-    """Equation (13) in whole 1/1024."""
+    """Equation (13) in integers of 1/1024."""
     i, j = site[0] // spacing, site[1] // spacing
     near = neighbours(i, j, order, *grid_size(temperature.shape, spacing), torus)
     here = [int(temperature[k * spacing, m * spacing]) for k, m in filter(None, near)]

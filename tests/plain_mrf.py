@@ -1,7 +1,7 @@
 """Algorithm 1 of Paget and Longstaff (1998) as plain loops, to the byte: what whole runs of the engine must give.
 
 Nothing here shares code with the package but the random words, whose generator is tested against published vectors. A
-picture is indexed [channel][row, column], and a place is (row, column). Grey levels are whole numbers, temperatures
+picture is indexed [channel][row, column], and a place is (row, column). Grey levels are integers, temperatures
 whole 1/1024. An array without a picture's shape runs over candidates p; ``float32`` stands where a result is rounded
 to it. The numbers in the comments are the algorithm's own.
 """

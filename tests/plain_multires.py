@@ -21,7 +21,7 @@ def within(i, n, torus):
 
 
 def rounded(numerator, denominator):
-    """The closest whole number to a fraction; halves go up."""
+    """The closest integer to a fraction; halves go up."""
     return (2 * numerator + denominator) // (2 * denominator)
 
 

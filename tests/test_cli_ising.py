@@ -112,7 +112,7 @@ def test_a_device_finds_what_the_reference_finds(any_device, tmp_path):
         (["--sweeps", "1"], "--sweeps is 1; give 2 or more"),
         (["--burn-in", "-1"], "burn_in is -1; give 0 or more"),
         (["--start", "down"], "unknown start 'down'; choose one of: up, random"),
-        (["--seed", "-1"], "give a whole number from 0 to 2**64 - 1"),
+        (["--seed", "-1"], "give an integer from 0 to 2**64 - 1"),
         (["--device", "no such device"], "no such device"),
         (["-o", "nowhere/report"], "the folder nowhere does not exist: create it first"),
     ],

@@ -226,7 +226,7 @@ def test_progress_runs_from_0_to_1():
         ({"seeds": [1, 1]}, "given twice"),
         ({"seeds": [-1]}, "seed"),
         ({"shape": (8, 20)}, "give 9 or more"),
-        ({"shape": 3}, "two whole numbers"),
+        ({"shape": 3}, "two integers"),
         ({"sample": np.zeros((8, 20))}, "too small"),
         ({"order": 400}, "largest order that fits"),
         ({"array": "round"}, "array"),

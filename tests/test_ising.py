@@ -310,7 +310,7 @@ def energies():
 
 
 def tabulated(weight):
-    """Probability of every (energy, |magnetisation|) of a 4x4 torus, both as whole numbers."""
+    """Probability of every (energy, |magnetisation|) of a 4x4 torus, both as integers."""
     table = {}
     for e, m, w in zip(energies(), np.abs(states().sum((1, 2))), weight / weight.sum(), strict=True):
         table[int(e), int(m)] = table.get((int(e), int(m)), 0.0) + w

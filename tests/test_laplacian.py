@@ -1,4 +1,4 @@
-"""The Laplacian pyramid in whole numbers, equations (5) and (6): its steps, its inverse, and tiles."""
+"""The Laplacian pyramid in integers, equations (5) and (6): its steps, its inverse, and tiles."""
 
 import numpy as np
 import plain_multires as plain
@@ -137,7 +137,7 @@ def test_the_shape_of_a_launch_changes_no_bit(cl_device, work_group):
 
 
 def test_nothing_overflows_at_the_limits(machine):
-    """Sums of the sample, of what 30 levels can add up to, and of whole numbers up to the 2**24 that is promised."""
+    """Sums of the sample, of what 30 levels can add up to, and of integers up to the 2**24 that is promised."""
     rng = np.random.default_rng(3)
     for g in (np.full((1, 8, 8), TOP), np.full((1, 8, 8), -TOP), rng.choice([-TOP, TOP], (1, 8, 8))):
         for torus in (True, False):

@@ -36,7 +36,7 @@ def test_an_order_without_neighbours_is_an_error(order):
 
 @pytest.mark.parametrize("order", [1.0, "8", None, True])
 def test_an_order_that_is_no_whole_number_is_an_error(order):
-    with pytest.raises(TypeError, match="order must be a whole number"):
+    with pytest.raises(TypeError, match="order must be an integer"):
         neighbourhood_offsets(order)
 
 

@@ -197,7 +197,7 @@ GREY = np.arange(42, dtype=np.uint8).reshape(6, 7)
     ("change", "error", "words"),
     [
         ({"order": 0}, ValueError, "order 0 has no neighbours; give 1"),
-        ({"order": 1.5}, TypeError, "order must be a whole number"),
+        ({"order": 1.5}, TypeError, "order must be an integer"),
         ({"order": 16}, ValueError, "the largest order that fits is 8"),
         ({"bandwidth": 0}, ValueError, "bandwidth is 0; give a number above 0"),
         ({"bandwidth": float("nan")}, ValueError, "bandwidth"),
@@ -207,7 +207,7 @@ GREY = np.arange(42, dtype=np.uint8).reshape(6, 7)
         ({"levels": 40}, ValueError, "holds 0 to 41, beyond 0 to 39"),
         ({"estimator": "kernel"}, ValueError, "choose one of: parzen, histogram"),
         ({"boundary": "mirror"}, ValueError, "choose one of: torus, open"),
-        ({"image": GREY.astype(float)}, TypeError, "image must hold whole numbers"),
+        ({"image": GREY.astype(float)}, TypeError, "image must hold integers"),
         ({"image": -GREY.astype(int)}, ValueError, "image holds -41 to 0"),
         ({"image": GREY[0]}, ValueError, "image must be a"),
         ({"sample": GREY[:0]}, ValueError, "sample must be a .* not empty"),

@@ -3,6 +3,7 @@
 import pickle
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -130,6 +131,27 @@ def test_a_sweep_says_where_it_stands():
     assert told[-1].relaxed == told[-1].wanted == level.grid.rows * level.grid.cols
     assert (info.level, info.number, info.phase, info.left) == (2, 1, "relax", 1.0)
     assert state.cooling == 1
+
+
+@pytest.mark.parametrize("schedule", ["coloring", "luby", "synchronous", "random-scan"])
+def test_sites_that_may_not_relax_keep_their_values(any_device, schedule):
+    for machine in (REFERENCE, opencl(any_device)):
+        run = prepared(machine, schedule=schedule)
+        given = np.random.default_rng(2).random(run.shape) < 0.3
+        state = begin(run)._replace(level=0)
+        before = state.off(machine)
+        cold = np.where(given, 0, before.temperature).astype(np.uint16)
+        level = replace(run.level(0), movable=machine.put((~given).astype(np.uint16)))
+        state = enter(level, before._replace(temperature=cold).on(machine))
+        while state.warm:
+            state, _ = sweep(level, state)
+        state, info = sweep(level, state, free=True)
+        after = state.off(machine)
+        for mine, theirs in zip(after.field, before._replace(temperature=cold).field, strict=True):
+            assert_same_bits(mine[..., given], theirs[..., given])
+        assert (after.source != before.source).mean() > 0.5
+        relaxed = np.concatenate([step.sites for chosen in info.chosen for step in chosen.apart(machine)])
+        assert not given.ravel()[relaxed].any()
 
 
 # -- beside the paper --------------------------------------------------------------------------------------------

@@ -188,7 +188,7 @@ def test_a_value_goes_through_the_cdf_and_the_table(case, bins):
 
 @given(pairs(lengths=(7, 40, 300)), histograms)
 def test_the_histogram_is_the_targets_to_a_bin(case, bins):
-    """Each cdf lies within the other one, moved by a bin of the target's range and 1 for the rounding to whole numbers,
+    """Each cdf lies within the other one, moved by a bin of the target's range and 1 for the rounding to integers,
     and by the mass of a bin of the table and of the fullest bin of the segment.
     """
     values, targets = case

@@ -397,7 +397,7 @@ BAD = [
     # the size
     ({"shape": (0, 5)}, ValueError, "rows of the output is 0; give 1 or more"),
     ({"shape": (5, -1)}, ValueError, "columns of the output is -1; give 1 or more"),
-    ({"shape": (5.0, 5)}, TypeError, "rows of the output must be a whole number"),
+    ({"shape": (5.0, 5)}, TypeError, "rows of the output must be an integer"),
     # the options
     ({"alpha": -1}, ValueError, "alpha is -1; give a number of at least 0"),
     ({"alpha": -math.inf}, ValueError, "alpha is -inf; give a number of at least 0"),
@@ -412,7 +412,7 @@ BAD = [
     ({"target": 0.5}, ValueError, "target is 0.5; give a number of at least 1"),
     ({"target": math.inf}, ValueError, "target is inf; give a number of at least 1"),
     ({"orientations": -1}, ValueError, "orientations is -1; give 0 or more"),
-    ({"orientations": 2.5}, TypeError, "orientations must be a whole number, not 2.5"),
+    ({"orientations": 2.5}, TypeError, "orientations must be an integer, not 2.5"),
     ({"sigma": 0}, ValueError, "sigma is 0; give a number of at least 0.2"),
     ({"sigma": -0.7}, ValueError, "sigma is -0.7; give a number of at least 0.2"),
     ({"sigma": math.inf}, ValueError, "sigma is inf; give a number of at least 0.2"),
@@ -420,12 +420,12 @@ BAD = [
     ({"sigma": "wide"}, TypeError, "sigma must be a number, not 'wide'"),
     ({"filter_size": 4}, ValueError, "filter_size is 4; give an odd number, 3 or 5"),
     ({"filter_size": 1}, ValueError, "filter_size is 1; give 3 or more"),
-    ({"filter_size": 2.0}, TypeError, "filter_size must be a whole number, not 2.0"),
+    ({"filter_size": 2.0}, TypeError, "filter_size must be an integer, not 2.0"),
     ({"phase": "both"}, ValueError, "unknown phase 'both'; choose one of: match, free"),
     ({"features": "hue"}, ValueError, "unknown features 'hue'; choose one of: luminance, channels"),
     ({"boundary": "mirror"}, ValueError, "unknown boundary 'mirror'; choose one of: torus, open"),
     ({"levels": 0}, ValueError, "levels is 0; give 1 or more"),
-    ({"levels": 2.0}, TypeError, "levels must be a whole number, not 2.0"),
+    ({"levels": 2.0}, TypeError, "levels must be an integer, not 2.0"),
     ({"levels": 6}, ValueError, "levels=6 is too many for this sample; give at most 5"),
     # thresholds
     ({"thresholds": [[0.1], [0.1, 0.2]]}, ValueError, "thresholds is ragged; give rows of equal length"),
@@ -443,7 +443,7 @@ BAD = [
     ({"order": 8}, TypeError, UNKNOWN.format("order")),
     ({"preset": "paper"}, TypeError, UNKNOWN.format("preset")),
     ({"method": "multi"}, ValueError, "unknown method 'multi'; choose one of: mrf, multires"),
-    ({"rng": -1}, ValueError, r"give a whole number from 0 to 2\*\*64 - 1"),
+    ({"rng": -1}, ValueError, r"give an integer from 0 to 2\*\*64 - 1"),
     ({"device": "no such device"}, simdtex.DeviceError, "choose one of: .*reference"),
 ]  # fmt: skip
 

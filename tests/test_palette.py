@@ -36,7 +36,7 @@ def test_channels_have_unit_variance_and_no_correlation(seed, channels):
     mean, covariance = moments(own.decorrelated(planes))
     deviations = np.sqrt(np.linalg.svd(moments(planes)[1])[1])
     busy = own.deviations > 0
-    assert abs(mean).max() <= channels / deviations[busy].min(), "the mean is a whole number"
+    assert abs(mean).max() <= channels / deviations[busy].min(), "the mean is an integer"
     assert abs(np.diag(covariance)[busy] - 1).max() <= DECORRELATED
     between = abs(covariance - np.diag(np.diag(covariance)))
     lesser = np.minimum(*np.meshgrid(deviations, deviations))

@@ -131,13 +131,13 @@ def test_none_gives_a_fresh_seed():
 
 @pytest.mark.parametrize("seed", [-1, 2**64, np.int64(-3)])
 def test_a_seed_out_of_range_is_an_error_that_says_the_range(seed):
-    with pytest.raises(ValueError, match=r"out of range; give a whole number from 0 to 2\*\*64 - 1"):
+    with pytest.raises(ValueError, match=r"out of range; give an integer from 0 to 2\*\*64 - 1"):
         random.as_seed(seed)
 
 
 @pytest.mark.parametrize("seed", [1.0, "1", True, [1], np.random.RandomState(0)])
 def test_another_type_of_seed_is_an_error_that_says_the_types(seed):
-    with pytest.raises(TypeError, match=r"None, a whole number or a numpy\.random\.Generator"):
+    with pytest.raises(TypeError, match=r"None, an integer or a numpy\.random\.Generator"):
         random.as_seed(seed)
 
 

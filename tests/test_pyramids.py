@@ -197,10 +197,10 @@ def test_names_are_as_many_as_subbands(kind):
         ({"kind": "gabor"}, ValueError, "unknown pyramid 'gabor'; choose one of: steerable, laplacian"),
         ({"levels": 4}, ValueError, "levels=4 is too many for this picture; give at most 3"),
         ({"levels": -1}, ValueError, "levels is -1; give 0 or more"),
-        ({"levels": 1.5}, TypeError, "levels must be a whole number"),
-        ({"levels": None}, TypeError, "levels must be a whole number"),
+        ({"levels": 1.5}, TypeError, "levels must be an integer"),
+        ({"levels": None}, TypeError, "levels must be an integer"),
         ({"orientations": 3}, ValueError, "orientations is 3; the steerable filters have one of: 1, 2, 4, 6"),
-        ({"orientations": True}, TypeError, "orientations must be a whole number"),
+        ({"orientations": True}, TypeError, "orientations must be an integer"),
         ({"boundary": "mirror"}, ValueError, "unknown boundary 'mirror'"),
     ],
 )

@@ -132,7 +132,7 @@ def test_the_mode_is_the_nearest_of_what_is_suggested(seed, spacing):
 
 
 def test_where_all_is_known_the_distance_is_that_of_the_exact_search():
-    """A whole number then, in any order of its terms: so are the choices of an exhaustive search."""
+    """An integer then, in any order of its terms: so are the choices of an exhaustive search."""
     p = problem(7, order=8, temperatures="zero", edges="reflect", shape=(12, 13))
     found, candidates = p.distances(REFERENCE, 1.0)
     choice, *_ = apart(REFERENCE, p, exhaustive=True)

@@ -473,8 +473,8 @@ def test_a_bad_name_is_refused_with_a_remedy(name, words):
         (schedules.RandomSubset, (1.5,), ValueError, "give one from 0.001 to 1"),
         (schedules.Block, (0, 3), ValueError, "rows of a tile is 0; give 1 or more"),
         (schedules.Block, (3, -1), ValueError, "columns of a tile is -1; give 1 or more"),
-        (schedules.Block, (2.5, 3), TypeError, "rows of a tile must be a whole number"),
-        (schedules.Block, (3, True), TypeError, "columns of a tile must be a whole number"),
+        (schedules.Block, (2.5, 3), TypeError, "rows of a tile must be an integer"),
+        (schedules.Block, (3, True), TypeError, "columns of a tile must be an integer"),
     ],
 )
 def test_bad_parameters_are_refused_with_a_remedy(make, arguments, error, words):

@@ -1,4 +1,4 @@
-"""The steerable pyramid in whole numbers: its filters, its two operations, and pyramids made with them."""
+"""The steerable pyramid in integers: its filters, its two operations, and pyramids made with them."""
 
 import numpy as np
 import plain_pyramid as plain

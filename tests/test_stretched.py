@@ -1,4 +1,4 @@
-"""The sample in whole numbers that do not depend on its contrast, and the way back."""
+"""The sample in integers that do not depend on its contrast, and the way back."""
 
 from fractions import Fraction
 

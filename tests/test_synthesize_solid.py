@@ -253,12 +253,12 @@ def test_what_a_callback_raises_passes_through(error):
 @pytest.mark.parametrize(
     ("shape", "options", "error", "words"),
     [
-        ((4, 5), {}, ValueError, r"shape must be three whole numbers \(depth, rows, columns\), not \(4, 5\)"),
-        (5, {}, ValueError, "shape must be three whole numbers"),
-        ((3, 4, 5, 6), {}, ValueError, "shape must be three whole numbers"),
+        ((4, 5), {}, ValueError, r"shape must be three integers \(depth, rows, columns\), not \(4, 5\)"),
+        (5, {}, ValueError, "shape must be three integers"),
+        ((3, 4, 5, 6), {}, ValueError, "shape must be three integers"),
         ((0, 4, 5), {}, ValueError, "depth of the block is 0; give 1 or more"),
         ((4, 5, -1), {}, ValueError, "columns of the output is -1; give 1 or more|block"),
-        ((4.0, 5, 6), {}, TypeError, "depth of the block must be a whole number, not 4.0"),
+        ((4.0, 5, 6), {}, TypeError, "depth of the block must be an integer, not 4.0"),
         ((2**11, 2**11, 2**11), {}, ValueError, "a block of 2048 x 2048 x 2048 is beyond 2"),
         ((4, 5, 6), {"solids": "one"}, ValueError, "unknown solids 'one'; choose one of: turns, average"),
         ((4, 5, 6), {"slices": "all"}, ValueError, "unknown slices 'all'; choose one of: each, together"),

@@ -1,4 +1,4 @@
-"""The temperature after a relaxation, equation (13), in whole 1/1024."""
+"""The temperature after a relaxation, equation (13), in integers of 1/1024."""
 
 import plain
 import pytest

@@ -24,18 +24,18 @@ CONTRAST = 1e-12
 """Relative error of plain float64 expressions of a few operations against each other."""
 
 TAP = 0.5 + 1e-9
-"""Of a tap of the filter bank, in its units of 2**-14, against the float64 formula: it is the closest whole number. The
+"""Of a tap of the filter bank, in its units of 2**-14, against the float64 formula: it is the closest integer. The
 rest is for what another libm rounds otherwise. The centre makes up for the others, so what is exact is the sum, 0."""
 
 HALF = 0.5 + 1e-6
-"""Of a whole number against the float64 that it is the closest to. The rest is for float64 itself, at up to 2**30."""
+"""Of an integer against the float64 that it is the closest to. The rest is for float64 itself, at up to 2**30."""
 
 UNIT32 = 2.0**-24
 """Relative error of one float32 rounding: n products and sums in a row are off by about n of these at most."""
 
 PYRTOOLS = 1e-4
 """Of a steerable pyramid's subband against that of pyrtools, relative to its largest value. Its taps and
-sums are float64; ours are float32, and rounded to whole numbers at every level, of pictures of +-2**20: 1e-5 seen."""
+sums are float64; ours are float32, and rounded to integers at every level, of pictures of +-2**20: 1e-5 seen."""
 
 RECONSTRUCTION = {1: 0.0035, 2: 0.015, 4: 0.012, 6: 0.032}
 """What a steerable pyramid loses of white noise on an even torus, rms relative to its standard deviation, by number of

@@ -3,7 +3,7 @@
 #ifndef SIMDTEX_BORDER_H
 #define SIMDTEX_BORDER_H
 
-// Index i, any whole number, brought to 0 .. n-1. The mirror stands on the outer pixels: -1 is 1, n is n - 2.
+// Index i, any integer, brought to 0 .. n-1. The mirror stands on the outer pixels: -1 is 1, n is n - 2.
 inline int within(const int i, const int n, const int torus)
 {
     const int period = torus ? n : max(1, 2 * n - 2);

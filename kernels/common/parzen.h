@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The Gaussian of equation (7), as weights of candidates and as a kernel over whole grey levels.
 //
-// Weights are whole numbers: W_p = floor(2^40 w_p / w_max). Whole numbers add up to the same sum in any order, so
+// Weights are integers: W_p = floor(2^40 w_p / w_max). Integers add up to the same sum in any order, so
 // no work-group size, chunking or reduction can change a draw. A weight below 2^-40 of the largest is zero by this definition.
 #ifndef SIMDTEX_PARZEN_H
 #define SIMDTEX_PARZEN_H

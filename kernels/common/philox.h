@@ -50,7 +50,7 @@ inline uint4 draw4(const ulong seed, const uint level, const uint turn, const ul
     return philox((uint4)((uint)site, turn, what, attempt), (uint2)((uint)seed, (uint)(seed >> 32)));
 }
 
-// A whole number 0 .. n-1 from 64 random bits; the bias is below n / 2^64.
+// An integer 0 .. n-1 from 64 random bits; the bias is below n / 2^64.
 inline ulong below(const uint lo, const uint hi, const ulong n)
 {
     return mul_hi((ulong)hi << 32 | lo, n);

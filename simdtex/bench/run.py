@@ -48,7 +48,7 @@ def threads_beside(info: DeviceInfo) -> int:
 
 
 def cpu_model() -> str:
-    """What the processor of this machine calls itself."""
+    """What the CPU of this machine calls itself."""
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:
             names = [line.partition(":")[2].strip() for line in file if line.startswith("model name")]

@@ -215,7 +215,7 @@ def parse_size(text: str) -> tuple[int, int]:
     Raises
     ------
     ValueError
-        It is not one or two whole numbers from 1 to 99999999.
+        It is not one or two integers from 1 to 99999999.
     """
     match = re.fullmatch(r"\s*([0-9]{1,8})(?:\s*[xX\u00d7]\s*([0-9]{1,8}))?\s*", text)
     sides = [int(side) for side in match.groups() if side is not None] if match else []

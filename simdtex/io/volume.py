@@ -114,7 +114,7 @@ def write(path: PathLike, volume: ArrayLike, channel_axis: int | None = None) ->
     ----------
     path : path
         ``.npz`` (compressed, key ``"volume"``) or ``.npy``, of any type; ``.tif`` ``.tiff``, a page for each slice, of
-        any type but bool; ``.nrrd``, whole numbers and floats of 32 and 64 bits; or a name without suffix for a folder
+        any type but bool; ``.nrrd``, integers and floats of 32 and 64 bits; or a name without suffix for a folder
         of slices ``slice-000.png``, 8 or 16 bits, up to 4 channels. A folder of slices that is there is replaced.
     volume : array_like, (depth, rows, cols) or with channels
         Real numbers, written as they are.

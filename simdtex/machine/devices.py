@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Find, probe, rank and name OpenCL devices.
 
-The listing is sorted by preference (graphics processors, then processors, then
+The listing is sorted by preference (GPUs, then CPUs, then
 other accelerators, then simulators; the NumPy reference is last), so the device
 taken by default is the first usable one in it, and an index into it is stable.
 A device is usable only once a tiny program has built and run on it and given the
@@ -306,7 +306,7 @@ def _describe(title: str, handle: Any) -> DeviceInfo:
         except Exception:  # what a device cannot tell of itself is not needed to use it
             return default
 
-    # The kinds are bits of a mask: 2 processor, 4 graphics processor, 8 accelerator.
+    # The kinds are bits of a mask: 2 CPU, 4 GPU, 8 accelerator.
     bits = int(read("type", 0))
     kind = "gpu" if bits & 4 else "cpu" if bits & 2 else "accelerator" if bits & 8 else "other"
     return DeviceInfo(

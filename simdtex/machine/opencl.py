@@ -37,10 +37,10 @@ OUT_OF_MEMORY = (
     cl.status_code.INVALID_BUFFER_SIZE,
 )
 
-FEW = 4
+SMALL_GROUP = 4
 """Work-items to a work-group of a CPU where each has much to do: a small group of sites still feeds all cores."""
 
-MANY = 1024
+LARGE_STEP = 1024
 """Sites from which on a work-group has as many work-items as elsewhere."""
 
 TOGETHER = ("active", "coloring", "start")
@@ -335,7 +335,7 @@ class OpenCL:
         kernel.set_args(*(a.data if type(a) is DeviceArray else a for a in args))
         fixed = self.forced or self.info.kind == "gpu"
         for begin, end in groups.tolist():
-            group = self.group if fixed or end - begin >= MANY else FEW
+            group = self.group if fixed or end - begin >= LARGE_STEP else SMALL_GROUP
             kernel.set_arg(1, np.int32(end))
             for first in range(begin, end, LONGEST):
                 size = -(-min(end - first, LONGEST) // group) * group

@@ -37,9 +37,9 @@ def neighbourhood_offsets(order: int) -> NDArray[np.int32]:
 
 
 def check_order(order: Any) -> None:
-    """Raise unless `order` is a whole number from 1 up."""
+    """Raise unless `order` is an integer from 1 up."""
     if isinstance(order, bool) or not isinstance(order, (int, np.integer)):
-        raise TypeError(f"order must be a whole number, not {type(order).__name__}")
+        raise TypeError(f"order must be an integer, not {type(order).__name__}")
     if order < 1:
         raise ValueError(f"order {order} has no neighbours; give 1 (4 neighbours) or more, say 8 or 18")
 

@@ -93,7 +93,7 @@ class Sample:
         """sigma^2 of equation (8): the mean over channels of the variance of the working levels."""
         n = self.height * self.width
         total = 0.0
-        for channel in self.levels.astype(np.int64):  # whole numbers: the same sum on every machine
+        for channel in self.levels.astype(np.int64):  # integers: the same sum on every machine
             squares, values = int((channel * channel).sum()), int(channel.sum())
             total += (n * squares - values * values) / n**2
         return float(total / self.channels)
@@ -194,7 +194,7 @@ class Sample:
 
 
 def stretch(pixels: NDArray[Any], top: int) -> tuple[NDArray[np.int64], float]:
-    """Pixels of any real type stretched over the whole numbers 0..top, and the size of 1 in their own unit."""
+    """Pixels of any real type stretched over the integers 0..top, and the size of 1 in their own unit."""
     if pixels.dtype.kind in "iu":
         whole = pixels.astype(np.uint64)  # modulo 2**64, so a difference from the least is exact
         half = (whole - pixels.min().astype(np.uint64)) / np.float64(2)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The sample in whole numbers that do not depend on its contrast, as pyramids take it."""
+"""The sample in integers that do not depend on its contrast, as pyramids take it."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Heat-bath relaxation of Ising spins: a draw from the conditional distribution of a site, by whole numbers alone.
+"""Heat-bath relaxation of Ising spins: a draw from the conditional distribution of a site, by integers alone.
 
 Spins are 0 (down) or 1 (up) in a (chains, H, W) uint8 array; where tiles read an older picture, it stands below in a
 (chains, 2 H, W) array (`simdtex.ops.snapshot`). Chains are copies of the lattice that know nothing of one another: the
@@ -22,7 +22,7 @@ from simdtex.model.lattice import Grid
 
 
 def heat_bath_chances(temperatures: Sequence[float], neighbours: int) -> NDArray[np.uint32]:
-    """The probabilities of up, in whole 2**-32.
+    """The probabilities of up, in integers of 2**-32.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Laplacian pyramid of Burt and Adelson in whole numbers, De Bonet's equations (5) and (6).
+"""The Laplacian pyramid of Burt and Adelson in integers, De Bonet's equations (5) and (6).
 
 Pictures are (planes, rows, cols) int32. A level has half the rows and columns of the one below it, rounded up. Sums
 stay within 32 bits where what is reduced is below 2**23, and what is collapsed below 2**25.

@@ -7,6 +7,7 @@ relaxation and users take from it. The kernels are in ``kernels/lcpdf.cl``.
 
 from __future__ import annotations
 
+from itertools import accumulate
 from math import exp, log, pow, sqrt
 from typing import Any, NamedTuple
 
@@ -84,10 +85,8 @@ def window(bandwidth: float, top: int) -> Window:
     radius = min(top, int(h * sqrt(2 * log(2.0**33))))
     gauss = [exp(-k * k / (2 * h * h)) for k in range(radius + 1)]
     steps = gauss[:0:-1] + gauss
-    total, running, noise = sum(steps), 0.0, []
-    for value in steps:
-        running += value
-        noise.append(min(2**32 - 1, round(running / total * 2**32)))
+    sums = list(accumulate(steps))  # Python 3.12's own sum() rounds in another way
+    noise = [min(2**32 - 1, round(partial / sums[-1] * 2**32)) for partial in sums]
     noise[-1] = 2**32 - 1
     return Window(scale, np.array(noise, np.uint32), np.array(gauss, np.float32), radius, top)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Histogram matching of every segment: Heeger and Bergen's match-histogram, by rank and by lookup, in whole numbers.
+"""Histogram matching of every segment: Heeger and Bergen's match-histogram, by rank and by lookup, in integers.
 
 Segments are rows of a (segments, n) int32 array. T targets serve segments // T segments in a row each.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Blocks of solid textures: their Laplacian pyramid in whole numbers, their slices the other ways, their mean.
+"""Blocks of solid textures: their Laplacian pyramid in integers, their slices the other ways, their mean.
 
 Blocks are (depth, rows, cols) int32. A level has half the slices, rows and columns of the one below it, rounded up;
 around a torus an odd number of them is folded instead, see `simdtex.ops.fold`.

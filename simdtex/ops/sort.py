@@ -27,7 +27,7 @@ def run_length(machine: Launcher, segments: int, n: int) -> int:
 
 
 def local(machine: Launcher) -> tuple[int]:
-    """Work-items of a group where each takes a run: on a processor a few long ones are to be shared out."""
+    """Work-items of a group where each takes a run: on a CPU a few long ones are to be shared out."""
     return (64,) if machine.info.kind == "gpu" else (1,)
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The steerable pyramid of Simoncelli and Freeman in whole numbers: its filters, and their transposes.
+"""The steerable pyramid of Simoncelli and Freeman in integers: its filters, and their transposes.
 
 Pictures are (planes, rows, cols) int32, bands (bands, planes, rows, cols) int32, and taps (bands, side, side) float32
 with an odd side, from `simdtex.ops.steerable_filters`. Sums are float32, over terms, bands, tap rows and tap columns in
-this order, each step an fma. They are rounded to whole numbers in the end, and must fit 32 bits. Taps are multiples of
+this order, each step an fma. They are rounded to integers in the end, and must fit 32 bits. Taps are multiples of
 2**-24, so the twin has each step exactly in double precision, as long as sums stay below 2**28.
 """
 

@@ -185,6 +185,11 @@ class Level:
         Whether the sites of a step may be written while others of it are read: none is another's neighbour.
     weighed : (H, W) int32 array of the machine
         Counts the candidates that each site has weighed.
+    lists : Lists
+        The schedule's lists of sites as the machine holds them.
+    movable : (H, W) uint16 array of the machine, optional
+        0 at sites whose values are given: free sweeps leave them alone, as all sweeps do that find their temperature 0.
+        None: every site may relax.
     """
 
     number: int
@@ -199,6 +204,7 @@ class Level:
     in_place: bool
     weighed: Array
     lists: Lists = field(repr=False)
+    movable: Array | None = None
 
     @property
     def machine(self) -> Machine:
@@ -221,7 +227,7 @@ class Level:
 
 
 class Warm:
-    """The sites that are warmer than 0 now; or all, in a free sweep.
+    """The sites that are warmer than 0 now; or, in a free sweep, all that may relax.
 
     Parameters
     ----------
@@ -231,26 +237,27 @@ class Warm:
     """
 
     def __init__(self, level: Level, temperature: Array, free: bool) -> None:
-        self._level, self._temperature, self._free = level, temperature, free
+        self._level = level
+        self._plane = level.movable if free else temperature  # above 0 where a site is active; None: everywhere
 
     def mask(self) -> NDArray[np.bool_]:
         """Read back from the machine."""
         grid = self._level.grid
-        if self._free:
+        if self._plane is None:
             return np.ones((grid.rows, grid.cols), bool)
-        return np.asarray(grid.view(self._level.machine.get(self._temperature)) > 0)
+        return np.asarray(grid.view(self._level.machine.get(self._plane)) > 0)
 
     def numbers(self) -> NDArray[np.int64]:
         """Read back from the machine."""
         grid = self._level.grid
-        return np.arange(grid.rows * grid.cols) if self._free else np.flatnonzero(self.mask())
+        return np.arange(grid.rows * grid.cols) if self._plane is None else np.flatnonzero(self.mask())
 
     def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
         """Found on the machine."""
         here, begins, firsts = self._level.lists.of(sites, starts)
-        if self._free:
+        if self._plane is None:
             return here, starts
-        return active.among(self._level.machine, here, begins, firsts, self._temperature)
+        return active.among(self._level.machine, here, begins, firsts, self._plane)
 
 
 def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int64], int, bool]]:

@@ -155,7 +155,7 @@ def _level_shapes(shape: tuple[int, ...], levels: int | None) -> list[tuple[int,
 
 
 def _energy(features: NDArray[np.int32], about_mean: bool = False) -> NDArray[np.float64]:
-    """Z (M,): the mean square of each column, or its variance, from sums in whole numbers."""
+    """Z (M,): the mean square of each column, or its variance, from sums in integers."""
     n = len(features)
     squares, total = np.zeros((2, features.shape[1]), object)
     for first in range(0, n, 2**20):  # the sum of so many squares fits 64 bits

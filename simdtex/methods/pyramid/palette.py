@@ -81,7 +81,7 @@ def palette(pictures: Sequence[NDArray[np.int32]], weights: Sequence[float], dec
 
     Notes
     -----
-    The covariance is a matrix of exact sums in whole numbers, divided at the end.
+    The covariance is a matrix of exact sums in integers, divided at the end.
     """
     shares = [float(weight) / float(sum(weights)) for weight in weights]
     means = [picture.reshape(len(picture), -1).mean(1, dtype=np.float64) for picture in pictures]
@@ -106,7 +106,7 @@ def palette(pictures: Sequence[NDArray[np.int32]], weights: Sequence[float], dec
 
 
 def _moments(picture: NDArray[np.int32], about: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Means of x and of x x' about some whole numbers, from sums in whole numbers."""
+    """Means of x and of x x' about some integers, from sums in integers."""
     x = picture.reshape(len(picture), -1)
     sums, products = np.zeros(len(x), object), np.zeros((len(x), len(x)), object)
     for first in range(0, x.shape[1], BLOCK):
@@ -119,7 +119,7 @@ def _moments(picture: NDArray[np.int32], about: NDArray[np.int64]) -> tuple[NDAr
 
 @dataclass(frozen=True)
 class Decorrelated:
-    """Pictures as decorrelated channels in whole numbers.
+    """Pictures as decorrelated channels in integers.
 
     Attributes
     ----------

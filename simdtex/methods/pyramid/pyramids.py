@@ -2,7 +2,7 @@
 """Image pyramids: pictures as subbands of several frequencies, and orientations, and back (Heeger and Bergen, 3.1).
 
 The Laplacian pyramid is that of Burt and Adelson; the steerable pyramid has the spatial filters of Simoncelli and
-co-workers. Everything is in whole numbers, so that a pyramid has the same bits on every device.
+co-workers. Everything is in integers, so that a pyramid has the same bits on every device.
 """
 
 from __future__ import annotations
