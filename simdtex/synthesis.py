@@ -89,12 +89,10 @@ def synthesize(
     ValueError, TypeError
         What is wrong and what would be right, in one sentence.
 
-    Notes
-    -----
-    Cost of ``mrf``: by default some 100 fma for every output pixel, neighbour and channel, whatever the sample's size,
-    since a site weighs about seven candidates. With ``search="exact"`` it is about 14 fma for every output pixel, sample
-    pixel, neighbour and channel, less what is proved to be needless; nearly all of it at the finest level, since each
-    coarser one has a quarter of the sites and of the candidates. ``multires``: some hundred
+    Notes ----- Cost of ``mrf``: by default some 100 fma for every output pixel, neighbour and channel, whatever the
+    sample's size, since a site weighs about seven candidates. With ``search="exact"`` it is about 14 fma for every
+    output pixel, sample pixel, neighbour and channel, less what is proved to be needless; nearly all of it at the
+    finest level, since each coarser one has a quarter of the sites and of the candidates. ``multires``: some hundred
     comparisons for every output pixel, growing slowly with the sample and quickly with alpha. ``pyramid``: some 1700
     multiply-adds and 8 sorted values for every output pixel, channel and iteration, whatever the sample's size. Memory
     grows with output pixels plus sample pixels, never with their product.

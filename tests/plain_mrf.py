@@ -21,10 +21,7 @@ from plain_schedules import below, schedule, words
 from simdtex import random
 
 ALL_IN_LANES = False
-"""Whether coherent search sums in lanes also where it weighs all candidates, or then in canonical order."""
-
-IN_ITS_OWN_KERNEL = 1024
-"""Of so many candidates or fewer coherent search weighs all itself; more are left to exact search."""
+"""Whether sums are in lanes also where all candidates are weighed. They are not; True shows that a test can tell."""
 
 LANES = 16
 ENOUGH = 64
@@ -197,9 +194,7 @@ class Level:
         coarsest, coherent = number == levels - 1, o.search == "coherent"
         self.gibbs = o.relaxation == "gibbs" or (coarsest and o.coarsest == "gibbs")
         self.all = not coherent or coarsest or n <= o.exhaustive
-        self.lanes = 1
-        if coherent and (not self.all or (ALL_IN_LANES and n <= IN_ITS_OWN_KERNEL)):
-            self.lanes = LANES
+        self.lanes = LANES if ALL_IN_LANES or not self.all else 1
         self.similar = [self.most_similar(p) for p in range(n)] if not self.all and o.similar else None
 
     def pixel(self, s):

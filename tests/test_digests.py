@@ -54,6 +54,10 @@ LARGE = {
 }
 
 
+QUICK = ("brick", "coffee", "grass-16-bit", "grass-coarsest", "multires-coffee", "pyramid-coffee")
+"""Those whose kernels other tests compile too."""
+
+
 @functools.cache
 def sample(name):
     """A sample by name, and its channel axis."""
@@ -115,7 +119,7 @@ def test_the_references_bytes_are_those_pinned(name):
     assert small(name) == pinned()[f"small {name}"]
 
 
-@pytest.mark.parametrize("name", LARGE)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK)) for name in LARGE])
 def test_the_devices_bytes_are_those_pinned(any_device, name):
     from cases import opencl
 
