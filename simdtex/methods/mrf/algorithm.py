@@ -29,38 +29,31 @@ class Info(NamedTuple):
     """What a sweep did.
 
     ``level`` and ``number``, the sweep within it, from 1; ``phase`` ``"relax"`` while temperatures are above 0, then
-    ``"free"``; ``left`` the mean temperature at its beginning, 0 to 1; ``chosen`` what the schedule decided;
-    ``ended`` whether the level ends with it.
+    ``"free"``; ``chosen`` what the schedule decided; ``ended`` whether the level ends with it.
     """
 
     level: int
     number: int
     phase: str
-    left: float
     chosen: list[schedules.Info]
     ended: bool
 
 
 class Part(NamedTuple):
-    """Where a sweep stands: told several times a second.
+    """A part of a sweep: told several times a second.
 
-    ``number``, ``phase``, ``left`` as of `Info`; ``steps`` of the sweep that have begun, and ``relaxed`` sites that
-    are done; ``wanted`` sites that were active when it began; ``last`` whether it ends here; ``field`` the arrays over
-    sites.
+    ``steps`` that have begun with it; ``sites`` that it has relaxed; ``last`` whether the sweep ends with it; ``field``
+    the arrays over sites.
     """
 
-    number: int
-    phase: str
-    left: float
     steps: int
-    relaxed: int
-    wanted: int
+    sites: int
     last: bool
     field: Field
 
 
-Watch = Callable[[Level, Part], Any]
-"""Called after every part of a sweep."""
+Watch = Callable[[Level, State, bool, Part], Any]
+"""Called after every part of a sweep, with the state before the sweep and whether it is a free one."""
 
 
 def anneal(run: Run, state: State | None = None, watch: Watch | None = None) -> Iterator[tuple[Level, State, Info]]:
@@ -124,25 +117,20 @@ def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None
     state : State
     info : Info
     """
-    sites = level.grid.rows * level.grid.cols
-    left = 0.0 if free else state.heat / (1024 * sites)
-    told = Part(state.cooling + state.free + 1, "free" if free else "relax", left, 0, 0, 0, False, state.field)
-    told = told._replace(wanted=sites if free else state.warm)
     field, memory = exchanged(level, state.field), state.schedule
-    all_chosen: list[schedules.Info] = []
-    while not (all_chosen and all_chosen[-1].last):
+    chosen: list[schedules.Info] = []
+    while not (chosen and chosen[-1].last):
         warm = Warm(level, field.temperature, free)
-        memory, chosen = level.schedule.step(level.setting, memory, warm)  # 6.2.1
-        for part in relaxed(level, field, chosen, told):  # 6.2.2
-            told = part
+        memory, now = level.schedule.step(level.setting, memory, warm)  # 6.2.1
+        for part in relaxed(level, field, now):  # 6.2.2
+            field = part.field
             if watch:
-                watch(level, told)
-        field = told.field
-        all_chosen.append(chosen)
+                watch(level, state, free, part)
+        chosen.append(now)
     hot, heat = active.survey(level.machine, level.grid, field.temperature)
-    done = {"cooling": state.cooling + (not free), "free": state.free + free}
-    info = Info(level.number, told.number, told.phase, left, all_chosen, False)
-    return State(*field, memory, level.number, **done, warm=hot, heat=heat), info
+    cooling, freed = state.cooling + (not free), state.free + free
+    info = Info(level.number, cooling + freed, "free" if free else "relax", chosen, False)
+    return State(*field, memory, level.number, cooling, freed, hot, heat), info
 
 
 def rule(level: Level) -> Relaxation:
@@ -159,37 +147,30 @@ def rule(level: Level) -> Relaxation:
     )
 
 
-def relaxed(level: Level, field: Field, chosen: schedules.Info, told: Part) -> Iterator[Part]:
+def relaxed(level: Level, field: Field, chosen: schedules.Info) -> Iterator[Part]:
     """Step 6.2.2 for the sites of one step after another, in parts that do not take long."""
-    machine, relaxation, seen = level.machine, rule(level), told
-
-    def part(field: Field, sites: int, steps: int, last: bool) -> Part:
-        machine.sync(level.work * sites)
-        steps, sites = seen.steps + steps, seen.relaxed + sites
-        return seen._replace(steps=steps, relaxed=sites, last=last and chosen.last, field=field)
-
+    machine, relaxation = level.machine, rule(level)
     if level.in_place:
-        sites = machine.put(chosen.sites) if isinstance(chosen.sites, np.ndarray) else chosen.sites
-        before = 0
+        sites, before = chosen.sites, 0
+        sites = machine.put(sites) if isinstance(sites, np.ndarray) else sites
         for ranges, begun, last in parts(chosen.ranges, level.at_once):
             field = relax(machine, sites, ranges, field, level.weighed, relaxation, chosen.turn)
-            seen = part(field, int((ranges[:, 1] - ranges[:, 0]).sum()), begun - before, last)
+            done = int((ranges[:, 1] - ranges[:, 0]).sum())
+            machine.sync(level.work * done)
+            yield Part(begun - before, done, last and chosen.last, field)
             before = begun
-            yield seen
         return
     for step in chosen.apart(machine):
         outcomes: list[Any] = []
-        pieces = list(machine.pieces(step.sites, level.grid, level.at_once))
-        for number, (masked, some) in enumerate(pieces, 1):  # no site sees another of its step
+        for masked, some in machine.pieces(step.sites, level.grid, level.at_once):  # no site sees another of its step
+            if outcomes:
+                yield Part(len(outcomes) == 1, outcomes[-1][1].size, False, field)
             here = masked.put(some)
             outcomes.append((masked, here, *relax_apart(masked, here, field, level.weighed, relaxation, chosen.turn)))
-            if number < len(pieces):
-                seen = part(field, some.size, number == 1, False)
-                yield seen
+            machine.sync(level.work * some.size)
         for masked, here, taken, cooled in outcomes:
             field = commit(masked, field, here, taken, cooled)
-        seen = part(field, pieces[-1][1].size if pieces else 0, len(pieces) < 2, step.last)
-        yield seen
+        yield Part(len(outcomes) < 2, outcomes[-1][1].size if outcomes else 0, step.last, field)
 
 
 def exchanged(level: Level, field: Field) -> Field:

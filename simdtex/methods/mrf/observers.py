@@ -42,35 +42,37 @@ class Observer:
         self.account = Account(array, packed=options.array is None)
         self._run, self._callback = run, callback
         self._level: Level | None = None
-        self._seen: Part | None = None
+        self._done = 0  # sites of the present sweep that are relaxed
+        self._ended = True  # the next part begins a sweep
         self._spared = self._weighed = 0
 
-    def part(self, level: Level, told: Part) -> None:
+    def part(self, level: Level, state: State, free: bool, part: Part) -> None:
         """Count a part of a sweep, and tell of it."""
         if level is not self._level:
             self._begin(level)
-        if self._seen is None or told.number != self._seen.number:
-            self.meter.sweep(told.phase, told.left)
-            self._seen = None
-        steps = told.steps - (self._seen.steps if self._seen else 0)
-        sites = told.relaxed - (self._seen.relaxed if self._seen else 0)
-        self._seen = told
-        step = self.meter.step(steps)
-        fma = 0 if isinstance(level.proposal, Listed) else level.work * sites
-        self.meter.add(sites, fma, min(1.0, told.relaxed / max(1, told.wanted)))
+        sites, phase = level.grid.rows * level.grid.cols, "free" if free else "relax"
+        left = 0.0 if free else state.heat / (1024 * sites)
+        if self._ended:
+            self.meter.sweep(phase, left)
+            self._done = 0
+        self._ended = part.last
+        self._done += part.sites
+        step = self.meter.step(part.steps)
+        fma = 0 if isinstance(level.proposal, Listed) else level.work * part.sites
+        self.meter.add(part.sites, fma, min(1.0, self._done / max(1, sites if free else state.warm)))
         if self._callback:
             self._callback(
                 Relaxing(
                     level=level.number,
                     levels=self._run.levels,
                     fraction=self.meter.fraction,
-                    image=partial(picture, self._run, level.grid, told.field),
-                    sweep=told.number,
+                    image=partial(picture, self._run, level.grid, part.field),
+                    sweep=state.cooling + state.free + 1,
                     step=step,
-                    phase=told.phase,
-                    temperature_left=told.left,
-                    end_of_sweep=told.last,
-                    temperature=partial(warmth, self._run, level.grid, told.field),
+                    phase=phase,
+                    temperature_left=left,
+                    end_of_sweep=part.last,
+                    temperature=partial(warmth, self._run, level.grid, part.field),
                 )
             )
 
@@ -86,7 +88,7 @@ class Observer:
             self._end(level, state)
 
     def _begin(self, level: Level) -> None:
-        self._level, self._seen, self._spared = level, None, level.machine.spared
+        self._level, self._spared = level, level.machine.spared
         candidates, slots = level.proposal.candidates.size, level.proposal.slots
         channels, coherence = self._run.sample.channels, bool(self._run.options.coherence)
         self.meter.begin(level.number, level.grid, candidates, slots)
