@@ -83,7 +83,7 @@ def test_many_neighbours_favour_a_candidate_once(machine):
 def test_a_distance_of_zero_stays_zero_and_is_found(machine):
     """The mark of a favoured distance is its sign, also of 0."""
     p = problem(8, order=2, shape=(6, 6), sample_shape=(9, 9), temperatures="zero", torus=False)
-    row, col = np.indices((6, 6)) + 1
+    row, col = np.indices((6, 6)) + 1 + p.sample.margin
     source = (row * p.sample.cols + col).astype(np.int32)
     values = p.sample.working[:, source]
     p = p._replace(field=p.field._replace(source=source, values=values))

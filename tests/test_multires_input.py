@@ -234,7 +234,7 @@ def test_progress_tells_every_piece_of_every_level(axis, monkeypatch):
         seen.append((progress, progress.image(), progress.candidates()))
 
     whole, output = run(sample, (40, 30), channel_axis=axis)
-    monkeypatch.setattr(multires, "LAUNCH", 1)  # so that levels come in pieces
+    monkeypatch.setattr("simdtex.methods.multires.algorithm.LAUNCH", 1)  # so that levels come in pieces
     image = synthesize(sample, (40, 30), channel_axis=axis, callback=look)
     assert_same_bits(image, whole)
     fractions = [progress.fraction for progress, *_ in seen]
@@ -324,7 +324,7 @@ def test_an_output_beyond_32_bits_is_refused_before_any_work(shape, monkeypatch)
     def never(*_, **__):
         raise AssertionError("worked")
 
-    monkeypatch.setattr(multires, "analyse", never)
+    monkeypatch.setattr("simdtex.methods.multires.algorithm.analyse", never)
     with pytest.raises(ValueError, match=f"{shape[0]} rows x {shape[1]} columns is beyond .*; give a smaller size"):
         synthesize(texture((13, 7)), shape)
 
