@@ -12,7 +12,7 @@ from simdtex.machine.opencl import OpenCL
 from simdtex.ops import lcpdf
 from simdtex.ops.coloring import coloring
 from simdtex.ops.commit import commit
-from simdtex.ops.relax import Choice, Relaxation, everything, listed, relax, relax_apart
+from simdtex.ops.relax import Choice, Everything, Relaxation, listed, relax, relax_apart
 from simdtex.schedules import Coloring
 
 PLAIN = {"suggesting": 12, "similar": 0, "chance": 4}
@@ -20,8 +20,11 @@ PLAIN = {"suggesting": 12, "similar": 0, "chance": 4}
 
 def proposal(machine, p, exhaustive=False, **options):
     """The coherent search's proposer; `exhaustive`: the exact one's."""
-    where = (machine, p.sample, p.sample.planes(machine), p.offsets, p.grid.step, p.phases, p.edges)
-    return everything(*where) if exhaustive else listed(*where, **PLAIN | options)
+    candidates = p.candidates(machine)
+    if exhaustive:
+        return Everything(candidates, p.strip(machine))
+    where = (p.offsets, p.grid.step, p.phases, p.edges)
+    return listed(machine, p.sample, candidates, *where, **PLAIN | options)
 
 
 def relaxation(machine, p, gibbs=False, noisy=False, coherence=1.0, level=0, **options):

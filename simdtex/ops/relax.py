@@ -25,7 +25,7 @@ from simdtex.ops.coherence import coherence, continuing
 from simdtex.ops.commit import commit
 from simdtex.ops.lcpdf import Distances, Relaxed, Window
 from simdtex.ops.level import constants
-from simdtex.ops.nearest import Strip, nearest, strip_of
+from simdtex.ops.nearest import Strip, nearest
 from simdtex.ops.neighbourhood import Field, neighbourhood
 from simdtex.ops.similar import most_similar
 from simdtex.ops.temperature import temperature
@@ -148,24 +148,10 @@ class Listed(NamedTuple):
         return np.where(numbers < 0, np.float32(np.inf), d[0])
 
 
-def everything(
-    machine: Machine,
-    sample: Sample,
-    planes: Array,
-    offsets: NDArray[np.int32],
-    step: int,
-    phases: str,
-    edges: str,
-) -> Everything:
-    """Lay out what the exact search needs of a level, whose sites are ``step`` pixels of the sample apart."""
-    candidates = sample.candidates(machine, offsets, step, phases, edges, planes)
-    return Everything(candidates, strip_of(machine, sample, offsets, step, phases, edges))
-
-
 def listed(
     machine: Machine,
     sample: Sample,
-    planes: Array,
+    candidates: Candidates,
     offsets: NDArray[np.int32],
     step: int,
     phases: str,
@@ -175,7 +161,6 @@ def listed(
     chance: int,
 ) -> Listed:
     """Lay out what the coherent search needs of a level, whose sites are ``step`` pixels of the sample apart."""
-    candidates = sample.candidates(machine, offsets, step, phases, edges, planes)
     radius, rows, cols = int(offsets.max()), sample.rows, sample.cols
     side, columns = 2 * radius + 1, -(-(2 * radius + 1) // LANES) * LANES
     disc = np.zeros((side, columns), np.float32)

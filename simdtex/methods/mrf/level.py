@@ -17,8 +17,9 @@ from simdtex.methods.mrf.options import Options
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Sample
 from simdtex.ops import active, lcpdf
+from simdtex.ops.nearest import strip_of
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.relax import Choice, Everything, Listed, everything, listed
+from simdtex.ops.relax import Choice, Everything, Listed, listed
 from simdtex.schedules import Setting
 
 ENOUGH = 64
@@ -129,17 +130,16 @@ class Run:
         """
         options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
         grid = self.grid(number).window(*window) if window else self.grid(number)
-        where = (machine, sample, self.planes, offsets, grid.step, options.phases, options.edges)
-        coarsest = number == self.levels - 1
-        size = sample.positions(offsets, grid.step, options.phases, options.edges).size
+        where = (offsets, grid.step, options.phases, options.edges)
+        candidates, coarsest = sample.candidates(machine, *where, self.planes), number == self.levels - 1
         proposal: Everything | Listed
-        if options.search == "exact" or coarsest or size <= options.exhaustive:
-            proposal = everything(*where)
+        if options.search == "exact" or coarsest or candidates.size <= options.exhaustive:
+            proposal = Everything(candidates, strip_of(machine, sample, *where))
         else:
             few = (options.suggesting, options.similar, options.chance)
-            proposal = listed(*where, *few)
+            proposal = listed(machine, sample, candidates, *where, *few)
         dimensions = sample.channels * (len(offsets) + 1)
-        h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, size, dimensions)  # (8)
+        h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, candidates.size, dimensions)  # (8)
         draws = options.relaxation == "gibbs" or (coarsest and options.coarsest == "gibbs")
         independent = self.schedule.independent(grid, offsets)
         return Level(
