@@ -61,7 +61,9 @@ def below_the_floor(name, search, found):
     return worse
 
 
-@pytest.mark.parametrize(("name", "search"), MEASURED)
+@pytest.mark.parametrize(
+    ("name", "search"), [pytest.param(*key, marks=[pytest.mark.slow] * (key[1] == "exact")) for key in MEASURED]
+)
 def test_quality_stays_above_the_floor(any_device, name, search):
     found = figures(name, search, opencl(any_device))
     assert not below_the_floor(name, search, found), found
