@@ -1,4 +1,4 @@
-"""Numbers and words of the method ``mrf`` that no picture depends on; found by mutation (docs/reference/mutants.rst)."""
+"""What the method ``mrf`` counts, asks for and says, which no picture shows: survivors of mutation had it changed."""
 
 import math
 import re
@@ -6,17 +6,20 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from cases import REFERENCE, texture
+from cases import REFERENCE, assert_same_bits, texture
 
 import simdtex
+from simdtex.maspar.array import parse_array
 from simdtex.methods import mrf
 from simdtex.methods.mrf import meter as meter_module
-from simdtex.methods.mrf.algorithm import anneal
-from simdtex.methods.mrf.level import Warm, check_fit, number_of_levels
+from simdtex.methods.mrf.algorithm import anneal, begin, enter, sweep
+from simdtex.methods.mrf.level import Warm, check_fit, number_of_levels, parts
 from simdtex.methods.mrf.meter import Meter
 from simdtex.methods.mrf.observers import expected_work
 from simdtex.methods.mrf.synthesis import laid_out
 from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.sample import Sample
+from simdtex.ops.relax import Everything, Listed
 
 # -- options ------------------------------------------------------------------------------------------------------
 
@@ -51,7 +54,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("name", "value", "words"), REFUSED, ids=lambda v: None)
+@pytest.mark.parametrize(("name", "value", "words"), REFUSED, ids=[name for name, *_ in REFUSED])
 def test_every_option_is_refused_by_its_name(name, value, words):
     with pytest.raises((TypeError, ValueError), match="^" + re.escape(words)):
         mrf.make_options(**{name: value})
@@ -148,6 +151,77 @@ def test_the_memory_that_is_asked_for(monkeypatch):
     assert asked == [460 * (12 + 8) + coarse * 165, 460 * (12 + 16) + fine * 177]
 
 
+@pytest.mark.parametrize(
+    ("most", "expected"),
+    [
+        (4, [([[0, 3]], 1, False), ([[3, 5], [9, 10]], 3, False), ([[20, 24]], 4, False), ([[24, 26]], 4, True)]),
+        (6, [([[0, 3], [3, 5], [9, 10]], 3, False), ([[20, 26]], 4, True)]),
+        (5, [([[0, 3], [3, 5]], 2, False), ([[9, 10]], 3, False), ([[20, 25]], 4, False), ([[25, 26]], 4, True)]),
+        (99, [([[0, 3], [3, 5], [9, 10], [20, 26]], 4, True)]),
+    ],
+)
+def test_as_many_steps_as_may_be_go_together(most, expected):
+    found = list(parts(np.array([[0, 3], [3, 5], [9, 10], [20, 26]]), most))
+    assert [(here.tolist(), begun, last) for here, begun, last in found] == expected
+    assert all(here.dtype == np.int64 for here, _, _ in found)
+
+
+def test_a_window_of_a_level():
+    run = prepared()
+    whole, window = run.level(1), run.level(1, (2, 3, 4, 5))
+    assert window.grid == run.grid(1).window(2, 3, 4, 5) != whole.grid == run.grid(1)
+    assert (window.weighed.shape, window.weighed.dtype, window.weighed.any()) == ((4, 5), np.int32, False)
+    assert whole.weighed is run.weighed
+    assert (run.weighed.shape, run.weighed.dtype, run.weighed.any()) == ((20, 23), np.int32, False)
+
+
+def test_a_level_with_few_candidates_weighs_them_all():
+    kinds = [type(prepared(search="coherent", exhaustive=n).level(0).proposal) for n in (599, 600)]
+    assert kinds == [Listed, Everything]
+
+
+def test_a_state_leaves_a_machine_and_comes_back():
+    run = prepared(free_sweeps=0)
+    _, state, _ = next(anneal(run))
+    away = state.off(REFERENCE)
+    back = away.on(REFERENCE)
+    for kept in (away, back):
+        assert kept[3:] == state[3:]
+        assert_same_bits(kept.field, state.field)
+    assert not any(np.shares_memory(ours, theirs) for ours, theirs in zip(away.field, state.field, strict=True))
+
+
+def test_neighbours_that_relax_together_are_counted_once(monkeypatch):
+    run, told = prepared(schedule="synchronous", search="exact"), []
+    level = run.level(2)
+    for scratch, pieces in ((REFERENCE.scratch, 1), (8 * (600 + 8 * 2) * 7, 5)):  # 7 sites at once
+        monkeypatch.setattr(REFERENCE, "scratch", scratch)
+        sweep(level, enter(level, begin(run)), watch=lambda level, part: told.append(part))
+        sites = [7, 14, 21, 28, 30][-pieces:]
+        assert [(part.steps, part.relaxed, part.last) for part in told] == [(1, n, n == 30) for n in sites]
+        told.clear()
+
+
+def test_a_step_may_have_no_sites():
+    few = {"order": 1, "levels": 1, "schedule": "random-subset:0.1"}
+    _, output = simdtex.synthesize(texture((7, 8)), (2, 2), rng=3, device=REFERENCE, full_output=True, **few)
+    assert not output.temperature.any()
+
+
+def test_grey_levels_are_as_fine_as_the_channels_and_neighbours_allow():
+    pixels = texture((24, 25), 2, np.uint16)
+    run = laid_out(REFERENCE, pixels, (20, 23), mrf.Options(order=2, levels=3), 5)
+    assert run.sample.top == Sample(pixels, 2 * 8, 8).top < Sample(pixels, 2, 8).top
+
+
+def test_a_machine_emulates_the_array_that_is_given(monkeypatch):
+    asked = []
+    monkeypatch.setattr(type(REFERENCE), "emulate", lambda self, array: asked.append(array) or self)
+    assert prepared(array="4x8", mapping="hierarchical").emulated is True
+    assert prepared(array="4x8", emulate=False).emulated is prepared().emulated is False
+    assert asked == [parse_array("4x8", "hierarchical")]
+
+
 # -- what is counted ------------------------------------------------------------------------------------------------
 
 
@@ -160,26 +234,26 @@ def test_a_meter(monkeypatch):
     meter.begin(1, Grid(8, 6, 2), 10, 4)
     done = []
 
-    def sweep(phase, left, *parts):
+    def one(phase, left, *those):
         number = meter.sweep(phase, left)
-        for relaxed, steps, share in parts:
+        for relaxed, steps, share in those:
             step = meter.step(steps)
             meter.add(relaxed, 20 * relaxed, share)
             done.append((number, step, round(meter.fraction * 460, 6)))
 
-    sweep("relax", 1.0, (6, 3, 0.5), (6, 1, 1.0))  # of the first no more is known than that it is one of many
-    sweep("relax", 0.25, (6, 2, 0.5))  # half of all
-    sweep("relax", 0.04, (1, 1, 1.0))  # no further than to the end
-    sweep("free", 0.0, (2, 1, 0.5), (10, 1, 1.0))
+    one("relax", 1.0, (6, 3, 0.5), (6, 1, 1.0))  # of the first no more is known than that it is one of many
+    one("relax", 0.25, (6, 2, 0.5))  # half of all
+    one("relax", 0.04, (1, 1, 1.0))  # no further than to the end
+    one("free", 0.0, (2, 1, 0.5), (10, 1, 1.0))
     clock.now = 107.0
     meter.end(7, (50, 3))
     assert done == [(1, 3, 5), (1, 4, 10), (2, 6, 75), (3, 7, 100), (4, 8, 108), (4, 9, 120)]
     done.clear()
     meter.begin(0, Grid(8, 6), 5)
-    sweep("relax", 0.5, (2, 1, 0.5))
-    sweep("relax", 0.32, (1, 1, 0.0))
-    sweep("relax", 0.405, (1, 1, 0.0))  # warmer again, and yet no less is done
-    sweep("free", 0.0, (2, 1, 0.5))
+    one("relax", 0.5, (2, 1, 0.5))
+    one("relax", 0.32, (1, 1, 0.0))
+    one("relax", 0.405, (1, 1, 0.0))  # warmer again, and yet no less is done
+    one("free", 0.0, (2, 1, 0.5))
     clock.now = 111.0
     meter.end(0)
     assert done == [(1, 1, 135), (2, 2, 180), (3, 3, 180), (4, 4, 430)]
@@ -242,10 +316,10 @@ def test_a_run_is_counted(given):
     for report, (number, done) in zip(statistics["levels"], sweeps.items(), strict=True):
         cooled = [part for info, part, _ in done if info.phase == "relax"]
         every = [part for _, part, _ in done]
-        for counted, parts in ((report, every), (report["equilibrium"], cooled)):
-            assert counted["sweeps"] == len(parts)
-            assert counted["steps"] == sum(part.steps for part in parts)
-            assert counted["relaxations"] == sum(part.relaxed for part in parts)
+        for counted, those in ((report, every), (report["equilibrium"], cooled)):
+            assert counted["sweeps"] == len(those)
+            assert counted["steps"] == sum(part.steps for part in those)
+            assert counted["relaxations"] == sum(part.relaxed for part in those)
         assert [p.step for p in seen if p.level == number][-1] == report["steps"]
         assert report["candidates"] == 600
         few = given.get("search") != "exact" and number < 2
