@@ -209,10 +209,10 @@ def test_a_step_may_have_no_sites():
 
 
 def test_grey_levels_are_as_fine_as_the_channels_and_neighbours_allow():
-    pixels = texture((24, 25), 2, np.uint16)
+    pixels = texture((24, 25), 3, np.uint16)
     run = laid_out(REFERENCE, pixels, (20, 23), mrf.Options(order=64, levels=1), 5)
     neighbours = len(neighbourhood_offsets(64))
-    assert run.sample.top == Sample(pixels, 2 * neighbours, 8).top < Sample(pixels, neighbours, 8).top
+    assert run.sample.top == Sample(pixels, 3 * neighbours, 8).top == 2047 < Sample(pixels, neighbours, 8).top
 
 
 def test_a_machine_emulates_the_array_that_is_given(monkeypatch):
