@@ -166,6 +166,10 @@ def test_as_many_steps_as_may_be_go_together(most, expected):
     assert all(here.dtype == np.int64 for here, _, _ in found)
 
 
+def test_a_site_always_cools():
+    assert [prepared(xi=xi).level(0).xi for xi in (-1e-9, -0.001, -0.0024, -1.5)] == [-1, -1, -2, -1536]
+
+
 def test_a_window_of_a_level():
     run = prepared()
     whole, window = run.level(1), run.level(1, (2, 3, 4, 5))
@@ -192,14 +196,18 @@ def test_a_state_leaves_a_machine_and_comes_back():
 
 
 def test_neighbours_that_relax_together_are_counted_once(monkeypatch):
-    run, told = prepared(schedule="synchronous", search="exact"), []
+    run, told, work = prepared(schedule="synchronous", search="exact"), [], []
     level = run.level(2)
+    monkeypatch.setattr(type(REFERENCE), "sync", lambda self, more=0: work.append(more))
     for scratch, pieces in ((REFERENCE.scratch, 1), (8 * (600 + 8 * 2) * 7, 5)):  # 7 sites at once
         monkeypatch.setattr(REFERENCE, "scratch", scratch)
-        sweep(level, enter(level, begin(run)), watch=lambda level, part: told.append(part))
+        _, info = sweep(level, enter(level, begin(run)), watch=lambda level, part: told.append(part))
+        assert info.ended is False  # only a run knows
         sites = [7, 14, 21, 28, 30][-pieces:]
         assert [(part.steps, part.relaxed, part.last) for part in told] == [(1, n, n == 30) for n in sites]
+        assert sum(work) == 30 * 2 * 600 * 8
         told.clear()
+        work.clear()
 
 
 def test_a_step_may_have_no_sites():
