@@ -6,7 +6,7 @@ VENV ?= .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check -qq
 
-.PHONY: help demo test slow lint docs cpu clean
+.PHONY: help demo test slow lint docs mutants cpu clean
 
 help:
 	@echo "make demo    textures from real samples, into ./demo"
@@ -14,6 +14,7 @@ help:
 	@echo "make slow    the tests that take long or need the package index"
 	@echo "make lint    ruff and mypy"
 	@echo "make docs    the documentation, into docs/_build/html"
+	@echo "make mutants mutation tests of the Markov random field"
 	@echo "make cpu     the CPU runtime of the package index, beside what is here already"
 	@echo "make clean   remove what these commands made, except $(VENV)"
 	@echo "Another Python: make PYTHON=python3.12 ..."
@@ -65,9 +66,16 @@ docs:
 	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	@echo "The documentation is in docs/_build/html/index.html"
 
+# MUTANTS='simdtex.ops.*' or 'simdtex.schedules.*' does others. No device: mutmut forks, which OpenCL does not survive.
+MUTANTS ?= simdtex.methods.mrf.*
+mutants:
+	$(call install,mutants,[mutants])
+	OCL_ICD_VENDORS=/nonexistent PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m mutmut run --max-children 1 '$(MUTANTS)'
+	$(PY) -m mutmut results
+
 cpu:
 	$(call install,cpu,[cpu])
 
 clean:
-	rm -rf build dist demo docs/_build docs/generated .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf build dist demo docs/_build docs/generated .hypothesis .mypy_cache .pytest_cache .ruff_cache mutants
 	find . -name __pycache__ -type d -not -path './$(VENV)/*' -prune -exec rm -rf {} +

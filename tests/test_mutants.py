@@ -1,0 +1,358 @@
+"""What the method ``mrf`` counts, asks for and says, which no picture shows: survivors of mutation had it changed."""
+
+import math
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, texture
+
+import simdtex
+from simdtex.maspar.array import parse_array
+from simdtex.methods import mrf
+from simdtex.methods.mrf import meter as meter_module
+from simdtex.methods.mrf.algorithm import anneal, begin, enter, sweep
+from simdtex.methods.mrf.level import Warm, check_fit, number_of_levels, parts
+from simdtex.methods.mrf.meter import Meter
+from simdtex.methods.mrf.observers import expected_work
+from simdtex.methods.mrf.synthesis import laid_out
+from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.sample import Sample
+from simdtex.ops.relax import Everything, Listed
+
+# -- options ------------------------------------------------------------------------------------------------------
+
+REFUSED = [
+    *(
+        (name, "other", f"unknown {name} 'other'; choose one of: {valid}")
+        for name, valid in {
+            "relaxation": "icm, gibbs",
+            "pixel": "source, density",
+            "phases": "all, decimated",
+            "edges": "auto, reflect, whole",
+            "coarsest": "gibbs, same",
+            "boundary": "torus, open",
+            "search": "auto, exact, coherent",
+            "preset": "default, paper",
+        }.items()
+    ),
+    ("order", 0, "order 0 has no neighbours; give 1 "),
+    ("levels", 0, "levels is 0; give 1 or more"),
+    ("bandwidth", 0, "bandwidth is 0; give a number above 0"),
+    ("coherence", -0.1, "coherence is -0.1; give a number of at least 0"),
+    ("xi", 0, "xi is 0; give a number below 0"),
+    ("xi", math.nan, "xi is nan; give a number of at least -inf"),
+    ("free_sweeps", -1, "free_sweeps is -1; give 0 or more"),
+    ("suggesting", 0, "suggesting is 0; give 1 or more"),
+    ("similar", -1, "similar is -1; give 0 or more"),
+    ("chance", -1, "chance is -1; give 0 or more"),
+    ("exhaustive", -1, "exhaustive is -1; give 0 or more"),
+    ("check_schedule", 1, "check_schedule must be True or False, not 1"),
+    ("emulate", 0, "emulate must be True or False, not 0"),
+    ("anything", 1, "unknown option 'anything' of the method 'mrf'; choose from: preset, order, "),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "words"), REFUSED, ids=[name for name, *_ in REFUSED])
+def test_every_option_is_refused_by_its_name(name, value, words):
+    with pytest.raises((TypeError, ValueError), match="^" + re.escape(words)):
+        mrf.make_options(**{name: value})
+
+
+def test_the_least_of_every_option_is_accepted():
+    least = {"order": 1, "levels": 1, "coherence": 0, "free_sweeps": 0}
+    mrf.make_options(**least, suggesting=1, similar=0, chance=0, exhaustive=0)
+
+
+def test_a_list_finds_no_mode_of_a_density():
+    words = 'search="coherent" finds no mode of a density; give search="exact", pixel="source" or relaxation="gibbs"'
+    with pytest.raises(ValueError, match=f"^{words}$"):
+        mrf.make_options(search="coherent", pixel="density")
+
+
+def test_options_resolve():
+    def resolved(**given):
+        found = mrf.make_options(**given).resolved()
+        return found.search, found.coherence
+
+    assert resolved() == ("coherent", 0.2)
+    assert resolved(relaxation="gibbs") == resolved(pixel="density") == ("exact", 1.0)
+    assert resolved(search="exact", coherence=0.5) == ("exact", 0.5)
+    assert resolved(search="coherent", relaxation="gibbs") == ("coherent", 0.2)
+
+
+# -- levels -------------------------------------------------------------------------------------------------------
+
+
+def test_a_neighbourhood_that_does_not_fit():
+    check_fit((3, 9), 1, 1)
+    for sample, radius, order, words in [
+        ((9, 4), 2, 8, "order 8 does not fit the sample of 9 rows x 4 columns; the largest order that fits is 3"),
+        ((5, 7), 3, 9, "order 9 does not fit the sample of 5 rows x 7 columns; the largest order that fits is 8"),
+        ((3, 3), 2, 4, "order 4 does not fit the sample of 3 rows x 3 columns; the largest order that fits is 3"),
+        ((2, 8), 1, 1, "order 1 does not fit the sample of 2 rows x 8 columns; give at least 3x3 pixels"),
+    ]:
+        with pytest.raises(ValueError, match=f"^a neighbourhood of {words}$"):
+            check_fit(sample, radius, order)
+
+
+@pytest.mark.parametrize(
+    ("sample", "shape", "given", "expected"),
+    [
+        ((16, 16), (64, 64), {"order": 1}, 2),  # 8 x 8 candidates are 64
+        ((15, 16), (64, 64), {"order": 1}, 1),
+        ((15, 16), (64, 64), {"order": 1, "phases": "all"}, 4),
+        ((64, 64), (5, 64), {"order": 1}, 2),
+        ((64, 64), (4, 64), {"order": 1}, 1),
+        ((64, 64), (64, 9), {"order": 1}, 3),
+        ((64, 64), (64, 8), {"order": 1}, 2),
+        ((20, 20), (64, 64), {"order": 1, "edges": "whole"}, 2),
+        ((19, 20), (64, 64), {"order": 1, "edges": "whole"}, 1),
+        ((16, 16), (8, 16), {"order": 1, "levels": 4}, 4),
+        ((9, 9), (64, 64), {"order": 1, "levels": 3, "edges": "whole"}, "give at most 2"),
+        ((16, 16), (8, 16), {"order": 1, "levels": 5}, "give at most 4"),
+        ((12, 12), (64, 64), {"order": 1, "levels": 3, "edges": "whole", "phases": "all"}, 3),
+    ],
+)
+def test_how_many_levels(sample, shape, given, expected):
+    options = mrf.make_options(**given)
+    offsets = neighbourhood_offsets(options.order)
+    if isinstance(expected, int):
+        assert number_of_levels(sample, offsets, shape, options) == expected
+    else:
+        words = f"levels={options.levels} is too many for this sample, output and order; {expected}"
+        with pytest.raises(ValueError, match=f"^{words}$"):
+            number_of_levels(sample, offsets, shape, options)
+
+
+def prepared(machine=REFERENCE, **given):
+    options = {"order": 2, "levels": 3, "phases": "all", "edges": "reflect"} | given
+    return laid_out(machine, texture((24, 25), seed=3)[..., None], (20, 23), mrf.Options(**options), 5)
+
+
+def test_which_sites_are_warm():
+    level = prepared().level(1)
+    temperature = np.zeros((20, 23), np.uint16)
+    temperature[2, 4], temperature[18, 22], temperature[1, 1] = 1, 1024, 7  # the last is no site of the level
+    warm, free = Warm(level, temperature, False), Warm(level, temperature, True)
+    assert np.argwhere(warm.mask()).tolist() == [[1, 2], [9, 11]]
+    assert warm.numbers().tolist() == [14, 119]
+    assert free.mask().shape == (10, 12) and free.mask().all() and free.mask().dtype == bool
+    assert free.numbers().tolist() == list(range(120))
+
+
+def test_the_memory_that_is_asked_for(monkeypatch):
+    asked = []
+    monkeypatch.setattr(type(REFERENCE), "require", lambda self, needed: asked.append(needed))
+    prepared()
+    prepared(similar=3, schedule="block", levels=1)
+    coarse, fine = (24 + 8) * (25 + 8), (24 + 2) * (25 + 2)  # with the margin of the coarsest level
+    assert asked == [460 * (12 + 8) + coarse * 165, 460 * (12 + 16) + fine * 177]
+
+
+@pytest.mark.parametrize(
+    ("most", "expected"),
+    [
+        (4, [([[0, 3]], 1, False), ([[3, 5], [9, 10]], 3, False), ([[20, 24]], 4, False), ([[24, 26]], 4, True)]),
+        (6, [([[0, 3], [3, 5], [9, 10]], 3, False), ([[20, 26]], 4, True)]),
+        (5, [([[0, 3], [3, 5]], 2, False), ([[9, 10]], 3, False), ([[20, 25]], 4, False), ([[25, 26]], 4, True)]),
+        (99, [([[0, 3], [3, 5], [9, 10], [20, 26]], 4, True)]),
+    ],
+)
+def test_as_many_steps_as_may_be_go_together(most, expected):
+    found = list(parts(np.array([[0, 3], [3, 5], [9, 10], [20, 26]]), most))
+    assert [(here.tolist(), begun, last) for here, begun, last in found] == expected
+    assert all(here.dtype == np.int64 for here, _, _ in found)
+
+
+def test_a_site_always_cools():
+    assert [prepared(xi=xi).level(0).xi for xi in (-1e-9, -0.001, -0.0024, -1.5)] == [-1, -1, -2, -1536]
+
+
+def test_a_window_of_a_level():
+    run = prepared()
+    whole, window = run.level(1), run.level(1, (2, 3, 4, 5))
+    assert window.grid == run.grid(1).window(2, 3, 4, 5) != whole.grid == run.grid(1)
+    assert (window.weighed.shape, window.weighed.dtype, window.weighed.any()) == ((4, 5), np.int32, False)
+    assert whole.weighed is run.weighed
+    assert (run.weighed.shape, run.weighed.dtype, run.weighed.any()) == ((20, 23), np.int32, False)
+
+
+def test_a_level_with_few_candidates_weighs_them_all():
+    kinds = [type(prepared(search="coherent", exhaustive=n).level(0).proposal) for n in (599, 600)]
+    assert kinds == [Listed, Everything]
+
+
+def test_a_state_leaves_a_machine_and_comes_back():
+    run = prepared(free_sweeps=0)
+    _, state, _ = next(anneal(run))
+    away = state.off(REFERENCE)
+    back = away.on(REFERENCE)
+    for kept in (away, back):
+        assert kept[3:] == state[3:]
+        assert_same_bits(kept.field, state.field)
+    assert not any(np.shares_memory(ours, theirs) for ours, theirs in zip(away.field, state.field, strict=True))
+
+
+def test_neighbours_that_relax_together_are_counted_once(monkeypatch):
+    run, told, work = prepared(schedule="synchronous", search="exact"), [], []
+    level = run.level(2)
+    monkeypatch.setattr(type(REFERENCE), "sync", lambda self, more=0: work.append(more))
+    for scratch, pieces in ((REFERENCE.scratch, 1), (8 * (600 + 8 * 2) * 7, 5)):  # 7 sites at once
+        monkeypatch.setattr(REFERENCE, "scratch", scratch)
+        _, info = sweep(level, enter(level, begin(run)), watch=lambda level, part: told.append(part))
+        assert info.ended is False  # only a run knows
+        sites = [7, 14, 21, 28, 30][-pieces:]
+        assert [(part.steps, part.relaxed, part.last) for part in told] == [(1, n, n == 30) for n in sites]
+        assert sum(work) == 30 * 2 * 600 * 8
+        told.clear()
+        work.clear()
+
+
+def test_a_step_may_have_no_sites():
+    few = {"order": 1, "levels": 1, "schedule": "random-subset:0.1"}
+    _, output = simdtex.synthesize(texture((7, 8)), (2, 2), rng=3, device=REFERENCE, full_output=True, **few)
+    assert not output.temperature.any()
+
+
+def test_grey_levels_are_as_fine_as_the_channels_and_neighbours_allow():
+    pixels = texture((24, 25), 3, np.uint16)
+    run = laid_out(REFERENCE, pixels, (20, 23), mrf.Options(order=64, levels=1), 5)
+    neighbours = len(neighbourhood_offsets(64))
+    assert run.sample.top == Sample(pixels, 3 * neighbours, 8).top == 2047 < Sample(pixels, neighbours, 8).top
+
+
+def test_a_machine_emulates_the_array_that_is_given(monkeypatch):
+    asked = []
+    monkeypatch.setattr(type(REFERENCE), "emulate", lambda self, array: asked.append(array) or self)
+    assert prepared(array="4x8", mapping="hierarchical").emulated is True
+    assert prepared(array="4x8", emulate=False).emulated is prepared().emulated is False
+    assert asked == [parse_array("4x8", "hierarchical")]
+
+
+# -- what is counted ------------------------------------------------------------------------------------------------
+
+
+def test_a_meter(monkeypatch):
+    clock = SimpleNamespace(now=100.0)
+    monkeypatch.setattr(meter_module, "time", SimpleNamespace(perf_counter=lambda: clock.now))
+    meter = Meter({1: (100.0, 20.0), 0: (300.0, 40.0)})
+    assert (meter.fraction, meter.reports) == (0, [])
+    clock.now = 102.0
+    meter.begin(1, Grid(8, 6, 2), 10, 4)
+    done = []
+
+    def one(phase, left, *those):
+        number = meter.sweep(phase, left)
+        for relaxed, steps, share in those:
+            step = meter.step(steps)
+            meter.add(relaxed, 20 * relaxed, share)
+            done.append((number, step, round(meter.fraction * 460, 6)))
+
+    one("relax", 1.0, (6, 3, 0.5), (6, 1, 1.0))  # of the first no more is known than that it is one of many
+    one("relax", 0.25, (6, 2, 0.5))  # half of all
+    one("relax", 0.04, (1, 1, 1.0))  # no further than to the end
+    one("free", 0.0, (2, 1, 0.5), (10, 1, 1.0))
+    clock.now = 107.0
+    meter.end(7, (50, 3))
+    assert done == [(1, 3, 5), (1, 4, 10), (2, 6, 75), (3, 7, 100), (4, 8, 108), (4, 9, 120)]
+    done.clear()
+    meter.begin(0, Grid(8, 6), 5)
+    one("relax", 0.5, (2, 1, 0.5))
+    one("relax", 0.32, (1, 1, 0.0))
+    one("relax", 0.405, (1, 1, 0.0))  # warmer again, and yet no less is done
+    one("free", 0.0, (2, 1, 0.5))
+    clock.now = 111.0
+    meter.end(0)
+    assert done == [(1, 1, 135), (2, 2, 180), (3, 3, 180), (4, 4, 430)]
+    assert meter.seconds == 11
+    assert meter.reports == [
+        {
+            "level": 1, "rows": 4, "cols": 3, "candidates": 10, "sweeps": 4, "steps": 9, "relaxations": 31,
+            "equilibrium": {"sweeps": 3, "steps": 7, "relaxations": 19},
+            "fma": 20 * 31 + 150, "weighed": 50 / 31, "skipped": 7, "seconds": 5.0,
+        },
+        {
+            "level": 0, "rows": 8, "cols": 6, "candidates": 5, "sweeps": 4, "steps": 4, "relaxations": 6,
+            "equilibrium": {"sweeps": 3, "steps": 3, "relaxations": 4},
+            "fma": 20 * 6, "weighed": 5.0, "skipped": 0, "seconds": 4.0,
+        },
+    ]  # fmt: skip
+    assert isinstance(meter.reports[1]["weighed"], float)
+
+
+@pytest.mark.parametrize(
+    ("given", "each", "first"),
+    [
+        ({"search": "exact"}, 600, 5.8),
+        ({"search": "coherent"}, 13, 5.8),
+        ({"search": "coherent", "similar": 2, "chance": 0, "xi": -2.0}, 28, 3.4),
+        ({"search": "coherent", "suggesting": 3, "free_sweeps": 1}, 8, 5.8),
+        ({"search": "coherent", "suggesting": 8, "similar": 99}, 600, 5.8),
+        ({"search": "coherent", "exhaustive": 600}, 600, 5.8),
+        ({"search": "coherent", "exhaustive": 599, "xi": -1e-9}, 13, 1024),
+    ],
+)
+def test_the_work_that_is_expected(given, each, first):
+    run = prepared(**given)
+    free = given.get("free_sweeps", 2)
+    expected = {0: (460 * each * 4.5, 460 * each * free), 1: (120 * each * 4.5, 120 * each * free)}
+    expected[2] = (30 * 600 * first, 30 * 600 * free)
+    found = expected_work(run)
+    assert set(found) == set(expected)
+    for level, work in expected.items():
+        assert found[level] == pytest.approx(work)
+
+
+@pytest.mark.parametrize("given", [{"search": "exact"}, {"search": "coherent"}, {"array": "4x4", "emulate": False}])
+def test_a_run_is_counted(given):
+    given = {"order": 2, "levels": 3, "phases": "all", "edges": "reflect", "free_sweeps": 1} | given
+    told, seen = [], []
+    run = prepared(**given)
+    sweeps = {2: [], 1: [], 0: []}
+    for level, _, info in anneal(run, watch=lambda level, part: told.append((level, part))):
+        sweeps[level.number].append((info, told[-1][1], level))
+    _, output = simdtex.synthesize(
+        texture((24, 25), seed=3), (20, 23), rng=5, device=REFERENCE, full_output=True, callback=seen.append, **given
+    )
+    assert [(p.level, p.sweep, p.phase, p.temperature_left, p.end_of_sweep) for p in seen] == [
+        (level.number, part.number, part.phase, part.left, part.last) for level, part in told
+    ]
+    assert {progress.levels for progress in seen} == {3}
+    statistics = output.statistics
+    assert seen[-1].fraction > 0.9
+    for report, (number, done) in zip(statistics["levels"], sweeps.items(), strict=True):
+        cooled = [part for info, part, _ in done if info.phase == "relax"]
+        every = [part for _, part, _ in done]
+        for counted, those in ((report, every), (report["equilibrium"], cooled)):
+            assert counted["sweeps"] == len(those)
+            assert counted["steps"] == sum(part.steps for part in those)
+            assert counted["relaxations"] == sum(part.relaxed for part in those)
+        assert [p.step for p in seen if p.level == number][-1] == report["steps"]
+        assert report["candidates"] == 600
+        few = given.get("search") != "exact" and number < 2
+        assert (0 < report["weighed"] <= 13) if few else report["weighed"] == 600
+        assert report["fma"] == round(report["weighed"] * report["relaxations"]) * 16
+    assert sum(report["relaxations"] for report in statistics["levels"]) == statistics["accounting"]["sites"]
+    assert statistics["accounting"]["emulated"] is False
+    assert statistics["options"]["levels"] == 3
+    assert statistics["options"]["schedule"] == "coloring"
+    assert set(statistics) == {"device", "seed", "options", "seconds", "device_seconds", "accounting", "levels"}
+
+
+# -- the density at a site --------------------------------------------------------------------------------------------
+
+
+def test_a_site_that_nothing_matches_is_named():
+    sample = np.zeros((7, 7), np.uint8)
+    sample[3, 3] = 1
+    image = np.zeros((6, 8), np.uint8)
+    image[4, 5] = image[4, 6] = image[3, 5] = 1
+    words = (
+        "no neighbourhood of the sample equals that of site ({}, {}); "
+        'use fewer grey levels, a smaller order, or estimator="parzen"'
+    )
+    with pytest.raises(ValueError) as caught:
+        simdtex.lcpdf(image, sample, [(0, 0), (4, 5), (3, 5)], order=1, estimator="histogram", device=REFERENCE)
+    assert str(caught.value) == words.format(4, 5)
