@@ -201,10 +201,12 @@ def test_neighbours_that_relax_together_are_counted_once(monkeypatch):
     monkeypatch.setattr(type(REFERENCE), "sync", lambda self, more=0: work.append(more))
     for scratch, pieces in ((REFERENCE.scratch, 1), (8 * (600 + 8 * 2) * 7, 5)):  # 7 sites at once
         monkeypatch.setattr(REFERENCE, "scratch", scratch)
-        _, info = sweep(level, enter(level, begin(run)), watch=lambda level, part: told.append(part))
+        _, info = sweep(level, enter(level, begin(run)), watch=lambda *seen: told.append(seen[-1]))
         assert info.ended is False  # only a run knows
-        sites = [7, 14, 21, 28, 30][-pieces:]
-        assert [(part.steps, part.relaxed, part.last) for part in told] == [(1, n, n == 30) for n in sites]
+        sites = [30] if pieces == 1 else [7, 7, 7, 7, 2]
+        assert [part.sites for part in told] == sites
+        assert [part.steps for part in told] == [1] + [0] * (pieces - 1)
+        assert [part.last for part in told] == [False] * (pieces - 1) + [True]
         assert sum(work) == 30 * 2 * 600 * 8
         told.clear()
         work.clear()
@@ -308,27 +310,35 @@ def test_the_work_that_is_expected(given, each, first):
 @pytest.mark.parametrize("given", [{"search": "exact"}, {"search": "coherent"}, {"array": "4x4", "emulate": False}])
 def test_a_run_is_counted(given):
     given = {"order": 2, "levels": 3, "phases": "all", "edges": "reflect", "free_sweeps": 1} | given
-    told, seen = [], []
+    told, seen, parts = [], [], []
     run = prepared(**given)
     sweeps = {2: [], 1: [], 0: []}
-    for level, _, info in anneal(run, watch=lambda level, part: told.append((level, part))):
-        sweeps[level.number].append((info, told[-1][1], level))
+    for level, _, info in anneal(run, watch=lambda *part: told.append(part)):
+        sweeps[level.number].append((info, [part for *_, part in told[sum(map(len, parts)) :]]))
+        parts.append(sweeps[level.number][-1][1])
     _, output = simdtex.synthesize(
         texture((24, 25), seed=3), (20, 23), rng=5, device=REFERENCE, full_output=True, callback=seen.append, **given
     )
     assert [(p.level, p.sweep, p.phase, p.temperature_left, p.end_of_sweep) for p in seen] == [
-        (level.number, part.number, part.phase, part.left, part.last) for level, part in told
+        (
+            level.number,
+            state.cooling + state.free + 1,
+            "free" if free else "relax",
+            0.0 if free else state.heat / (1024 * level.grid.rows * level.grid.cols),
+            part.last,
+        )
+        for level, state, free, part in told
     ]
     assert {progress.levels for progress in seen} == {3}
     statistics = output.statistics
     assert seen[-1].fraction > 0.9
     for report, (number, done) in zip(statistics["levels"], sweeps.items(), strict=True):
-        cooled = [part for info, part, _ in done if info.phase == "relax"]
-        every = [part for _, part, _ in done]
-        for counted, those in ((report, every), (report["equilibrium"], cooled)):
-            assert counted["sweeps"] == len(those)
-            assert counted["steps"] == sum(part.steps for part in those)
-            assert counted["relaxations"] == sum(part.relaxed for part in those)
+        cooled = [those for info, those in done if info.phase == "relax"]
+        every = [those for _, those in done]
+        for counted, swept in ((report, every), (report["equilibrium"], cooled)):
+            assert counted["sweeps"] == len(swept)
+            assert counted["steps"] == sum(part.steps for those in swept for part in those)
+            assert counted["relaxations"] == sum(part.sites for those in swept for part in those)
         assert [p.step for p in seen if p.level == number][-1] == report["steps"]
         assert report["candidates"] == 600
         few = given.get("search") != "exact" and number < 2
