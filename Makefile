@@ -66,11 +66,11 @@ docs:
 	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	@echo "The documentation is in docs/_build/html/index.html"
 
-# MUTANTS='simdtex.ops.*' or 'simdtex.schedules.*' does others. No device: mutmut forks, which OpenCL does not survive.
+# MUTANTS='simdtex.ops.*' or 'simdtex.schedules.*' does others, a list of names those alone. No OpenCL: mutmut forks.
 MUTANTS ?= simdtex.methods.mrf.*
 mutants:
 	$(call install,mutants,[mutants])
-	OCL_ICD_VENDORS=/nonexistent PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(PY) -m mutmut run --max-children 1 '$(MUTANTS)'
+	set -f; OCL_ICD_VENDORS=/nonexistent $(PY) -m mutmut run --max-children 1 $(MUTANTS)
 	$(PY) -m mutmut results
 
 cpu:

@@ -147,8 +147,9 @@ def test_the_memory_that_is_asked_for(monkeypatch):
     monkeypatch.setattr(type(REFERENCE), "require", lambda self, needed: asked.append(needed))
     prepared()
     prepared(similar=3, schedule="block", levels=1)
+    laid_out(REFERENCE, texture((24, 25), 3), (20, 23), mrf.Options(order=2, levels=1), 5)
     coarse, fine = (24 + 8) * (25 + 8), (24 + 2) * (25 + 2)  # with the margin of the coarsest level
-    assert asked == [460 * (12 + 8) + coarse * 165, 460 * (12 + 16) + fine * 177]
+    assert asked == [460 * (12 + 8) + coarse * 165, 460 * (12 + 16) + fine * 177, 460 * (12 + 12) + fine * 193]
 
 
 @pytest.mark.parametrize(
@@ -282,6 +283,14 @@ def test_a_meter(monkeypatch):
         },
     ]  # fmt: skip
     assert isinstance(meter.reports[1]["weighed"], float)
+
+
+def test_a_meter_of_a_level_that_is_held_from_the_beginning():
+    meter = Meter({0: (300.0, 100.0)})
+    meter.begin(0, Grid(2, 2), 5)
+    assert meter.sweep("free", 0.0) == 1
+    meter.add(4, 0, 1.0)
+    assert meter.fraction == 320 / 400
 
 
 @pytest.mark.parametrize(
