@@ -45,7 +45,7 @@
 
 #ifdef ALL
 #ifndef N
-#define N 60 // neighbours
+#define N 64 // most neighbours
 #endif
 #ifndef STEP
 #define STEP 4 // vectors of candidates in registers together
@@ -72,7 +72,8 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
     float u[N], xu[N * C];
     int list[N], m = 0, sum = g.xi, members = 0;
     ulong seen = 0;
-    for (int k = 0; k < N; ++k) {
+    const int neighbours = g.neighbours;
+    for (int k = 0; k < neighbours; ++k) {
         const int r = neighbour(g.lattice, i, j, offsets[k].x, offsets[k].y);
         const int t = r < 0 ? UNTOUCHED : temperature[r];
         u[k] = (float)(1024 - t) * 0x1p-10f;
@@ -96,7 +97,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
             y[q] = strip + g.first + n / wide * g.pitch + n % wide * V;
             sums[q] = 0.0f;
         }
-        for (int k = 0; k < N; ++k)
+        for (int k = 0; k < neighbours; ++k)
 #pragma unroll
             for (int c = 0; c < C; ++c)
 #pragma unroll

@@ -375,8 +375,8 @@ def _fused(
         strip = proposal.strip
         level |= {"first": strip.first, "pitch": strip.pitch, "size": strip.pixels.shape[1]}
         level |= {"strip_rows": strip.rows, "strip_cols": strip.cols}
-        whole = next(n for n in (64, 256, KEPT) if proposal.slots <= n)  # so that few programs serve all
-        defines |= {"ALL": whole, "N": offsets.shape[0], "STEP": machine.step}
+        most = 256 if proposal.slots <= 256 else KEPT  # so that few programs serve all
+        defines |= {"ALL": most, "N": -(-offsets.shape[0] // 64) * 64, "STEP": machine.step}
         name, own = "relax_all", [strip.pixels, strip.reach, noise, key]
     else:
         level |= {"plane": proposal.levels.shape[1], "down": proposal.down}
