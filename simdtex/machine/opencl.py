@@ -40,9 +40,6 @@ OUT_OF_MEMORY = (
 SMALL_GROUP = 4
 """Work-items to a work-group of a CPU where each has much to do: a small group of sites still feeds all cores."""
 
-LARGE_STEP = 1024
-"""Sites from which on a work-group has as many work-items as elsewhere."""
-
 TOGETHER = ("active", "coloring", "start")
 """Files whose kernels need no -D constant and serve every run of ``mrf``: one program, since each costs some 50 ms to
 load on PoCL."""
@@ -333,9 +330,8 @@ class OpenCL:
         launch costs a few microseconds.
         """
         kernel.set_args(*(a.data if type(a) is DeviceArray else a for a in args))
-        fixed = self.forced or self.info.kind == "gpu"
+        group = self.group if self.forced or self.info.kind == "gpu" else SMALL_GROUP
         for begin, end in groups.tolist():
-            group = self.group if fixed or end - begin >= LARGE_STEP else SMALL_GROUP
             kernel.set_arg(1, np.int32(end))
             for first in range(begin, end, LONGEST):
                 size = -(-min(end - first, LONGEST) // group) * group
