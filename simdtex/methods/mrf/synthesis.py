@@ -90,8 +90,8 @@ def laid_out(machine: Machine, pixels: NDArray[Any], shape: tuple[int, int], opt
     schedule = schedules.get(options.schedule)
     _check_memory(machine, sample, shape, options.similar, copies=2 if schedule.tile else 1)
     emulated = bool(options.array) and options.emulate
-    if emulated:
-        machine = machine.emulate(parse_array(options.array or "", options.mapping))
+    if options.array and emulated:
+        machine = machine.emulate(parse_array(options.array, options.mapping))
     return Run(
         machine=machine,
         sample=sample,
