@@ -201,6 +201,15 @@ class Choice(NamedTuple):
     density: bool
     window: Window
 
+    @property
+    def stores(self) -> bool:
+        """Whether it takes more of the distances than the least."""
+        return self.draws or self.density
+
+    def mode(self, channels: int) -> Operation[[Distances, Candidates, Window], Relaxed]:
+        """The mode of a density: over grey levels where there are few of them, else over pixel vectors."""
+        return lcpdf.mode if channels == 1 and self.window.top == 255 else lcpdf.mode_vector
+
     def taken(
         self,
         numbers: NDArray[np.int64],
@@ -212,10 +221,7 @@ class Choice(NamedTuple):
         """What each site takes, in NumPy."""
         candidates, d = relaxation.proposal.candidates, distances.distance
         if self.density and not self.draws:
-            grey = len(candidates.pixels) == 1 and self.window.top == 255
-            mode = lcpdf.mode if grey else lcpdf.mode_vector
-            found: Relaxed = mode.reference(distances, candidates, self.window)
-            return found
+            return self.mode(len(candidates.pixels)).reference(distances, candidates, self.window)
         keys, places = (relaxation.seed, relaxation.level, turn), relaxation.grid.places(sites)
         if self.draws:
             w = lcpdf.weights(d, self.window.scale)
@@ -257,11 +263,6 @@ class Relaxation(NamedTuple):
         if isinstance(self.proposal, Listed):
             return True
         return self.proposal.slots <= KEPT and (self.choice.draws or not self.choice.density)
-
-    @property
-    def stores(self) -> bool:
-        """Whether a device that relaxes in several kernels keeps all distances."""
-        return self.choice.draws or self.choice.density
 
 
 def _apart_reference(
@@ -338,7 +339,7 @@ def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxatio
     grid, offsets, proposal, choice = relaxation.grid, relaxation.offsets, relaxation.proposal, relaxation.choice
     assert isinstance(proposal, Everything)
     candidates, window = proposal.candidates, choice.window
-    if not relaxation.stores:
+    if not choice.stores:
         relaxed = nearest(machine, sites, field, offsets, grid, candidates, proposal.strip, relaxation.favour)
     else:
         near = neighbourhood(machine, sites, field, offsets, grid)
@@ -348,10 +349,8 @@ def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxatio
         if choice.draws:
             keys = (choice.density, relaxation.seed, relaxation.level, turn)
             relaxed = lcpdf.draw(machine, distances, candidates, sites, grid, window, *keys)
-        elif len(candidates.pixels) == 1 and window.top == 255:
-            relaxed = lcpdf.mode(machine, distances, candidates, window)
         else:
-            relaxed = lcpdf.mode_vector(machine, distances, candidates, window)
+            relaxed = choice.mode(len(candidates.pixels))(machine, distances, candidates, window)
     return relaxed, temperature(machine, sites, field, offsets, grid, relaxation.xi)
 
 
@@ -389,10 +388,10 @@ def _fused(
 
 
 relax = Operation("relax", _reference, _launch)
-"""``relax(machine, sites, steps, field, weighed, relaxation, turn)``: relax the sites ``steps[0, 0]`` to ``steps[0,
-1]``
-- 1 of a list together, then those of ``steps[1]``, and so on, in place; no two that relax together may be neighbours.
+"""``relax(machine, sites, steps, field, weighed, relaxation, turn)``: relax sites step after step, in place.
 
+Those of a list from ``steps[0, 0]`` to ``steps[0, 1]`` - 1 relax together, then those of ``steps[1]``, and so on; no
+two that relax together may be neighbours.
 ``steps`` (steps, 2) int64; ``weighed`` (H, W) int32 counts the candidates that each site has weighed, of `Listed`.
 Cost: candidates weighed x |N| x C x 2 fma.
 """

@@ -221,7 +221,7 @@ class Level:
     def at_once(self) -> int:
         """Sites that are relaxed between two looks at the clock, as far as scratch memory holds what they need."""
         channels, neighbours = int(self.proposal.candidates.pixels.shape[0]), len(self.setting.offsets)
-        stores = isinstance(self.proposal, Everything) and (self.choice.draws or self.choice.density)
+        stores = isinstance(self.proposal, Everything) and self.choice.stores
         most = self.machine.chunk(self.proposal.slots, neighbours, channels, stores)
         return max(most, TOGETHER) if isinstance(self.proposal, Listed) and self.in_place else most
 
