@@ -17,6 +17,7 @@
 // reach    (N,)         pixel offset of each in the sample
 // index_of (pixels,)    number of the candidate at a pixel of the sample, -1 where there is none
 // positions (count,)    pixel index of each candidate
+// price    (count,)     what each candidate costs beside its distance
 // noise                 the kernel of equation (7) over grey levels, as in lcpdf.cl
 #pragma OPENCL FP_CONTRACT OFF
 #ifdef ALL
@@ -58,7 +59,8 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
                         __global ushort *temperature, const Level g, __global const int2 *restrict offsets,
                         __global const int *restrict reach, __global const int *restrict index_of,
                         __global const int *restrict positions, __global const float *restrict strip,
-                        __global const int *restrict strip_reach, __global const uint *restrict noise, const uint turn,
+                        __global const int *restrict strip_reach, __global const float *restrict price,
+                        __global const uint *restrict noise, const uint turn,
                         __global ushort *restrict new_values, __global int *restrict new_source,
                         __global ushort *restrict new_temperature LANES_ARG)
 {
@@ -70,7 +72,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
 
     // 6.2.2.1: the neighbourhood, and which candidates continue a neighbour's source.
     float u[N], xu[N * C];
-    int list[N], m = 0, sum = g.xi, members = 0;
+    int list[N], next[N], m = 0, sum = g.xi, members = 0;
     ulong seen = 0;
     const int neighbours = g.neighbours;
     for (int k = 0; k < neighbours; ++k) {
@@ -81,8 +83,8 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
             xu[k * C + c] = r < 0 ? 0.0f : (float)values[c * g.area + r] * u[k];
         sum += r < 0 ? 0 : t;
         members += r < 0 ? 0 : 1;
-        if (t < UNTOUCHED)
-            m = proposed(continuing(index_of, source[r], reach[k], g.pixels), list, m, &seen);
+        next[k] = t < UNTOUCHED ? continuing(index_of, source[r], reach[k], g.pixels) : -1;
+        m = proposed(next[k], list, m, &seen);
     }
 
     // All candidates, V side by side, neighbours in canonical order; the last of a row are overwritten by the next row's.
@@ -113,6 +115,12 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
     }
     for (int k = 0; k < m; ++k)
         d[list[k]] *= g.favour;
+    for (int p = 0; p < g.candidates; ++p)
+        d[p] += price[p];
+    if (g.novelty > 0.0f)
+        for (int k = 0; k < neighbours; ++k)
+            if (next[k] >= 0)
+                d[next[k]] += g.novelty;
 
     // 6.2.2.2
 #define NUMBER(k) (k)
@@ -148,8 +156,9 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
                          __global const int *restrict reach, __global const int *restrict index_of,
                          __global const int *restrict positions, __global const float *restrict disc,
                          __global const int *restrict at, __global const ushort *restrict levels,
-                         __global const int *restrict similar, __global const uint *restrict noise,
-                         __global int *restrict weighed, const uint turn, __global ushort *restrict new_values,
+                         __global const int *restrict similar, __global const float *restrict price,
+                         __global const uint *restrict noise, __global int *restrict weighed, const uint turn,
+                         __global ushort *restrict new_values,
                          __global int *restrict new_source, __global ushort *restrict new_temperature LANES_ARG)
 {
     const int s = LANE;
@@ -240,7 +249,8 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
     }
     float d[SLOTS];
     for (int k = 0; k < m; ++k)
-        d[k] = distance_in_lanes(at[list[k]], u, xu, levels, g.plane, g.down) * (k < suggested ? g.favour : 1.0f);
+        d[k] = distance_in_lanes(at[list[k]], u, xu, levels, g.plane, g.down) * (k < suggested ? g.favour : 1.0f) +
+               price[list[k]];
 
     // 6.2.2.2
 #define NUMBER(k) list[k]

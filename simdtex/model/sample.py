@@ -3,14 +3,20 @@
 
 from __future__ import annotations
 
+from copy import copy
 from math import log2
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.model.structure import structure
+
 BLOCK = 64
 """Candidates to a block (kernels/lcpdf.cl); lists of candidates are padded to whole blocks."""
+
+FINE = 8
+"""Steps to a working level, where that is no pixel of its own."""
 
 ENOUGH_WHOLE = 0.75
 """Share of positions that must have a whole neighbourhood for ``edges="auto"`` not to reflect."""
@@ -50,6 +56,15 @@ class Sample:
     margin : int
         Pixels by which the sample is continued, by reflection, on every side for the sake of the neighbourhoods of
         its outer pixels. Nothing is ever taken from the margin itself.
+    weight : float
+        Of the structure channel (`simdtex.model.structure`), which is matched like the others and never shown; 0: none.
+
+    Attributes
+    ----------
+    shown : int
+        Channels of a picture.
+    channels : int
+        Channels that are matched: those, and the structure channel.
 
     Notes
     -----
@@ -58,9 +73,8 @@ class Sample:
     each term, has the bits of a device's fma.
     """
 
-    def __init__(self, pixels: NDArray[Any], values: int, margin: int = 0) -> None:
-        self.pixels = pixels
-        self.channels = pixels.shape[-1]
+    def __init__(self, pixels: NDArray[Any], values: int, margin: int = 0, weight: float = 0.0) -> None:
+        self.pixels, self.shown = pixels, pixels.shape[-1]
         planes = np.moveaxis(pixels, -1, 0)
         if pixels.dtype in (np.bool_, np.uint8):
             self.top, self.unit = 255, 1.0
@@ -69,34 +83,45 @@ class Sample:
             self.top = 2 ** min(12, int((33 - log2(values)) / 2)) - 1
             stretched, self.unit = stretch(planes, self.top)
             levels = stretched.astype(np.uint16)
+        if weight:
+            levels = np.concatenate([levels, structure(levels, weight, variance(levels), max(self.top, 1023))[None]])
         self._lay(levels, margin)
 
     @classmethod
     def of_levels(cls, levels: NDArray[Any], count: int) -> Sample:
         """A grey sample that is given in working levels 0 .. count - 1 already."""
         sample = cls.__new__(cls)
-        sample.pixels, sample.channels = levels[..., None], 1
+        sample.pixels, sample.shown = levels[..., None], 1
         sample.top, sample.unit = count - 1, 1.0
         sample._lay(levels[None].astype(np.uint16), 0)
         return sample
 
     def _lay(self, levels: NDArray[np.uint16], margin: int) -> None:
-        self.levels, self.margin = levels, margin
+        self.levels, self.margin, self.channels = levels, margin, len(levels)
         self.height, self.width = levels.shape[1:]
         around = ((0, 0), (margin, margin), (margin, margin))
         padded = np.pad(levels, around, mode="reflect" if min(levels.shape[1:]) > 1 else "edge")
         self.rows, self.cols = padded.shape[1:]
         self.working = np.ascontiguousarray(padded).reshape(self.channels, -1)
 
+    def level(self, number: int) -> Sample:
+        """The sample as a coarse level sees it: smoothed before it is decimated, as in a Gaussian pyramid.
+
+        The binomial (1 4 6 4 1)/16 along rows and columns, its taps 2^k pixels apart for k = 0 .. number - 1, rounded to
+        whole levels each time; beyond its edges the sample is reflected. Its standard deviation is sqrt((4^number - 1)
+        / 3) pixels (Burt and Adelson 1983).
+        """
+        levels = self.levels
+        for k in range(number):
+            levels = smoothed(levels, 2**k)
+        sample = copy(self)
+        sample._lay(levels, self.margin)
+        return sample
+
     @property
     def variance(self) -> float:
         """sigma^2 of equation (8): the mean over channels of the variance of the working levels."""
-        n = self.height * self.width
-        total = 0.0
-        for channel in self.levels.astype(np.int64):  # integers: the same sum on every machine
-            squares, values = int((channel * channel).sum()), int(channel.sum())
-            total += (n * squares - values * values) / n**2
-        return float(total / self.channels)
+        return variance(self.levels)
 
     def positions(
         self,
@@ -119,6 +144,15 @@ class Sample:
             Those whose neighbourhood lies in the sample, equation (4); all, where the margin is wide enough; or
             the former where they are three quarters of all or more, else the latter.
         """
+        row, col = self.lines(offsets, spacing, phases, edges)
+        row, col = row + np.int32(self.margin), col + np.int32(self.margin)
+        positions: NDArray[np.int32] = (row[:, None] * np.int32(self.cols) + col[None, :]).ravel()
+        return positions
+
+    def lines(
+        self, offsets: NDArray[np.int32], spacing: int, phases: str = "decimated", edges: str = "whole"
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Rows and columns of the user's sample at whose crossings the candidates of a level lie; see `positions`."""
         (top, left), (bottom, right) = offsets.min(0) * spacing, offsets.max(0) * spacing
         step = 1 if phases == "all" else spacing
         row = np.arange(0, self.height, step, dtype=np.int32)
@@ -128,9 +162,7 @@ class Sample:
         few = whole_row.size * whole_col.size < ENOUGH_WHOLE * row.size * col.size
         if not (edges == "reflect" or (edges == "auto" and few)):
             row, col = whole_row, whole_col
-        row, col = row + np.int32(self.margin), col + np.int32(self.margin)
-        positions: NDArray[np.int32] = (row[:, None] * np.int32(self.cols) + col[None, :]).ravel()
-        return positions
+        return row, col
 
     def reach(self, offsets: NDArray[np.int32], spacing: int) -> NDArray[np.int32]:
         """Pixel offset of each neighbour, (N,), at a level whose sites are `spacing` pixels apart."""
@@ -175,7 +207,7 @@ class Sample:
         Parameters
         ----------
         values : (C, rows, cols) array
-            Working levels.
+            Working levels; the structure channel does not show.
         source : (rows, cols) array
             Pixel index in the sample.
 
@@ -186,11 +218,58 @@ class Sample:
         """
         row, col = np.divmod(source, np.int32(self.cols))
         own = self.pixels[row - np.int32(self.margin), col - np.int32(self.margin)]
-        usual = self.working[:, source]
-        if (values == usual).all():
+        usual = self.working[: self.shown, source]
+        if (values[: self.shown] == usual).all():
             return np.ascontiguousarray(own)
-        step = np.moveaxis(values.astype(np.int64) - usual, 0, -1)
+        step = np.moveaxis(values[: self.shown].astype(np.int64) - usual, 0, -1)
         return moved(own, step * self.unit, self.pixels)
+
+    def moved(self, source: NDArray[Any], by: NDArray[np.int16]) -> NDArray[Any]:
+        """The pixels of some sources, moved by what `simdtex.ops.finish` says.
+
+        Parameters
+        ----------
+        source : (rows, cols) array
+            Pixel index in the sample.
+        by : (C, rows, cols) array
+            Working levels of 8-bit samples; `FINE`-ths of a working level of others.
+
+        Returns
+        -------
+        (rows, cols, C) array
+            In the sample's own type.
+        """
+        row, col = np.divmod(source, np.int32(self.cols))
+        own, change = self.pixels[row - np.int32(self.margin), col - np.int32(self.margin)], np.moveaxis(by, 0, -1)
+        if self.pixels.dtype == np.uint8:
+            exact: NDArray[Any] = (own + change).astype(np.uint8)  # a mean of pixels is one
+            return exact
+        return moved(own, change * (self.unit / self.fine), self.pixels)
+
+    @property
+    def fine(self) -> int:
+        """Steps to a working level in which a finished picture differs from its sources."""
+        return 1 if self.top == 255 else FINE
+
+
+def variance(levels: NDArray[np.integer]) -> float:
+    """The mean over channels of the variance of working levels (C, rows, cols)."""
+    n, total = levels[0].size, 0.0
+    for channel in levels.astype(np.int64):  # integers: the same sum on every machine
+        squares, values = int((channel * channel).sum()), int(channel.sum())
+        total += (n * squares - values * values) / n**2
+    return float(total / len(levels))
+
+
+def smoothed(levels: NDArray[np.uint16], apart: int) -> NDArray[np.uint16]:
+    """Working levels (C, rows, cols) smoothed by (1 4 6 4 1)/16 along both axes, its taps so many pixels apart."""
+    whole = levels.astype(np.int64)
+    for axis in (1, 2):
+        n = whole.shape[axis]
+        around = np.pad(whole, [(2 * apart, 2 * apart) if a == axis else (0, 0) for a in range(3)], mode="symmetric")
+        at = [np.take(around, np.arange(k * apart, k * apart + n), axis) for k in range(5)]
+        whole = at[0] + at[4] + 4 * (at[1] + at[3]) + 6 * at[2]
+    return ((whole + 128) // 256).astype(np.uint16)
 
 
 def stretch(pixels: NDArray[Any], top: int) -> tuple[NDArray[np.int64], float]:

@@ -20,7 +20,8 @@ LEVEL = np.dtype(
         ),
         *((name, np.int32) for name in ("plane", "down", "first", "pitch", "size", "strip_rows", "strip_cols")),
         *((name, np.float32) for name in ("favour", "scale")),
-        *((name, np.int32) for name in ("radius", "top", "draws", "xi", "unused")),
+        *((name, np.int32) for name in ("radius", "top", "draws", "xi")),
+        ("novelty", np.float32),
     ],
     align=True,
 )

@@ -19,6 +19,7 @@ from simdtex.machine.interface import Array, Launcher, Machine, Operation
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import BLOCK, Candidates, Sample
 from simdtex.ops import coherence, lcpdf, neighbourhood
+from simdtex.ops.charge import charge
 from simdtex.ops.lcpdf import Relaxed
 from simdtex.ops.leaves import FEATURES, Leaves, grow
 from simdtex.ops.neighbourhood import Field
@@ -99,10 +100,12 @@ def _reference(
     candidates: Candidates,
     strip: Strip,
     favour: np.float32,
+    price: NDArray[np.float32],
 ) -> Relaxed:
     near = neighbourhood.neighbourhood.reference(sites, field, offsets, grid)
     distances = lcpdf.distance.reference(near, candidates)
     distances = coherence.coherence.reference(distances, candidates, sites, field, offsets, grid, favour)
+    distances = charge.reference(distances, candidates, price)
     choice = candidates.positions[distances.distance.argmin(0)]
     return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
 
@@ -116,6 +119,7 @@ def _launch(
     candidates: Candidates,
     strip: Strip,
     favour: np.float32,
+    price: Array,
 ) -> Relaxed:
     count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
     plane = np.int32(candidates.rows * candidates.cols)
@@ -133,7 +137,7 @@ def _launch(
         *(sites, i(count), i(neighbours), *field, i(prod(field.values.shape[1:])), offsets, grid.struct),
         *(candidates.index_of, plane),
         *(candidates.pixels, candidates.positions, candidates.reach, strip.reach),
-        *(machine.constant(_spread(strip.offsets)), favour, axes, f(leaves.middle if leaves else 0)),
+        *(machine.constant(_spread(strip.offsets)), favour, price, axes, f(leaves.middle if leaves else 0)),
         *(near, terms, used, features, least, where, certain),
         defines=defines,
     )
@@ -158,7 +162,7 @@ def _launch(
                     leaves.rows,
                     leaves.order,
                 ),
-                *(i(leaves.number), f(leaves.blur), candidates.pixels, plane, candidates.positions, candidates.reach),
+                *(i(leaves.number), f(leaves.blur), candidates.pixels, plane, candidates.positions, candidates.reach, price),
                 *(i(split), found, at, work, wanted),
                 defines=defines,
             )
@@ -167,7 +171,7 @@ def _launch(
             ("nearest", "nearest_scan"),
             (count * split,),
             *(i(count), i(neighbours), terms, used, near, least, where),
-            *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach),
+            *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach, price),
             *(slack(neighbours * channels), i(split), i(leaves is None), wanted, i(row), found, at, work),
             defines=defines,
         )
@@ -184,7 +188,7 @@ def _launch(
             (pitch // machine.vector, parts),
             *(around.confidence, around.weighted, i(neighbours), i(pitch)),
             *(candidates.pixels, plane, candidates.positions, i(candidates.size)),
-            *(candidates.reach, i(blocks), i(parts), found, at),
+            *(candidates.reach, price, i(blocks), i(parts), found, at),
             local=machine.tile,
             defines=defines,
         )

@@ -18,20 +18,17 @@ from numpy.typing import NDArray
 from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Machine, Operation
 from simdtex.model.lattice import Grid
-from simdtex.model.sample import Candidates, Sample
+from simdtex.model.sample import Candidates
 from simdtex.ops import lcpdf
-from simdtex.ops.arithmetic import fma32
+from simdtex.ops.charge import charge
 from simdtex.ops.coherence import coherence, continuing
 from simdtex.ops.commit import commit
 from simdtex.ops.lcpdf import Distances, Relaxed, Window
 from simdtex.ops.level import constants
 from simdtex.ops.nearest import Strip, nearest
 from simdtex.ops.neighbourhood import Field, neighbourhood
-from simdtex.ops.similar import most_similar
+from simdtex.ops.square import Square
 from simdtex.ops.temperature import temperature
-
-LANES = 16
-"""Partial sums of a distance of `Listed`: one for each column, modulo 16, of the square around a neighbourhood."""
 
 KEPT = 1024
 """Distances that a work-item can keep; where there are more candidates, several kernels weigh them."""
@@ -62,24 +59,39 @@ class Everything(NamedTuple):
         found = lcpdf.distance.reference(near, self.candidates)
         where = (sites, field, relaxation.offsets, relaxation.grid)
         found = coherence.reference(found, self.candidates, *where, relaxation.favour)
+        found = charge.reference(found, self.candidates, relaxation.price)
+        if relaxation.novelty > 0:
+            copied(found.distance, self.candidates, *where, relaxation.novelty)
         return np.arange(self.slots)[:, None], found
+
+
+def copied(
+    distance: NDArray[np.float32],
+    candidates: Candidates,
+    sites: NDArray[np.int32],
+    field: Field,
+    offsets: NDArray[np.int32],
+    grid: Grid,
+    novelty: np.float32,
+) -> None:
+    """Charge each candidate for every neighbour whose source it continues, in place; neighbours in canonical order."""
+    r = grid.neighbours(sites, offsets)
+    p = continuing(candidates, field.source.ravel()[r])
+    touched = (r >= 0) & (field.temperature.ravel()[r] < 1024) & (p >= 0)
+    for k in range(len(r)):
+        here = np.flatnonzero(touched[k])
+        distance[p[k, here], here] += novelty
 
 
 class Listed(NamedTuple):
     """The coherent search: a few candidates are proposed, those that neighbours suggest and some more.
 
-    ``at`` (n,) int32 the candidates' places in ``levels`` (C, plane) uint16, the sample's working levels with the
-    columns that are a level's step apart side by side; ``down`` from one row of the lattice to the next there;
-    ``disc`` (side, columns) float32, 1 on the neighbourhood; ``similar`` (n, K) int32, the candidates most similar to
-    each, (1, 1) where ``likes`` K is 0; ``suggesting`` nearest neighbours that suggest; ``chance`` candidates at
-    random.
+    ``square`` their pixels side by side; ``similar`` (n, K) int32, the candidates most similar to each, (1, 1) where
+    ``likes`` K is 0; ``suggesting`` nearest neighbours that suggest; ``chance`` candidates at random.
     """
 
     candidates: Candidates
-    at: Array
-    levels: Array
-    down: int
-    disc: Array
+    square: Square
     similar: Array
     likes: int
     suggesting: int
@@ -97,8 +109,11 @@ class Listed(NamedTuple):
         """Numbers (slots, S) of the candidates, -1 past the last, and their distances, infinity there."""
         r = relaxation.grid.neighbours(sites, relaxation.offsets)
         numbers, suggested = self._list(sites, r, field, relaxation, turn)
-        d = self._distances(numbers, r, field, relaxation.offsets)
-        return numbers, Distances(np.where(suggested, d * relaxation.favour, d), None, sites.size)
+        u = np.where(r < 0, np.float32(0), (1024 - field.temperature.ravel()[r].astype(np.float32)) / np.float32(1024))
+        x = np.moveaxis(field.values.reshape(len(field.values), -1)[:, r], 0, 1)
+        d = self.square.distance(numbers, x, u, relaxation.offsets)
+        d = np.where(suggested, d * relaxation.favour, d) + relaxation.price[np.maximum(numbers, 0)]
+        return numbers, Distances(d, None, sites.size)
 
     def _list(
         self, sites: NDArray[np.int32], r: NDArray[np.int32], field: Field, relaxation: Relaxation, turn: int
@@ -128,63 +143,6 @@ class Listed(NamedTuple):
             number = (word.astype(np.uint64) * np.uint64(self.candidates.size)) >> np.uint64(32)
             add(np.where(k < draws, number.astype(np.int64), -1))
         return numbers[:-1], suggested
-
-    def _distances(
-        self, numbers: NDArray[np.int64], r: NDArray[np.int32], field: Field, offsets: NDArray[np.int32]
-    ) -> NDArray[np.float32]:
-        """Equation (12) for each candidate, (slots, S), infinity where there is none; summed as the kernel does."""
-        u = np.where(r < 0, np.float32(0), (1024 - field.temperature.ravel()[r].astype(np.float32)) / np.float32(1024))
-        radius = int(offsets.max())
-        d = np.zeros((LANES, *numbers.shape), np.float32)
-        for k in np.lexsort((offsets[:, 1], offsets[:, 0])):
-            row, col = offsets[k]
-            apart = row * self.down + col
-            for x, y in zip(field.values.reshape(len(field.values), -1), self.levels, strict=True):
-                e = (x[r[k]] - y[self.at[np.maximum(numbers, 0)] + apart].astype(np.float32)) * u[k]
-                lane = (col + radius) % LANES
-                d[lane] = fma32(e, e, d[lane])
-        while len(d) > 1:
-            d = d[: len(d) // 2] + d[len(d) // 2 :]
-        return np.where(numbers < 0, np.float32(np.inf), d[0])
-
-
-def listed(
-    machine: Machine,
-    sample: Sample,
-    candidates: Candidates,
-    offsets: NDArray[np.int32],
-    step: int,
-    phases: str,
-    edges: str,
-    suggesting: int,
-    similar: int,
-    chance: int,
-) -> Listed:
-    """Lay out what the coherent search needs of a level, whose sites are ``step`` pixels of the sample apart."""
-    radius, rows, cols = int(offsets.max()), sample.rows, sample.cols
-    side, columns = 2 * radius + 1, -(-(2 * radius + 1) // LANES) * LANES
-    disc = np.zeros((side, columns), np.float32)
-    disc[tuple((offsets + radius).T)] = 1
-    wide = -(-cols // step)
-    around = ((0, 0), (0, 0), (0, wide * step - cols))
-    working = np.pad(sample.working.reshape(-1, rows, cols), around, mode="edge").reshape(-1, rows, wide, step)
-    levels = working.swapaxes(2, 3).reshape(len(working), -1)
-    positions = sample.positions(offsets, step, phases, edges)
-    row, col = np.divmod(positions, np.int32(cols))
-    at = (row * np.int32(step) + col % np.int32(step)) * np.int32(wide) + col // np.int32(step)
-    likes = min(similar, candidates.size - 1)
-    reach = sample.reach(offsets, step)
-    return Listed(
-        candidates,
-        machine.put(at),
-        machine.put(np.pad(levels, ((0, 0), (0, columns)))),  # whole vectors are read at the end, too
-        step * step * wide,
-        machine.put(disc),
-        most_similar(machine, sample, positions, reach, candidates, likes),
-        likes,
-        min(suggesting, len(offsets)),
-        chance,
-    )
 
 
 # -- what is chosen: step 6.2.2.2 ---------------------------------------------------------------------------------
@@ -244,14 +202,18 @@ class Relaxation(NamedTuple):
     """How a site relaxes.
 
     ``grid``, ``offsets`` its lattice and neighbourhood; ``proposal`` the candidates; ``favour`` 1 / (1 + coherence),
-    by which the distance of those is multiplied that continue a neighbour's source; ``choice`` what it takes of them;
-    ``xi`` of equation (13) in 1/1024; ``seed`` and ``level`` the keys of its random numbers.
+    by which the distance of those is multiplied that continue a neighbour's source; ``novelty`` what is added to it for
+    each neighbour whose source is continued; ``price`` (n or more,) float32 what is added to that of each candidate
+    (`simdtex.ops.use`); ``choice`` what it takes of them; ``xi`` of equation (13) in 1/1024; ``seed`` and ``level`` the
+    keys of its random numbers.
     """
 
     grid: Grid
     offsets: Array
     proposal: Everything | Listed
     favour: np.float32
+    novelty: np.float32
+    price: Array
     choice: Choice
     xi: int
     seed: int
@@ -340,12 +302,14 @@ def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxatio
     assert isinstance(proposal, Everything)
     candidates, window = proposal.candidates, choice.window
     if not choice.stores:
-        relaxed = nearest(machine, sites, field, offsets, grid, candidates, proposal.strip, relaxation.favour)
+        terms = (relaxation.favour, relaxation.price)
+        relaxed = nearest(machine, sites, field, offsets, grid, candidates, proposal.strip, *terms)
     else:
         near = neighbourhood(machine, sites, field, offsets, grid)
         distances = lcpdf.distance(machine, near, candidates)
         if relaxation.favour != 1:
             distances = coherence(machine, distances, candidates, sites, field, offsets, grid, relaxation.favour)
+        distances = charge(machine, distances, candidates, relaxation.price)
         if choice.draws:
             keys = (choice.density, relaxation.seed, relaxation.level, turn)
             relaxed = lcpdf.draw(machine, distances, candidates, sites, grid, window, *keys)
@@ -364,7 +328,7 @@ def _fused(
         **{"seed": relaxation.seed, "level": relaxation.level, "area": prod(field.source.shape)},
         **{"neighbours": offsets.shape[0], "pixels": candidates.index_of.size, "candidates": candidates.size},
         **{"favour": relaxation.favour, "scale": window.scale, "top": window.top, "draws": choice.draws},
-        **{"radius": window.radius if choice.density else -1, "xi": relaxation.xi},
+        **{"radius": window.radius if choice.density else -1, "xi": relaxation.xi, "novelty": relaxation.novelty},
     }
     common = (offsets, candidates.reach, candidates.index_of, candidates.positions)
     noise, key = machine.constant(window.noise), np.uint32(turn)
@@ -376,13 +340,14 @@ def _fused(
         level |= {"strip_rows": strip.rows, "strip_cols": strip.cols}
         most = 256 if proposal.slots <= 256 else KEPT  # so that few programs serve all
         defines |= {"ALL": most, "N": -(-offsets.shape[0] // 64) * 64, "STEP": machine.step}
-        name, own = "relax_all", [strip.pixels, strip.reach, noise, key]
+        name, own = "relax_all", [strip.pixels, strip.reach, relaxation.price, noise, key]
     else:
-        level |= {"plane": proposal.levels.shape[1], "down": proposal.down}
+        square = proposal.square
+        level |= {"plane": square.levels.shape[1], "down": square.down}
         level |= {"suggesting": proposal.suggesting, "similar": proposal.likes, "chance": proposal.chance}
-        defines |= {"RADIUS": proposal.disc.shape[0] // 2, "SLOTS": -(-proposal.slots // 64) * 64}
+        defines |= {"RADIUS": square.disc.shape[0] // 2, "SLOTS": -(-proposal.slots // 64) * 64}
         name = "relax_list"
-        own = [proposal.disc, proposal.at, proposal.levels, proposal.similar, noise, weighed, key]
+        own = [square.disc, square.at, square.levels, proposal.similar, relaxation.price, noise, weighed, key]
     arguments = [sites, np.int32(sites.size), *field, constants(grid, **level), *common, *own]
     return name, defines, arguments
 

@@ -17,12 +17,15 @@ from numpy.typing import NDArray
 from simdtex import schedules
 from simdtex.methods.mrf.level import Level, Run, State, Warm, parts
 from simdtex.model.lattice import Grid
+from simdtex.model.sample import BLOCK
 from simdtex.ops import active
 from simdtex.ops.commit import commit
 from simdtex.ops.neighbourhood import Field
+from simdtex.ops.recolour import recolour
 from simdtex.ops.relax import Relaxation, relax, relax_apart
 from simdtex.ops.snapshot import snapshot
 from simdtex.ops.start import start
+from simdtex.ops.use import price, use
 
 
 class Info(NamedTuple):
@@ -90,13 +93,15 @@ def begin(run: Run) -> State:
     """The state before the first level: every site a pixel of the sample at random (2), at temperature 1 (5)."""
     everywhere = run.machine.put(run.sample.positions(np.zeros((1, 2), np.int32), 1))
     field = start(run.machine, run.planes, everywhere, Grid(*run.shape), run.seed)
-    return State(*field, schedule=None, level=run.levels - 1)
+    return State(*field, price=None, schedule=None, level=run.levels - 1)
 
 
 def enter(level: Level, state: State) -> State:
     """The state at the beginning of a level: sites kept from the level above have t = 0, all others t = 1."""
     warm, heat = active.survey(level.machine, level.grid, state.temperature)
-    return State(*state.field, level.schedule.init(level.setting), level.number, warm=warm, heat=heat)
+    field = state.field if level.planes is None else recolour(level.machine, state.field, level.grid, level.planes)
+    price = priced(level, field, None)
+    return State(*field, price, level.schedule.init(level.setting), level.number, warm=warm, heat=heat)
 
 
 def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None = None) -> tuple[State, Info]:
@@ -118,11 +123,12 @@ def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None
     info : Info
     """
     field, memory = exchanged(level, state.field), state.schedule
+    relaxation = rule(level, state.price)
     chosen: list[schedules.Info] = []
     while not (chosen and chosen[-1].last):
         warm = Warm(level, field.temperature, free)
         memory, now = level.schedule.step(level.setting, memory, warm)  # 6.2.1
-        for part in relaxed(level, field, now):  # 6.2.2
+        for part in relaxed(level, field, now, relaxation):  # 6.2.2
             field = part.field
             if watch:
                 watch(level, state, free, part)
@@ -130,16 +136,27 @@ def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None
     hot, heat = active.survey(level.machine, level.grid, field.temperature)
     cooling, freed = state.cooling + (not free), state.free + free
     info = Info(level.number, cooling + freed, "free" if free else "relax", chosen, False)
-    return State(*field, memory, level.number, cooling, freed, hot, heat), info
+    price = priced(level, field, state.price)
+    return State(*field, price, memory, level.number, cooling, freed, hot, heat), info
 
 
-def rule(level: Level) -> Relaxation:
+def priced(level: Level, field: Field, before: NDArray[np.float32] | None) -> NDArray[np.float32]:
+    """What each candidate costs during the next sweep, from how often it is used now: the same for all sites of it."""
+    candidates = level.proposal.candidates
+    counts = use(level.machine, field, level.grid, candidates) if level.rate else np.zeros(candidates.size, np.int32)
+    return price(counts, level.extent, level.around, level.rate, before)
+
+
+def rule(level: Level, price: NDArray[np.float32] | None) -> Relaxation:
     """How a site of the level relaxes: what happens to all sites of a step in parallel."""
+    assert price is not None  # the level has begun
     return Relaxation(
         grid=level.grid,
         offsets=level.offsets,
         proposal=level.proposal,  # 6.2.2.1 the LCPDF, equations (6) and (12), of these candidates
         favour=level.favour,
+        novelty=level.novelty,
+        price=level.machine.put(np.pad(price, (0, -price.size % BLOCK))),
         choice=level.choice,  # 6.2.2.2 a draw from it, or its mode
         xi=level.xi,  # 6.2.2.3 the temperature, equation (13)
         seed=level.setting.seed,
@@ -147,9 +164,9 @@ def rule(level: Level) -> Relaxation:
     )
 
 
-def relaxed(level: Level, field: Field, chosen: schedules.Info) -> Iterator[Part]:
+def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Relaxation) -> Iterator[Part]:
     """Step 6.2.2 for the sites of one step after another, in parts that do not take long."""
-    machine, relaxation = level.machine, rule(level)
+    machine = level.machine
     if level.in_place:
         sites, before = chosen.sites, 0
         sites = machine.put(sites) if isinstance(sites, np.ndarray) else sites

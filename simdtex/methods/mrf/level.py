@@ -15,15 +15,14 @@ from simdtex import schedules
 from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf.options import Options
 from simdtex.model.lattice import Grid
-from simdtex.model.sample import Sample
+from simdtex.model.sample import Candidates, Sample
 from simdtex.ops import active, lcpdf
 from simdtex.ops.nearest import strip_of
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.relax import Choice, Everything, Listed, listed
+from simdtex.ops.relax import KEPT, Choice, Everything, Listed
+from simdtex.ops.similar import Lattice, Table, most_similar
+from simdtex.ops.square import square_of
 from simdtex.schedules import Setting
-
-ENOUGH = 64
-"""Candidates that the sample must still have at the coarsest of the default levels."""
 
 TOGETHER = 2**16
 """Sites that one kernel relaxes between two looks at the clock."""
@@ -40,6 +39,9 @@ class State(NamedTuple):
         The source map: pixel index in the sample, its margin included.
     temperature : (H, W) uint16 array
         t in 1/1024.
+    price : (n,) float32 array
+        What each candidate of the level costs during the next sweep (`simdtex.ops.use`), on the host; None before the
+        level has begun.
     schedule : tuple of arrays and numbers
         The schedule's own state; None before the level has begun.
     level : int
@@ -58,6 +60,7 @@ class State(NamedTuple):
     values: Array
     source: Array
     temperature: Array
+    price: NDArray[np.float32] | None
     schedule: Any
     level: int
     cooling: int = 0
@@ -112,6 +115,8 @@ class Run:
     levels: int
     emulated: bool
     weighed: Array
+    smoothed: dict[int, tuple[Sample, Array]] = field(default_factory=dict, repr=False)
+    tables: dict[int, Table] = field(default_factory=dict, repr=False)
 
     def grid(self, number: int) -> Grid:
         """The lattice of a level, equation (10)."""
@@ -128,19 +133,23 @@ class Run:
             Row and column of the first site, rows and columns of a window of the lattice; the state's arrays then hold
             that alone, site by site. None: the whole lattice, in pictures of the output's size.
         """
-        options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
+        options, machine, offsets = self.options, self.machine, self.offsets
+        sample, planes = self.seen(number)
         grid = self.grid(number).window(*window) if window else self.grid(number)
-        where = (offsets, grid.step, options.phases, options.edges)
-        candidates, coarsest = sample.candidates(machine, *where, self.planes), number == self.levels - 1
+        candidates, coarsest = self.candidates(number), number == self.levels - 1
         proposal: Everything | Listed
         if options.search == "exact" or coarsest or candidates.size <= options.exhaustive:
-            proposal = Everything(candidates, strip_of(machine, sample, *where))
+            proposal = Everything(candidates, strip_of(machine, sample, *self.where(number)))
         else:
-            few = (options.suggesting, options.similar, options.chance)
-            proposal = listed(machine, sample, candidates, *where, *few)
+            likes = min(options.similar, candidates.size - 1)
+            similar = self.similar(number).numbers if likes else machine.put(np.zeros((1, 1), np.int32))
+            few = (min(options.suggesting, len(offsets)), options.chance)
+            proposal = Listed(candidates, square_of(machine, sample, *self.where(number)), similar, likes, *few)
+        rows, cols = sample.lines(*self.where(number))
         dimensions = sample.channels * (len(offsets) + 1)
         h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, candidates.size, dimensions)  # (8)
         draws = options.relaxation == "gibbs" or (coarsest and options.coarsest == "gibbs")
+        anew = coarsest and candidates.size <= KEPT and (draws or options.pixel == "source")
         independent = self.schedule.independent(grid, offsets)
         return Level(
             number=number,
@@ -150,12 +159,46 @@ class Run:
             schedule=self.schedule,
             proposal=proposal,
             choice=Choice(draws, options.pixel == "density", lcpdf.window(h, sample.top)),
-            favour=np.float32(1 / (1 + (options.coherence or 0))),
+            favour=np.float32(1 / (1 + options.coherence)),
+            novelty=np.float32(options.novelty * sample.channels * sample.variance if anew else 0),
+            rate=options.balance * len(offsets) * sample.channels * sample.variance,
+            extent=(rows.size, cols.size),
+            around=int(offsets.max()) * (grid.step if options.phases == "all" else 1),
             xi=min(-1, round(options.xi * 1024)),
             in_place=independent and not self.schedule.tile and not self.emulated,
             weighed=machine.put(np.zeros((grid.height, grid.width), np.int32)) if window else self.weighed,
             lists=Lists(machine),
+            planes=planes if options.decimation == "gaussian" else None,
         )
+
+    def seen(self, number: int) -> tuple[Sample, Array]:
+        """The sample as a level sees it, and its planes on the machine; each level's is made once."""
+        if not (number and self.options.decimation == "gaussian"):
+            return self.sample, self.planes
+        if number not in self.smoothed:
+            sample = self.sample.level(number)
+            self.smoothed[number] = sample, sample.planes(self.machine)
+        return self.smoothed[number]
+
+    def where(self, number: int) -> tuple[NDArray[np.int32], int, str, str]:
+        """What says where the candidates of a level lie: see `simdtex.model.sample.Sample.positions`."""
+        return self.offsets, 2**number, self.options.phases, self.options.edges
+
+    def candidates(self, number: int) -> Candidates:
+        """The candidates of a level."""
+        sample, planes = self.seen(number)
+        return sample.candidates(self.machine, *self.where(number), planes)
+
+    def similar(self, number: int) -> Table:
+        """The candidates of a level most similar to each: made with the help of the level above, once."""
+        if number not in self.tables:
+            above = self.similar(number + 1) if number < self.levels - 1 else None
+            step = 2**number if self.options.phases == "decimated" else 1
+            lattice = Lattice(*self.sample.lines(*self.where(number)), step, self.sample.positions(*self.where(number)))
+            square = square_of(self.machine, self.seen(number)[0], *self.where(number))
+            candidates, likes = self.candidates(number), self.options.similar
+            self.tables[number] = most_similar(self.machine, self.offsets, candidates, square, lattice, likes, above)
+        return self.tables[number]
 
 
 @dataclass(frozen=True)
@@ -179,6 +222,14 @@ class Level:
         What it takes of them.
     favour : float32
         1 / (1 + coherence).
+    novelty : float32
+        What a candidate costs for each neighbour whose source it continues.
+    rate : float
+        lambda N C sigma^2: what a candidate costs whose surroundings are used twice as often as their share.
+    extent : (int, int)
+        Rows and columns of candidates.
+    around : int
+        Candidates from one to the edge of its neighbourhood.
     xi : int
         Of equation (13), in 1/1024.
     in_place : bool
@@ -187,6 +238,8 @@ class Level:
         Counts the candidates that each site has weighed.
     lists : Lists
         The schedule's lists of sites as the machine holds them.
+    planes : (C, pixels) float32 array of the machine, optional
+        The sample's grey levels at this level, which its sites take when it begins. None: they keep theirs.
     movable : (H, W) uint16 array of the machine, optional
         0 at sites whose values are given: free sweeps leave them alone, as all sweeps do that find their temperature 0.
         None: every site may relax.
@@ -200,10 +253,15 @@ class Level:
     proposal: Everything | Listed
     choice: Choice
     favour: np.float32
+    novelty: np.float32
+    rate: float
+    extent: tuple[int, int]
+    around: int
     xi: int
     in_place: bool
     weighed: Array
     lists: Lists = field(repr=False)
+    planes: Array | None = None
     movable: Array | None = None
 
     @property
@@ -301,7 +359,7 @@ def number_of_levels(
     if options.levels is None:
         levels = 1
         reach = 2 * int(offsets.max()) * 2  # of a neighbourhood at the next level
-        while levels < most and candidates(levels + 1) >= ENOUGH and min(shape) > reach * 2 ** (levels - 1):
+        while levels < most and candidates(levels + 1) >= options.overview and min(shape) > reach * 2 ** (levels - 1):
             levels += 1
         return levels
     if options.levels > most:

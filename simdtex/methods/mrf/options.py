@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from simdtex import schedules
 from simdtex.maspar.array import parse_array
 from simdtex.model.lattice import check_order
@@ -22,16 +25,25 @@ PRESETS: dict[str, dict[str, Any]] = {
         "free_sweeps": 0,
         "pixel": "density",
         "phases": "decimated",
+        "decimation": "plain",
         "edges": "whole",
         "coarsest": "same",
         "search": "exact",
+        "overview": 64,
+        "balance": 0.0,
+        "structure": 0.0,
+        "novelty": 0.0,
+        "finish": 0.0,
     },
 }
 """``paper`` keeps the 1998 rules to the letter."""
 
 
-COHERENCE_OF_A_LIST = 0.2
-"""The default of ``coherence`` with coherent search: a list holds little else to weigh against continuing."""
+CATEGORIES = 16
+"""Different pixels up to which a sample is taken for a map of categories."""
+
+FINISH = 1.5
+"""The default standard deviation of the finish, pixels."""
 
 
 @dataclass(frozen=True)
@@ -43,15 +55,30 @@ class Options:
     order : int
         o of equation (3): neighbours within the distance sqrt(o).
     levels : int, optional
-        M of Algorithm 1. None: the most levels at which the sample still has 64 candidates, and the output's
+        M of Algorithm 1. None: the most levels at which the sample still has `overview` candidates, and the output's
         lattice a whole neighbourhood.
+    overview : int
+        Candidates that the sample still has at the coarsest of the default levels, at least. The fewer, the more of
+        the sample's own layout comes out again.
     relaxation : {"icm", "gibbs"}
         Take the LCPDF's mode, or draw from it.
     bandwidth : float
         h in units of h_opt, equation (8).
-    coherence : float, optional
-        The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence. None: 1
-        where all candidates are weighed, 0.2 with coherent search.
+    coherence : float
+        The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence.
+    balance : float
+        lambda of the price on use: a candidate whose surroundings serve more sites than their share costs
+        lambda N C sigma^2 min(2, u - 1), u their use over the fair share. 0: nobody counts.
+    structure : float
+        Weight of a channel that tells how far a pixel is from the sample's edges, matched like the others and not
+        shown; its standard deviation in units of the sample's. 0: there is none.
+    novelty : float
+        mu: at the coarsest level a candidate costs mu C sigma^2 for each neighbour whose source it continues, where
+        a site takes a sample's pixel and there are 1024 candidates or fewer.
+    finish : float, optional
+        Each output pixel is the mean of what its neighbours' sources say of it, with Gaussian weights of this
+        standard deviation, pixels; 0: it is its own source's. None: 1.5, but 0 where a sample has 16 different pixels
+        or fewer, since a mean of categories is none of them, and with ``pixel="density"``.
     xi : float
         xi < 0 of equation (13): the further below 0, the fewer sweeps.
     free_sweeps : int
@@ -61,6 +88,9 @@ class Options:
         kernel also spreads over x_s.
     phases : {"all", "decimated"}
         Candidates at coarse levels: every sample position, or those of the decimated sample, equation (10).
+    decimation : {"gaussian", "plain"}
+        The sample at coarse levels: smoothed first, so that no detail poses as a coarse one, or its pixels themselves,
+        equation (10). ``pixel="density"`` takes them plain.
     edges : {"auto", "reflect", "whole"}
         Candidates are those sample positions whose whole neighbourhood lies in the sample, equation (4)
         (``whole``), or all, those near the edge with a neighbourhood completed by reflection (``reflect``);
@@ -98,13 +128,19 @@ class Options:
 
     order: int = 18
     levels: int | None = None
+    overview: int = 256
     relaxation: str = "icm"
     bandwidth: float = 0.15
-    coherence: float | None = None
+    coherence: float = 0.0
+    balance: float = 0.5
+    structure: float = 1.0
+    novelty: float = 1.0
+    finish: float | None = None
     xi: float = -1.0
     free_sweeps: int = 2
     pixel: str = "source"
     phases: str = "decimated"
+    decimation: str = "gaussian"
     edges: str = "auto"
     coarsest: str = "gibbs"
     schedule: str | schedules.Schedule = "coloring"
@@ -114,7 +150,7 @@ class Options:
     mapping: str = "cut-and-stack"
     search: str = "auto"
     suggesting: int = 24
-    similar: int = 0
+    similar: int = 4
     chance: int = 4
     exhaustive: int = 64
     emulate: bool = True
@@ -124,16 +160,22 @@ class Options:
         check_order(self.order)
         if self.levels is not None:
             whole("levels", self.levels, 1)
+        whole("overview", self.overview, 1)
         one_of("relaxation", self.relaxation, ("icm", "gibbs"))
         real("bandwidth", self.bandwidth, 0, above=True)
-        if self.coherence is not None:
-            real("coherence", self.coherence, 0)
+        real("coherence", self.coherence, 0)
+        real("balance", self.balance, 0)
+        real("structure", self.structure, 0)
+        real("novelty", self.novelty, 0)
+        if self.finish is not None:
+            real("finish", self.finish, 0)
         real("xi", self.xi, -inf)
         if self.xi >= 0:
             raise ValueError(f"xi is {self.xi}; give a number below 0")
         whole("free_sweeps", self.free_sweeps, 0)
         one_of("pixel", self.pixel, ("source", "density"))
         one_of("phases", self.phases, ("all", "decimated"))
+        one_of("decimation", self.decimation, ("gaussian", "plain"))
         one_of("edges", self.edges, ("auto", "reflect", "whole"))
         one_of("coarsest", self.coarsest, ("gibbs", "same"))
         one_of("boundary", self.boundary, ("torus", "open"))
@@ -152,12 +194,25 @@ class Options:
         parse_array(self.array or "1x1", self.mapping)
         true_or_false("emulate", self.emulate)
 
-    def resolved(self) -> Options:
-        """The same with what ``search="auto"`` and ``coherence=None`` stand for."""
+    def resolved(self, pixels: NDArray[Any]) -> Options:
+        """The same with what ``search="auto"`` and ``finish=None`` stand for, for a sample (rows, cols, channels)."""
         nearest = (self.relaxation, self.pixel) == ("icm", "source")
         search = ("coherent" if nearest else "exact") if self.search == "auto" else self.search
-        usual = COHERENCE_OF_A_LIST if search == "coherent" else 1.0
-        return replace(self, search=search, coherence=usual if self.coherence is None else self.coherence)
+        finish = self.finish
+        if finish is None:
+            finish = 0.0 if self.pixel == "density" or few(pixels) else FINISH
+        decimation = "plain" if self.pixel == "density" else self.decimation
+        return replace(self, search=search, finish=finish, decimation=decimation)
+
+
+def few(pixels: NDArray[Any]) -> bool:
+    """Whether a sample (rows, cols, channels) has at most `CATEGORIES` different pixels: then it is a map of them."""
+    flat, seen = pixels.reshape(-1, pixels.shape[-1]), np.zeros((0, pixels.shape[-1]), pixels.dtype)
+    for first in range(0, len(flat), 2**16):
+        seen = np.unique(np.concatenate([seen, flat[first : first + 2**16]]), axis=0)
+        if len(seen) > CATEGORIES:
+            return False
+    return True
 
 
 def make_options(preset: str = "default", **given: Any) -> Options:

@@ -12,13 +12,17 @@ from simdtex import schedules
 from simdtex.machine.interface import Machine
 from simdtex.maspar.array import parse_array
 from simdtex.methods.mrf.algorithm import anneal
-from simdtex.methods.mrf.level import Run, number_of_levels
+from simdtex.methods.mrf.level import Run, State, number_of_levels
 from simdtex.methods.mrf.observers import Observer
 from simdtex.methods.mrf.options import Options
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
+from simdtex.ops.finish import around, finish
 from simdtex.options import within_32_bits
 from simdtex.run import Callback, Output, device_seconds
+
+AT_ONCE = 2**20
+"""Sites that are finished together."""
 
 
 def synthesize(
@@ -67,7 +71,7 @@ def synthesize(
         observer.sweep(level, state, info)
     assert state is not None  # there is a level, and it has a sweep
     values, source, temperatures = (Grid(*shape).view(machine.get(plane)) for plane in state.field)
-    image = run.sample.picture(values, source)
+    image = finished(run, state) if run.options.finish else run.sample.picture(values, source)
     meter, account = observer.meter, observer.account
     statistics = {
         "device": machine.name,
@@ -83,10 +87,11 @@ def synthesize(
 
 def laid_out(machine: Machine, pixels: NDArray[Any], shape: tuple[int, int], options: Options, seed: int) -> Run:
     """Lay out a run on a machine; the arguments are those of `synthesize`."""
-    options = options.resolved()
+    options = options.resolved(pixels)
     offsets = neighbourhood_offsets(options.order)
     levels = number_of_levels(pixels.shape[:2], offsets, shape, options)  # 1
-    sample = Sample(pixels, pixels.shape[-1] * len(offsets), int(offsets.max()) * 2 ** (levels - 1))
+    channels, margin = pixels.shape[-1] + bool(options.structure), int(offsets.max()) * 2 ** (levels - 1)
+    sample = Sample(pixels, channels * len(offsets), margin, options.structure)
     schedule = schedules.get(options.schedule)
     _check_memory(machine, sample, shape, options.similar, copies=2 if schedule.tile else 1)
     emulated = bool(options.array) and options.emulate
@@ -105,6 +110,20 @@ def laid_out(machine: Machine, pixels: NDArray[Any], shape: tuple[int, int], opt
         emulated=emulated,
         weighed=machine.put(np.zeros(shape, np.int32)),
     )
+
+
+def finished(run: Run, state: State) -> NDArray[Any]:
+    """The picture of the last level's sources with the finish (`simdtex.ops.finish`), in the sample's type."""
+    sample, grid = run.sample, Grid(*run.shape, 1, run.options.boundary == "torus")
+    rows = max(1, AT_ONCE // grid.cols)
+    picture = np.empty((*run.shape, sample.shown), sample.pixels.dtype)
+    source = grid.view(run.machine.get(state.source))
+    for top in range(0, grid.rows, rows):
+        here = source[top : top + rows]
+        sites = (top * grid.cols, here.size)
+        by = finish(run.machine, state.source, grid, run.planes, sample, *around(run.options.finish or 0), *sites)
+        picture[top : top + rows] = sample.moved(here, by.reshape(-1, *here.shape))
+    return picture
 
 
 def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], similar: int, copies: int) -> None:

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma OPENCL FP_CONTRACT OFF
+#include "common/lanes.h"
+
+#ifndef BLOCK
+#define BLOCK 64
+#endif
+
+// Add the price of each candidate to its distance, for distances that are kept.
+//
+// price    (blocks * BLOCK,)      of ops/use.py
+// distance (blocks * BLOCK, P)    in and out; the sign bit that marks what coherence.cl has favoured is gone
+// nearest  (blocks, P)            out: the smallest of each block
+// One work-item per (site, block).
+__kernel void charge(const int S, const int P, const int count, const int blocks, __global const float *restrict price,
+                     __global float *restrict distance, __global float *restrict nearest LANES_ARG)
+{
+    const int s = LANE;
+    if (IDLE(s))
+        return;
+    ALONG(block, blocks)
+    {
+        float least = INFINITY;
+        for (int p = block * BLOCK; p < min((block + 1) * BLOCK, count); ++p) {
+            const float d = fabs(distance[p * P + s]) + price[p];
+            distance[p * P + s] = d;
+            least = fmin(least, d);
+        }
+        nearest[block * P + s] = least;
+    }
+}

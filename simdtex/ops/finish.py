@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The finish: each pixel becomes the weighted mean of what its neighbours' sources say of it, so that seams melt.
+
+x_s = sum_r w_r Y[p_r + (s - r)] / sum_r w_r, w_r = exp(-|r - s|^2 / 2 sd^2): the average over overlapping pieces of
+Kwatra et al. (2005). Where all continue one another it is Y[p_s] itself.
+"""
+
+from __future__ import annotations
+
+from math import ceil, exp
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.machine.interface import Array, Launcher, Operation
+from simdtex.model.lattice import Grid
+from simdtex.model.sample import Sample
+
+
+def around(sd: float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Offsets (N, 2), the site itself among them, and weights (N,) in 1/1024 of a Gaussian, cut off at 2.5 sd."""
+    radius = ceil(2.5 * sd)
+    row, col = np.mgrid[-radius : radius + 1, -radius : radius + 1].reshape(2, -1)
+    squared = row * row + col * col
+    inside = squared <= 6.25 * sd * sd
+    weights = [round(1024 * exp(-n / (2 * sd * sd))) for n in squared[inside].tolist()]
+    return np.stack([row, col], 1)[inside].astype(np.int32), np.array(weights, np.int32)
+
+
+def _reference(
+    source: NDArray[np.int32],
+    grid: Grid,
+    planes: NDArray[np.float32],
+    sample: Sample,
+    offsets: NDArray[np.int32],
+    weights: NDArray[np.int32],
+    first: int,
+    count: int,
+) -> NDArray[np.int16]:
+    sites, source = grid.sites()[first : first + count], source.ravel()
+    shown = sample.working[: sample.shown].astype(np.int64)
+    own = shown[:, source[sites]]
+    total, sums = np.zeros(count, np.int64), np.zeros(own.shape, np.int64)
+    for offset, weight in zip(offsets, weights.tolist(), strict=True):
+        r = grid.neighbours(sites, offset[None])[0] if offset.any() else sites
+        row, col = np.divmod(source[r], np.int32(sample.cols)) - offset[:, None]
+        at = np.stack([row, col]) - sample.margin
+        inside = (r >= 0) & (at >= 0).all(0) & (at[0] < sample.height) & (at[1] < sample.width)
+        said = shown[:, np.where(inside, row * sample.cols + col, 0)]
+        total += weight * inside
+        sums += weight * inside * (said - own)
+    return ((2 * sample.fine * sums + total) // (2 * total)).astype(np.int16)
+
+
+def _launch(
+    machine: Launcher,
+    source: Array,
+    grid: Grid,
+    planes: Array,
+    sample: Sample,
+    offsets: NDArray[np.int32],
+    weights: NDArray[np.int32],
+    first: int,
+    count: int,
+) -> NDArray[np.int16]:
+    out, i = machine.empty((sample.shown, count), np.int16), np.int32
+    machine.launch(
+        machine.kernel("finish", "finish", C=sample.shown),
+        (count,),
+        *(grid.struct, i(first), i(count), source, machine.constant(offsets), machine.constant(weights)),
+        *(i(len(offsets)), planes, i(planes.shape[1]), i(sample.cols), i(sample.margin)),
+        *(i(sample.height), i(sample.width), i(sample.fine), out),
+    )
+    found: NDArray[np.int16] = machine.get(out)
+    return found
+
+
+finish = Operation("finish", _reference, _launch)
+"""``finish(machine, source, grid, planes, sample, offsets, weights, first, count)``: (channels, count) int16, on the host.
+
+By how much the pixels of the sites from ``first`` on differ from their sources', in working levels of 8-bit samples, and
+in 1/8 of a working level of others. ``source`` (H, W) and ``planes``, the sample's, are of the machine.
+Cost: N channels gathers a site.
+"""

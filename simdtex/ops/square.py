@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The sample as the square around a neighbourhood reads it: kernels/common/square.h."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.machine.interface import Array, Machine
+from simdtex.model.sample import Sample
+from simdtex.ops.arithmetic import fma32
+
+LANES = 16
+"""Partial sums of a distance: one for each column, modulo 16, of the square around a neighbourhood."""
+
+
+class Square(NamedTuple):
+    """A level's candidates and their neighbours, side by side.
+
+    ``at`` (n,) int32 the candidates' places in ``levels`` (C, plane) uint16, the sample's working levels with the
+    columns that are a level's step apart side by side; ``down`` from one row of the lattice to the next there;
+    ``disc`` (side, columns) float32, 1 on the neighbourhood.
+    """
+
+    at: Array
+    levels: Array
+    down: int
+    disc: Array
+
+    def distance(
+        self,
+        numbers: NDArray[np.integer],
+        x: NDArray[np.floating],
+        u: NDArray[np.float32],
+        offsets: NDArray[np.int32],
+    ) -> NDArray[np.float32]:
+        """Equation (12) for each candidate, (slots, S), infinity where there is none; summed as a device does.
+
+        ``numbers`` (slots, S), -1 where there is none; ``x`` (N, C, S) grey levels of the neighbours and ``u`` (N, S),
+        1 - t of each.
+        """
+        radius = int(offsets.max())
+        d = np.zeros((LANES, *numbers.shape), np.float32)
+        for k in np.lexsort((offsets[:, 1], offsets[:, 0])):
+            row, col = offsets[k]
+            apart = row * self.down + col
+            for c, y in enumerate(self.levels):
+                e = (x[k, c] - y[self.at[np.maximum(numbers, 0)] + apart].astype(np.float32)) * u[k]
+                lane = (col + radius) % LANES
+                d[lane] = fma32(e, e, d[lane])
+        while len(d) > 1:
+            d = d[: len(d) // 2] + d[len(d) // 2 :]
+        return np.where(numbers < 0, np.float32(np.inf), d[0])
+
+
+def square_of(machine: Machine, sample: Sample, offsets: NDArray[np.int32], step: int, phases: str, edges: str) -> Square:
+    """Lay out a level whose sites are ``step`` pixels of the sample apart."""
+    radius, rows, cols = int(offsets.max()), sample.rows, sample.cols
+    side, columns = 2 * radius + 1, -(-(2 * radius + 1) // LANES) * LANES
+    disc = np.zeros((side, columns), np.float32)
+    disc[tuple((offsets + radius).T)] = 1
+    wide = -(-cols // step)
+    around = ((0, 0), (0, 0), (0, wide * step - cols))
+    working = np.pad(sample.working.reshape(-1, rows, cols), around, mode="edge").reshape(-1, rows, wide, step)
+    levels = working.swapaxes(2, 3).reshape(len(working), -1)
+    row, col = np.divmod(sample.positions(offsets, step, phases, edges), np.int32(cols))
+    at = (row * np.int32(step) + col % np.int32(step)) * np.int32(wide) + col // np.int32(step)
+    return Square(
+        machine.put(at),
+        machine.put(np.pad(levels, ((0, 0), (0, columns)))),  # whole vectors are read at the end, too
+        step * step * wide,
+        machine.put(disc),
+    )
