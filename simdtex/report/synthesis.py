@@ -83,7 +83,11 @@ def _use(sample: Picture, made: Picture, output: Output) -> list[Text | Table | 
     used = _enlarged(use_colours(source, shape))
     _frame(used, use["most_used"], used.shape[0] // shape[0])
     own = source_colours(np.moveaxis(np.indices(shape), 0, -1), shape)
-    arranged = [("the sample", _enlarged(own)), ("where from", source_colours(source, shape)), ("the output", made)]
+    arranged = [
+        ("places in the sample", _enlarged(own)),
+        ("where from", source_colours(source, shape)),
+        ("the output", made),
+    ]
     return [
         Text(words_of_use(use)),
         Figure(
