@@ -163,10 +163,14 @@ def place_map(rows, cols, shape):
 # ---------------------------------------------------------------- repeats
 
 
+def half_size(picture):
+    p = planes(picture)
+    return (p[::2, ::2] + p[1::2, ::2] + p[::2, 1::2] + p[1::2, 1::2]) / 4
+
+
 def naive_repeats(picture, scale, step):
     """The share of patches of 16 x 16 that stand again at half the size."""
-    p = planes(picture)
-    half = (p[::2, ::2] + p[1::2, ::2] + p[::2, 1::2] + p[1::2, 1::2]) / 4
+    half = half_size(picture)
     places = [(i, j) for i in range(half.shape[0] - 15) for j in range(half.shape[1] - 15)]
     asked = [(i, j) for i, j in places if i % (step // 2) == j % (step // 2) == 0]
     again = 0
@@ -181,10 +185,11 @@ def naive_repeats(picture, scale, step):
 def test_repeats_against_loops(channels):
     sample, output = noise(20, (56, 60, *channels)), noise(21, (64, 80, *channels))
     output[26:64, :40] = output[:38, 40:]
-    expected = naive_repeats(output, deviation(sample), 8), naive_repeats(sample, deviation(sample), 8)
+    scale = deviation(half_size(sample))
+    expected = naive_repeats(output, scale, 8), naive_repeats(sample, scale, 8)
     assert 0 < expected[0] < 1
     assert quality.repeats(sample, output) == pytest.approx(expected)
-    assert quality.repeats(sample, output, step=2).share == pytest.approx(naive_repeats(output, deviation(sample), 2))
+    assert quality.repeats(sample, output, step=2).share == pytest.approx(naive_repeats(output, scale, 2))
 
 
 def test_a_repeat_is_as_near_as_035_and_as_far_as_half_a_patch():
@@ -199,10 +204,15 @@ def test_a_repeat_is_as_near_as_035_and_as_far_as_half_a_patch():
         return quality.repeats(ground, made).share
 
     assert share(0.3, 40) > 0 == share(0.4, 40)
-    stripes = np.tile(noise(25, (48, 14), float).repeat(2, 1), (1, 4))  # period 28, and each phase once in a patch
-    assert quality.repeats(stripes, stripes).share == 1.0
-    narrow = stripes[:, :48]  # a displacement of 28 is not within 48 - 32 pixels
-    assert quality.repeats(narrow, narrow).share == 0.0
+    for period, expected in ((14, 0), (16, 2 / 3), (28, 0)):  # of three places each way the outer two are 16 apart
+        columns = np.tile(noise(25, (48, period // 2), float).repeat(2, 1), (1, 4))[:, :48]
+        assert quality.repeats(columns, columns).share == pytest.approx(expected)
+        assert quality.repeats(columns, columns.T[:48]).share == pytest.approx(expected)
+
+
+def test_fine_grain_makes_nothing_alike():
+    coarse, grain = noise(29, (48, 48), float).repeat(2, 0).repeat(2, 1), np.indices((96, 96)).sum(0) % 2 * 2000.0
+    assert quality.repeats(coarse + grain, coarse + grain) == (0.0, 0.0)  # the grain is gone at half the size
 
 
 def test_repeats_of_tiles_and_of_noise():

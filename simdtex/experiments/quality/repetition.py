@@ -13,7 +13,7 @@ from simdtex.experiments.quality.pictures import Planes, as_pair, halved, in_dev
 
 REPEATED_PATCH = 32  # side of the patches, pixels of the full size
 APART = 16  # least displacement of a repeat in one direction, pixels of the full size
-ALIKE = 0.35  # sample standard deviations
+ALIKE = 0.35  # standard deviations of the sample at half its size
 GRID = 8  # from patch to patch, pixels of the full size
 PATCHES = 1024  # looked up at most where no step is given
 
@@ -36,8 +36,9 @@ def repeats(sample: ArrayLike, output: ArrayLike, *, step: int | None = None) ->
        \min_y \frac{1}{\sigma} \sqrt{\frac{1}{256 c} \sum_i (a_{x,i} - a_{y,i})^2} < 0.35
 
     over all places :math:`y` of the half size that are at least half a patch from :math:`x` in
-    rows or in columns. The picture is not continued around its border: a repeat across it is not
-    seen.
+    rows or in columns. Here :math:`\sigma` is the standard deviation of the sample at half its
+    size, so fine grain, which is lost there, makes nothing alike. The picture is not continued
+    around its border: a repeat across it is not seen.
 
     Parameters
     ----------
@@ -65,7 +66,8 @@ def repeats(sample: ArrayLike, output: ArrayLike, *, step: int | None = None) ->
     if step is not None and (step < 2 or step % 2):
         raise ValueError(f"step is {step}: give an even number of pixels, 2 or more")
     first, second = as_pair(sample, output, REPEATED_PATCH + APART)
-    own, made = (_share(halved(planes), step) for planes in in_deviations(first, first, second))
+    small, large = (halved(planes) for planes in in_deviations(first, first, second))
+    own, made = (_share(planes, step) for planes in in_deviations(small, small, large))
     return Repeats(share=made, own=own)
 
 
