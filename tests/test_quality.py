@@ -210,6 +210,11 @@ def test_a_repeat_is_as_near_as_035_and_as_far_as_half_a_patch():
         assert quality.repeats(columns, columns.T[:48]).share == pytest.approx(expected)
 
 
+def test_a_patch_with_no_elsewhere_is_not_repeated():
+    flat = np.full((48, 48), 7, np.uint8)  # the middle one of three places each way is less than 16 pixels from all
+    assert quality.repeats(flat, flat) == pytest.approx((8 / 9, 8 / 9))
+
+
 def test_fine_grain_makes_nothing_alike():
     coarse, grain = noise(29, (48, 48), float).repeat(2, 0).repeat(2, 1), np.indices((96, 96)).sum(0) % 2 * 2000.0
     assert quality.repeats(coarse + grain, coarse + grain) == (0.0, 0.0)  # the grain is gone at half the size
@@ -381,9 +386,10 @@ def test_effective_use_as_a_dict_and_errors():
 
 
 def test_measure_gathers_all():
-    sample, output = noise(12, (48, 50, 3)), noise(13, (52, 49, 3))
-    source = place_map(48, 50, (52, 49))
+    sample, output = noise(12, (48, 50, 3)), np.tile(noise(13, (52, 33, 3)), (1, 2))
+    source = place_map(48, 50, (52, 66))
     figures = quality.measure(sample, output, source)
+    assert figures.repeats > 0.5 and figures.own_repeats == 0
     assert figures.plausibility == quality.plausibility(sample, output)
     assert figures.coverage == quality.coverage(sample, output)
     assert (figures.repeats, figures.own_repeats) == quality.repeats(sample, output)

@@ -16,7 +16,7 @@ from simdtex.io import image
 from simdtex.model.use import counts, effective_use
 from simdtex.report.page import Figure
 from simdtex.report.sheet import heat, source_colours, use_colours
-from simdtex.report.synthesis import FRAME, _use, words_of_use
+from simdtex.report.synthesis import FRAME, _frame, _use, words_of_use
 from simdtex.run import Output
 
 OPTIONS = {"mrf": {"order": 2}, "multires": {"alpha": 0.5}}
@@ -116,6 +116,16 @@ def test_pictures_of_use_show_the_map_the_frame_and_the_arrangement():
     assert stands_in(arranged, source_colours(source, (130, 132)))
     assert stands_in(arranged, np.stack([made] * 3, axis=-1))
     assert stands_in(used, use_colours(source, (130, 132))[20:])  # below the frame
+
+
+def test_the_frame_is_around_the_piece():
+    picture = np.zeros((40, 60, 3), np.uint8)
+    _frame(picture, {"row": 2, "col": 5, "rows": 3, "cols": 4}, 4)
+    framed = (picture == FRAME).all(axis=-1)
+    expected = np.zeros((40, 60), bool)
+    expected[8:20, 20:36] = True
+    expected[9:19, 21:35] = False
+    np.testing.assert_array_equal(framed, expected)
 
 
 # ---------------------------------------------------------------- the page
