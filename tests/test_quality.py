@@ -386,8 +386,8 @@ def test_effective_use_as_a_dict_and_errors():
 
 
 def test_measure_gathers_all():
-    sample, output = noise(12, (48, 50, 3)), np.tile(noise(13, (52, 33, 3)), (1, 2))
-    source = place_map(48, 50, (52, 66))
+    sample, output = noise(12, (48, 50, 3)), np.tile(noise(13, (52, 40, 3)), (1, 2, 1))
+    source = place_map(48, 50, (52, 80))
     figures = quality.measure(sample, output, source)
     assert figures.repeats > 0.5 and figures.own_repeats == 0
     assert figures.plausibility == quality.plausibility(sample, output)
