@@ -134,7 +134,7 @@ def measure(
 
     Notes
     -----
-    About 2 s on two CPU cores for a 128 x 128 sample and a 256 x 256 output in colour, half of it for plausibility and
+    About 2.5 s on two CPU cores for a 128 x 128 sample and a 256 x 256 output in colour, half of it for plausibility and
     coverage.
     """
     job = _Job(sample, output, source, stride)
