@@ -134,8 +134,8 @@ def measure(
 
     Notes
     -----
-    About 2.5 s on two CPU cores for a 128 x 128 sample and a 256 x 256 output in colour, half of it for plausibility and
-    coverage.
+    About 2.5 s on two CPU cores for a 128 x 128 sample and a 256 x 256 output in colour, half of it for plausibility
+    and coverage.
     """
     job = _Job(sample, output, source, stride)
     wanted = _possible(job) if figures is None else _checked(figures, job)
