@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The samples of every study: crops of pictures that scikit-image carries."""
 
+from fnmatch import fnmatch
+
 from skimage import data
+
+from simdtex.io.image import read
 
 
 def grey():
@@ -16,3 +20,22 @@ def colour():
         "wood": data.coffee()[266:362, 486:582],
         "stars": data.hubble_deep_field()[346:442, 166:262],
     }
+
+
+def folder(path, only=""):
+    """Every picture of a folder, by its name without the suffix; `only` are names or patterns, as ``*.png``."""
+    found = {}
+    for file in sorted(path.iterdir()) if path.is_dir() else ():
+        if only and not any(fnmatch(file.name, each) or fnmatch(file.stem, each) for each in only.split(",")):
+            continue
+        try:
+            pixels = read(file).pixels
+        except ValueError as error:
+            print(f"left out: {error}")
+            continue
+        if file.stem in found:
+            raise ValueError(f"two pictures in {path} are called {file.stem}: rename one, or leave it out by --only")
+        found[file.stem] = pixels
+    if not found:
+        raise ValueError(f"there is no picture in {path}: give a folder of samples")
+    return found

@@ -8,6 +8,15 @@ Writes a table (mean over the seeds) and one sheet of pictures per sample, and p
 mrf.csv and mrf-NAME.png for `mrf`, likewise for `multires` and `pyramid`, and for `exact`: `mrf` with the exact search.
 The first lines of `multires` and `pyramid` are other methods with their defaults. Outputs are twice the sample in
 each direction. ``--quick`` takes half of each sample's sides.
+
+    python benchmarks/study.py --samples DIR --out DIR [--method mrf] [--after OPTIONS] [--seeds N] [--only '*.png']
+                               [--before OPTIONS | --before-dir DIR]
+
+does it for every picture of a folder, with the defaults or with the options ``--after``, and compares with the options
+``--before`` (as ``"search=exact,order=8"``, or ``""`` for the defaults) or with the pictures that an earlier run has
+written. Writes NAME.png for each sample (NAME-seed2.png for the second seed and so on, before/NAME.png for those made
+with ``--before``), sheets/NAME.png with sample, before and after at 1:1, a seed a row, sheets.png with all samples,
+and figures.csv; prints mean and worst of every figure.
 """
 
 import argparse
@@ -18,6 +27,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import over_folder
 import samples
 from pyramid_figures import png
 
@@ -181,20 +191,42 @@ def tried(method):
         yield "mrf", {"method": "mrf", "search": "exact"}, 1
     if method == "pyramid":
         yield "multires", {"method": "multires"}, 1
-    own = {"method": "mrf", "search": "exact"} if method == "exact" else {"method": method}
+    own = own_options(method)
     for label, given in STUDIES[method].settings.items():
         yield label, own | given, None
+
+
+def own_options(method):
+    """What a study passes on to name its method."""
+    return {"method": "mrf", "search": "exact"} if method == "exact" else {"method": method}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--method", choices=STUDIES, default="mrf")
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "docs" / "study")
+    parser.add_argument("--out", type=Path, help="docs/study unless given; needed with --samples")
     parser.add_argument("--seeds", type=int, help="1 with exact and 3 with others unless given")
     parser.add_argument("--only", default="")
     parser.add_argument("--device")
     parser.add_argument("--quick", action="store_true", help="small samples")
+    parser.add_argument("--samples", type=Path, help="folder of pictures, each a sample")
+    parser.add_argument("--after", default="", help="options as NAME=VALUE,NAME=VALUE; the defaults unless given")
+    parser.add_argument("--before", help="other options, for the pictures to compare with")
+    parser.add_argument("--before-dir", type=Path, help="folder of earlier pictures to compare with")
     options = parser.parse_args()
+    if options.samples:
+        if options.out is None:
+            parser.error("--samples needs --out, a folder for the pictures and the table")
+        try:
+            over_folder.main(options, own_options(options.method))
+        except (ValueError, TypeError) as error:
+            parser.error(str(error))
+        return
+    if options.before is not None or options.before_dir or options.after:
+        parser.error(
+            "--before, --before-dir and --after are for --samples; leave them out, or give a folder of samples"
+        )
+    options.out = options.out or Path(__file__).parent.parent / "docs" / "study"
     study = STUDIES[options.method]
     machine = simdtex.open_machine(options.device)
     print(f"device: {machine.name}")
@@ -225,7 +257,7 @@ def main():
                     **given,
                 )
                 seconds.append(time.perf_counter() - began)
-                found = {**asdict(measure(sample, made)), "repetition": repetition(sample, made)}
+                found = {**asdict(measure(sample, made, figures=FIGURES)), "repetition": repetition(sample, made)}
                 figures.append([found[figure] for figure in study.figures])
             if given.get("alpha") == "auto":
                 setting = f"{setting} ({output.statistics['options']['alpha']:g})"

@@ -4,6 +4,7 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from simdtex.experiments import quality
     from simdtex.machine import open_machine
     from simdtex.machine.devices import DeviceError, devices
     from simdtex.methods.pyramid.mixtures import mix
@@ -20,6 +21,7 @@ __all__ = [
     "lcpdf",
     "mix",
     "open_machine",
+    "quality",
     "suggest_alpha",
     "synthesize",
     "synthesize_solid",
@@ -39,16 +41,19 @@ _HOMES = {
 }
 """Where the public names live; each is loaded when it is asked for first, so that the command line starts at once."""
 
+_MODULES = {"quality": "simdtex.experiments.quality"}
+"""The public names that are modules themselves."""
+
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         from importlib.metadata import version
 
         found: Any = version("simdtex")
-    elif name in _HOMES:
+    elif name in _HOMES or name in _MODULES:
         from importlib import import_module
 
-        found = getattr(import_module(_HOMES[name]), name)
+        found = getattr(import_module(_HOMES[name]), name) if name in _HOMES else import_module(_MODULES[name])
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = found  # the next time it is found without this function

@@ -357,7 +357,8 @@ def test_a_run_is_counted(given):
     assert statistics["accounting"]["emulated"] is False
     assert statistics["options"]["levels"] == 3
     assert statistics["options"]["schedule"] == "coloring"
-    assert set(statistics) == {"device", "seed", "options", "seconds", "device_seconds", "accounting", "levels"}
+    own = {"device", "seed", "options", "seconds", "device_seconds", "accounting", "levels", "use"}
+    assert set(statistics) == own
 
 
 # -- the density at a site --------------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Sheets, animations, false colours and stages are whole files of the right pictures."""
 
+import io
 import os
 
 import numpy as np
@@ -37,6 +38,21 @@ def test_contact_sheet_shows_every_picture_at_its_own_size(tmp_path):
     assert contains(laid, np.stack([image.to_display(deep)] * 3, axis=-1))
     assert sheet.contact_sheet(pictures, columns=1).shape[0] > laid.shape[0]
     assert os.listdir(tmp_path) == ["sheet.png"]
+
+
+def test_one_to_one_neither_enlarges_nor_reduces():
+    rng = np.random.default_rng(1)
+    small, large = (rng.integers(0, 256, (3, side, 3), dtype=np.uint8) for side in (20, 1100))
+    as_they_are = sheet.contact_sheet([("small", small), ("large", large)], columns=1, one_to_one=True)
+    assert contains(as_they_are, small) and contains(as_they_are, large)
+    fitting = sheet.contact_sheet([("small", small), ("large", large)], columns=1)
+    assert not contains(fitting, small) and not contains(fitting, large)
+
+
+def test_encoded_is_a_png_of_the_picture():
+    picture = np.random.default_rng(2).integers(0, 256, (5, 7, 3), dtype=np.uint8)
+    with PIL.Image.open(io.BytesIO(sheet.encoded(picture))) as read:
+        np.testing.assert_array_equal(np.asarray(read), picture)
 
 
 def test_contact_sheet_errors(tmp_path):

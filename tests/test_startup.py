@@ -16,8 +16,8 @@ from simdtex.machine import cache, programs, runtimes
 
 HEAVY = {"pyopencl", "scipy", "skimage", "matplotlib", "tifffile", "imagecodecs", "jinja2", "nrrd", "emcee", "rich"}
 PUBLIC = {
-    *("DeviceError", "Output", "Progress", "devices", "lcpdf", "mix", "open_machine", "suggest_alpha", "synthesize"),
-    *("synthesize_solid", "__version__"),
+    *("DeviceError", "Output", "Progress", "devices", "lcpdf", "mix", "open_machine", "quality", "suggest_alpha"),
+    *("synthesize", "synthesize_solid", "__version__"),
 }
 COMMAND_LINE = """
 from simdtex.cli import main
@@ -67,7 +67,7 @@ def test_a_whole_run_on_the_reference_needs_no_heavy_module(tmp_path):
 def test_every_public_name_is_there():
     assert set(dir(simdtex)) >= PUBLIC
     assert set(simdtex.__all__) == PUBLIC - {"__version__"}
-    assert set(simdtex._HOMES) == set(simdtex.__all__)
+    assert {*simdtex._HOMES, *simdtex._MODULES} == set(simdtex.__all__)
     for name in PUBLIC:
         assert getattr(simdtex, name) is not None
     assert callable(simdtex.devices)

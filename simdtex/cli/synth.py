@@ -16,6 +16,7 @@ from simdtex.cli.common import (
     SEED,
     candidates_per_level,
     check_distinct,
+    command_line,
     given,
     last_iteration,
     method_options,
@@ -66,6 +67,12 @@ from simdtex.cli.common import (
     metavar="MAP=OUT",
     help="Carry the arrangement over to another map of the material (normal, height); may be repeated.",
 )
+@click.option(
+    "--report",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Write a page of the run: pictures, and how evenly it uses the sample.",
+)
 @PROFILE
 @QUIET
 @plainly
@@ -80,6 +87,7 @@ def synth(
     stages: Path | None,
     source_map: Path | None,
     also: tuple[str, ...],
+    report: Path | None,
     accounting: bool,
     profile: bool,
     quiet: bool,
@@ -105,7 +113,11 @@ def synth(
     if source_map:
         image.check_writable(source_map, suffixes=maps.SOURCE_SUFFIXES)
     others = [_other_map(text, (height, width)) for text in also]
-    outputs = [output, *(path for path in (source_map, stages) if path), *(path for _, path in others)]
+    if report:
+        from simdtex.report.page import check_folder
+
+        check_folder(report)
+    outputs = [output, *(path for path in (source_map, stages, report) if path), *(path for _, path in others)]
     inputs = [sample, *([start] if start else []), *(Path(text.partition("=")[0]) for text in also)]
     check_distinct(outputs, inputs)
 
@@ -129,6 +141,10 @@ def synth(
         image.write(path, array)
     if source_map:
         maps.save_source_map(source_map, source)
+    if report:
+        from simdtex.report.synthesis import write_synthesis
+
+        write_synthesis(report, pixels, made, run, command_line(click.get_current_context()))
     if not quiet:
         click.echo(
             f"{output}: {shape[1]}x{shape[0]} from {width}x{height} in {time.perf_counter() - began:.1f} s "

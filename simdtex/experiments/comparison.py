@@ -29,6 +29,9 @@ __all__ = ["FIGURES", "Comparison", "Entry", "Now", "Recorder", "Run", "Spread",
 
 Tell = Callable[[Relaxing], Any]
 
+MEASURED = "plausibility", "coverage", "copying", "histogram_distance", "seam"
+"""The figures of merit of each run, out of `simdtex.experiments.quality.FIGURES`."""
+
 
 @dataclass(frozen=True)
 class Run:
@@ -41,7 +44,7 @@ class Run:
     image : array
         The output, with the sample's type and axes.
     quality : simdtex.experiments.quality.Quality
-        Of the output against the sample.
+        Of the output against the sample: plausibility, coverage, copying, histogram distance and seam.
     sweeps : tuple of Sweep
         All levels, the coarsest first.
     levels : list of dict
@@ -221,7 +224,7 @@ def _entry_results(entry: Entry) -> dict[str, Any]:
             "seed": run.seed,
             "seconds": run.seconds,
             "device_seconds": run.device_seconds,
-            "quality": asdict(run.quality),
+            "quality": {name: getattr(run.quality, name) for name in MEASURED},
             "accounting": run.accounting,
             "levels": run.levels,
             "sweeps": [asdict(sweep) for sweep in run.sweeps],
@@ -380,7 +383,7 @@ class _Job:
             schedule.name,
             seed,
             image,
-            measure(self._grey, made),
+            measure(self._grey, made, figures=MEASURED),
             tuple(recorder.sweeps),
             said["levels"],
             said["seconds"] - recorder.seconds,

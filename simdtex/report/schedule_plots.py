@@ -3,12 +3,10 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import PIL.Image
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
@@ -16,7 +14,7 @@ from numpy.typing import NDArray
 from simdtex.experiments.comparison import Comparison, Entry, Spread, Sweep
 from simdtex.io.image import to_display
 from simdtex.report.plots import Curve, curves, dots, figure_png, legend, named_rows, new_figure, styles, tidy
-from simdtex.report.sheet import contact_sheet
+from simdtex.report.sheet import contact_sheet, encoded
 
 __all__ = ["all_seeds", "channels_last", "costs", "first_seed", "per_sweep", "qualities", "temperature"]
 
@@ -43,7 +41,7 @@ def first_seed(comparison: Comparison) -> bytes:
     """The sample, and each schedule's picture of the first seed."""
     pictures = [("the sample", _shown(comparison, comparison.sample, SHOWN_SIDE))]
     pictures += [(_label(entry), _shown(comparison, entry.runs[0].image, SHOWN_SIDE)) for entry in comparison.entries]
-    return _encoded(contact_sheet(pictures, columns=min(4, len(pictures))))
+    return encoded(contact_sheet(pictures, columns=min(4, len(pictures))))
 
 
 def all_seeds(comparison: Comparison) -> bytes:
@@ -53,13 +51,7 @@ def all_seeds(comparison: Comparison) -> bytes:
         for runs in zip(*(entry.runs for entry in comparison.entries), strict=True)
         for entry, run in zip(comparison.entries, runs, strict=True)
     ]
-    return _encoded(contact_sheet(pictures, columns=len(comparison.entries)))
-
-
-def _encoded(picture: NDArray[np.uint8]) -> bytes:
-    buffer = io.BytesIO()
-    PIL.Image.fromarray(picture).save(buffer, format="PNG")
-    return buffer.getvalue()
+    return encoded(contact_sheet(pictures, columns=len(comparison.entries)))
 
 
 # ---------------------------------------------------------------- plots

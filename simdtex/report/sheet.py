@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -17,16 +18,19 @@ import PIL.ImageFont
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.image import atomic_path, check_writable, to_display, write
+from simdtex.model.use import counts
 
 __all__ = [
     "animation",
     "contact_sheet",
+    "encoded",
     "enlarged",
     "fitted",
     "heat",
     "reduction",
     "source_colours",
     "thinned",
+    "use_colours",
 ]
 
 Picture = NDArray[np.uint8]
@@ -49,6 +53,7 @@ def contact_sheet(
     *,
     columns: int | None = None,
     captions: Sequence[str] | None = None,
+    one_to_one: bool = False,
 ) -> Picture:
     """Lay labelled pictures out on one sheet, each under its label.
 
@@ -63,12 +68,14 @@ def contact_sheet(
         Pictures in a row; by default as many as make the sheet about square.
     captions : sequence of str, optional
         A line below each picture.
+    one_to_one : bool
+        Whether pictures of any size stand as they are.
 
     Returns
     -------
     ndarray of uint8, (rows, cols, 3)
-        Pictures stand at their own size; those of less than 96 pixels are enlarged by a whole
-        factor without smoothing, those of more than 1024 reduced.
+        Pictures stand at their own size; unless `one_to_one` is given, those of less than 96
+        pixels are enlarged by a whole factor without smoothing, those of more than 1024 reduced.
 
     Raises
     ------
@@ -85,7 +92,8 @@ def contact_sheet(
     below = [""] * len(pictures) if captions is None else list(captions)
     if len(below) != len(pictures):
         raise ValueError(f"there are {len(below)} captions for {len(pictures)} pictures: give one for each")
-    shown = [(label, _cell(_rgb(to_display(picture)))) for label, picture in pictures]
+    plain = [(label, _rgb(to_display(picture))) for label, picture in pictures]
+    shown = plain if one_to_one else [(label, _cell(picture)) for label, picture in plain]
     font = PIL.ImageFont.load_default(TEXT)
     strip = TEXT + 6
     height = max(picture.shape[0] for _, picture in shown) + strip + (0 if captions is None else strip) + GAP
@@ -120,6 +128,13 @@ def _rgb(picture: Picture) -> Picture:
     if picture.shape[2] < 3:  # grey, or grey and alpha
         return np.repeat(picture[..., :1], 3, axis=2)
     return np.ascontiguousarray(picture[..., :3])
+
+
+def encoded(picture: Picture) -> bytes:
+    """A picture (rows, cols[, channels]) as the bytes of a PNG."""
+    buffer = io.BytesIO()
+    PIL.Image.fromarray(picture).save(buffer, format="PNG")
+    return buffer.getvalue()
 
 
 def reduction(shape: tuple[int, ...], side: int) -> int:
@@ -291,6 +306,31 @@ def source_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
     colours = _srgb(np.full(positions.shape[:2], 0.72), 0.19 * across[..., 0], 0.19 * across[..., 1])
     colours[(positions < 0).any(axis=2)] = 0
     return colours
+
+
+def use_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
+    """Colour each pixel of the sample by how often it was taken.
+
+    Parameters
+    ----------
+    source : array_like of int, (rows, cols, 2)
+        For every output pixel, the (row, column) of the sample that it was taken from.
+    sample_shape : (rows, cols)
+        Of the sample, pixels.
+
+    Returns
+    -------
+    ndarray of uint8, (sample rows, sample cols, 3)
+        The colours of `heat` for log(1 + u) / log(1 + max u), where u is how often: near black for
+        a pixel that was never taken, pale yellow for the one that was taken most.
+
+    Raises
+    ------
+    ValueError
+        `source` is no source map, or points outside the sample.
+    """
+    uses = np.log1p(counts(source, sample_shape))
+    return heat(uses / uses.max())
 
 
 def _srgb(lightness: NDArray[Any], a: NDArray[Any], b: NDArray[Any]) -> Picture:

@@ -17,6 +17,7 @@ from simdtex.methods.mrf.observers import Observer
 from simdtex.methods.mrf.options import Options
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
+from simdtex.model.use import effective_use
 from simdtex.ops.finish import around, finish
 from simdtex.options import within_32_bits
 from simdtex.run import Callback, Output, device_seconds
@@ -81,6 +82,7 @@ def synthesize(
         "device_seconds": device_seconds(machine, worked),
         "accounting": account.report() | {"emulated": run.emulated, "launches": machine.launches - launches},
         "levels": meter.reports,
+        "use": effective_use(run.sample.place(source), pixels.shape).as_dict(),
     }
     return image, Output(run.sample.place(source), temperatures / 1024, observer.stages, statistics)
 

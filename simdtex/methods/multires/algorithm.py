@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex.machine import Machine
 from simdtex.machine.interface import Array
 from simdtex.methods.multires.analysis import Analysis, analyse
+from simdtex.model.use import effective_use
 from simdtex.ops.candidates import Sampled, Structure, candidates
 from simdtex.ops.laplacian import laplacian_collapse
 from simdtex.options import build, one_of, real, whole, within_32_bits
@@ -306,6 +307,7 @@ def resample(
         "seconds": perf_counter() - began,
         "device_seconds": device_seconds(machine, worked),
         "levels": record.reports,
+        "use": effective_use(place, analysis.shapes[0]).as_dict(),
     }
     return image, Output(place, None, record.stages, statistics)
 

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How evenly an output uses its sample: counted on the source map over pieces of the sample."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["MostUsed", "Use", "counts", "effective_use"]
+
+PIECE = 8  # side of a piece of the sample, pixels
+
+
+class MostUsed(NamedTuple):
+    """The piece that is used most: how many times its fair share, its first pixel and its size, see `effective_use`."""
+
+    times_fair_share: float
+    row: int
+    col: int
+    rows: int
+    cols: int
+
+
+class Use(NamedTuple):
+    """How evenly an output uses its sample, see `effective_use`."""
+
+    effective_share: float
+    most_used: MostUsed
+
+    def as_dict(self) -> dict[str, Any]:
+        """The same as `simdtex.run.Output.statistics` has it."""
+        return {"effective_share": self.effective_share, "most_used": self.most_used._asdict()}
+
+
+def counts(source: ArrayLike, sample_shape: tuple[int, ...]) -> NDArray[np.intp]:
+    """How many output pixels each pixel of the sample was taken for.
+
+    Parameters
+    ----------
+    source : array_like of int, (rows, cols, 2)
+        For every output pixel, the (row, column) of the sample that it was taken from.
+    sample_shape : (rows, cols)
+        The size of the sample, pixels.
+
+    Returns
+    -------
+    ndarray of int, sample_shape
+
+    Raises
+    ------
+    ValueError
+        `source` is no source map, or points outside the sample.
+    """
+    rows, cols = sample_shape[:2]
+    positions = np.asarray(source)
+    if positions.ndim != 3 or positions.shape[2] != 2 or positions.dtype.kind not in "iu":
+        raise ValueError("the source map is not (rows, cols, 2) integers: pass the one of the run")
+    row, col = (positions[..., axis].astype(np.intp) for axis in (0, 1))
+    if positions.size == 0 or min(row.min(), col.min()) < 0 or row.max() >= rows or col.max() >= cols:
+        raise ValueError(
+            f"the source map points outside a sample of {rows} x {cols} pixels: pass the sample that it was made from"
+        )
+    return np.bincount((row * cols + col).ravel(), minlength=rows * cols).reshape(rows, cols)
+
+
+def effective_use(source: ArrayLike, sample_shape: tuple[int, ...], piece: int = PIECE) -> Use:
+    r"""How evenly the output uses the pieces of its sample, and which one it uses most.
+
+    The sample is cut into pieces of about 8 x 8 pixels. With :math:`u_p` the number of output
+    pixels taken from the piece p, of :math:`a_p` pixels, the effective share is
+
+    .. math::
+
+       \frac{(\sum_p u_p)^2}{\sum_p a_p \sum_p u_p^2 / a_p} ,
+
+    which is :math:`(\sum u)^2 / (n \sum u^2)` where n pieces are equally large. It is the share of
+    the sample that would do if all of it were used alike.
+
+    Parameters
+    ----------
+    source : array_like of int, (rows, cols, 2)
+        For every output pixel, the (row, column) of the sample that it was taken from.
+    sample_shape : (rows, cols)
+        The size of the sample, pixels.
+    piece : int
+        Side of a piece, pixels: each side of the sample is cut into as many parts as come nearest
+        to this length, which differ by one pixel at most.
+
+    Returns
+    -------
+    effective_share : float
+        Above 0, to 1; a verbatim copy of the sample has 1.
+    most_used : MostUsed
+        ``times_fair_share`` is :math:`(u_p / \sum u) / (a_p / \sum a)` of the piece where it is
+        largest, 1 or more; ``row`` and ``col`` are the piece's first pixel, ``rows`` and ``cols``
+        its size.
+
+    Raises
+    ------
+    ValueError
+        `source` is no source map, or points outside the sample; `piece` is less than 1.
+
+    Notes
+    -----
+    About 1 ms for an output of 256 x 256 pixels. Where pieces are taken by chance a piece of n
+    output pixels varies by sqrt(n), so a small output has a lower share than a large one.
+    """
+    if piece < 1:
+        raise ValueError(f"piece is {piece}: give its side in pixels, 1 or more")
+    uses = counts(source, sample_shape)
+    row, col = (_starts(length, piece) for length in uses.shape)
+    taken = np.add.reduceat(np.add.reduceat(uses, row, axis=0), col, axis=1)
+    tall, wide = np.diff([*row, uses.shape[0]]), np.diff([*col, uses.shape[1]])
+    density = taken / np.multiply.outer(tall, wide) * (uses.size / taken.sum())  # mean 1 over the sample's pixels
+    i, j = (int(n) for n in np.unravel_index(density.argmax(), density.shape))
+    most = MostUsed(float(density[i, j]), int(row[i]), int(col[j]), int(tall[i]), int(wide[j]))
+    return Use(float(taken.sum() / (taken * density).sum()), most)
+
+
+def _starts(length: int, piece: int) -> NDArray[np.intp]:
+    """Where the parts of a side begin."""
+    parts = max(1, round(length / piece))
+    return np.arange(parts) * length // parts
