@@ -95,7 +95,7 @@ class Options:
 
     alpha: float | str = 0.3
     beta: float = 0.0
-    strain: float = 0.04
+    strain: float = 0.05
     target: float | None = None
     thresholds: ArrayLike | None = None
     orientations: int = 4

@@ -20,7 +20,7 @@ PLACES = 128
 """Places of the sample that a strip is tried from, at most, evenly spaced."""
 
 FITS = 11, 10
-"""A join that differs by no more than 11/10 of what neighbours inside differ by is left as it is."""
+"""Edges that differ by no more than 11/10 of what neighbours inside do, or beside both edges, are left alone."""
 
 _FAR = np.int64(2**62)
 
@@ -61,8 +61,12 @@ def mend(planes: NDArray[np.int32]) -> NDArray[np.intp]:
 def _fits(values: NDArray[np.int64]) -> bool:
     """Whether the last column goes with the first, or there are too few."""
     cols = values.shape[1]
-    inside, across = int(np.abs(np.diff(values, axis=1)).sum()), int(np.abs(values[:, -1] - values[:, 0]).sum())
-    return cols < 2 * SHARE or across * (cols - 1) * FITS[1] <= inside * FITS[0]
+    if cols < 2 * SHARE:
+        return True
+    lines = np.abs(np.diff(values, axis=1)).sum((0, 2))
+    across = int(np.abs(values[:, -1] - values[:, 0]).sum()) * FITS[1]
+    # stripes along the edge may wrap around where they are steep, which the lines on both sides then are
+    return across * (cols - 1) <= int(lines.sum()) * FITS[0] or across <= int(min(lines[0], lines[-1])) * FITS[0]
 
 
 def _covered(values: NDArray[np.int64], place: NDArray[np.intp], closed: bool) -> NDArray[np.intp]:
@@ -72,14 +76,16 @@ def _covered(values: NDArray[np.int64], place: NDArray[np.intp], closed: bool) -
     left = turn - reach  # of the strip, where the join is before column `turn`
     there = np.roll(values, turn, 1)[:, left : left + 2 * reach]
     starts = range(0, cols - 2 * reach + 1, -(-cols // PLACES))
-    joins = [_joins(there, values[:, x : x + 2 * reach]) for x in starts]
-    best = int(np.argmin([sum(int(cost.min(1).sum()) for cost in pair) for pair in joins]))
-    first, last = (_path(cost, closed)[:, None] for cost in joins[best])
+    # the least that any two paths cost ranks the places well enough
+    least = [sum(int(c.min(1).sum()) for c in _joins(there, values[:, x : x + 2 * reach])) for x in starts]
+    best = starts[int(np.argmin(least))]
+    first, last = (_path(c, closed)[:, None] for c in _joins(there, values[:, best : best + 2 * reach]))
     col = np.arange(2 * reach)
-    turned = np.roll(place, turn, 1)
-    strip = place[:, starts[best] : starts[best] + 2 * reach]
-    turned[:, left : left + 2 * reach] = np.where((col > first) & (col <= reach + last), strip, turned[:, left:][:, col])
-    return np.roll(turned, -turn, 1)
+    own = np.roll(place, turn, 1)
+    covered = own[:, left : left + 2 * reach]
+    inside = (col > first) & (col <= reach + last)
+    own[:, left : left + 2 * reach] = np.where(inside, place[:, best : best + 2 * reach], covered)
+    return np.roll(own, -turn, 1)
 
 
 def _joins(there: NDArray[np.int64], strip: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -94,7 +100,7 @@ def _path(cost: NDArray[np.int64], closed: bool) -> NDArray[np.intp]:
     """Column of the least path in each row, (rows,): from row to row it moves by one at most, also around if closed."""
     if not closed:
         return _least(cost, None)
-    begin = _least(np.concatenate([cost, cost]), None)[len(cost)]  # once around, the start does not matter any more
+    begin = _least(np.concatenate([cost, cost]), None)[len(cost)]  # after a turn the start hardly matters
     return _least(cost, int(begin))
 
 
