@@ -20,7 +20,7 @@ PLACES = 128
 """Places of the sample that a strip is tried from, at most, evenly spaced."""
 
 FITS = 11, 10
-"""Edges that differ by no more than 11/10 of what neighbours inside do, or beside both edges, are left alone."""
+"""Edges that differ by no more than 11/10 of what neighbours inside do are left alone."""
 
 _FAR = np.int64(2**62)
 
@@ -61,12 +61,8 @@ def mend(planes: NDArray[np.int32]) -> NDArray[np.intp]:
 def _fits(values: NDArray[np.int64]) -> bool:
     """Whether the last column goes with the first, or there are too few."""
     cols = values.shape[1]
-    if cols < 2 * SHARE:
-        return True
-    lines = np.abs(np.diff(values, axis=1)).sum((0, 2))
-    across = int(np.abs(values[:, -1] - values[:, 0]).sum()) * FITS[1]
-    # stripes along the edge may wrap around where they are steep, which the lines on both sides then are
-    return across * (cols - 1) <= int(lines.sum()) * FITS[0] or across <= int(min(lines[0], lines[-1])) * FITS[0]
+    inside, across = int(np.abs(np.diff(values, axis=1)).sum()), int(np.abs(values[:, -1] - values[:, 0]).sum())
+    return bool(cols < 2 * SHARE or across * (cols - 1) * FITS[1] <= inside * FITS[0])
 
 
 def _covered(values: NDArray[np.int64], place: NDArray[np.intp], closed: bool) -> NDArray[np.intp]:
