@@ -121,6 +121,28 @@ def test_a_closed_path_ends_beside_its_beginning(cost):
     assert cost[range(len(cost)), path].sum() in totals
 
 
+def test_the_strip_is_the_one_that_fits_best_and_ends_where_it_differs_least():
+    """Of 12 rows and 64 columns: only columns are mended, and the strip reaches 8 pixels to either side."""
+    planes = Stretched(GRASS[:12, 40:104, None]).planes
+    values, col = planes[0].astype(np.int64) >> 8, np.arange(16)
+    turned = np.roll(mend(planes) % 64, 32, 1)
+    there = np.roll(values, 32, 1)[:, 24:40]
+    [start] = {int(k) for k in (turned[:, 24:40] - col).ravel()} & set(range(49))
+    costs = []
+    for x in range(49):
+        square = (there - values[:, x : x + 16]) ** 2
+        costs.append(square[:, :-1] + square[:, 1:])
+    assert start == np.argmin([(cost[:, :7].min(1) + cost[:, 8:].min(1)).sum() for cost in costs])
+    inside = turned[:, 24:40] == start + col
+    rows, cost = range(12), costs[start]
+    first, last = inside.argmax(1), 15 - inside[:, ::-1].argmax(1)
+    assert (inside == (col >= first[:, None]) & (col <= last[:, None])).all(), (
+        "the join is covered, and no hole is left"
+    )
+    for cut, half in ((first - 1, cost[:, :7]), (last - 8, cost[:, 8:])):
+        assert half[rows, cut].sum() == half[rows, _path(half, closed=False)].sum()
+
+
 # -- the texture ----------------------------------------------------------------------------------------------
 
 

@@ -48,7 +48,7 @@ def mend(planes: NDArray[np.int32]) -> NDArray[np.intp]:
     -----
     Cost: for each axis at most 128 times a quarter of the picture. Memory: 60 + 20 channels bytes a pixel.
     """
-    values = np.moveaxis(planes, 0, -1).astype(np.int64) >> 8  # so that the squares of a path fit 64 bits
+    values = np.moveaxis(planes, 0, -1).astype(np.int64) >> 8  # the squares along any path then fit 64 bits
     place = np.arange(values[..., 0].size).reshape(values.shape[:2])
     if not _fits(values):
         place = _covered(values, place, closed=False)
