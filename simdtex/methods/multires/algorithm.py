@@ -224,9 +224,9 @@ def strain(machine: Machine, analysis: Analysis, options: Options, alpha: float)
     """How much pieces of the sample that meet in a texture differ from what each would go on with.
 
     Of a texture as large as the sample, for each level of the finer half and each pair of neighbours p and q, where q
-    is to the right of p or below, and s says which pixel of the band L each was copied from,
+    is to the right of p or below, and s says which pixel of the band L each was copied from, this is ::
 
-        strain = mean of |L(s(p) + q - p) - L(s(q))|**2 / (2 mean of |L|**2),
+        mean of |L(s(p) + q - p) - L(s(q))|**2 / (2 mean of |L|**2)
 
     averaged over these levels. Neighbours that are neighbours in the sample add nothing, and strangers add 1. Coarser
     levels do not count: what is smooth shows no line.
