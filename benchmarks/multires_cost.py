@@ -101,6 +101,15 @@ def jobs(machine, repeats):
             job(1 if alpha == np.inf else repeats, machine, name, 128, 256, alpha)
 
 
+def of_options(machine, repeats):
+    """What mending and blending add."""
+    for side, output in ((128, 256), (256, 1024), (512, 1024)):
+        for options in ({"edges": "keep", "joins": "cut"}, {"edges": "keep"}, {}):
+            seconds, _ = best_of(repeats, machine, picture("gravel", side), output, **options)
+            named = ", ".join(f"{name}={value}" for name, value in options.items()) or "defaults"
+            print(f"gravel {side:3} -> {output:4}, {named:21}: {seconds:7.3f} s", flush=True)
+
+
 def by_kernel(device):
     """Device seconds of each kernel."""
     machine = simdtex.open_machine(device, profile=True)
@@ -183,6 +192,7 @@ def main():
     print(f"device: {machine.name}, {machine.info.compute_units} compute units")
     parts = {
         "jobs": partial(jobs, machine, repeats),
+        "options": partial(of_options, machine, repeats),
         "kernels": partial(by_kernel, device),
         "goal": partial(goal, machine, repeats),
         "alone": partial(alone, device),

@@ -2,16 +2,19 @@
 """Every figure of the page on multiresolution sampling.
 
     python benchmarks/multires_figures.py [--out docs/multires] [--device TEXT]
+    python benchmarks/multires_figures.py --table [--folder FOLDER] [--device TEXT]
 
-Writes PNG files, the same bytes every time, and prints their names.
+The first writes PNG files, the same bytes every time, and prints their names. The second prints how much edges and
+lines show, for the samples of the studies or for the PNG files of a folder.
 """
 
 import argparse
 from functools import partial
 from io import BytesIO
-from itertools import pairwise
+from itertools import pairwise, product
 from math import inf
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 import PIL.Image
@@ -20,8 +23,11 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.patches import Patch, Polygon, Rectangle
 
 import simdtex
+from simdtex.experiments.quality import seam
+from simdtex.io.image import read
 from simdtex.methods.multires import tiled
 from simdtex.methods.multires.analysis import pyramid
+from simdtex.methods.multires.mend import mend
 from simdtex.model.stretched import TOP, Stretched
 from simdtex.ops.filters import UNIT_BITS, bank, filters
 from simdtex.report.plots import DPI, FAINT, INK, figure_png, new_figure
@@ -30,6 +36,17 @@ from simdtex.report.sheet import contact_sheet, enlarged, heat, source_colours
 ALPHAS = {0: (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, inf), 1: (0.1, 0.2, 0.3, 0.4, 0.6, 1, 1.5)}
 OWN, SIMILAR, FAILS, CANDIDATE = "#0072B2", "#8CC9A8", "#E07B4F", "#E69F00"
 SIBLING, OTHER, UNSEEN, THIRD = "#A9D3EE", "#F8E3B5", "#ECECEA", "#CFE8DA"
+PERIODS = (8, 16, 32)  # of the grids whose lines show
+PAPER = {"edges": "keep", "joins": "cut"}
+SHOWN = {
+    "alpha 0.3, keep, cut": {"alpha": 0.3} | PAPER,
+    "auto, target 1.1, keep, cut": {"alpha": "auto", "target": 1.1} | PAPER,
+    "alpha 0.3, mend, cut": {"alpha": 0.3, "joins": "cut"},
+    "alpha 0.3, keep, blend": {"alpha": 0.3, "edges": "keep"},
+    "alpha 0.3": {"alpha": 0.3},
+    "auto": {"alpha": "auto"},
+    "auto, target 1.1": {"alpha": "auto", "target": 1.1},
+}
 CELL = 160  # side of an output that is shown level by level, pixels; 1.25 tiles
 
 
@@ -37,12 +54,17 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "docs" / "multires")
     parser.add_argument("--device")
+    parser.add_argument("--table", action="store_true")
+    parser.add_argument("--folder", type=Path, metavar="FOLDER", help="PNG files to measure in place of the studies'")
     options = parser.parse_args()
     machine = simdtex.open_machine(options.device)
     print(f"device: {machine.name}")
     options.out.mkdir(parents=True, exist_ok=True)
-    gravel = samples.grey()["gravel"]
-    tissue = samples.colour()["tissue"]
+    collection = samples.grey() | samples.colour()
+    gravel, tissue = collection["gravel"], collection["tissue"]
+    if options.table or options.folder:
+        folder = options.folder and sorted(options.folder.glob("*.png"))
+        return table(machine, {path.stem: read(path).pixels for path in folder} if folder else collection)
     made = {
         "pyramid": partial(pyramids, machine, gravel),
         "filters": partial(responses, machine, gravel),
@@ -54,6 +76,8 @@ def main():
         "beta-1": partial(series, machine, gravel, 1),
         "phase": partial(phases, machine, gravel),
         "colour": partial(colours, machine, tissue),
+        "edges": partial(edges, {name: collection[name] for name in ("brick", "gravel", "tissue", "wood")}),
+        "joins": partial(joins, machine, {name: collection[name] for name in ("gravel", "brick", "tissue")}),
     }
     for name, figure in made.items():
         path = options.out / f"{name}.png"
@@ -306,12 +330,65 @@ def series(machine, gravel, beta):
     """One sample under many alphas, as in Figures 11 and 12 of the paper."""
     pictures = [("the sample", gravel)]
     for alpha in ALPHAS[beta]:
-        image, output = run(machine, gravel, 2 * len(gravel), alpha=alpha, beta=beta)
-        if alpha == 0 and not (image == np.tile(gravel, (2, 2))).all():
+        joins = "cut" if alpha == inf else "blend"  # where all are strangers, a blend leaves no contrast
+        image, output = run(machine, gravel, 2 * len(gravel), alpha=alpha, beta=beta, joins=joins)
+        if alpha == 0 and not (image == np.tile(mended(gravel), (2, 2))).all():
             raise AssertionError("alpha = 0 does not tile the sample")
         name = "infinity" if alpha == inf else f"{alpha:g}"
         pictures.append((f"alpha {name}: {mean_candidates(output):.2f} candidates", image))
     return png(contact_sheet(pictures, columns=4))
+
+
+def mended(sample):
+    """The sample as it wraps around."""
+    planes = Stretched(sample.reshape(*sample.shape[:2], -1)).planes
+    return sample.reshape(-1, *sample.shape[2:])[mend(planes)]
+
+
+def edges(collection):
+    """Samples laid beside themselves, as they are and mended."""
+    pictures = [
+        (f"{name}, keep: seam {seam(one):.2f}", np.tile(one, (2, 2, 1)[: one.ndim])) for name, one in collection.items()
+    ]
+    for name, one in collection.items():
+        pictures.append((f"{name}, mend: seam {seam(mended(one)):.2f}", np.tile(mended(one), (2, 2, 1)[: one.ndim])))
+    return png(contact_sheet(pictures, columns=len(collection)))
+
+
+def joins(machine, collection):
+    """Textures at the same alpha, of the same places, whose bands are cut where they meet and fade into each other."""
+    pictures = []
+    for how in ("cut", "blend"):
+        for name, one in collection.items():
+            image, _ = run(machine, one, 2 * len(one), alpha=0.3, joins=how)
+            pictures.append((f"{name}, {how}: lines {lines(image):.2f}", image))
+    return png(contact_sheet(pictures, columns=len(collection)))
+
+
+def lines(picture):
+    """The mean absolute difference across the lines of the coarser grids, over that across all other lines.
+
+    A line of a grid is at a multiple of its period, 8, 16 or 32; the mean is over these three and both directions. It
+    is about 1 where no line of a grid shows.
+    """
+    ratios = []
+    for axis, period in product((0, 1), PERIODS):
+        across = abs(np.diff(np.moveaxis(picture.astype(float), axis, 0), axis=0))
+        across = across.reshape(len(across), -1).mean(1)
+        at = np.arange(1, len(across) + 1) % period == 0
+        ratios.append(across[at].mean() / across[~at].mean())
+    return float(np.mean(ratios))
+
+
+def table(machine, collection):
+    """How much edges and lines show in textures of each sample, by option."""
+    for how, options in SHOWN.items():
+        made = {name: run(machine, one, 2 * len(one), **options) for name, one in collection.items()}
+        seams, shown = ({name: measure(image) for name, (image, _) in made.items()} for measure in (seam, lines))
+        print(f"{how}: seam {median(seams.values()):.2f}, lines {median(shown.values()):.2f}")
+        for name, (_, output) in made.items():
+            alpha = output.statistics["options"]["alpha"]
+            print(f"    {name:<9} alpha {alpha:<4g} seam {seams[name]:.2f}, lines {shown[name]:.2f}", flush=True)
 
 
 def phases(machine, gravel):
@@ -319,7 +396,7 @@ def phases(machine, gravel):
     pictures = []
     for phase in ("match", "free"):
         for alpha in (0, 0.05, 0.2, 0.4):
-            image, output = run(machine, gravel, 192, alpha=alpha, phase=phase)
+            image, output = run(machine, gravel, 192, alpha=alpha, phase=phase, joins="cut")
             pictures.append((f"{phase}, alpha {alpha:g}: {mean_candidates(output):.2f} candidates", image))
     return png(contact_sheet(pictures, columns=4))
 

@@ -76,3 +76,37 @@ __kernel void laplacian_collapse(__global const int *restrict band, const int pl
     const int up = expanded(g, coarse_rows, coarse_cols, tile_rows, tile_cols, torus, s / cols, s % cols);
     fine[plane * rows * cols + s] = band[plane * tile_rows * tile_cols + source[s]] + up;
 }
+
+// Pixel (i, j) of L_i of the output where pieces of the sample that meet fade into each other: (1, 2, 1) / 4 in each
+// direction of what the neighbours, and the pixel itself, were copied from would go on with here.
+inline int joined(__global const int *restrict band, const int tile_rows, const int tile_cols, const int torus,
+                  __global const int *restrict source, const int rows, const int cols, const int i, const int j)
+{
+    int sum = 0;
+    for (int a = -1; a <= 1; ++a)
+        for (int b = -1; b <= 1; ++b) {
+            const int k = torus ? beside(i + a, rows, 1) : clamp(i + a, 0, rows - 1);
+            const int l = torus ? beside(j + b, cols, 1) : clamp(j + b, 0, cols - 1);
+            const int s = source[k * cols + l];
+            const int row = s / tile_cols - (torus ? a : k - i), col = s % tile_cols - (torus ? b : l - j);
+            sum += (2 - abs(a)) * (2 - abs(b)) *
+                   band[beside(row, tile_rows, torus) * tile_cols + beside(col, tile_cols, torus)];
+        }
+    return (sum + 8) >> 4;
+}
+
+// As `laplacian_collapse`, where pieces fade into each other.
+__kernel void laplacian_blend(__global const int *restrict band, const int planes, const int tile_rows,
+                              const int tile_cols, const int torus, __global const int *restrict source,
+                              const int rows, const int cols, __global const int *restrict coarse,
+                              const int coarse_rows, const int coarse_cols, __global int *restrict fine)
+{
+    const int s = get_global_id(0), plane = get_global_id(1);
+    if (s >= rows * cols || plane >= planes)
+        return;
+    const int i = s / cols, j = s % cols;
+    __global const int *g = coarse + plane * coarse_rows * coarse_cols;
+    __global const int *own = band + plane * tile_rows * tile_cols;
+    fine[plane * rows * cols + s] = joined(own, tile_rows, tile_cols, torus, source, rows, cols, i, j) +
+                                    expanded(g, coarse_rows, coarse_cols, tile_rows, tile_cols, torus, i, j);
+}

@@ -179,7 +179,8 @@ class Stage:
     image : (rows, cols[, channels]) array
         In the sample's type.
     source : (rows, cols, 2) int32 array or None
-        ``multires``: for every pixel of the level, the (row, column) of the sample's level that it was copied from.
+        ``multires``: for every pixel of the level, the (row, column) of the sample's level that it was copied from; on
+        the levels above the finest, of the sample with its edges mended.
     candidates : (rows, cols) int32 array or None
         ``multires``: among how many candidates each pixel was drawn.
     """

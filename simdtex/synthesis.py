@@ -71,10 +71,10 @@ def synthesize(
         Of the method. ``mrf``: ``preset``, ``order``, ``levels``, ``relaxation``, ``bandwidth``, ``coherence``, ``xi``,
         ``free_sweeps``, ``pixel``, ``phases``, ``edges``, ``coarsest``, ``schedule``, ``check_schedule``,
         ``boundary``, ``array``, ``mapping``, ``search``, ``suggesting``, ``similar``, ``chance``, ``exhaustive``,
-        ``emulate``; see `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``target``, ``thresholds``,
-        ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``phase``, ``boundary``; see
-        `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``, ``levels``,
-        ``orientations``, ``iterations``, ``match``, ``bins``, ``edges``, ``color``, ``start``; see
+        ``emulate``; see `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``strain``, ``target``,
+        ``thresholds``, ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``phase``,
+        ``boundary``, ``edges``, ``joins``; see `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``,
+        ``levels``, ``orientations``, ``iterations``, ``match``, ``bins``, ``edges``, ``color``, ``start``; see
         `simdtex.methods.pyramid.Options`.
 
     Returns
@@ -199,7 +199,7 @@ def suggest_alpha(
     device: str | Machine | None = None,
     **options: Any,
 ) -> float:
-    """The threshold of the method ``multires`` at which this sample's coarser levels leave a choice.
+    """The threshold of the method ``multires`` that leaves as much choice as joins allow.
 
     Parameters
     ----------
@@ -207,7 +207,8 @@ def suggest_alpha(
         As in `synthesize`.
     target : float, optional
         Candidates that a pixel of the coarser half of the levels is to have on average, 1 or more. At 1 there is
-        nothing to choose, and the sample is tiled; the more, the less of its order is kept. None takes the method's.
+        nothing to choose, and the sample is tiled; the more, the less of its order is kept. Without a target the option
+        ``strain`` decides: how much pieces of the sample that meet may differ from what either would go on with.
     channel_axis : int, optional
         As in `synthesize`.
     device : str, optional
@@ -218,9 +219,10 @@ def suggest_alpha(
     Returns
     -------
     float
-        alpha, the least multiple of 1/100 at which the candidates of the sample's own pixels, averaged over each of
-        these levels and then over the levels, reach the target; 4 where none below does. ``alpha="auto"`` takes the
-        same. Finer levels do not count: their flat parts have many candidates at any alpha.
+        alpha, which ``alpha="auto"`` takes: without a target, the largest multiple of 1/100 up to 0.4 at which a
+        texture as large as the sample has no more than this strain, 0 where there is none; with one, the least at which
+        the candidates of the sample's own pixels, averaged over each of these levels and then over the levels, reach
+        it, 4 where none below does.
 
     Raises
     ------
@@ -229,7 +231,7 @@ def suggest_alpha(
 
     Notes
     -----
-    Cost: nine scans of at most 4096 pixels of each of these levels.
+    Cost: six textures of the sample's size; for a target, nine scans of at most 4096 pixels of each of these levels.
 
     Examples
     --------

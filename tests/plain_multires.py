@@ -11,6 +11,10 @@ GAUSS = {-2: 1, -1: 4, 0: 6, 1: 4, 2: 1}
 """g in each direction, in 1/16."""
 
 
+WEIGHTS = {-1: 1, 0: 2, 1: 1}
+"""Of neighbours that fade into each other, in each direction, in 1/4."""
+
+
 def within(i, n, torus):
     """Index i brought to 0 .. n-1: around a torus, or back and forth between mirrors on the outer pixels."""
     if torus or n == 1:
@@ -56,6 +60,22 @@ def expanded(coarse, shape, tile, torus):
                 total += 4 * GAUSS[a] * GAUSS[b] * int(coarse[k, m])
         fine[i, j] = rounded(total, 16 * 16)
     return fine
+
+
+def faded(band, source, torus):
+    """L_i of an output where pieces that meet fade into each other; source is the number of a pixel of the band."""
+    rows, cols = source.shape
+    made = np.zeros(source.shape, np.int64)
+    for i, j in np.ndindex(rows, cols):
+        total = 0
+        for p, q in ((p, q) for p in WEIGHTS for q in WEIGHTS):
+            # at the border of a plane a pixel stands in for the neighbour that it lacks
+            a, b = (p, q) if torus else (p * (0 <= i + p < rows), q * (0 <= j + q < cols))
+            k, m = divmod(int(source[(i + a) % rows, (j + b) % cols]), band.shape[1])
+            goes_on = band[within(k - a, band.shape[0], torus), within(m - b, band.shape[1], torus)]
+            total += WEIGHTS[p] * WEIGHTS[q] * int(goes_on)
+        made[i, j] = rounded(total, 16)
+    return made
 
 
 def pyramid(picture, levels, torus):

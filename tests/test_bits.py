@@ -107,6 +107,8 @@ RUNS = {
         MULTIRES | {"orientations": 1, "thresholds": [[0, 0, 0], [2, 1, np.inf], [0.5, 4, 1], [0.2, 0.7, 0.3]]},
     ),
     "multires-auto": ((14, 13), None, np.uint8, (17, 12), MULTIRES | {"alpha": "auto", "target": 1.5}),
+    "multires-mended": ((17, 20), 3, np.uint8, (21, 23), MULTIRES | {"alpha": "auto", "strain": 0.2}),
+    "multires-keep-cut": ((17, 20), 3, np.uint8, (21, 23), MULTIRES | {"edges": "keep", "joins": "cut"}),
     "multires-larger-than-the-sample": ((7, 6), None, np.uint8, (33, 29), MULTIRES | {"alpha": 1.5}),
     "multires-smaller-than-the-sample": ((23, 26), None, np.uint8, (5, 4), MULTIRES | {"orientations": 0}),
     "multires-a-row": ((9, 8), None, np.uint8, (1, 17), MULTIRES),

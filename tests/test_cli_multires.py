@@ -59,12 +59,14 @@ def test_everything_at_once(folder):
         "--filter-size",
         5,
     ]
-    args += ["--phase", "free", "--levels", 4, "--boundary", "open", "--stages", folder / "st"]
+    args += ["--phase", "free", "--levels", 4, "--boundary", "open", "--edges", "keep", "--joins", "cut"]
+    args += ["--stages", folder / "st"]
     result = synth(folder, *args, "--source-map", folder / "s.npz", "--also", f"{folder}/colour.png={folder}/c.png")
     assert result.exit_code == 0, result.output
     made = image.read(folder / "out.png").pixels
     options = {"alpha": 0.6, "beta": 0.5, "orientations": 3, "sigma": 0.8, "filter_size": 5}
-    options |= {"phase": "free", "levels": 4, "boundary": "open", "rng": 5, "device": "reference"}
+    options |= {"phase": "free", "levels": 4, "boundary": "open", "edges": "keep", "joins": "cut"}
+    options |= {"rng": 5, "device": "reference"}
     expected = simdtex.synthesize(texture((16, 12)), (26, 30), method="multires", **options)
     np.testing.assert_array_equal(made, expected)
     source, colour = load_source_map(folder / "s.npz"), texture((16, 12), 3)
@@ -75,11 +77,13 @@ def test_everything_at_once(folder):
 
 
 def test_alpha_0_tiles_and_auto_says_what_it_took(folder):
-    assert synth(folder, "--alpha", 0, "--size", "24x32").exit_code == 0
+    assert synth(folder, "--alpha", 0, "--size", "24x32", "--edges", "keep").exit_code == 0
     np.testing.assert_array_equal(image.read(folder / "out.png").pixels, np.tile(texture((16, 12)), (2, 2)))
     result = synth(folder, "--alpha", "auto", "--target", 1.5)
     expected = simdtex.suggest_alpha(texture((16, 12)), target=1.5, device="reference")
     assert f"alpha {expected};" in result.output
+    alpha = simdtex.suggest_alpha(texture((16, 12)), strain=0.2, device="reference")
+    assert alpha != expected and f"alpha {alpha};" in synth(folder, "--alpha", "auto", "--strain", 0.2).output
     assert "alpha inf;" in synth(folder, "--alpha", "inf").output
     assert synth(folder, "-q").output == ""
 
@@ -107,6 +111,8 @@ BAD = {
     "filter size": (["--filter-size", 4], "give an odd number"),
     "features": (["--features", "hue"], "choose one of: luminance, channels"),
     "phase": (["--phase", "any"], "choose one of: match, free"),
+    "edges": (["--edges", "reflect"], "choose one of: mend, keep"),
+    "joins": (["--joins", "glue"], "choose one of: blend, cut"),
     "levels": (["--levels", 9], "levels=9 is too many for this sample; give at most 5"),
     "an option of mrf": (["--order", 8], "choose from: alpha, beta"),
     "accounting": (["--accounting"], "--accounting is of the method mrf"),

@@ -18,6 +18,9 @@ import simdtex
 
 PINNED = Path(__file__).with_name("digests.json")
 
+PAPER = {"edges": "keep", "joins": "cut"}
+"""What the paper says of ``multires``, with the bytes of the versions before these options."""
+
 # sample, output shape, options: larger than the runs of test_bits, on the device that is preferred here.
 LARGE = {
     "brick": ("brick", (256, 256), {}),
@@ -49,6 +52,8 @@ LARGE = {
     "array-luby": ("brick-64", (40, 40), {"array": "16x16", "order": 5, "schedule": "luby", "mapping": "hierarchical"}),
     "multires-brick": ("brick", (256, 200), {"method": "multires"}),
     "multires-coffee": ("coffee", (130, 96), {"method": "multires", "alpha": "auto"}),
+    "multires-brick-paper": ("brick", (256, 200), {"method": "multires"} | PAPER),
+    "multires-coffee-paper": ("coffee", (130, 96), {"method": "multires", "alpha": "auto", "target": 1.1} | PAPER),
     "pyramid-grass": ("grass", (128, 160), {"method": "pyramid"}),
     "pyramid-coffee": ("coffee", (96, 96), {"method": "pyramid", "match": "lookup", "pyramid": "laplacian"}),
 }

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from simdtex.methods.multires.analysis import pyramid
 from simdtex.model.stretched import TOP
-from simdtex.ops.laplacian import half, laplacian_band, laplacian_collapse, laplacian_reduce, within
+from simdtex.ops.laplacian import half, laplacian_band, laplacian_blend, laplacian_collapse, laplacian_reduce, within
 
 RANGES = {"sample": (0, TOP), "bits": (0, 1), "signed": (-TOP, TOP), "small": (-3, 3)}
 sides = st.integers(1, 9)
@@ -52,9 +52,9 @@ def steps(machine, g, torus):
     return host(machine, [coarse, laplacian_band(machine, fine, coarse, torus)])
 
 
-def collapse(machine, band, source, coarse, torus):
+def collapse(machine, band, source, coarse, torus, how=laplacian_collapse):
     arrays = [machine.put(np.ascontiguousarray(a)) for a in (band, source, coarse)]
-    return np.asarray(machine.get(laplacian_collapse(machine, *arrays, torus)))
+    return np.asarray(machine.get(how(machine, *arrays, torus)))
 
 
 def both(machine, g, levels, torus):
@@ -95,6 +95,35 @@ def test_the_reference_collapses_by_the_rule(case, torus):
         assert (fine[plane] == expected).all()
 
 
+@given(levels_of_an_output(), st.booleans())
+def test_the_reference_blends_by_the_rule(case, torus):
+    band, source, coarse = case
+    fine = collapse(REFERENCE, *case, torus, laplacian_blend)
+    assert fine.dtype == np.int32
+    for plane, own in enumerate(coarse):
+        up = plain.expanded(own, source.shape, band.shape[1:], torus)
+        assert (fine[plane] == plain.faded(band[plane], source, torus) + up).all()
+
+
+@given(pictures(), st.integers(1, 3), st.integers(1, 3))
+def test_where_pieces_go_on_a_blend_is_a_collapse(g, down, across):
+    """Whole tiles on a torus, and the inside of pieces."""
+    coarse, band = steps(REFERENCE, g, torus=True)
+    tiles = np.tile(identity(g.shape[1:]), (down, across))
+    above = np.tile(coarse, (1, down, across))
+    assert_same_bits(collapse(REFERENCE, band, tiles, above, True, laplacian_blend), np.tile(g, (1, down, across)))
+    coarse, band = steps(REFERENCE, g, torus=False)
+    assert_same_bits(collapse(REFERENCE, band, identity(g.shape[1:]), coarse, False, laplacian_blend), g)
+
+
+def test_a_blend_fades_over_one_pixel_on_either_side_of_a_join():
+    band = np.zeros((1, 4, 16), np.int32)
+    band[..., 8:] = 16  # two flat pieces, laid side by side with 4 columns of each
+    source = identity((4, 16))[:, [2, 3, 4, 5, 10, 11, 12, 13]]
+    made = collapse(REFERENCE, band, source, np.zeros((1, 2, 4), np.int32), False, laplacian_blend)
+    assert (made[0] == [0, 0, 0, 4, 12, 16, 16, 16]).all()
+
+
 @pytest.mark.parametrize("torus", [True, False])
 def test_a_pixel_spreads_as_the_papers_kernel(torus):
     """An impulse of 1 far from any border, reduced and expanded: g itself in 1/16."""
@@ -123,7 +152,8 @@ def test_a_device_has_the_references_bits(machine, g, torus):
 @given(case=levels_of_an_output(), torus=st.booleans())
 @settings(max_examples=25)
 def test_a_device_collapses_to_the_references_bits(machine, case, torus):
-    assert_same_bits(collapse(machine, *case, torus), collapse(REFERENCE, *case, torus))
+    for how in (laplacian_collapse, laplacian_blend):
+        assert_same_bits(collapse(machine, *case, torus, how), collapse(REFERENCE, *case, torus, how))
 
 
 @pytest.mark.parametrize("work_group", [3, 16])
@@ -149,8 +179,9 @@ def test_nothing_overflows_at_the_limits(machine):
         for sign in (1, -1):
             coarse = np.full((1, 4, 4), sign * most, np.int32)
             band = np.full((1, 8, 8), sign * TOP, np.int32)
-            fine = collapse(machine, band, identity((8, 8)), coarse, True)
-            assert (fine == sign * (most + TOP)).all()
+            for how in (laplacian_collapse, laplacian_blend):
+                fine = collapse(machine, band, identity((8, 8)), coarse, True, how)
+                assert (fine == sign * (most + TOP)).all()
 
 
 # -- what a pyramid is for ------------------------------------------------------------------------------------

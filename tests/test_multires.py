@@ -62,7 +62,7 @@ def test_alpha_0_tiles_the_sample_to_the_bit(dtype, size):
     sample = texture(size, dtype=dtype)
     for whole in ((1, 1), (2, 3)):
         shape = size[0] * whole[0], size[1] * whole[1]
-        image, output = run(sample, shape, alpha=0)
+        image, output = run(sample, shape, alpha=0, edges="keep")
         assert_same_bits(image, np.tile(sample, whole))
         for stage, own in zip(output.stages, reversed(sizes(size)), strict=True):
             assert np.array_equal(stage.source, tiling(stage.source.shape[:2], own))
@@ -172,7 +172,21 @@ def expanded(coarse, shape, tile, torus):
     return np.einsum("ik,jl,klc->ijc", row, col, coarse)
 
 
-def reconstructions(sample, output, torus):
+def faded(band, source, torus):
+    """A level's band where pieces that meet fade into each other: nine neighbours say what goes on at a pixel."""
+    made = np.zeros((*source.shape[:2], band.shape[-1]))
+    for pixel in np.ndindex(*source.shape[:2]):
+        for step in itertools.product((-1, 0, 1), repeat=2):
+            shifted = zip(pixel, step, source.shape, strict=False)
+            near = [i + s if torus else min(max(i + s, 0), n - 1) for i, s, n in shifted]
+            back = [k - i for i, k in zip(pixel, near, strict=True)]
+            own = source[near[0] % made.shape[0], near[1] % made.shape[1]]
+            place = tuple(border(k - b, n, torus) for k, b, n in zip(own, back, band.shape, strict=False))
+            made[pixel] += (2 - abs(step[0])) * (2 - abs(step[1])) * band[place] / 16
+    return made
+
+
+def reconstructions(sample, output, torus, blend=True):
     """The picture of every level, coarsest first: bands in floats, copied as the source maps say, and added up."""
     gaussian = [sample.astype(float)]
     while len(gaussian) < len(output.stages):
@@ -184,9 +198,8 @@ def reconstructions(sample, output, torus):
         if picture is not None:
             shape = own.shape[:2]
             band = own - expanded(gaussian[stage.level + 1], shape, shape, torus)
-            picture = band[tuple(np.moveaxis(stage.source, -1, 0))] + expanded(
-                picture, stage.source.shape[:2], shape, torus
-            )
+            copied = faded(band, stage.source, torus) if blend else band[tuple(np.moveaxis(stage.source, -1, 0))]
+            picture = copied + expanded(picture, stage.source.shape[:2], shape, torus)
         else:
             picture = own[tuple(np.moveaxis(stage.source, -1, 0))]
         yield picture
@@ -194,21 +207,23 @@ def reconstructions(sample, output, torus):
 
 @pytest.mark.parametrize("boundary", ["torus", "open"])
 @pytest.mark.parametrize(("size", "shape"), [((16, 16), (40, 32)), ((13, 7), (20, 24)), ((9, 22), (4, 30))], ids=str)
-def test_every_level_is_its_copied_bands_added_up(size, shape, boundary):
+@pytest.mark.parametrize("joins", ["blend", "cut"])
+def test_every_level_is_its_copied_bands_added_up(size, shape, boundary, joins):
     sample = texture(size, 3)
     for options in ({}, {"alpha": INF, "phase": "free"}, {"alpha": 1.0, "features": "channels"}):
-        _, output = run(sample, shape, boundary=boundary, **options)
-        for stage, expected in zip(output.stages, reconstructions(sample, output, boundary == "torus"), strict=True):
+        _, output = run(sample, shape, boundary=boundary, edges="keep", joins=joins, **options)
+        pictures = reconstructions(sample, output, boundary == "torus", joins == "blend")
+        for stage, expected in zip(output.stages, pictures, strict=True):
             # Half a grey level is the last rounding; those of the levels are 2**-20 of the range each, a few dozen.
             assert abs(stage.image - np.clip(expected, 0, 255)).max() < 1
 
 
 def test_float_pixels_stay_in_the_samples_range():
     sample = texture((13, 7), dtype=np.float32)
-    image, output = run(sample, (20, 24), alpha=INF)
+    image, output = run(sample, (20, 24), alpha=INF, joins="cut")
     assert image.dtype == np.float32
     assert all(sample.min() <= s.image.min() <= s.image.max() <= sample.max() for s in output.stages)
-    [*_, expected] = reconstructions(sample[..., None], output, torus=True)
+    [*_, expected] = reconstructions(sample[..., None], output, torus=True, blend=False)
     beyond = (expected[..., 0] < sample.min()) | (expected[..., 0] > sample.max())
     assert beyond.any() and np.isin(image[beyond], [sample.min(), sample.max()]).all()
 
@@ -455,8 +470,8 @@ def test_luminance_sees_nothing_of_a_texture_of_equal_luminance():
     t = np.random.default_rng(2).integers(0, 23, (16, 16))
     red, green = 46871 * t, 13933 * (22 - t)  # 0.2126 R + 0.7152 G is the same everywhere
     sample = np.stack([red, green, np.full((16, 16), 2**20)], -1).astype(np.int32)
-    _, blind = run(sample, (32, 32), alpha=0)
+    _, blind = run(sample, (32, 32), alpha=0, edges="keep")
     assert (blind.stages[-1].candidates == 64).all(), "all there are"
-    _, seeing = run(sample, (32, 32), alpha=0, features="channels")
+    _, seeing = run(sample, (32, 32), alpha=0, features="channels", edges="keep")
     assert (seeing.stages[-1].candidates == 1).all()
     assert np.array_equal(seeing.source, tiling((32, 32), (16, 16)))

@@ -5,12 +5,14 @@ import math
 from dataclasses import fields
 
 import numpy as np
+import plain_multires as plain
 import pytest
 from cases import REFERENCE, assert_same_bits, opencl, texture
 
 import simdtex
 from simdtex.machine.reference import Reference
 from simdtex.methods import multires
+from simdtex.methods.multires.analysis import analyse
 
 INF = math.inf
 
@@ -345,7 +347,64 @@ def test_a_suggested_alpha_grows_with_the_target_between_its_ends():
 def test_a_suggested_alpha_of_a_sample_of_one_level_or_one_value_is_the_least():
     for sample in (texture((1, 1)), np.ones((8, 8))):
         assert simdtex.suggest_alpha(sample, target=2, device=REFERENCE) == 0.01
-    assert simdtex.suggest_alpha(texture((9, 9)), levels=1, device=REFERENCE) == 0.01
+    assert simdtex.suggest_alpha(texture((9, 9)), target=1.1, levels=1, device=REFERENCE) == 0.01
+
+
+def test_an_alpha_without_a_target_is_the_freest_whose_strain_is_small_enough():
+    sample = texture((24, 20), 3)
+    analysis = analyse(REFERENCE, sample)
+    for beta in (0, 1):
+        strains = {}
+        for most in (0, 0.02, 0.1, 0.3, 9):
+            options = multires.make_options(strain=most, beta=beta)
+            alpha = multires.suggest_alpha(REFERENCE, analysis, options)
+            found = simdtex.suggest_alpha(sample, strain=most, beta=beta, channel_axis=-1, device=REFERENCE)
+            assert found == alpha
+            strains[alpha] = multires.strain(REFERENCE, analysis, options, alpha)
+            assert strains[alpha] <= most
+            if alpha < 0.4:
+                assert multires.strain(REFERENCE, analysis, options, alpha + 0.01) > most
+        assert min(strains) < max(strains) == 0.4
+        assert list(strains) == sorted(strains)
+
+
+def test_where_nothing_meets_nothing_strains():
+    """A sample of one level, of one value, or without a choice; then the freest alpha is the paper's largest."""
+    for sample in (texture((1, 1)), np.ones((8, 8))):
+        assert simdtex.suggest_alpha(sample, device=REFERENCE) == 0.4
+    assert simdtex.suggest_alpha(texture((9, 9)), levels=1, device=REFERENCE) == 0.4
+    analysis = analyse(REFERENCE, texture((32, 32), 1))
+    assert multires.strain(REFERENCE, analysis, multires.make_options(), 0) == 0
+
+
+@pytest.mark.parametrize("boundary", ["torus", "open"])
+def test_a_strain_is_what_neighbours_differ_by_from_what_the_other_goes_on_with(boundary):
+    sample, torus = texture((24, 20), 2), boundary == "torus"
+    options = multires.make_options(boundary=boundary, alpha=1.0, edges="keep")
+    analysis = analyse(REFERENCE, sample, **options.analysis)
+    _, output = multires.resample(REFERENCE, analysis, (24, 20), options, 0)
+    levels = []
+    for level, source in ((stage.level, stage.source) for stage in output.stages if stage.level < 2):
+        band = analysis.bands[level].astype(float)
+        rows, cols = band.shape[1:]
+        total = 0.0
+        for i, j in np.ndindex(rows, cols):
+            for a, b in ((1, 0), (0, 1)):
+                if torus or (i + a < rows and j + b < cols):
+                    goes_on = source[i, j] + (a, b)
+                    row, col = (plain.within(int(k), n, torus) for k, n in zip(goes_on, (rows, cols), strict=True))
+                    there = source[(i + a) % rows, (j + b) % cols]
+                    total += ((band[:, row, col] - band[:, there[0], there[1]]) ** 2).sum()
+        levels.append(total / (4 * (band**2).sum()))
+    assert len(levels) == 2
+    assert multires.strain(REFERENCE, analysis, options, 1.0) == pytest.approx(np.mean(levels), rel=1e-3)
+
+
+def test_strangers_strain_by_1():
+    noise = np.random.default_rng(1).integers(0, 256, (128, 128, 1)).astype(np.uint8)
+    analysis = analyse(REFERENCE, noise, edges="keep", levels=3)
+    free = multires.strain(REFERENCE, analysis, multires.make_options(phase="free"), INF)
+    assert free == pytest.approx(1, abs=0.05)
 
 
 def test_a_device_suggests_the_same_alpha(any_device):
@@ -373,8 +432,8 @@ def test_automatic_alpha_is_the_suggested_one(axis):
 SAMPLE = texture((13, 7))
 FLOAT = texture((13, 7), dtype=np.float64)
 UNKNOWN = (
-    "unknown option '{}' of the method 'multires'; choose from: alpha, beta, target, thresholds, orientations, sigma, "
-    "filter_size, features, levels, phase, boundary"
+    "unknown option '{}' of the method 'multires'; choose from: alpha, beta, strain, target, thresholds, orientations, "
+    "sigma, filter_size, features, levels, phase, boundary, edges, joins"
 )
 
 
@@ -411,6 +470,10 @@ BAD = [
     ({"beta": "1"}, TypeError, "beta must be a number, not '1'"),
     ({"target": 0.5}, ValueError, "target is 0.5; give a number of at least 1"),
     ({"target": math.inf}, ValueError, "target is inf; give a number of at least 1"),
+    ({"strain": -0.1}, ValueError, "strain is -0.1; give a number of at least 0"),
+    ({"strain": "low"}, TypeError, "strain must be a number, not 'low'"),
+    ({"edges": "reflect"}, ValueError, "unknown edges 'reflect'; choose one of: mend, keep"),
+    ({"joins": "fade"}, ValueError, "unknown joins 'fade'; choose one of: blend, cut"),
     ({"orientations": -1}, ValueError, "orientations is -1; give 0 or more"),
     ({"orientations": 2.5}, TypeError, "orientations must be an integer, not 2.5"),
     ({"sigma": 0}, ValueError, "sigma is 0; give a number of at least 0.2"),

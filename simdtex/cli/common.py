@@ -70,6 +70,7 @@ LEVELS = option("--levels", type=int, help="Of the multigrid, or of the pyramid.
 BOUNDARY = option("--boundary", help="mrf, multires: torus (the result tiles) or open.  [{mrf.boundary}]")
 
 _EDGES = {
+    "multires": "mend (make the sample wrap around) or keep.  [{multires.edges}]",
     "mrf": "auto, reflect or whole: candidates at the sample's edge.  [{mrf.edges}]",
     "pyramid": "reflect or wrap: how the sample goes on beyond its edge.  [{pyramid.edges}]",
 }
@@ -139,6 +140,7 @@ _MULTIRES_OPTIONS = (
     option("--filter-size", type=int, help="multires: rows of a filter, odd.  [{multires.filter_size}]"),
     option("--features", help="multires: of the luminance or of all channels.  [{multires.features}]"),
     option("--phase", help="multires: match or free: candidates among siblings.  [{multires.phase}]"),
+    option("--joins", help="multires: blend or cut: where pieces meet.  [{multires.joins}]"),
 )
 
 
@@ -147,7 +149,8 @@ _THRESHOLD_OPTIONS = (
         "--alpha", metavar="FLOAT|auto", help="multires: threshold; more is freer, auto finds one.  [{multires.alpha}]"
     ),
     option("--beta", type=float, help="multires: stricter at high frequencies, alpha / k^beta.  [{multires.beta:g}]"),
-    option("--target", type=float, help="multires: mean candidates for --alpha auto.  [{multires.target}]"),
+    option("--strain", type=float, help="multires: of joins, at most, for --alpha auto.  [{multires.strain}]"),
+    option("--target", type=float, help="multires: mean candidates for --alpha auto, in place of --strain."),
     option(
         "--thresholds",
         type=click.Path(path_type=Path),
@@ -187,14 +190,18 @@ mrf_options = _with(*_MRF_OPTIONS, _shared("--edges", _EDGES, "mrf"), LEVELS, BO
 """The options of the method ``mrf`` that any command takes which runs it."""
 
 multires_options = _with(
-    _shared("--orientations", _ORIENTATIONS, "multires", type=int), *_MULTIRES_OPTIONS, LEVELS, BOUNDARY
+    _shared("--orientations", _ORIENTATIONS, "multires", type=int),
+    *_MULTIRES_OPTIONS,
+    _shared("--edges", _EDGES, "multires"),
+    LEVELS,
+    BOUNDARY,
 )
 """Those of ``multires``, but for its thresholds."""
 
 method_options = _with(
     LEVELS,
     BOUNDARY,
-    _shared("--edges", _EDGES, "mrf", "pyramid"),
+    _shared("--edges", _EDGES, "mrf", "multires", "pyramid"),
     _shared("--orientations", _ORIENTATIONS, "multires", "pyramid", type=int),
     *_MRF_OPTIONS,
     *_THRESHOLD_OPTIONS,

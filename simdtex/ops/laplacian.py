@@ -7,6 +7,8 @@ stay within 32 bits where what is reduced is below 2**23, and what is collapsed 
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -61,6 +63,34 @@ def _collapse(
     return (taken + _expanded(coarse, source.shape, band.shape[1:], torus)).astype(np.int32)
 
 
+def _joined(band: NDArray[np.int32], source: NDArray[np.int32], torus: bool) -> NDArray[np.int64]:
+    """L_i of the output, (planes, rows, cols), where pieces of the sample that meet fade into each other."""
+    rows, cols = band.shape[1:]
+    place, total = np.divmod(source, np.int32(cols)), np.zeros((len(band), *source.shape), np.int64)
+    for a, b in product((-1, 0, 1), repeat=2):
+        near, step = zip(*(beside(n, d, torus) for n, d in zip(source.shape, (a, b), strict=True)), strict=True)
+        row, col = (
+            within(own[np.ix_(*near)].astype(np.intp) - by, n, torus)
+            for own, by, n in zip(place, (step[0][:, None], step[1]), (rows, cols), strict=True)
+        )
+        total += (2 - abs(a)) * (2 - abs(b)) * band[:, row, col].astype(np.int64)
+    return (total + 8) >> 4
+
+
+def beside(n: int, by: int, torus: bool) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The neighbours of n pixels in a line on one side, and how far they are: without a torus the last has itself."""
+    own = np.arange(n)
+    near = own + by
+    return (near % n, np.full(n, by)) if torus else (np.clip(near, 0, n - 1), np.clip(near, 0, n - 1) - own)
+
+
+def _blend(
+    band: NDArray[np.int32], source: NDArray[np.int32], coarse: NDArray[np.int32], torus: bool
+) -> NDArray[np.int32]:
+    made = _joined(band, source, torus) + _expanded(coarse, source.shape, band.shape[1:], torus)
+    return made.astype(np.int32)
+
+
 def _sizes(*numbers: int) -> tuple[np.int32, ...]:
     return tuple(np.int32(n) for n in numbers)
 
@@ -90,13 +120,23 @@ def _launch_band(machine: Launcher, fine: Array, coarse: Array, torus: bool) -> 
 
 
 def _launch_collapse(machine: Launcher, band: Array, source: Array, coarse: Array, torus: bool) -> Array:
+    return _launch_up(machine, "laplacian_collapse", 25 / 4, band, source, coarse, torus)
+
+
+def _launch_blend(machine: Launcher, band: Array, source: Array, coarse: Array, torus: bool) -> Array:
+    return _launch_up(machine, "laplacian_blend", 25 / 4 + 9, band, source, coarse, torus)
+
+
+def _launch_up(
+    machine: Launcher, kernel: str, each: float, band: Array, source: Array, coarse: Array, torus: bool
+) -> Array:
     rows, cols = source.shape
     fine = machine.empty((band.shape[0], rows, cols), np.int32)
     machine.launch(
-        machine.kernel("laplacian", "laplacian_collapse"),
+        machine.kernel("laplacian", kernel),
         (rows * cols, band.shape[0]),
         *(band, *_sizes(*band.shape, torus), source, *_sizes(rows, cols), coarse, *_sizes(*coarse.shape[1:]), fine),
-        work=touching(band, source, coarse, fine, fma=25 / 4 * fine.size),
+        work=touching(band, source, coarse, fine, fma=each * fine.size),
     )
     return fine
 
@@ -111,4 +151,11 @@ laplacian_collapse = Operation("laplacian", _collapse, _launch_collapse)
 """``laplacian_collapse(machine, band, source, coarse, torus)``: G_i of L_i and G_{i+1}.
 
 ``source`` (rows, cols) int32 are the pixels of ``band`` that make up L_i, which may be of another size.
+"""
+
+laplacian_blend = Operation("laplacian", _blend, _launch_blend)
+"""``laplacian_blend(machine, band, source, coarse, torus)``: as `laplacian_collapse`, without hard joins.
+
+Where neighbours are not neighbours in the band, a pixel of L_i is the mean, by (1, 2, 1) / 4 in each direction, of what
+the band has there if each neighbour's piece goes on; elsewhere it is the band's own pixel, to the bit.
 """

@@ -22,7 +22,7 @@ from simdtex.machine.interface import Array
 from simdtex.methods.multires.analysis import Analysis, analyse
 from simdtex.model.use import effective_use
 from simdtex.ops.candidates import Sampled, Structure, candidates
-from simdtex.ops.laplacian import laplacian_collapse
+from simdtex.ops.laplacian import beside, laplacian_blend, laplacian_collapse, within
 from simdtex.options import build, one_of, real, whole, within_32_bits
 from simdtex.run import Callback, Output, Sampling, Stage, device_seconds, paced
 
@@ -39,7 +39,13 @@ WIDEST = 100
 """The largest sigma; a filter of one far narrower does not know it from a larger one."""
 
 STEPS, MOST = 100, 4
-"""`suggest_alpha` tries the multiples of 1/100 up to 4."""
+"""`suggest_alpha` tries the multiples of 1/100 up to 4 for a target."""
+
+FREEST = 0.4
+"""The largest alpha of the paper's figures, and the largest that is suggested for a strain."""
+
+COARSENED = 6
+"""Bits that strains leave out of a band, so that the sums of squares fit 64."""
 
 STRETCHES, STRETCH = 16, 256
 """Of pixels, in each level, that `suggest_alpha` counts the candidates of."""
@@ -53,11 +59,15 @@ class Options:
     ----------
     alpha : float or "auto"
         Of T = alpha / k**beta (13), 0 or more: 0 tiles the sample (but for parts that are equal to the bit), infinity
-        samples every band on its own. ``"auto"`` takes what `simdtex.suggest_alpha` does for ``target``.
+        samples every band on its own. ``"auto"`` takes what `simdtex.suggest_alpha` finds for ``strain`` or ``target``.
     beta : float
         Of the same, 0 or more. k counts levels from the lowest frequency upward.
-    target : float
-        With ``alpha="auto"``, candidates that a pixel of the coarser levels is to have on average.
+    strain : float
+        With ``alpha="auto"``, how much pieces that meet may differ from what either would go on with: 0, nothing, to 1,
+        as much as strangers. See `simdtex.methods.multires.strain`.
+    target : float, optional
+        With ``alpha="auto"``, in place of the strain: candidates that a pixel of the coarser levels is to have on
+        average.
     thresholds : array, optional
         T itself, in place of alpha and beta: one row for each level but the finest, the lowest frequency first; one
         column for all features or one for each.
@@ -76,11 +86,18 @@ class Options:
         text.
     boundary : {"torus", "open"}
         Whether pyramids wrap around, or continue as in a mirror.
+    edges : {"mend", "keep"}
+        Whether the edges of a sample that does not wrap around are first covered with a piece of itself, so that it
+        does; see `simdtex.methods.multires.mend.mend`.
+    joins : {"blend", "cut"}
+        Whether the bands of pieces that meet fade into each other, over a pixel of each level, or end where they meet.
+        ``"cut"`` is the paper's text.
     """
 
     alpha: float | str = 0.3
     beta: float = 0.0
-    target: float = 1.1
+    strain: float = 0.05
+    target: float | None = None
     thresholds: ArrayLike | None = None
     orientations: int = 4
     sigma: float = 0.7
@@ -89,6 +106,8 @@ class Options:
     levels: int | None = None
     phase: str = "match"
     boundary: str = "torus"
+    edges: str = "mend"
+    joins: str = "blend"
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -98,7 +117,9 @@ class Options:
         elif not (isinstance(self.alpha, Real) and self.alpha == inf):
             real("alpha", self.alpha, 0)
         real("beta", self.beta, 0)
-        real("target", self.target, 1)
+        real("strain", self.strain, 0)
+        if self.target is not None:
+            real("target", self.target, 1)
         whole("orientations", self.orientations, 0)
         real("sigma", self.sigma, 0.2)
         if self.sigma > WIDEST:
@@ -111,13 +132,15 @@ class Options:
             whole("levels", self.levels, 1)
         one_of("phase", self.phase, ("match", "free"))
         one_of("boundary", self.boundary, ("torus", "open"))
+        one_of("edges", self.edges, ("mend", "keep"))
+        one_of("joins", self.joins, ("blend", "cut"))
         if self.thresholds is not None:
             _check_thresholds(self.thresholds)
 
     @property
     def analysis(self) -> dict[str, Any]:
         """Those that bear on the analysis."""
-        names = ("orientations", "sigma", "filter_size", "features", "levels", "boundary")
+        names = ("orientations", "sigma", "filter_size", "features", "levels", "boundary", "edges")
         return {name: vars(self)[name] for name in names}
 
 
@@ -165,35 +188,107 @@ def differences(analysis: Analysis, table: NDArray[np.float64]) -> NDArray[np.ui
 
 
 def suggest_alpha(machine: Machine, analysis: Analysis, options: Options) -> float:
-    """The alpha at which pixels have `Options.target` candidates on average, counted on the sample itself.
-
-    Only the coarser half of the levels that are sampled counts: what is chosen there rearranges the sample. At the
-    finer ones flat parts have many candidates at any alpha.
+    """The freest alpha at which joins do not show, or that at which pixels have `Options.target` candidates.
 
     Parameters
     ----------
     machine : Machine
     analysis : Analysis
     options : Options
-        Of which ``target``, ``beta`` and ``phase`` matter, beside those of the analysis.
+        Of which ``strain``, ``target``, ``beta`` and ``phase`` matter, beside those of the analysis.
 
     Returns
     -------
     float
-        The least multiple of 1/100 at which the candidates of the sample's own pixels, averaged over each of these
-        levels and then over the levels, reach the target; 4 where none below does.
+        Without a target, the largest multiple of 1/100 up to 0.4 at which a texture as large as the sample has no more
+        than this `strain`; 0 where there is none.
+
+        With a target, the least multiple of 1/100 at which the candidates of the sample's own pixels, averaged over
+        each level of the coarser half and then over these levels, reach it; 4 where none below does.
 
     Notes
     -----
-    Cost: eight or nine scans, without draws, of at most 4096 pixels of each of these levels.
+    Cost: six textures of the sample's size without their pictures; for a target, eight or nine scans, without draws, of
+    at most 4096 pixels of each of these levels. Both bisect: candidates never fall as alpha grows, and a strain hardly.
     """
+    if options.target is not None:
+        return _alpha_of_target(machine, analysis, options, options.target)
+    low, high = 0, 1 + round(FREEST * STEPS)
+    while high - low > 1:
+        middle = (low + high) // 2
+        passes = strain(machine, analysis, options, middle / STEPS) <= options.strain
+        low, high = (middle, high) if passes else (low, middle)
+    return low / STEPS
+
+
+def strain(machine: Machine, analysis: Analysis, options: Options, alpha: float) -> float:
+    """How much pieces of the sample that meet in a texture differ from what each would go on with.
+
+    Of a texture as large as the sample, for each level of the finer half and each pair of neighbours p and q, where q
+    is to the right of p or below, and s says which pixel of the band L each was copied from, this is ::
+
+        mean of |L(s(p) + q - p) - L(s(q))|**2 / (2 mean of |L|**2)
+
+    averaged over these levels. Neighbours that are neighbours in the sample add nothing, and strangers add 1. Coarser
+    levels do not count: what is smooth shows no line.
+
+    Parameters
+    ----------
+    machine : Machine
+    analysis : Analysis
+    options : Options
+        As for `suggest_alpha`.
+    alpha : float
+        In place of that of the options.
+
+    Returns
+    -------
+    float
+        0 and more. The seed is always 0, and sums are of integers, so it is the same on every device.
+
+    Notes
+    -----
+    Cost: a texture as large as the sample, without its picture. Memory: as `resample` takes.
+    """
+    structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
+    top, shapes = analysis.levels - 1, analysis.shapes
+    sampled = _copied(machine, shapes, shapes[top])
+    strains = []
+    for level in reversed(range(top)):
+        for first, end in paced(pixels([shapes[level]]), _first_launch(analysis, level)):
+            sampled = candidates(machine, structure, sampled, level, first, end, options.phase == "match", 0)
+            machine.sync()
+        if level < max(1, top // 2):
+            band = np.moveaxis(machine.get(analysis.bands[level]) >> COARSENED, 0, -1).astype(np.int64)
+            strains.append(_strain(band, _read(machine, sampled, shapes, level)[0], analysis.torus))
+    return float(np.mean(strains)) if strains else 0.0
+
+
+def _strain(band: NDArray[np.int64], source: NDArray[np.int32], torus: bool) -> float:
+    """Of one level: its band (rows, cols, channels) and the source of its pixels (rows, cols)."""
+    squares = int((band * band).sum())
+    if not squares:
+        return 0.0
+    place, differences = _place(source, source.shape[1]), 0
+    for axis, n in enumerate(source.shape):
+        near, by = beside(n, 1, torus)
+        other, own = place.take(near, axis), place.copy()
+        moved = own[..., axis] + by.reshape((-1, 1) if axis == 0 else -1)
+        own[..., axis] = within(moved, n, torus)
+        apart = band[own[..., 0], own[..., 1]] - band[other[..., 0], other[..., 1]]
+        differences += int((apart * apart).sum())
+    return differences / (4 * squares)  # of two directions
+
+
+def _alpha_of_target(machine: Machine, analysis: Analysis, options: Options, target: float) -> float:
+    """The alpha of a target, counted on the sample itself."""
     itself = _sampled(
         machine, analysis.shapes, [np.arange(pixels([shape]), dtype=np.int32) for shape in analysis.shapes]
     )
     low, high = 0, MOST * STEPS
     while high - low > 1:  # candidates only grow with alpha
         middle = (low + high) // 2
-        reached = _mean_candidates(machine, analysis, itself, options, middle / STEPS) >= options.target
+        reached = _mean_candidates(machine, analysis, itself, options, middle / STEPS) >= target
         low, high = (low, middle) if reached else (middle, high)
     return high / STEPS
 
@@ -283,18 +378,17 @@ def resample(
     sampled = _copied(machine, shapes, analysis.shapes[top])
     picture = None
     for level in reversed(range(analysis.levels)):  # Loop i from top level downto 0
-        nodes = pixels(analysis.shapes[level + 1 :])
         if level < top:
-            least = 1 + int(LAUNCH / (nodes * analysis.features.shape[1]))
-            for first, end in paced(pixels([shapes[level]]), least):  # Loop x', y'
+            for first, end in paced(pixels([shapes[level]]), _first_launch(analysis, level)):  # Loop x', y'
                 match = options.phase == "match"
                 sampled = candidates(machine, structure, sampled, level, first, end, match, seed)  # (9) to (12)
                 machine.sync()
                 record.tell(level, end)
         source, counts = _read(machine, sampled, shapes, level)
-        picture = _collapsed(machine, analysis, level, source, picture)  # CollapsePyramid
+        picture = _collapsed(machine, analysis, level, source, picture, options.joins == "blend")  # CollapsePyramid
         image = analysis.sample.picture(machine.get(picture), source if level == 0 else None)
-        place = _place(source, analysis.shapes[level][1])
+        given = analysis.place.ravel()[source].astype(np.int32) if level == 0 else source
+        place, nodes = _place(given, analysis.shapes[level][1]), pixels(analysis.shapes[level + 1 :])
         record.end(Stage(level, image, place, np.ascontiguousarray(counts[..., 0])), counts, nodes)
 
     used: dict[str, Any] = {"alpha": alpha, "levels": analysis.levels}
@@ -368,6 +462,11 @@ def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int],
     return rows, cols
 
 
+def _first_launch(analysis: Analysis, level: int) -> int:
+    """Pixels of a level in its first launch."""
+    return 1 + int(LAUNCH / (pixels(analysis.shapes[level + 1 :]) * analysis.features.shape[1]))
+
+
 def _lattice(shapes: Sequence[tuple[int, int]], first: int) -> NDArray[np.int32]:
     """Lattices as of `Structure` and `Sampled`, where levels stand one after another, from one of them on."""
     begins = np.cumsum([0, *(rows * cols * (level >= first) for level, (rows, cols) in enumerate(shapes))])
@@ -412,14 +511,15 @@ def _place(source: NDArray[np.int32], cols: int) -> NDArray[np.int32]:
 
 
 def _collapsed(
-    machine: Machine, analysis: Analysis, level: int, source: NDArray[np.int32], coarse: Array | None
+    machine: Machine, analysis: Analysis, level: int, source: NDArray[np.int32], coarse: Array | None, blend: bool
 ) -> Array:
     """G of a level of the output, from its source map and G of the level above."""
     band = analysis.bands[level]
     if coarse is None:
         residue = machine.get(band)
         return machine.put(np.ascontiguousarray(residue.reshape(len(residue), -1)[:, source]))
-    return laplacian_collapse(machine, band, machine.put(source), coarse, analysis.torus)
+    collapse = laplacian_blend if blend else laplacian_collapse
+    return collapse(machine, band, machine.put(source), coarse, analysis.torus)
 
 
 def _check_thresholds(table: ArrayLike) -> None:

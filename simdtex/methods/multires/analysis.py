@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from simdtex.machine import Machine
 from simdtex.machine.interface import Array
+from simdtex.methods.multires.mend import mend
 from simdtex.model.stretched import Stretched
 from simdtex.ops.filters import bank, filters
 from simdtex.ops.laplacian import half, laplacian_band, laplacian_reduce
@@ -37,6 +38,8 @@ class Analysis:
         Z of (10): the mean square of each feature over its level, the variance for the residue.
     torus : bool
         Whether pyramids wrap around.
+    place : (rows, cols) int array
+        Number of the pixel of the given sample that stands there; another one where the sample is mended.
     """
 
     sample: Stretched
@@ -45,6 +48,7 @@ class Analysis:
     features: Array
     energy: NDArray[np.float64]
     torus: bool
+    place: NDArray[np.intp]
 
     @property
     def levels(self) -> int:
@@ -86,6 +90,7 @@ def analyse(
     features: str = "luminance",
     levels: int | None = None,
     boundary: str = "torus",
+    edges: str = "mend",
 ) -> Analysis:
     """The first phase of the paper: bands and features of the sample at every level.
 
@@ -93,7 +98,7 @@ def analyse(
     ----------
     machine : Machine
     pixels : (rows, cols, channels) array
-    orientations, sigma, filter_size, features, levels, boundary
+    orientations, sigma, filter_size, features, levels, boundary, edges
         See `simdtex.methods.multires.Options`.
 
     Returns
@@ -109,7 +114,7 @@ def analyse(
     -----
     Cost: 45 multiply-adds for every pixel and channel, and a third of filter_size**2 for every pixel and filter. Memory
     on the device: 16 bytes for every pixel and channel (and luminance, where there is one beside them), 3 for every
-    pixel and feature.
+    pixel and feature. `simdtex.methods.multires.mend.mend` says what mending takes.
     """
     rows, cols, channels = pixels.shape
     seen = 1 if features == "luminance" else channels  # planes that features are made of
@@ -120,6 +125,9 @@ def analyse(
             f"a sample of {rows} rows x {cols} columns with {width} features is beyond 2**31 values; give a smaller one"
         )
     sample, torus = Stretched(pixels), boundary == "torus"
+    place = mend(sample.planes) if edges == "mend" else np.arange(rows * cols).reshape(rows, cols)
+    if edges == "mend":
+        sample = Stretched(pixels.reshape(-1, channels)[place])
     shapes = _level_shapes((rows, cols), levels)
     machine.require(rows * cols * (16 * (channels + (seen < channels)) + 3 * width))
 
@@ -141,7 +149,7 @@ def analyse(
             "candidates are compared by their bands alone",
             *(*shapes[0], filter_size, filter_size),
         )
-    return Analysis(sample, shapes, bands, machine.put(np.concatenate(measured)), np.array(energy), torus)
+    return Analysis(sample, shapes, bands, machine.put(np.concatenate(measured)), np.array(energy), torus, place)
 
 
 def _level_shapes(shape: tuple[int, ...], levels: int | None) -> list[tuple[int, int]]:
