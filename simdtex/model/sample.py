@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from math import log2
 from typing import Any, NamedTuple
 
@@ -14,6 +13,9 @@ from simdtex.model.structure import structure
 
 BLOCK = 64
 """Candidates to a block (kernels/lcpdf.cl); lists of candidates are padded to whole blocks."""
+
+STEPS = 1023
+"""Highest level of the structure channel of 8-bit samples, which may vary more than they do."""
 
 FINE = 8
 """Steps to a working level, where that is no pixel of its own."""
@@ -84,7 +86,7 @@ class Sample:
             stretched, self.unit = stretch(planes, self.top)
             levels = stretched.astype(np.uint16)
         if weight:
-            levels = np.concatenate([levels, structure(levels, weight, variance(levels), max(self.top, 1023))[None]])
+            levels = np.concatenate([levels, structure(levels, weight, variance(levels), max(self.top, STEPS))[None]])
         self._lay(levels, margin)
 
     @classmethod
@@ -103,20 +105,6 @@ class Sample:
         padded = np.pad(levels, around, mode="reflect" if min(levels.shape[1:]) > 1 else "edge")
         self.rows, self.cols = padded.shape[1:]
         self.working = np.ascontiguousarray(padded).reshape(self.channels, -1)
-
-    def level(self, number: int) -> Sample:
-        """The sample as a coarse level sees it: smoothed before it is decimated, as in a Gaussian pyramid.
-
-        The binomial (1 4 6 4 1)/16 along rows and columns, its taps 2^k pixels apart for k = 0 .. number - 1, rounded to
-        whole levels each time; beyond its edges the sample is reflected. Its standard deviation is sqrt((4^number - 1)
-        / 3) pixels (Burt and Adelson 1983).
-        """
-        levels = self.levels
-        for k in range(number):
-            levels = smoothed(levels, 2**k)
-        sample = copy(self)
-        sample._lay(levels, self.margin)
-        return sample
 
     @property
     def variance(self) -> float:
@@ -142,7 +130,7 @@ class Sample:
             The pixels of the decimated sample, equation (10), or every pixel.
         edges : {"whole", "reflect", "auto"}
             Those whose neighbourhood lies in the sample, equation (4); all, where the margin is wide enough; or
-            the former where they are three quarters of all or more, else the latter.
+            the former at the finest level, where they are three quarters of all or more, else the latter.
         """
         row, col = self.lines(offsets, spacing, phases, edges)
         row, col = row + np.int32(self.margin), col + np.int32(self.margin)
@@ -160,7 +148,7 @@ class Sample:
         whole_row = row[(row + top >= 0) & (row + bottom < self.height)]
         whole_col = col[(col + left >= 0) & (col + right < self.width)]
         few = whole_row.size * whole_col.size < ENOUGH_WHOLE * row.size * col.size
-        if not (edges == "reflect" or (edges == "auto" and few)):
+        if not (edges == "reflect" or (edges == "auto" and (spacing > 1 or few))):
             row, col = whole_row, whole_col
         return row, col
 
@@ -259,17 +247,6 @@ def variance(levels: NDArray[np.integer]) -> float:
         squares, values = int((channel * channel).sum()), int(channel.sum())
         total += (n * squares - values * values) / n**2
     return float(total / len(levels))
-
-
-def smoothed(levels: NDArray[np.uint16], apart: int) -> NDArray[np.uint16]:
-    """Working levels (C, rows, cols) smoothed by (1 4 6 4 1)/16 along both axes, its taps so many pixels apart."""
-    whole = levels.astype(np.int64)
-    for axis in (1, 2):
-        n = whole.shape[axis]
-        around = np.pad(whole, [(2 * apart, 2 * apart) if a == axis else (0, 0) for a in range(3)], mode="symmetric")
-        at = [np.take(around, np.arange(k * apart, k * apart + n), axis) for k in range(5)]
-        whole = at[0] + at[4] + 4 * (at[1] + at[3]) + 6 * at[2]
-    return ((whole + 128) // 256).astype(np.uint16)
 
 
 def stretch(pixels: NDArray[Any], top: int) -> tuple[NDArray[np.int64], float]:

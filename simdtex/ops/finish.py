@@ -76,9 +76,10 @@ def _launch(
 
 
 finish = Operation("finish", _reference, _launch)
-"""``finish(machine, source, grid, planes, sample, offsets, weights, first, count)``: (channels, count) int16, on the host.
+"""``finish(machine, source, grid, planes, sample, offsets, weights, first, count)``: (channels, count) int16, on the
+host.
 
-By how much the pixels of the sites from ``first`` on differ from their sources', in working levels of 8-bit samples, and
+By how much the pixels of the sites from ``first`` on differ from their sources, in working levels of 8-bit samples, and
 in 1/8 of a working level of others. ``source`` (H, W) and ``planes``, the sample's, are of the machine.
 Cost: N channels gathers a site.
 """

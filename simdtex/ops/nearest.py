@@ -162,7 +162,15 @@ def _launch(
                     leaves.rows,
                     leaves.order,
                 ),
-                *(i(leaves.number), f(leaves.blur), candidates.pixels, plane, candidates.positions, candidates.reach, price),
+                *(
+                    i(leaves.number),
+                    f(leaves.blur),
+                    candidates.pixels,
+                    plane,
+                    candidates.positions,
+                    candidates.reach,
+                    price,
+                ),
                 *(i(split), found, at, work, wanted),
                 defines=defines,
             )

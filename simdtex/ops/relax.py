@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.machine.interface import Array, Launcher, Machine, Operation
+from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates
 from simdtex.ops import lcpdf

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Machine, Operation
-from simdtex.model.sample import Candidates, Sample
+from simdtex.model.sample import Candidates
 from simdtex.ops.square import Square
 
 FEW = 1024

@@ -55,7 +55,9 @@ class Square(NamedTuple):
         return np.where(numbers < 0, np.float32(np.inf), d[0])
 
 
-def square_of(machine: Machine, sample: Sample, offsets: NDArray[np.int32], step: int, phases: str, edges: str) -> Square:
+def square_of(
+    machine: Machine, sample: Sample, offsets: NDArray[np.int32], step: int, phases: str, edges: str
+) -> Square:
     """Lay out a level whose sites are ``step`` pixels of the sample apart."""
     radius, rows, cols = int(offsets.max()), sample.rows, sample.cols
     side, columns = 2 * radius + 1, -(-(2 * radius + 1) // LANES) * LANES

@@ -6,12 +6,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.machine.interface import Array, Launcher, Operation
+from simdtex.machine.interface import Launcher, Operation
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates
 from simdtex.ops.neighbourhood import Field
 
-CAP = 2.0
+CAP = 4.0
 """Excess of use over the fair share above which the price grows no more."""
 
 
@@ -65,7 +65,7 @@ def price(
     Returns
     -------
     (n,) float32 array
-        lambda N C sigma^2 min(2, max(0, u - 1)), u the use of the square around a candidate over its fair share; the
+        lambda N C sigma^2 min(4, max(0, u - 1)), u the use of the square around a candidate over its fair share; the
         mean of that and of `before`, so that prices settle.
 
     Notes

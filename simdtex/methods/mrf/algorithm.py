@@ -21,7 +21,6 @@ from simdtex.model.sample import BLOCK
 from simdtex.ops import active
 from simdtex.ops.commit import commit
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.recolour import recolour
 from simdtex.ops.relax import Relaxation, relax, relax_apart
 from simdtex.ops.snapshot import snapshot
 from simdtex.ops.start import start
@@ -99,9 +98,8 @@ def begin(run: Run) -> State:
 def enter(level: Level, state: State) -> State:
     """The state at the beginning of a level: sites kept from the level above have t = 0, all others t = 1."""
     warm, heat = active.survey(level.machine, level.grid, state.temperature)
-    field = state.field if level.planes is None else recolour(level.machine, state.field, level.grid, level.planes)
-    price = priced(level, field, None)
-    return State(*field, price, level.schedule.init(level.setting), level.number, warm=warm, heat=heat)
+    price = priced(level, state.field, None)
+    return State(*state.field, price, level.schedule.init(level.setting), level.number, warm=warm, heat=heat)
 
 
 def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None = None) -> tuple[State, Info]:

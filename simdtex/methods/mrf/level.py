@@ -115,7 +115,6 @@ class Run:
     levels: int
     emulated: bool
     weighed: Array
-    smoothed: dict[int, tuple[Sample, Array]] = field(default_factory=dict, repr=False)
     tables: dict[int, Table] = field(default_factory=dict, repr=False)
 
     def grid(self, number: int) -> Grid:
@@ -133,8 +132,7 @@ class Run:
             Row and column of the first site, rows and columns of a window of the lattice; the state's arrays then hold
             that alone, site by site. None: the whole lattice, in pictures of the output's size.
         """
-        options, machine, offsets = self.options, self.machine, self.offsets
-        sample, planes = self.seen(number)
+        options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
         grid = self.grid(number).window(*window) if window else self.grid(number)
         candidates, coarsest = self.candidates(number), number == self.levels - 1
         proposal: Everything | Listed
@@ -168,17 +166,7 @@ class Run:
             in_place=independent and not self.schedule.tile and not self.emulated,
             weighed=machine.put(np.zeros((grid.height, grid.width), np.int32)) if window else self.weighed,
             lists=Lists(machine),
-            planes=planes if options.decimation == "gaussian" else None,
         )
-
-    def seen(self, number: int) -> tuple[Sample, Array]:
-        """The sample as a level sees it, and its planes on the machine; each level's is made once."""
-        if not (number and self.options.decimation == "gaussian"):
-            return self.sample, self.planes
-        if number not in self.smoothed:
-            sample = self.sample.level(number)
-            self.smoothed[number] = sample, sample.planes(self.machine)
-        return self.smoothed[number]
 
     def where(self, number: int) -> tuple[NDArray[np.int32], int, str, str]:
         """What says where the candidates of a level lie: see `simdtex.model.sample.Sample.positions`."""
@@ -186,8 +174,7 @@ class Run:
 
     def candidates(self, number: int) -> Candidates:
         """The candidates of a level."""
-        sample, planes = self.seen(number)
-        return sample.candidates(self.machine, *self.where(number), planes)
+        return self.sample.candidates(self.machine, *self.where(number), self.planes)
 
     def similar(self, number: int) -> Table:
         """The candidates of a level most similar to each: made with the help of the level above, once."""
@@ -195,7 +182,7 @@ class Run:
             above = self.similar(number + 1) if number < self.levels - 1 else None
             step = 2**number if self.options.phases == "decimated" else 1
             lattice = Lattice(*self.sample.lines(*self.where(number)), step, self.sample.positions(*self.where(number)))
-            square = square_of(self.machine, self.seen(number)[0], *self.where(number))
+            square = square_of(self.machine, self.sample, *self.where(number))
             candidates, likes = self.candidates(number), self.options.similar
             self.tables[number] = most_similar(self.machine, self.offsets, candidates, square, lattice, likes, above)
         return self.tables[number]
@@ -238,8 +225,6 @@ class Level:
         Counts the candidates that each site has weighed.
     lists : Lists
         The schedule's lists of sites as the machine holds them.
-    planes : (C, pixels) float32 array of the machine, optional
-        The sample's grey levels at this level, which its sites take when it begins. None: they keep theirs.
     movable : (H, W) uint16 array of the machine, optional
         0 at sites whose values are given: free sweeps leave them alone, as all sweeps do that find their temperature 0.
         None: every site may relax.
@@ -261,7 +246,6 @@ class Level:
     in_place: bool
     weighed: Array
     lists: Lists = field(repr=False)
-    planes: Array | None = None
     movable: Array | None = None
 
     @property

@@ -25,7 +25,6 @@ PRESETS: dict[str, dict[str, Any]] = {
         "free_sweeps": 0,
         "pixel": "density",
         "phases": "decimated",
-        "decimation": "plain",
         "edges": "whole",
         "coarsest": "same",
         "search": "exact",
@@ -68,7 +67,7 @@ class Options:
         The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence.
     balance : float
         lambda of the price on use: a candidate whose surroundings serve more sites than their share costs
-        lambda N C sigma^2 min(2, u - 1), u their use over the fair share. 0: nobody counts.
+        lambda N C sigma^2 min(4, u - 1), u their use over the fair share. 0: nobody counts.
     structure : float
         Weight of a channel that tells how far a pixel is from the sample's edges, matched like the others and not
         shown; its standard deviation in units of the sample's. 0: there is none.
@@ -88,13 +87,11 @@ class Options:
         kernel also spreads over x_s.
     phases : {"all", "decimated"}
         Candidates at coarse levels: every sample position, or those of the decimated sample, equation (10).
-    decimation : {"gaussian", "plain"}
-        The sample at coarse levels: smoothed first, so that no detail poses as a coarse one, or its pixels themselves,
-        equation (10). ``pixel="density"`` takes them plain.
     edges : {"auto", "reflect", "whole"}
         Candidates are those sample positions whose whole neighbourhood lies in the sample, equation (4)
         (``whole``), or all, those near the edge with a neighbourhood completed by reflection (``reflect``);
-        ``auto`` reflects at the levels at which fewer than three quarters of them have a whole neighbourhood.
+        ``auto`` reflects at all levels but the finest, and there where fewer than three quarters of them have a whole
+        neighbourhood.
     coarsest : {"gibbs", "same"}
         How the coarsest level relaxes: by draws, or as the other levels. Its mode says nothing while all is unknown.
     schedule : str or simdtex.schedules.Schedule
@@ -131,16 +128,15 @@ class Options:
     overview: int = 256
     relaxation: str = "icm"
     bandwidth: float = 0.15
-    coherence: float = 0.0
+    coherence: float = 0.5
     balance: float = 0.5
-    structure: float = 1.0
+    structure: float = 2.0
     novelty: float = 1.0
     finish: float | None = None
     xi: float = -1.0
     free_sweeps: int = 2
     pixel: str = "source"
     phases: str = "decimated"
-    decimation: str = "gaussian"
     edges: str = "auto"
     coarsest: str = "gibbs"
     schedule: str | schedules.Schedule = "coloring"
@@ -150,7 +146,7 @@ class Options:
     mapping: str = "cut-and-stack"
     search: str = "auto"
     suggesting: int = 24
-    similar: int = 4
+    similar: int = 0
     chance: int = 4
     exhaustive: int = 64
     emulate: bool = True
@@ -175,7 +171,6 @@ class Options:
         whole("free_sweeps", self.free_sweeps, 0)
         one_of("pixel", self.pixel, ("source", "density"))
         one_of("phases", self.phases, ("all", "decimated"))
-        one_of("decimation", self.decimation, ("gaussian", "plain"))
         one_of("edges", self.edges, ("auto", "reflect", "whole"))
         one_of("coarsest", self.coarsest, ("gibbs", "same"))
         one_of("boundary", self.boundary, ("torus", "open"))
@@ -201,8 +196,7 @@ class Options:
         finish = self.finish
         if finish is None:
             finish = 0.0 if self.pixel == "density" or few(pixels) else FINISH
-        decimation = "plain" if self.pixel == "density" else self.decimation
-        return replace(self, search=search, finish=finish, decimation=decimation)
+        return replace(self, search=search, finish=finish)
 
 
 def few(pixels: NDArray[Any]) -> bool:
