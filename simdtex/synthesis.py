@@ -68,10 +68,10 @@ def synthesize(
     full_output : bool
         Return statistics, stages, the source map and, of ``mrf``, temperatures too; of ``pyramid`` statistics alone.
     **options
-        Of the method. ``mrf``: ``preset``, ``order``, ``levels``, ``relaxation``, ``bandwidth``, ``coherence``, ``xi``,
-        ``free_sweeps``, ``pixel``, ``phases``, ``edges``, ``coarsest``, ``schedule``, ``check_schedule``,
-        ``boundary``, ``array``, ``mapping``, ``search``, ``suggesting``, ``similar``, ``chance``, ``exhaustive``,
-        ``emulate``; see `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``strain``, ``target``,
+        Of the method. ``mrf``: ``preset``, ``order``, ``levels``, ``overview``, ``relaxation``, ``bandwidth``,
+        ``coherence``, ``balance``, ``structure``, ``novelty``, ``finish``, ``xi``, ``free_sweeps``, ``pixel``,
+        ``phases``, ``edges``, ``coarsest``, ``schedule``, ``check_schedule``, ``boundary``, ``array``, ``mapping``,
+        ``search``, ``suggesting``, ``similar``, ``chance``, ``exhaustive``, ``emulate``; see `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``strain``, ``target``,
         ``thresholds``, ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``phase``,
         ``boundary``, ``edges``, ``joins``; see `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``,
         ``levels``, ``orientations``, ``iterations``, ``match``, ``bins``, ``edges``, ``color``, ``start``; see
@@ -89,13 +89,15 @@ def synthesize(
     ValueError, TypeError
         What is wrong and what would be right, in one sentence.
 
-    Notes ----- Cost of ``mrf``: by default some 100 fma for every output pixel, neighbour and channel, whatever the
-    sample's size, since a site weighs about seven candidates. With ``search="exact"`` it is about 14 fma for every
-    output pixel, sample pixel, neighbour and channel, less what is proved to be needless; nearly all of it at the
-    finest level, since each coarser one has a quarter of the sites and of the candidates. ``multires``: some hundred
-    comparisons for every output pixel, growing slowly with the sample and quickly with alpha. ``pyramid``: some 1700
-    multiply-adds and 8 sorted values for every output pixel, channel and iteration, whatever the sample's size. Memory
-    grows with output pixels plus sample pixels, never with their product.
+    Notes
+    -----
+    Cost of ``mrf``: by default some 100 fma for every output pixel, neighbour and channel, whatever the sample's size,
+    since a site weighs about six candidates; the structure channel is a channel more. With ``search="exact"`` it is
+    about 14 fma for every output pixel, sample pixel, neighbour and channel, less what is proved to be needless; nearly
+    all of it at the finest level, since each coarser one has a quarter of the sites and of the candidates.
+    ``multires``: some hundred comparisons for every output pixel, growing slowly with the sample and quickly with
+    alpha. ``pyramid``: some 1700 multiply-adds and 8 sorted values for every output pixel, channel and iteration,
+    whatever the sample's size. Memory grows with output pixels plus sample pixels, never with their product.
 
     Examples
     --------

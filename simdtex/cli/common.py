@@ -116,9 +116,12 @@ _MRF_OPTIONS = (
     option("--order", type=int, help="mrf: neighbours within sqrt(order): 8 has 24, 18 has 60.  [{mrf.order}]"),
     option("--relaxation", help="mrf: icm (the mode) or gibbs (a draw).  [{mrf.relaxation}]"),
     option("--bandwidth", type=float, help="mrf: of the Parzen kernel, in units of h_opt.  [{mrf.bandwidth}]"),
-    option(
-        "--coherence", type=float, help="mrf: preference for continuing a neighbour's source.  [exact 1, coherent 0.2]"
-    ),
+    option("--coherence", type=float, help="mrf: preference for continuing a neighbour's source.  [{mrf.coherence}]"),
+    option("--balance", type=float, help="mrf: price of using parts of the sample more than others.  [{mrf.balance}]"),
+    option("--structure", type=float, help="mrf: weight of the distance to the sample's edges.  [{mrf.structure}]"),
+    option("--novelty", type=float, help="mrf: price of keeping the sample's layout.  [{mrf.novelty}]"),
+    option("--overview", type=int, help="mrf: candidates at the coarsest level, at least.  [{mrf.overview}]"),
+    option("--finish", type=float, help="mrf: pixels over which seams melt; 0: none.  [1.5; of categories 0]"),
     option("--xi", type=float, help="mrf: cooling, below 0; further down is faster.  [{mrf.xi}]"),
     option(
         "--free-sweeps",

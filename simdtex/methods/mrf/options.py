@@ -28,6 +28,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "edges": "whole",
         "coarsest": "same",
         "search": "exact",
+        "suggesting": 24,
         "overview": 64,
         "balance": 0.0,
         "structure": 0.0,
@@ -145,7 +146,7 @@ class Options:
     array: str | None = None
     mapping: str = "cut-and-stack"
     search: str = "auto"
-    suggesting: int = 24
+    suggesting: int = 12
     similar: int = 0
     chance: int = 4
     exhaustive: int = 64

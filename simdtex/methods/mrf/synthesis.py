@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import schedules
-from simdtex.machine.interface import Machine
+from simdtex.machine.interface import Array, Machine
 from simdtex.maspar.array import parse_array
 from simdtex.methods.mrf.algorithm import anneal
-from simdtex.methods.mrf.level import Run, State, number_of_levels
+from simdtex.methods.mrf.level import Run, number_of_levels
 from simdtex.methods.mrf.observers import Observer
 from simdtex.methods.mrf.options import Options
 from simdtex.model.lattice import Grid, neighbourhood_offsets
@@ -60,10 +60,10 @@ def synthesize(
     Notes
     -----
     Cost: sweeps x sites x candidates x |N| x channels x 2 fma, about 7 sweeps a level; the coherent search weighs some
-    7 candidates, the exact search all of the level. Memory on the device, in bytes: 18 + 2 channels per output pixel
-    (24 + 4 channels with the schedule ``block``), 14 channels + 4 similar + 151 per pixel of the sample with its
-    margin, and the machine's scratch memory or, if that is more, 65 per candidate. On the host: about 50 per output
-    pixel.
+    6 candidates, the exact search all of the level; the structure channel is a channel more. Memory on the device, in
+    bytes: 18 + 2 channels per output pixel (24 + 4 channels with the schedule ``block``), 14 channels + 4 similar + 159
+    per pixel of the sample with its margin, and the machine's scratch memory or, if that is more, 65 per candidate. On
+    the host: about 50 per output pixel.
     """
     launches, worked = machine.launches, machine.seconds
     run = laid_out(machine, pixels, shape, options, seed)
@@ -72,7 +72,7 @@ def synthesize(
         observer.sweep(level, state, info)
     assert state is not None  # there is a level, and it has a sweep
     values, source, temperatures = (Grid(*shape).view(machine.get(plane)) for plane in state.field)
-    image = finished(run, state) if run.options.finish else run.sample.picture(values, source)
+    image = finished(run, state.source, source) if run.options.finish else run.sample.picture(values, source)
     meter, account = observer.meter, observer.account
     statistics = {
         "device": machine.name,
@@ -114,16 +114,23 @@ def laid_out(machine: Machine, pixels: NDArray[Any], shape: tuple[int, int], opt
     )
 
 
-def finished(run: Run, state: State) -> NDArray[Any]:
-    """The picture of the last level's sources with the finish (`simdtex.ops.finish`), in the sample's type."""
-    sample, grid = run.sample, Grid(*run.shape, 1, run.options.boundary == "torus")
-    rows = max(1, AT_ONCE // grid.cols)
+def finished(run: Run, source: Array, seen: NDArray[np.int32]) -> NDArray[Any]:
+    """The picture with the finish (`simdtex.ops.finish`), in the sample's type.
+
+    Parameters
+    ----------
+    run : Run
+    source : (H, W) int32 array of the machine
+        Of the finest level.
+    seen : (rows, cols) int32 array
+        The same on the host.
+    """
+    sample, grid, ring = run.sample, run.grid(0), around(run.options.finish or 0)
     picture = np.empty((*run.shape, sample.shown), sample.pixels.dtype)
-    source = grid.view(run.machine.get(state.source))
+    rows = max(1, AT_ONCE // grid.cols)
     for top in range(0, grid.rows, rows):
-        here = source[top : top + rows]
-        sites = (top * grid.cols, here.size)
-        by = finish(run.machine, state.source, grid, run.planes, sample, *around(run.options.finish or 0), *sites)
+        here = seen[top : top + rows]
+        by = finish(run.machine, source, grid, run.planes, sample, *ring, top * grid.cols, here.size)
         picture[top : top + rows] = sample.moved(here, by.reshape(-1, *here.shape))
     return picture
 
@@ -132,4 +139,4 @@ def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], simi
     pixels, channels = shape[0] * shape[1], sample.channels
     within_32_bits(shape, channels * copies)
     field = copies * (6 + 2 * channels)
-    machine.require(pixels * (12 + field) + sample.rows * sample.cols * (14 * channels + 151 + 4 * similar))
+    machine.require(pixels * (12 + field) + sample.rows * sample.cols * (14 * channels + 159 + 4 * similar))
