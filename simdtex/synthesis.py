@@ -71,11 +71,11 @@ def synthesize(
         Of the method. ``mrf``: ``preset``, ``order``, ``levels``, ``overview``, ``relaxation``, ``bandwidth``,
         ``coherence``, ``balance``, ``structure``, ``novelty``, ``finish``, ``xi``, ``free_sweeps``, ``pixel``,
         ``phases``, ``edges``, ``coarsest``, ``schedule``, ``check_schedule``, ``boundary``, ``array``, ``mapping``,
-        ``search``, ``suggesting``, ``similar``, ``chance``, ``exhaustive``, ``emulate``; see `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``strain``, ``target``,
-        ``thresholds``, ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``phase``,
-        ``boundary``, ``edges``, ``joins``; see `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``,
-        ``levels``, ``orientations``, ``iterations``, ``match``, ``bins``, ``edges``, ``color``, ``start``; see
-        `simdtex.methods.pyramid.Options`.
+        ``search``, ``suggesting``, ``similar``, ``chance``, ``exhaustive``, ``emulate``; see
+        `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``strain``, ``target``, ``thresholds``,
+        ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``phase``, ``boundary``, ``edges``,
+        ``joins``; see `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``, ``levels``, ``orientations``,
+        ``iterations``, ``match``, ``bins``, ``edges``, ``color``, ``start``; see `simdtex.methods.pyramid.Options`.
 
     Returns
     -------
