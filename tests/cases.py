@@ -13,6 +13,7 @@ from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
 from simdtex.ops.nearest import strip_of
 from simdtex.ops.neighbourhood import Field, neighbourhood
+from simdtex.ops.square import square_of
 from simdtex.schedules import Setting
 
 REFERENCE = Reference()
@@ -67,6 +68,16 @@ class Problem(NamedTuple):
 
     def strip(self, machine):
         return strip_of(machine, self.sample, self.offsets, self.grid.spacing, self.phases, self.edges)
+
+    def square(self, machine):
+        return square_of(machine, self.sample, self.offsets, self.grid.spacing, self.phases, self.edges)
+
+    def price(self, dear=1.0):
+        """Of each candidate, padded to whole blocks: some cost nothing, some much in terms of a distance."""
+        candidates = self.candidates(REFERENCE)
+        scale = dear * self.sample.variance * len(self.offsets) * self.sample.channels
+        price = scale * np.random.default_rng(candidates.size).choice([0, 0, 0.1, 1, 2], candidates.positions.size)
+        return price.astype(np.float32)
 
     def on(self, machine):
         """Sites, field and offsets as arrays of a machine."""
@@ -128,13 +139,14 @@ def problem(
     edges="whole",
     phases="all",
     count=None,
+    weight=0.0,
 ):
     """A problem from a seed. A third of its sites stand beside what their neighbours were taken from."""
     rng = np.random.default_rng(seed)
     offsets = neighbourhood_offsets(order)
     pixels = texture(sample_shape, channels, dtype, seed)
     margin = int(offsets.max()) * spacing
-    sample = Sample(pixels, channels * len(offsets), margin)
+    sample = Sample(pixels, (channels + bool(weight)) * len(offsets), margin, weight)
     grid = Grid(*shape, spacing, torus)
     row, col = np.indices(shape)
     scattered = rng.integers(0, sample_shape, (*shape, 2))

@@ -92,7 +92,7 @@ def test_a_case_counts_what_weighing_every_candidate_takes():
     assert phases["cold"]["relaxations"] == 2 * 16 * 16  # free sweeps
     assert phases["warm"]["brute_force"] + phases["cold"]["brute_force"] == finest["fma"]
     assert run["brute_force"] == sum(level["fma"] for level in run["levels"])
-    assert brute_force(MRF, [0, 10])[1] == 2 * 10 * 8 * finest["candidates"]
+    assert brute_force(MRF, [0, 10])[1] == 2 * 10 * 8 * 2 * finest["candidates"]
     assert 0 < phases["cold"]["seconds"] < run["seconds"]
 
 

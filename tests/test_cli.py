@@ -58,7 +58,7 @@ def test_a_stranger_gets_more_texture(folder):
 
 
 def test_everything_at_once(folder):
-    args = ["--size", "30x26", "--stages", folder / "st", "--source-map", folder / "s.npz"]
+    args = ["--size", "30x26", "--stages", folder / "st", "--source-map", folder / "s.npz", "--finish", "0"]
     result = synth(folder, *args, "--also", f"{folder}/normal.png={folder}/normal-out.png")
     assert result.exit_code == 0, result.output
     source = load_source_map(folder / "s.npz")

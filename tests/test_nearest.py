@@ -11,6 +11,7 @@ from simdtex.ops import nearest as module
 from simdtex.ops.nearest import nearest
 
 strengths = st.sampled_from([0.0, 0.5, 1.0, 7.0])
+prices = st.sampled_from([0.0, 0.1, 1.0])
 FORMS = [
     {"vector": 1, "step": 1, "split": 64},  # a GPU's
     {"vector": 4, "step": 2, "split": 3},
@@ -21,29 +22,28 @@ FORMS = [
 ]
 
 
-def run(machine, p, strength=1.0):
+def run(machine, p, strength=1.0, dear=0.1):
     sites, field, offsets = p.on(machine)
-    favour = np.float32(1 / (1 + strength))
-    return host(
-        machine, nearest(machine, sites, field, offsets, p.grid, p.candidates(machine), p.strip(machine), favour)
-    )
+    terms = (np.float32(1 / (1 + strength)), machine.put(p.price(dear)))
+    candidates, strip = p.candidates(machine), p.strip(machine)
+    return host(machine, nearest(machine, sites, field, offsets, p.grid, candidates, strip, *terms))
 
 
-@given(problems(max_order=5), strengths)
+@given(problems(max_order=5), strengths, prices)
 @settings(max_examples=20)
-def test_the_reference_is_the_nearest_of_the_rule_the_first_of_several(p, strength):
-    choice, values = run(REFERENCE, p, strength)
+def test_the_reference_is_the_nearest_of_the_rule_the_first_of_several(p, strength, dear):
+    choice, values = run(REFERENCE, p, strength, dear)
     found, candidates = p.distances(REFERENCE, strength)
     for s in range(p.sites.size):
-        column = found.distance[:, s].tolist()
+        column = (found.distance[:, s] + p.price(dear)[: candidates.size]).tolist()
         assert choice[s] == candidates.positions[column.index(min(column))]
     assert np.array_equal(values, p.sample.working[:, choice])
 
 
-@given(p=problems(max_order=18), strength=strengths)
+@given(p=problems(max_order=18), strength=strengths, dear=prices)
 @settings(max_examples=25)
-def test_a_device_has_the_references_bits(machine, p, strength):
-    assert_same_bits(run(machine, p, strength), run(REFERENCE, p, strength))
+def test_a_device_has_the_references_bits(machine, p, strength, dear):
+    assert_same_bits(run(machine, p, strength, dear), run(REFERENCE, p, strength, dear))
 
 
 @pytest.mark.parametrize("options", FORMS, ids=lambda options: "-".join(f"{k}-{v}" for k, v in options.items()))
@@ -78,9 +78,9 @@ def flat(p, levels):
 def test_of_equals_it_is_the_first(machine, cl_device, levels, temperatures):
     p = flat(problem(4, order=2, sample_shape=(19, 24), shape=(10, 9), temperatures=temperatures), levels)
     for strength in (0.0, 1.0):
-        theirs = run(REFERENCE, p, strength)
-        assert_same_bits(run(machine, p, strength), theirs)
-        assert_same_bits(run(opencl(cl_device, vector=1, split=7), p, strength), theirs)
+        theirs = run(REFERENCE, p, strength, dear=0.0)
+        assert_same_bits(run(machine, p, strength, dear=0.0), theirs)
+        assert_same_bits(run(opencl(cl_device, vector=1, split=7), p, strength, dear=0.0), theirs)
 
 
 def test_what_is_skipped_is_counted(cl_device):

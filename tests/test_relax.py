@@ -12,7 +12,8 @@ from simdtex.machine.opencl import OpenCL
 from simdtex.ops import lcpdf
 from simdtex.ops.coloring import coloring
 from simdtex.ops.commit import commit
-from simdtex.ops.relax import Choice, Everything, Relaxation, listed, relax, relax_apart
+from simdtex.ops.relax import Choice, Everything, Listed, Relaxation, relax, relax_apart
+from simdtex.ops.similar import Lattice, most_similar
 from simdtex.schedules import Coloring
 
 PLAIN = {"suggesting": 12, "similar": 0, "chance": 4}
@@ -23,15 +24,23 @@ def proposal(machine, p, exhaustive=False, **options):
     candidates = p.candidates(machine)
     if exhaustive:
         return Everything(candidates, p.strip(machine))
+    few = PLAIN | options
+    likes = min(few["similar"], candidates.size - 1)
     where = (p.offsets, p.grid.step, p.phases, p.edges)
-    return listed(machine, p.sample, candidates, *where, **PLAIN | options)
+    step = p.grid.step if p.phases == "decimated" else 1
+    lattice = Lattice(*p.sample.lines(*where), step, p.sample.positions(*where))
+    square, similar = p.square(machine), machine.put(np.zeros((1, 1), np.int32))
+    if likes:
+        similar = most_similar(machine, p.offsets, candidates, square, lattice, likes).numbers
+    return Listed(candidates, square, similar, likes, min(few["suggesting"], len(p.offsets)), few["chance"])
 
 
-def relaxation(machine, p, gibbs=False, noisy=False, coherence=1.0, level=0, **options):
+def relaxation(machine, p, gibbs=False, noisy=False, coherence=1.0, level=0, dear=0.0, novelty=0.0, **options):
     window, _ = p.window(0.5)
     favour, choice = np.float32(1 / (1 + coherence)), Choice(gibbs, noisy, window)
+    terms = (favour, np.float32(novelty * p.sample.variance), machine.put(p.price(dear)))
     proposed = proposal(machine, p, **options)
-    return Relaxation(p.grid, machine.put(p.offsets), proposed, favour, choice, -1024, 2**33 + 5, level)
+    return Relaxation(p.grid, machine.put(p.offsets), proposed, *terms, choice, -1024, 2**33 + 5, level)
 
 
 def counter(machine, p):
@@ -89,6 +98,8 @@ FORMS = st.fixed_dictionaries(
         "gibbs": st.booleans(),
         "noisy": st.booleans(),
         "coherence": st.sampled_from([0.0, 0.7, 3.0]),
+        "dear": st.sampled_from([0.0, 1.0]),
+        "novelty": st.sampled_from([0.0, 0.0, 2.0]),
     }
 )
 
@@ -97,6 +108,8 @@ FORMS = st.fixed_dictionaries(
 @settings(max_examples=20)
 def test_a_device_has_the_references_bits(machine, p, form):
     form = form | {"noisy": form["noisy"] and (form["gibbs"] or form["exhaustive"])}  # a list has no mode of a density
+    if not form["exhaustive"] or (form["noisy"] and not form["gibbs"]):  # where nothing is charged for continuing
+        form["novelty"] = 0.0
     assert_same_bits(apart(machine, p, **form), apart(REFERENCE, p, **form))
 
 
@@ -183,9 +196,60 @@ def test_steps_in_place_are_step_after_step(machine, monkeypatch, longest, how):
     assert_same_bits(first, [*field, weighed])
 
 
+def test_each_candidate_costs_its_price():
+    """The mode is the least of distance, favoured or not, and price."""
+    p = problem(3, order=5, shape=(10, 11), edges="reflect", temperatures="mixed", channels=2)
+    price, favour = p.price(), 1 / (1 + 0.7)
+    _, candidates = p.distances(REFERENCE)
+    numbers = {int(position): n for n, position in enumerate(candidates.positions[: candidates.size])}
+    dear = cheap = 0
+    choice, *_ = apart(REFERENCE, p, chance=0, coherence=0.7, dear=1.0)
+    for s, site in enumerate(p.where()):
+        found = suggestions(p, site, PLAIN["suggesting"])
+        own = tuple(int(n) for n in p.source()[site])
+        listed = found + [own] * (own in p.positions() and own not in found)
+        t, here = p.temperature(), (p.order, 1, p.grid.torus)
+        d = [plain.distance(p.image(), t, site, p.padded(), position, *here) for position in listed]
+        d = [a * (favour if position in found else 1) for a, position in zip(d, listed, strict=True)]
+        total = [a + price[numbers[r * p.sample.cols + c]] for a, (r, c) in zip(d, listed, strict=True)]
+        best = listed.index(divmod(int(choice[s]), p.sample.cols))
+        assert total[best] <= min(total) * (1 + 1e-5)
+        dear += d[best] > min(d)
+        cheap += d[best] == min(d)
+    assert dear, "a price decides somewhere"
+    assert cheap, "and somewhere does not"
+
+
+def test_each_continued_neighbour_costs():
+    p = problem(4, order=4, shape=(10, 11), edges="reflect", sample_shape=(9, 10))
+    cost = np.float32(2 * p.sample.variance)
+    rule, sites = relaxation(REFERENCE, p, exhaustive=True, coherence=0.0), p.sites
+    _, plainly = rule.proposal.weighed(sites, p.field, rule, 3)
+    _, charged = rule.proposal.weighed(sites, p.field, rule._replace(novelty=cost), 3)
+    most = 0
+    for s, site in enumerate(p.where()):
+        i, j = site
+        count = dict.fromkeys(p.positions(), 0)
+        near = plain.neighbours(i, j, p.order, p.grid.rows, p.grid.cols, p.grid.torus)
+        for (di, dj), r in zip(plain.offsets(p.order), near, strict=True):
+            if r is not None and p.field.temperature[r] < 1024:
+                row, col = p.source()[r]
+                continued = (int(row) - di, int(col) - dj)
+                count[continued] = count.get(continued, 0) + 1
+        for n, position in enumerate(p.positions()):
+            expected = plainly.distance[n, s]
+            for _ in range(count[position]):
+                expected = np.float32(expected + cost)
+            assert charged.distance[n, s] == expected
+            most = max(most, count[position])
+    assert most > 1
+
+
+@pytest.mark.parametrize("dear", [0.0, 1.0])
 @pytest.mark.parametrize("how", [{}, {"gibbs": True}, {"gibbs": True, "noisy": True}], ids=str)
-def test_few_candidates_in_one_kernel_are_many_in_several(machine, monkeypatch, how):
+def test_few_candidates_in_one_kernel_are_many_in_several(machine, monkeypatch, how, dear):
     """The exact search has the same bits in either form."""
+    how = how | {"dear": dear}
     p = problem(14, order=8, channels=2, shape=(11, 13), edges="reflect", sample_shape=(9, 13))
     one = apart(machine, p, exhaustive=True, **how)
     monkeypatch.setattr("simdtex.ops.relax.KEPT", 10)
@@ -244,7 +308,8 @@ def test_the_work_is_counted(cl_device):
     _, levels = run(OpenCL(cl_device), order=8, chance=2, suggesting=20)
     for level in levels:
         assert 1 <= level["weighed"] <= (level["candidates"] if level is levels[0] else 23)
-        assert level["fma"] == round(2 * 24 * level["weighed"] * level["relaxations"])
+        channels = 2  # one of them the structure channel
+        assert level["fma"] == round(2 * 24 * channels * level["weighed"] * level["relaxations"])
     assert levels[0]["weighed"] == levels[0]["candidates"], "the coarsest level is exact"
 
 

@@ -67,7 +67,7 @@ def test_colour_on_the_first_axis_has_its_use_too():
 
 def test_a_tiling_uses_all_alike():
     _, output = simdtex.synthesize(
-        texture((16, 16)), (32, 32), method="multires", alpha=0.0, device="reference", full_output=True
+        texture((16, 16)), (32, 32), method="multires", alpha=0.0, edges="keep", device="reference", full_output=True
     )
     assert output.statistics["use"]["effective_share"] == 1.0
     assert output.statistics["use"]["most_used"]["times_fair_share"] == 1.0

@@ -26,9 +26,12 @@ def quick(sample, shape, **options):
 @pytest.mark.parametrize("dtype", TYPES)
 def test_the_type_is_the_samples_and_every_pixel_is_one_of_its_own(dtype):
     sample = texture((9, 10), dtype=dtype)
-    image = quick(sample, (7, 8))
+    image = quick(sample, (7, 8), finish=0.0)
     assert (image.dtype, image.shape) == (sample.dtype, (7, 8))
     assert np.isin(image, sample).all()
+    finished = quick(sample, (7, 8))
+    assert finished.dtype == sample.dtype
+    assert sample.min() <= finished.min() <= finished.max() <= sample.max()
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32, np.bool_])
@@ -75,7 +78,7 @@ def test_the_sample_is_not_changed():
 @pytest.mark.parametrize("boundary", ["torus", "open"])
 def test_any_size(shape, boundary):
     sample = texture((9, 8))
-    image = simdtex.synthesize(sample, shape, order=2, boundary=boundary, rng=1, device=REFERENCE)
+    image = simdtex.synthesize(sample, shape, order=2, boundary=boundary, finish=0.0, rng=1, device=REFERENCE)
     assert image.shape == shape
     assert np.isin(image, sample).all()
 
@@ -102,7 +105,7 @@ def test_any_sample_that_fits_any_size_and_any_order(sample_shape, shape, order,
 
 def test_a_sample_that_barely_fits_has_one_candidate():
     sample = texture((5, 5))
-    image = quick(sample, (4, 4), order=8, edges="whole")
+    image = quick(sample, (4, 4), order=8, edges="whole", finish=0.0)
     assert (image == sample[2, 2]).all()
 
 
@@ -173,7 +176,7 @@ def test_the_source_map_names_where_every_pixel_was_taken_from(axis, edges):
     given = sample if axis is None else np.moveaxis(sample, -1, axis)
     image, output = simdtex.synthesize(
         given, (11, 9), order=2, levels=2, channel_axis=axis, rng=1, device=REFERENCE, full_output=True,
-        pixel="source", edges=edges,
+        pixel="source", edges=edges, finish=0.0,
     )  # fmt: skip
     row, col = np.moveaxis(output.source, -1, 0)
     assert output.source.shape == (11, 9, 2)
@@ -195,7 +198,7 @@ def test_the_stages_are_the_levels_coarsest_first(axis):
     sample = texture((17, 18), None if axis is None else 2)
     given = sample if axis is None else np.moveaxis(sample, -1, axis)
     image, output = simdtex.synthesize(
-        given, (13, 10), order=1, levels=3, channel_axis=axis, rng=2, device=REFERENCE, full_output=True
+        given, (13, 10), order=1, levels=3, channel_axis=axis, rng=2, device=REFERENCE, full_output=True, finish=0.0
     )
     assert [stage.level for stage in output.stages] == [2, 1, 0]
     sizes = [stage.image.shape for stage in output.stages]
@@ -226,7 +229,7 @@ def test_the_statistics_count_what_was_done():
     assert [(level["rows"], level["cols"]) for level in told["levels"]] == [(5, 6), (9, 12)]
     for level in told["levels"]:
         sites = level["rows"] * level["cols"]
-        assert level["fma"] == level["relaxations"] * level["candidates"] * 8 * 2
+        assert level["fma"] == level["relaxations"] * level["candidates"] * 8 * 2 * 2  # 8 neighbours, 2 channels
         assert sites < level["relaxations"] <= sites * level["sweeps"]
         assert level["seconds"] >= 0
     assert told["seconds"] >= sum(level["seconds"] for level in told["levels"])
@@ -323,7 +326,7 @@ def test_progress_shows_the_picture_and_its_temperature(axis):
             pictures.append((progress.level, progress.image(), progress.temperature()))
 
     image = simdtex.synthesize(
-        given, (7, 10), order=1, levels=2, channel_axis=axis, rng=1, device=REFERENCE, callback=look
+        given, (7, 10), order=1, levels=2, channel_axis=axis, rng=1, device=REFERENCE, callback=look, finish=0.0
     )
     sizes = {0: (7, 10), 1: (4, 5)}
     for level, picture, temperature in pictures:
@@ -474,8 +477,10 @@ def test_the_most_levels_that_are_named_work_and_one_more_does_not(edges):
 @pytest.mark.parametrize("scale", [1e-320, 1e-300, 1.0, 1e300, 8e307])
 def test_float_pixels_of_any_magnitude(scale):
     sample = texture((9, 10), dtype=np.float64) * scale
-    image = quick(sample, (5, 6))
+    image = quick(sample, (5, 6), finish=0.0)
     assert np.isin(image, sample).all()
+    image = quick(sample, (5, 6))
+    assert sample.min() <= image.min() <= image.max() <= sample.max()
     image = quick(sample, (5, 6), pixel="density", relaxation="gibbs")
     assert np.isfinite(image).all()
 
@@ -494,7 +499,8 @@ def test_integer_pixels_of_any_magnitude(dtype):
     bounds = np.iinfo(dtype)
     sample = texture((9, 10), dtype=np.int8).astype(dtype)
     sample[4, 4:6] = bounds.min, bounds.max
-    image = quick(sample, (5, 6))
+    image = quick(sample, (5, 6), finish=0.0)
     assert np.isin(image, sample).all()
+    assert quick(sample, (5, 6)).dtype == dtype
     image = quick(sample, (5, 6), pixel="density", relaxation="gibbs")
     assert image.dtype == dtype

@@ -111,7 +111,8 @@ def test_every_form_has_the_references_bits(any_device):
 
     def run(m):
         sites, field, offsets = p.on(m)
-        return host(m, nearest(m, sites, field, offsets, p.grid, p.candidates(m), p.strip(m), np.float32(0.5)))
+        terms = (np.float32(0.5), m.put(p.price(0.1)))
+        return host(m, nearest(m, sites, field, offsets, p.grid, p.candidates(m), p.strip(m), *terms))
 
     for form in tuner.others(any_device):
         machine = OpenCL(any_device)

@@ -84,9 +84,9 @@ def picture(side: int) -> NDArray[np.uint8]:
 
 
 def brute_force(case: Case, relaxations: list[int]) -> list[float]:
-    """Multiply-adds that weighing every candidate takes, 2 for each neighbour, for relaxations of each level.
+    """Multiply-adds that weighing every candidate takes, 2 for each neighbour and channel.
 
-    The levels are those of a run, the coarsest first.
+    ``relaxations`` are those of the levels of a run, the coarsest first.
     """
     offsets, options = neighbourhood_offsets(case.order), mrf.Options()
     sample = Sample(picture(case.sample)[..., None], len(offsets))
@@ -94,7 +94,8 @@ def brute_force(case: Case, relaxations: list[int]) -> list[float]:
         sample.positions(offsets, 2**level, options.phases, options.edges).size
         for level in reversed(range(len(relaxations)))
     ]
-    return [2.0 * count * len(offsets) * many for count, many in zip(counts, relaxations, strict=True)]
+    channels = 1 + bool(options.structure)
+    return [2.0 * count * len(offsets) * channels * many for count, many in zip(counts, relaxations, strict=True)]
 
 
 @contextmanager

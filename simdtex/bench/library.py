@@ -22,11 +22,12 @@ from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates
 from simdtex.ops import lcpdf
 from simdtex.ops.candidates import Sampled, Structure, candidates
+from simdtex.ops.charge import charge
 from simdtex.ops.coherence import coherence, continuing
 from simdtex.ops.commit import commit
 from simdtex.ops.filters import filters
 from simdtex.ops.neighbourhood import Field, Neighbourhoods, neighbourhood
-from simdtex.ops.relax import Everything, Relaxation, relax, relax_apart
+from simdtex.ops.relax import Everything, Relaxation, copied, relax, relax_apart
 from simdtex.ops.sort import sort
 from simdtex.ops.steerable import steerable_join, steerable_split
 from simdtex.ops.temperature import temperature
@@ -155,6 +156,9 @@ class Library(Reference):
         grid, offsets, candidates = relaxation.grid, relaxation.offsets, relaxation.proposal.candidates
         found = self.distance(neighbourhood.reference(sites, field, offsets, grid), candidates)
         found = self.coherence(found, candidates, sites, field, offsets, grid, relaxation.favour)
+        found = charge.reference(found, candidates, relaxation.price)
+        if relaxation.novelty > 0:
+            copied(found.distance, candidates, sites, field, offsets, grid, relaxation.novelty)
         numbers = np.arange(candidates.size)[:, None]
         relaxed = relaxation.choice.taken(numbers, found, sites, relaxation, turn)
         return relaxed, temperature.reference(sites, field, offsets, grid, relaxation.xi)

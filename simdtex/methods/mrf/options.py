@@ -28,7 +28,6 @@ PRESETS: dict[str, dict[str, Any]] = {
         "edges": "whole",
         "coarsest": "same",
         "search": "exact",
-        "suggesting": 24,
         "overview": 64,
         "balance": 0.0,
         "structure": 0.0,
@@ -71,7 +70,7 @@ class Options:
         lambda N C sigma^2 min(4, u - 1), u their use over the fair share. 0: nobody counts.
     structure : float
         Weight of a channel that tells how far a pixel is from the sample's edges, matched like the others and not
-        shown; its standard deviation in units of the sample's. 0: there is none.
+        shown; its standard deviation in units of the sample's. 0, and with ``pixel="density"``: there is none.
     novelty : float
         mu: at the coarsest level a candidate costs mu C sigma^2 for each neighbour whose source it continues, where
         a site takes a sample's pixel and there are 1024 candidates or fewer.
@@ -191,13 +190,17 @@ class Options:
         true_or_false("emulate", self.emulate)
 
     def resolved(self, pixels: NDArray[Any]) -> Options:
-        """The same with what ``search="auto"`` and ``finish=None`` stand for, for a sample (rows, cols, channels)."""
+        """The same as it is executed: what ``search="auto"`` and ``finish=None`` mean for a sample (rows, cols, C).
+
+        The grey levels of a density are nobody's, so nothing says how far from an edge they are: no structure channel.
+        """
         nearest = (self.relaxation, self.pixel) == ("icm", "source")
         search = ("coherent" if nearest else "exact") if self.search == "auto" else self.search
         finish = self.finish
         if finish is None:
             finish = 0.0 if self.pixel == "density" or few(pixels) else FINISH
-        return replace(self, search=search, finish=finish)
+        structure = 0.0 if self.pixel == "density" else self.structure
+        return replace(self, search=search, finish=finish, structure=structure)
 
 
 def few(pixels: NDArray[Any]) -> bool:

@@ -1,0 +1,144 @@
+"""The finish: a pixel is the weighted mean of what its neighbours' sources say of it."""
+
+from math import exp, floor
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, problem, texture
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import simdtex
+from simdtex.methods.mrf.options import few
+from simdtex.model.lattice import Grid
+from simdtex.model.sample import Sample
+from simdtex.model.source_map import apply_source_map
+from simdtex.ops.finish import around, finish
+
+
+def plainly(p, sd):
+    """(C, rows, cols) changes in Python numbers, in working levels or eighths of one."""
+    scale = 1 if p.sample.top == 255 else 8
+    reach = range(-5, 6)
+    weight = {
+        (a, b): round(1024 * exp(-(a * a + b * b) / (2 * sd * sd)))
+        for a in reach
+        for b in reach
+        if a * a + b * b <= (2.5 * sd) ** 2
+    }
+    source, (rows, cols) = p.source() - p.sample.margin, p.field.source.shape
+    shown = p.sample.levels[: p.sample.shown].astype(int)
+    found = np.zeros((p.sample.shown, rows, cols), int)
+    for i in range(rows):
+        for j in range(cols):
+            own = tuple(source[i, j])
+            for c, y in enumerate(shown):
+                total = said = 0
+                for (a, b), w in weight.items():
+                    k, m = (i + a) % rows, (j + b) % cols
+                    inside = p.grid.torus or (0 <= i + a < rows and 0 <= j + b < cols)
+                    if not inside or ((a, b) != (0, 0) and (k, m) == (i, j)):
+                        continue
+                    row, col = source[k, m] - (a, b)
+                    if 0 <= row < p.sample.height and 0 <= col < p.sample.width:
+                        total += w
+                        said += w * (int(y[row, col]) - int(y[own]))
+                found[c, i, j] = floor(scale * said / total + 0.5)
+    return found
+
+
+def finished(m, p, sd, first=0, count=None):
+    _, field, _ = p.on(m)
+    return finish(m, field.source, p.grid, p.sample.planes(m), p.sample, *around(sd), first, count or p.grid.plane)
+
+
+@pytest.mark.parametrize("sd", [0.5, 1.5, 2.0])
+@pytest.mark.parametrize("how", [{}, {"channels": 3, "torus": False}, {"dtype": np.uint16, "weight": 1.0}], ids=str)
+def test_a_change_is_the_weighted_mean(machine, sd, how):
+    p = problem(3, shape=(9, 11), sample_shape=(10, 12), edges="reflect", **how)
+    expected = plainly(p, sd).astype(np.int16)
+    assert expected.any()
+    for m in (REFERENCE, machine):
+        assert_same_bits(finished(m, p, sd).reshape(expected.shape), expected)
+
+
+@given(p=st.integers(0, 99), rows=st.integers(1, 6), torus=st.booleans())
+@settings(max_examples=10)
+def test_a_device_has_the_references_bits_on_any_rows(machine, p, rows, torus):
+    p = problem(p, shape=(8, 7), torus=torus, channels=2)
+    assert_same_bits(*(finished(m, p, 1.5, 7 * rows, 14) for m in (REFERENCE, machine)))
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int8, np.float32, np.float64])
+def test_where_the_arrangement_is_coherent_nothing_changes(machine, dtype):
+    pixels = texture((20, 22), 2, dtype, 1)
+    sample, grid = Sample(pixels, 8, 3), Grid(9, 10, 1, False)
+    row, col = np.indices((9, 10)) + sample.margin + 4
+    source = (row * sample.cols + col).astype(np.int32)
+    for m in (REFERENCE, machine):
+        by = finish(m, m.put(source), grid, sample.planes(m), sample, *around(1.5), 0, 90)
+        assert not by.any()
+        assert_same_bits(sample.moved(source, by.reshape(2, 9, 10)), pixels[4:13, 4:14])
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int16, np.float32, np.float64])
+def test_a_finished_picture_is_close_to_the_mean_in_any_type(dtype):
+    p = problem(5, shape=(9, 11), sample_shape=(10, 12), edges="reflect", dtype=dtype)
+    by = finished(REFERENCE, p, 1.5).reshape(1, 9, 11)
+    image = p.sample.moved(p.field.source, by)[..., 0]
+    assert image.dtype == dtype
+    own = p.sample.pixels[tuple(np.moveaxis(p.source() - p.sample.margin, -1, 0))][..., 0].astype(float)
+    exact = plainly(p, 1.5)[0] * p.sample.unit / p.sample.fine + own
+    assert np.abs(image - exact).max() <= (0 if dtype == np.uint8 else 0.5 if np.dtype(dtype).kind in "iu" else 1e-6)
+    assert (image != own).any()
+
+
+def run(sample, **options):
+    return simdtex.synthesize(sample, (40, 36), rng=2, device=REFERENCE, full_output=True, order=5, **options)
+
+
+def test_the_source_map_stays():
+    sample = texture((32, 30), seed=3)
+    (plain, without), (image, output) = run(sample, finish=0.0), run(sample)
+    assert_same_bits(output.source, without.source)
+    assert_same_bits(apply_source_map(output.source, sample), plain)
+    assert (image != plain).any()
+    assert output.statistics["options"]["finish"] == 1.5
+
+
+@pytest.mark.parametrize(
+    "sample", [np.uint8([[0, 255]]), np.uint8([[[1, 2, 3], [4, 5, 6]]]), np.array([[True, False]])]
+)
+def test_categories_are_never_averaged(sample):
+    cells = np.random.default_rng(1).integers(0, 2, (30, 30))
+    map_ = sample[0][cells]
+    image, output = simdtex.synthesize(
+        map_, (33, 31), channel_axis=-1 if map_.ndim == 3 else None, rng=1, device=REFERENCE, full_output=True
+    )
+    seen = {tuple(np.atleast_1d(pixel)) for row in image for pixel in row}
+    assert seen <= {tuple(np.atleast_1d(pixel)) for pixel in sample[0]}
+    assert output.statistics["options"]["finish"] == 0
+
+
+def test_a_finish_that_is_asked_for_averages_categories_too():
+    cells = np.random.default_rng(1).integers(0, 2, (30, 30)).astype(np.uint8) * 200
+    assert len(np.unique(run(cells, finish=2.0)[0])) > 2
+
+
+def test_a_density_is_left_alone():
+    _, output = run(texture((32, 30), seed=3), pixel="density", relaxation="gibbs", free_sweeps=0, xi=-8.0)
+    assert output.statistics["options"]["finish"] == 0
+
+
+@pytest.mark.parametrize(("count", "expected"), [(1, True), (16, True), (17, False)])
+def test_few_pixels_are_up_to_sixteen(count, expected):
+    flat = np.arange(300 * 300) % count
+    pixels = np.stack([flat, flat * 3], -1).reshape(300, 300, 2).astype(np.int32)
+    assert few(pixels) is expected
+    assert few(pixels[::-1]) is expected
+
+
+@pytest.mark.parametrize("value", [-1, np.inf, "soft"])
+def test_bad_options_are_one_sentence(value):
+    with pytest.raises((ValueError, TypeError), match="finish"):
+        run(texture((32, 30)), finish=value)

@@ -1,0 +1,95 @@
+"""The price on use: how often each candidate is a source, and what it costs for that."""
+
+import numpy as np
+import pytest
+from cases import REFERENCE, opencl, problem, problems
+from hypothesis import given, settings
+
+import simdtex
+from simdtex.model.use import effective_use
+from simdtex.ops.use import price, use
+
+
+@given(p=problems(max_order=5))
+@settings(max_examples=20)
+def test_known_sites_are_counted_at_their_sources(machine, p):
+    expected = dict.fromkeys(p.positions(), 0)
+    source = p.source()
+    for i in range(0, p.grid.height, p.grid.spacing):
+        for j in range(0, p.grid.width, p.grid.spacing):
+            place = tuple(int(n) for n in source[i, j])
+            if p.field.temperature[i, j] < 1024 and place in expected:
+                expected[place] += 1
+    for m in (REFERENCE, machine):
+        _, field, _ = p.on(m)
+        found = use(m, field, p.grid, p.candidates(m))
+        assert (found.dtype, found.tolist()) == (np.int32, list(expected.values()))
+
+
+def test_many_sites_of_one_source_are_all_counted(machine):
+    """Work-items that add to one number at once."""
+    p = problem(1, shape=(90, 80), edges="reflect", temperatures="zero")
+    p = p._replace(field=p.field._replace(source=np.full_like(p.field.source, p.candidates(REFERENCE).positions[5])))
+    _, field, _ = p.on(machine)
+    found = use(machine, field, p.grid, p.candidates(machine))
+    assert found[5] == 7200
+    assert found.sum() == 7200
+
+
+def plainly(counts, radius, rate):
+    """The price in Python numbers."""
+    rows, cols = counts.shape
+    found = np.zeros(counts.shape)
+    for i in range(rows):
+        for j in range(cols):
+            here = [
+                int(counts[k, m])
+                for k in range(max(0, i - radius), min(rows, i + radius + 1))
+                for m in range(max(0, j - radius), min(cols, j + radius + 1))
+            ]
+            u = (sum(here) / len(here)) / (int(counts.sum()) / counts.size)
+            found[i, j] = rate * min(4, max(0, u - 1))
+    return found.ravel()
+
+
+@pytest.mark.parametrize("radius", [0, 1, 2, 9])
+def test_the_price_is_the_excess_over_the_fair_share(radius):
+    rng = np.random.default_rng(radius)
+    counts = rng.integers(0, 4, (7, 9)) * (rng.random((7, 9)) < 0.3)
+    counts[2, 3] = 60
+    found = price(counts.ravel(), (7, 9), radius, 12.5)
+    assert found.dtype == np.float32
+    assert np.allclose(found, plainly(counts, radius, 12.5), rtol=1e-6, atol=1e-6)
+    if radius == 1:
+        assert found.max() == 50, "no more than four times the rate"
+        assert found.min() == 0, "what is used less than its share costs nothing"
+
+
+def test_fair_use_costs_nothing():
+    assert not price(np.full(20, 3), (4, 5), 1, 7.0).any()
+
+
+def test_a_price_is_the_mean_of_two_sweeps():
+    counts, before = np.array([8, 0, 0, 0]), np.array([2, 4, 0, 6, 99], np.float32)
+    assert price(counts, (2, 2), 0, 1.0).tolist() == [3, 0, 0, 0]
+    assert price(counts, (2, 2), 0, 1.0, before).tolist() == [2.5, 2, 0, 3]
+
+
+def test_where_nothing_is_known_nothing_costs():
+    nobody = np.zeros(6, np.int32)
+    assert price(nobody, (2, 3), 1, 5.0).tolist() == [0] * 6
+    assert price(nobody + 1, (2, 3), 1, 0.0).tolist() == [0] * 6
+    assert price(nobody, (2, 3), 1, 5.0, np.full(6, 4, np.float32)).tolist() == [2] * 6, "and a price fades"
+
+
+def test_a_run_uses_the_sample_more_evenly(cl_device):
+    """A bright corner of a gradient that nothing but the price would use."""
+    row, col = np.indices((48, 48))
+    sample = (row * 2 + col * 2 + np.random.default_rng(1).integers(0, 40, (48, 48))).astype(np.uint8)
+    share = {}
+    for balance in (0.0, 0.5):
+        _, output = simdtex.synthesize(
+            sample, (96, 96), rng=1, device=opencl(cl_device), balance=balance, full_output=True
+        )
+        share[balance] = effective_use(output.source, sample.shape).effective_share
+    assert share[0.5] > share[0.0] + 0.05
