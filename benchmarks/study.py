@@ -38,22 +38,31 @@ from simdtex.report.sheet import contact_sheet
 MRF = {
     "default": {},
     "search=exact": {"search": "exact"},
+    "balance=0": {"balance": 0.0},
+    "balance=1": {"balance": 1.0},
+    "structure=0": {"structure": 0.0},
+    "structure=1": {"structure": 1.0},
+    "novelty=0": {"novelty": 0.0},
+    "novelty=2": {"novelty": 2.0},
+    "overview=64": {"overview": 64},
+    "finish=0": {"finish": 0.0},
+    "finish=2": {"finish": 2.0},
     "coherence=0": {"coherence": 0.0},
-    "coherence=0.5": {"coherence": 0.5},
     "coherence=1": {"coherence": 1.0},
+    "edges=reflect": {"edges": "reflect"},
     "order=8": {"order": 8},
-    "suggesting=8": {"suggesting": 8},
-    "similar=2": {"similar": 2},
+    "similar=4": {"similar": 4},
+    "suggesting=24": {"suggesting": 24},
     "chance=0": {"chance": 0},
-    "chance=16": {"chance": 16},
-    "exhaustive=1024": {"exhaustive": 1024},
+    "xi=-2": {"xi": -2.0},
     "free_sweeps=0": {"free_sweeps": 0},
 }
 EXACT = {
     "default": {},
     "coherence=0": {"coherence": 0.0},
-    "coherence=0.5": {"coherence": 0.5},
-    "coherence=2": {"coherence": 2.0},
+    "coherence=1": {"coherence": 1.0},
+    "balance=0": {"balance": 0.0},
+    "structure=0": {"structure": 0.0},
     "order=8": {"order": 8},
     "relaxation=gibbs": {"relaxation": "gibbs"},
     "free_sweeps=0": {"free_sweeps": 0},
@@ -66,7 +75,7 @@ EXACT = {
     "preset=paper, icm": {"preset": "paper", "relaxation": "icm", "coarsest": "gibbs"},
     "preset=paper, bandwidth=0.15": {"preset": "paper", "bandwidth": 0.15},
 }
-IN_COLOUR = ("default", "coherence=0", "coherence=0.5", "coherence=2", "order=8", "relaxation=gibbs")
+IN_COLOUR = ("default", "coherence=0", "coherence=1", "balance=0", "structure=0", "order=8", "relaxation=gibbs")
 MULTIRES = {
     "alpha=0": {"alpha": 0.0},
     "alpha=0.05": {"alpha": 0.05},
@@ -120,6 +129,9 @@ UNSEEN = {  # not on the sheets, where they look like others
     "orientations=8",
     "sigma=0.5",
     "sigma=1",
+    "suggesting=24",
+    "xi=-2",
+    "free_sweeps=0",
     "iterations=2",
     "iterations=10",
     "levels=3",
@@ -128,6 +140,7 @@ UNSEEN = {  # not on the sheets, where they look like others
     "edges=wrap",
 }
 FIGURES = ("plausibility", "coverage", "copying", "histogram_distance", "seam")
+OF_MRF = ("plausibility", "coverage", "copying", "repeats", "salt", "contrast", "seam")
 
 
 def repetition(sample, made):
@@ -152,8 +165,8 @@ class Study(NamedTuple):
 STUDIES = {
     "mrf": Study(
         settings=MRF,
-        skipped={"colour": ["free_sweeps=0"], "grey": []},
-        figures=FIGURES,
+        skipped={"colour": [], "grey": []},
+        figures=OF_MRF,
         seeds=3,
         table="mrf.csv",
         prefix="mrf-",
@@ -161,7 +174,7 @@ STUDIES = {
     "exact": Study(
         settings=EXACT,
         skipped={"colour": [setting for setting in EXACT if setting not in IN_COLOUR], "grey": []},
-        figures=FIGURES,
+        figures=OF_MRF,
         seeds=1,
         table="exact.csv",
         prefix="exact-",
@@ -257,7 +270,8 @@ def main():
                     **given,
                 )
                 seconds.append(time.perf_counter() - began)
-                found = {**asdict(measure(sample, made, figures=FIGURES)), "repetition": repetition(sample, made)}
+                wanted = ["tones" if name == "contrast" else name for name in study.figures if name != "repetition"]
+                found = {**asdict(measure(sample, made, figures=wanted)), "repetition": repetition(sample, made)}
                 figures.append([found[figure] for figure in study.figures])
             if given.get("alpha") == "auto":
                 setting = f"{setting} ({output.statistics['options']['alpha']:g})"
