@@ -199,11 +199,13 @@ class Output:
     ----------
     source : (rows, cols, 2) int32 array or None
         For every output pixel the (row, column) of the sample pixel it was taken from; with ``multires``, of the one
-        that its highest frequencies were taken from. None with ``pyramid``, which takes no pixel from anywhere.
+        that its highest frequencies were taken from. With ``mrf`` and a finish, pixels near seams are means of that
+        pixel and of what their neighbours' sources say. None with ``pyramid``, which takes no pixel from anywhere.
     temperature : (rows, cols) float64 array or None
         ``mrf``: what is left of the pixel temperatures, 0 to 1.
     stages : list of Stage
-        Each level's picture at its end, the coarsest first. None with ``pyramid``; its callback sees every iteration.
+        Each level's picture at its end, the coarsest first; of ``mrf`` without the finish. None with ``pyramid``; its
+        callback sees every iteration.
     statistics : dict
         ``device``, ``seed``, ``options``, ``seconds``, ``device_seconds`` (of kernels; None unless the machine was
         opened with ``profile=True``; then there are ``kernels`` and ``gaps`` too, as of

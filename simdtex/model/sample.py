@@ -47,7 +47,8 @@ class Sample:
 
     Eight-bit pixels are their own working levels. Other types are mapped onto 0..top, `top` being 4095 or, for
     neighbourhoods of more than 512 values, the largest 2**b - 1 for which the distance of equation (12) is exact
-    (see `Notes`). Pixels of the output are taken from the sample itself, so nothing is lost there.
+    (see `Notes`). Pixels of the output are taken from the sample itself, or moved from there by the finish in steps of
+    an eighth of a level, so nothing is lost there.
 
     Parameters
     ----------
