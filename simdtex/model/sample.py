@@ -60,6 +60,8 @@ class Sample:
         its outer pixels. Nothing is ever taken from the margin itself.
     weight : float
         Of the structure channel (`simdtex.model.structure`), which is matched like the others and never shown; 0: none.
+    spread : bool
+        Whether grey levels are drawn from a kernel that knows 0..top alone; the structure channel then keeps to it.
 
     Attributes
     ----------
@@ -75,7 +77,9 @@ class Sample:
     each term, has the bits of a device's fma.
     """
 
-    def __init__(self, pixels: NDArray[Any], values: int, margin: int = 0, weight: float = 0.0) -> None:
+    def __init__(
+        self, pixels: NDArray[Any], values: int, margin: int = 0, weight: float = 0.0, spread: bool = False
+    ) -> None:
         self.pixels, self.shown = pixels, pixels.shape[-1]
         planes = np.moveaxis(pixels, -1, 0)
         if pixels.dtype in (np.bool_, np.uint8):
@@ -86,7 +90,8 @@ class Sample:
             stretched, self.unit = stretch(planes, self.top)
             levels = stretched.astype(np.uint16)
         if weight:
-            levels = np.concatenate([levels, structure(levels, weight, variance(levels), max(self.top, STEPS))[None]])
+            most = self.top if spread else max(self.top, STEPS)
+            levels = np.concatenate([levels, structure(levels, weight, variance(levels), most)[None]])
         self._lay(levels, margin)
 
     @classmethod

@@ -93,7 +93,7 @@ def laid_out(machine: Machine, pixels: NDArray[Any], shape: tuple[int, int], opt
     offsets = neighbourhood_offsets(options.order)
     levels = number_of_levels(pixels.shape[:2], offsets, shape, options)  # 1
     channels, margin = pixels.shape[-1] + bool(options.structure), int(offsets.max()) * 2 ** (levels - 1)
-    sample = Sample(pixels, channels * len(offsets), margin, options.structure)
+    sample = Sample(pixels, channels * len(offsets), margin, options.structure, options.pixel == "density")
     schedule = schedules.get(options.schedule)
     _check_memory(machine, sample, shape, options.similar, copies=2 if schedule.tile else 1)
     emulated = bool(options.array) and options.emulate
