@@ -98,7 +98,7 @@ CASES = {
     "novelty-colour": ((12, 11), 3, np.uint8, (8, 9), EXACT | {"novelty": 0.05, "levels": 1, "boundary": "open"}),
     "novelty-density": ((9, 10), None, np.uint8, (6, 7), DENSITY | {"novelty": 0.4, "coarsest": "same"}),
     "novelty-no-mode": ((9, 10), None, np.uint8, (6, 7), EXACT | {"novelty": 9.0, "coarsest": "same", "levels": 1}),
-    "finish-colour": ((12, 11), 3, np.uint8, (8, 7), FEW | {"finish": 0.8, "boundary": "open"}),
+    "finish-colour": ((12, 11), 3, np.uint8, (8, 7), EXACT | {"finish": 0.8, "boundary": "open"}),
     "finish-16-bit": ((12, 11), 2, np.uint16, (8, 7), FEW | {"finish": 2.2}),
     "finish-float32": ((12, 11), None, np.float32, (3, 7), FEW | {"finish": 1.1, "levels": 1, "edges": "reflect"}),
     "finish-nobody-else": ((12, 11), None, np.uint8, (8, 7), FEW | {"finish": 0.3}),
@@ -176,8 +176,7 @@ CLOSE = BARE | {"order": 8, "relaxation": "gibbs", "bandwidth": 0.0005, "coheren
 SUMS = {
     "exact": (3, 1, {"search": "exact", "levels": 1}),
     "all": (2, 3, {"search": "coherent", "levels": 1}),
-    "few": (3, 1, {"search": "coherent", "levels": 2, "exhaustive": 0, "chance": 60}),
-    "similar": (3, 1, {"search": "coherent", "levels": 2, "exhaustive": 0, "chance": 0, "similar": 3}),
+    "few": (3, 1, {"search": "coherent", "levels": 2, "exhaustive": 0, "chance": 60, "order": 18}),
 }
 
 
