@@ -48,6 +48,7 @@
 #ifndef N
 #define N 64 // most neighbours
 #endif
+#define AGAIN 4.0f // what being a neighbour's source costs, over continuing it
 #ifndef STEP
 #define STEP 4 // vectors of candidates in registers together
 #endif
@@ -72,7 +73,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
 
     // 6.2.2.1: the neighbourhood, and which candidates continue a neighbour's source.
     float u[N], xu[N * C];
-    int list[N], next[N], m = 0, sum = g.xi, members = 0;
+    int list[N], next[N], same[N], m = 0, sum = g.xi, members = 0;
     ulong seen = 0;
     const int neighbours = g.neighbours;
     for (int k = 0; k < neighbours; ++k) {
@@ -84,6 +85,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
         sum += r < 0 ? 0 : t;
         members += r < 0 ? 0 : 1;
         next[k] = t < UNTOUCHED ? continuing(index_of, source[r], reach[k], g.pixels) : -1;
+        same[k] = t < UNTOUCHED ? index_of[source[r]] : -1;
         m = proposed(next[k], list, m, &seen);
     }
 
@@ -118,9 +120,12 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
     for (int p = 0; p < g.candidates; ++p)
         d[p] += price[p];
     if (g.novelty > 0.0f)
-        for (int k = 0; k < neighbours; ++k)
+        for (int k = 0; k < neighbours; ++k) {
             if (next[k] >= 0)
                 d[next[k]] += g.novelty;
+            if (same[k] >= 0)
+                d[same[k]] += AGAIN * g.novelty;
+        }
 
     // 6.2.2.2
 #define NUMBER(k) (k)

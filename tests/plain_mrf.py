@@ -9,7 +9,7 @@ to it. The numbers in the comments are the algorithm's own.
 from copy import deepcopy
 from fractions import Fraction
 from itertools import accumulate, product
-from math import exp, isqrt, log, log2, sqrt
+from math import ceil, exp, isqrt, log, log2, sqrt
 from types import SimpleNamespace
 
 import numpy as np
@@ -24,38 +24,46 @@ ALL_IN_LANES = False
 """Whether sums are in lanes also where all candidates are weighed. They are not; True shows that a test can tell."""
 
 LANES = 16
-ENOUGH = 64
+CATEGORIES = 16  # different pixels of a map of categories, at most
+MOST_KEPT = 1024  # candidates of a level that knows novelty, at most
+COMPARED = 1024  # candidates of which each is compared with all, at most
 
 DEFAULTS = {
-    **{"order": 18, "levels": None, "relaxation": "icm", "bandwidth": 0.15, "coherence": None, "xi": -1.0},
+    **{"order": 18, "levels": None, "overview": 256, "relaxation": "icm", "bandwidth": 0.15, "coherence": 0.5},
+    **{"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": None, "xi": -1.0},
     **{"free_sweeps": 2, "pixel": "source", "phases": "decimated", "edges": "auto", "coarsest": "gibbs"},
-    **{"schedule": "coloring", "boundary": "torus", "search": "auto", "suggesting": 24, "similar": 0, "chance": 4},
+    **{"schedule": "coloring", "boundary": "torus", "search": "auto", "suggesting": 12, "similar": 0, "chance": 4},
     "exhaustive": 64,
 }
 PAPER = {
     **{"relaxation": "gibbs", "bandwidth": 1.0, "coherence": 0.0, "free_sweeps": 0, "pixel": "density"},
-    **{"edges": "whole", "coarsest": "same", "search": "exact"},
+    **{"edges": "whole", "coarsest": "same", "search": "exact", "suggesting": 24, "overview": 64},
+    **{"balance": 0.0, "structure": 0.0, "novelty": 0.0, "finish": 0.0},
 }
 
 
-def options(preset="default", **given):
-    """All options, with what ``search="auto"`` and ``coherence=None`` stand for."""
+def options(pixels, preset="default", **given):
+    """All options, with what ``search="auto"`` and ``finish=None`` stand for."""
     o = SimpleNamespace(**DEFAULTS | (PAPER if preset == "paper" else {}) | given)
     if o.search == "auto":
         o.search = "coherent" if (o.relaxation, o.pixel) == ("icm", "source") else "exact"
-    if o.coherence is None:
-        o.coherence = 0.2 if o.search == "coherent" else 1.0
+    if o.finish is None:
+        categories = len({tuple(pixel) for row in pixels.tolist() for pixel in row}) <= CATEGORIES
+        o.finish = 0 if categories or o.pixel == "density" else 1.5
+    if o.pixel == "density":
+        o.structure = 0
     return o
 
 
 def synthesize(pixels, shape, seed, **given):
     """Image, source (row, column) and temperature of every pixel, from a sample (rows, columns, channels)."""
-    o = options(**given)
-    y, top, unit = grey_levels(pixels, o.order)
+    o = options(pixels, **given)
+    y, top, unit = grey_levels(pixels, o)
     levels = number_of_levels(pixels.shape[:2], shape, o)  # 1.
-    X = at_random(y, shape, seed)  # 2., 5.
+    X, level = at_random(y, shape, seed), None  # 2., 5.
     for number in reversed(range(levels)):  # 6.
-        level = Level(number, levels, y, top, shape, seed, o)  # 3., 4., 6.1
+        level = Level(number, levels, y, top, shape, seed, o, level)  # 3., 4., 6.1
+        level.price = prices(level, X)
         cooling = True
 
         def active(level=level):
@@ -67,11 +75,12 @@ def synthesize(pixels, shape, seed, **given):
         cooling = False
         for _ in range(o.free_sweeps):
             sweep(level, X, steps)
-    return picture(pixels, y, unit, X), X.source, X.t / 1024  # 7.
+    image = finished(pixels, y, unit, X, o) if o.finish else picture(pixels, y, unit, X)
+    return image, X.source, X.t / 1024  # 7.
 
 
 def sweep(level, X, steps):
-    """Steps of a schedule until it says that its sweep ends."""
+    """Steps of a schedule until it says that its sweep ends; prices are the same for all of them, and then settle."""
     old = deepcopy(X)  # what tiles see of one another
     for sites, turn, last in steps:  # 6.2.1
         new = [relaxed(level, X, old, s, turn) for s in sites]  # 6.2.2, in parallel: none sees another
@@ -81,6 +90,7 @@ def sweep(level, X, steps):
             X.source[level.pixel(s)] = source
             X.t[level.pixel(s)] = t
         if last:
+            level.price = (prices(level, X) + level.price) / float32(2)
             return
 
 
@@ -92,9 +102,12 @@ def relaxed(level, X, old, s, turn):
         at = None if r is None else level.pixel(r)
         near.append(None if r is None else ([int(x[at]) for x in seen.x], int(seen.t[at]), tuple(seen.source[at])))
 
-    numbers, favoured = candidates_of(level, X, s, near, turn)  # 6.2.2.1: equations (6) and (12)
-    d = distances(level, near, numbers)
+    numbers, favoured, charged = candidates_of(level, X, s, near, turn)  # 6.2.2.1: equations (6) and (12)
+    d = distances(level, near, numbers, level.lanes)
     d = np.where(favoured, d * float32(1 / (1 + level.o.coherence)), d)
+    d = d + level.price[numbers]
+    for p, times in charged if level.novelty else []:  # neighbour by neighbour; the numbers are all candidates
+        d[p] += float32(times) * level.novelty
 
     if level.gibbs:  # 6.2.2.2
         values, p = drawn(level, d, numbers, s, turn)
@@ -114,12 +127,19 @@ def relaxed(level, X, old, s, turn):
 # -- the sample and the levels --------------------------------------------------------------------------------
 
 
-def grey_levels(pixels, order):
-    """Y as whole grey levels from 0 to top, and what 1 of them is in pixels."""
+def grey_levels(pixels, o):
+    """Y as whole grey levels from 0 to top, the structure channel last; and what 1 of them is in pixels."""
     planes = np.moveaxis(pixels, -1, 0)
-    if pixels.dtype == np.uint8:
-        return [plane.astype(int) for plane in planes], 255, 1.0
-    values = len(planes) * len(plain.offsets(order))
+    y, top, unit = ([plane.astype(int) for plane in planes], 255, 1.0)
+    if pixels.dtype != np.uint8:
+        y, top, unit = stretched(pixels, planes, (len(planes) + (o.structure > 0)) * len(plain.offsets(o.order)))
+    if o.structure:
+        y.append(structure(y, o.structure, max(top, 1023)))
+    return y, top, unit
+
+
+def stretched(pixels, planes, values):
+    """The same of pixels of other types than 8 bits."""
     top = 2 ** min(12, int((33 - log2(values)) / 2)) - 1  # so that every distance is exact in float64
     least, most = (Fraction(bound.item()) for bound in (pixels.min(), pixels.max()))
     exact = [[[round((Fraction(v) - least) * top / (most - least)) for v in row] for row in y] for y in planes.tolist()]
@@ -128,8 +148,42 @@ def grey_levels(pixels, order):
 
 def variance(y):
     """sigma^2 of equation (8): the mean over channels."""
-    greys = [plane.ravel().tolist() for plane in y]
-    return sum((len(g) * sum(v * v for v in g) - sum(g) ** 2) / len(g) ** 2 for g in greys) / len(greys)
+    greys, total = [plane.ravel().tolist() for plane in y], 0.0
+    for g in greys:  # Python's own sum of doubles rounds in another way
+        total += (len(g) * sum(v * v for v in g) - sum(g) ** 2) / len(g) ** 2
+    return total / len(greys)
+
+
+def structure(y, weight, most):
+    """The signed distance to the edges of the sample, from 0 up, with this weight where that leaves 0..most alone."""
+    rows, cols = y[0].shape
+    slope = np.zeros((rows, cols), int)
+    for plane in y:
+        smooth = np.zeros((rows, cols), int)
+        for i, j, a, b in product(range(rows), range(cols), range(-2, 3), range(-2, 3)):
+            weights = (1, 4, 6, 4, 1)[a + 2] * (1, 4, 6, 4, 1)[b + 2]
+            smooth[i, j] += weights * plane[clamped(i + a, rows), clamped(j + b, cols)]
+        for i, j in product(range(rows), range(cols)):
+            down = smooth[clamped(i + 1, rows), j] - smooth[clamped(i - 1, rows), j]
+            right = smooth[i, clamped(j + 1, cols)] - smooth[i, clamped(j - 1, cols)]
+            slope[i, j] += down**2 + right**2
+    edge = slope > sorted(slope.ravel())[int(0.85 * (slope.size - 1))]
+    signed = np.zeros((rows, cols), int)  # in 1/256 of a pixel
+    for i, j in product(range(rows), range(cols)):
+        others = np.argwhere(edge != edge[i, j])
+        nearest = min([256, *((others - (i, j)) ** 2).sum(1).tolist()])  # 16 pixels at most
+        signed[i, j] = round(sqrt(nearest) * 256) * (-1 if edge[i, j] else 1)
+    signed -= signed.min()
+    spread = sqrt(variance([signed]))
+    if not spread:
+        return signed
+    scale = min(weight * sqrt(variance(y)) / spread, most / int(signed.max()))
+    return np.array([[round(v * scale) for v in row] for row in signed.tolist()])
+
+
+def clamped(i, n):
+    """Index i brought to 0 .. n-1: the outermost stands for all beyond."""
+    return min(max(i, 0), n - 1)
 
 
 def at_random(y, shape, seed):
@@ -157,7 +211,7 @@ def number_of_levels(sample, shape, o):
         assert o.levels <= most
         return o.levels
     levels = 1
-    while levels < most and enough(levels + 1, ENOUGH) and min(shape) > 2 * radius * 2**levels:
+    while levels < most and enough(levels + 1, o.overview) and min(shape) > 2 * radius * 2**levels:
         levels += 1
     return levels
 
@@ -165,8 +219,8 @@ def number_of_levels(sample, shape, o):
 class Level:
     """One level: its lattice, its neighbourhoods, its candidates and the Gaussian of equation (7)."""
 
-    def __init__(self, number, levels, y, top, shape, seed, o):
-        """Equations (8), (10) and (11)."""
+    def __init__(self, number, levels, y, top, shape, seed, o, above=None):
+        """Equations (8), (10) and (11); ``above`` is the next coarser level."""
         self.number, self.spacing, self.width, self.seed, self.o = number, 2**number, shape[1], seed, o
         self.rows, self.cols = plain.grid_size(shape, self.spacing)
         self.sites = list(product(range(self.rows), range(self.cols)))
@@ -180,6 +234,12 @@ class Level:
         self.number_of = {place: p for p, place in enumerate(self.places)}
         self.own = np.array([[plane[p] for p in self.places] for plane in y])
         self.around = np.array([[self.beside(plane, offset) for plane in y] for offset in self.offsets])
+
+        radius, step = isqrt(o.order), 1 if o.phases == "all" else self.spacing
+        self.step, self.above, self.found = step, above, None
+        self.pitch = y[0].shape[1] + 2 * radius * 2 ** (levels - 1)  # of the sample with its margin
+        self.lattice = tuple(len({place[axis] for place in self.places}) for axis in (0, 1))
+        self.blur = radius * self.spacing // step  # candidates from one to the edge of its neighbourhood
 
         n, dimensions = len(self.places), len(y) * (len(self.offsets) + 1)
         best = sqrt(variance(y)) * pow(4 / (n * (2 * dimensions + 1)), 1 / (dimensions + 4))  # (8)
@@ -195,7 +255,11 @@ class Level:
         self.gibbs = o.relaxation == "gibbs" or (coarsest and o.coarsest == "gibbs")
         self.all = not coherent or coarsest or n <= o.exhaustive
         self.lanes = LANES if ALL_IN_LANES or not self.all else 1
-        self.similar = [self.most_similar(p) for p in range(n)] if not self.all and o.similar else None
+        self.similar = similar(self) if not self.all and o.similar else None
+
+        self.rate = o.balance * len(self.offsets) * len(y) * variance(y)
+        anew = coarsest and n <= MOST_KEPT and (self.gibbs or o.pixel == "source")
+        self.novelty = float32(o.novelty * len(y) * variance(y) if anew else 0)
 
     def pixel(self, s):
         """The pixel of X that a site of the level's lattice is."""
@@ -215,39 +279,107 @@ class Level:
         there = [(i + offset[0] * self.spacing, j + offset[1] * self.spacing) for i, j in self.places]
         return [plane[within(i, rows, False), within(j, cols, False)] for i, j in there]
 
-    def most_similar(self, p):
-        """The other candidates, nearest neighbourhood first, as many as asked for."""
-        d = np.zeros(len(self.places), float32)
-        for planes in self.around:
-            for y in planes:
-                d = ((y - y[p]) ** 2 + d.astype(float)).astype(float32)
-        others = sorted((q for q in range(len(d)) if q != p), key=lambda q: d[q])
-        return others[: self.o.similar]
-
 
 def positions(shape, spacing, o):
     """The candidates of a level, row by row."""
     step = 1 if o.phases == "all" else spacing
     every = list(product(range(0, shape[0], step), range(0, shape[1], step)))
     whole = plain.whole_positions(shape, o.order, spacing, step)
-    reflect = o.edges == "reflect" or (o.edges == "auto" and len(whole) < 0.75 * len(every))
+    reflect = o.edges == "reflect" or (o.edges == "auto" and (spacing > 1 or len(whole) < 0.75 * len(every)))
     return every if reflect else whole
+
+
+def similar(level):
+    """For each candidate the K most similar others, nearest neighbourhood first; itself where there are too few."""
+    if level.found is None:
+        everyone = range(len(level.places))
+        if len(everyone) <= COMPARED:
+            level.found = [most_similar(level, p, everyone) for p in everyone]
+        else:
+            level.found = approximately_similar(level)
+    return level.found
+
+
+def approximately_similar(level):
+    """The same of many candidates: who is like p lies to it as who is like one of p's kin lies to that."""
+    everyone, k = range(len(level.places)), level.o.similar
+    at = [i * level.pitch + j for i, j in level.places]  # pixels of the sample with its margin
+    number_at = {pixel: p for p, pixel in enumerate(at)}
+
+    def moves(table, at):
+        return [[at[q] - at[p] for q in row] for p, row in enumerate(table)]
+
+    if level.above is None:
+        drawn = [[words(0, 0, 0, p, random.SEARCH, n // 4)[n % 4] * len(at) >> 32 for n in range(k)] for p in everyone]
+        kin, moved, rounds = list(everyone), moves(drawn, at), 6
+    else:
+        above = level.above
+        lines = [sorted({place[axis] for place in above.places}) for axis in (0, 1)]
+        before = [
+            tuple(max([line for line in lines[axis] if line <= place[axis]] or lines[axis][:1]) for axis in (0, 1))
+            for place in level.places
+        ]
+        kin = [above.number_of[place] for place in before]
+        moved, rounds = moves(similar(above), [i * level.pitch + j for i, j in above.places]), 2
+    for _ in range(rounds):
+        found = []
+        for p in everyone:
+            around = [at[p] + (a * level.pitch + b) * level.step for a in (-1, 0, 1) for b in (-1, 0, 1)]
+            those = [kin[number_at[pixel]] for pixel in around if pixel in number_at]
+            there = {at[p] + move for row in those for move in moved[row]}
+            found.append(most_similar(level, p, sorted(number_at[pixel] for pixel in there & number_at.keys())))
+        kin, moved = list(everyone), moves(found, at)
+    return found
+
+
+def most_similar(level, p, numbers):
+    """The K of these most similar to p, but for those next to it; the lowest number where several are as near."""
+    (i, j), near = level.places[p], level.step
+    others = [q for q in numbers if max(abs(level.places[q][0] - i), abs(level.places[q][1] - j)) > near]
+    here = [([y[p] for y in planes], 0, None) for planes in level.around]
+    d = distances(level, here, others, LANES)
+    nearest = [q for _, q in sorted(zip(d, others, strict=True))][: level.o.similar]
+    return nearest + [p] * (level.o.similar - len(nearest))
+
+
+def prices(level, X):
+    """What each candidate costs, lambda N C sigma^2 min(4, max(0, u - 1)).
+
+    u is the use of the square around it over its fair share: the square is as wide as the neighbourhood, as far as it
+    lies among the candidates, and only pixels with t < 1 use their source.
+    """
+    used = np.zeros(len(level.places), int)
+    for s in level.sites:
+        p = level.number_of.get(tuple(X.source[level.pixel(s)]))
+        if X.t[level.pixel(s)] < 1024 and p is not None:
+            used[p] += 1
+    total, used = int(used.sum()), used.reshape(level.lattice)
+    price = np.zeros(level.lattice, float32)
+    for a, b in np.ndindex(*level.lattice) if total else []:
+        square = used[max(0, a - level.blur) : a + level.blur + 1, max(0, b - level.blur) : b + level.blur + 1]
+        u = int(square.sum()) * used.size / (square.size * total)
+        price[a, b] = float32(level.rate * min(4, max(0, u - 1)))
+    return price.ravel()
 
 
 # -- 6.2.2.1: what a site weighs ------------------------------------------------------------------------------
 
 
 def candidates_of(level, X, s, near, turn):
-    """The numbers of the candidates that a site weighs, and which of them continue a neighbour's source."""
+    """The numbers of the candidates that a site weighs; which of them continue a neighbour's source; and the number of
+    each that does so, once for every such neighbour, and of each that is a neighbour's source, which counts 4 times.
+    """
     o = level.o
-    suggested = []
+    suggested, charged = [], []
     for (di, dj), r in list(zip(level.offsets, near, strict=True))[: None if level.all else o.suggesting]:
         if r is None or r[1] == 1024:  # as nothing has touched it yet
             continue
         i, j = r[2]
         suggested.append(level.number_of.get((i - di * level.spacing, j - dj * level.spacing)))
+        charged += [(suggested[-1], 1), (level.number_of.get((i, j)), 4)]
     if level.all:
-        return list(range(len(level.places))), [p in suggested for p in range(len(level.places))]
+        numbers = list(range(len(level.places)))
+        return numbers, [p in suggested for p in numbers], [(p, n) for p, n in charged if p is not None]
 
     found = list(dict.fromkeys(p for p in suggested if p is not None))
     favoured = len(found)
@@ -259,22 +391,22 @@ def candidates_of(level, X, s, near, turn):
         word = words(level.seed, level.number, turn, level.index(s), random.SEARCH, k // 4)[k % 4]
         found.append(word * len(level.places) >> 32)
     found = list(dict.fromkeys(found))
-    return found, [k < favoured for k in range(len(found))]
+    return found, [k < favoured for k in range(len(found))], []
 
 
-def distances(level, near, numbers):
+def distances(level, near, numbers, lanes):
     """d_p of equation (12) for each candidate, rounded after each term.
 
     In lanes there is a sum for each column, modulo 16, of the square around the neighbourhood, which is gone through
     row by row; a tree adds them up.
     """
-    d = np.zeros((level.lanes, len(numbers)), float32)
+    d = np.zeros((lanes, len(numbers)), float32)
     inside = [k for k, r in enumerate(near) if r is not None]
-    if level.lanes > 1:
+    if lanes > 1:
         inside.sort(key=lambda k: level.offsets[k])
     for k in inside:
         x, t, _ = near[k]
-        lane = (level.offsets[k][1] + isqrt(level.o.order)) % level.lanes
+        lane = (level.offsets[k][1] + isqrt(level.o.order)) % lanes
         for x_r, y_r in zip(x, level.around[k], strict=True):
             e = (x_r - y_r[numbers]) * ((1024 - t) / 1024)
             d[lane] = (e * e + d[lane].astype(float)).astype(float32)  # the double is exact
@@ -352,16 +484,47 @@ def mode_of_vectors(level, d, numbers):
 
 
 def picture(pixels, y, unit, X):
-    """Each pixel that of its source, moved by what the grey level differs, within the legal range."""
-    image = np.zeros((*X.t.shape, len(y)), pixels.dtype)
-    low, high = (0, 255) if pixels.dtype == np.uint8 else (pixels.min().item(), pixels.max().item())
+    """Each pixel that of its source, moved by what the grey level differs."""
+    image = np.zeros((*X.t.shape, pixels.shape[-1]), pixels.dtype)
     for i, j, c in np.ndindex(image.shape):
         place = tuple(X.source[i, j])
-        own = pixels[(*place, c)].item()
-        step = int(X.x[c][i, j] - y[c][place])
-        moved = own + step * unit if pixels.dtype.kind == "f" else round(own + step * unit)
-        image[i, j, c] = min(max(moved, low), high) if step else own
+        image[i, j, c] = moved(pixels, (*place, c), int(X.x[c][i, j] - y[c][place]), unit)
     return image
+
+
+def finished(pixels, y, unit, X, o):
+    """Each pixel the weighted mean of what its neighbours' sources say of it: Y[p_r + s - r], r up to 2.5 sd from s.
+
+    Weights are whole 1/1024. The mean is rounded, halves up, to a grey level of 8 bits and to 1/8 of one of others.
+    """
+    (rows, cols), (height, width), radius = X.t.shape, y[0].shape, ceil(2.5 * o.finish)
+    image = np.zeros((rows, cols, pixels.shape[-1]), pixels.dtype)
+    fine = 1 if pixels.dtype == np.uint8 else 8
+    for i, j in np.ndindex(rows, cols):
+        own, total, sums = tuple(X.source[i, j].tolist()), 0, [0] * pixels.shape[-1]
+        for a, b in product(range(-radius, radius + 1), repeat=2):
+            r = ((i + a) % rows, (j + b) % cols) if o.boundary == "torus" else (i + a, j + b)
+            far, outside = a * a + b * b > (2.5 * o.finish) ** 2, not (0 <= r[0] < rows and 0 <= r[1] < cols)
+            if far or outside or (r == (i, j) and (a, b) != (0, 0)):
+                continue
+            k, m = X.source[r].tolist()
+            if 0 <= k - a < height and 0 <= m - b < width:
+                weight = round(1024 * exp(-(a * a + b * b) / (2 * o.finish**2)))
+                total += weight
+                for c in range(pixels.shape[-1]):  # not the structure channel
+                    sums[c] += weight * int(y[c][k - a, m - b] - y[c][own])
+        for c in range(pixels.shape[-1]):
+            step = (2 * fine * sums[c] + total) // (2 * total)
+            image[i, j, c] = moved(pixels, (*own, c), step, unit / fine)
+    return image
+
+
+def moved(pixels, at, step, unit):
+    """A value of the sample moved by so many steps, within the legal range."""
+    low, high = (0, 255) if pixels.dtype == np.uint8 else (pixels.min().item(), pixels.max().item())
+    own = pixels[at].item()
+    value = own + step * unit if pixels.dtype.kind == "f" else round(own + step * unit)
+    return min(max(value, low), high) if step else own
 
 
 # -- numbers --------------------------------------------------------------------------------------------------

@@ -14,17 +14,24 @@ from simdtex.methods.mrf import PRESETS, Options
 
 SEED = 2**40 + 3
 
-EXACT = {"search": "exact", "order": 2, "levels": 2}
-FEW = {"search": "coherent", "order": 2, "levels": 2, "exhaustive": 0}
+BARE = {"balance": 0.0, "structure": 0.0, "novelty": 0.0, "finish": 0.0, "overview": 64, "suggesting": 24}
+"""Nothing but the equations of the paper in distances and pictures."""
+EXACT = BARE | {"search": "exact", "order": 2, "levels": 2, "coherence": 1.0}
+FEW = BARE | {"search": "coherent", "order": 2, "levels": 2, "exhaustive": 0, "coherence": 0.2}
 """Coherent search that weighs a few candidates at every level but the coarsest."""
-DENSITY = {"pixel": "density", "order": 1, "xi": -4.0, "free_sweeps": 1}
+DENSITY = BARE | {"pixel": "density", "order": 1, "xi": -4.0, "free_sweeps": 1, "coherence": 1.0}
+MORE = {"order": 2, "levels": 2}
+"""The prices, the structure channel and the finish of the defaults, all together."""
+MORE_OF_A_DENSITY = {"relaxation": "gibbs", "balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": 1.5}
 
 # sample shape, channels, type, output shape, options
 CASES = {
     "defaults": ((9, 10), None, np.uint8, (3, 4), {}),
-    "default-levels-by-candidates": ((16, 17), None, np.uint8, (18, 17), {"order": 1}),
-    "default-levels-by-output": ((32, 33), None, np.uint8, (10, 8), {"order": 2}),
-    "default-levels-whole": ((20, 19), None, np.uint8, (11, 9), {"order": 2, "edges": "whole", "phases": "all"}),
+    "default-levels-by-candidates": ((16, 17), None, np.uint8, (18, 17), BARE | {"order": 1}),
+    "default-levels-by-output": ((32, 33), None, np.uint8, (10, 8), BARE | {"order": 2}),
+    "default-levels-whole": ((20, 19), None, np.uint8, (11, 9), BARE | {"order": 2, "edges": "whole", "phases": "all"}),
+    "default-overview": ((32, 33), None, np.uint8, (9, 8), {"order": 1}),
+    "default-overview-whole": ((20, 19), None, np.uint8, (9, 8), {"order": 1, "edges": "whole", "phases": "all"}),
     "paper": ((12, 11), None, np.uint8, (8, 9), {"preset": "paper", "order": 2}),
     "paper-icm": ((12, 11), None, np.uint8, (5, 6), {"preset": "paper", "order": 1, "relaxation": "icm", "xi": -4.0}),
     "exact": ((12, 11), None, np.uint8, (8, 9), EXACT),
@@ -58,9 +65,9 @@ CASES = {
     "few-same": ((12, 11), None, np.uint8, (8, 9), FEW | {"coarsest": "same"}),
     "few-gibbs": ((12, 11), None, np.uint16, (8, 9), FEW | {"relaxation": "gibbs", "bandwidth": 0.5, "suggesting": 2}),
     "few-gibbs-density": ((10, 9), 2, np.uint8, (7, 8), FEW | {"relaxation": "gibbs", "pixel": "density", "chance": 6}),
-    "all-of-many": ((35, 31), None, np.float32, (5, 6), {"order": 2, "levels": 1, "coarsest": "same"}),
-    "seam": ((9, 9), None, np.uint8, (7, 11), {"search": "exact", "order": 5, "levels": 1, "xi": -8.0}),
-    "a-row": ((9, 8), None, np.uint8, (1, 13), {"order": 2}),
+    "all-of-many": ((35, 31), None, np.float32, (5, 6), BARE | {"order": 2, "levels": 1, "coarsest": "same"}),
+    "seam": ((9, 9), None, np.uint8, (7, 11), BARE | {"search": "exact", "order": 5, "levels": 1, "xi": -8.0}),
+    "a-row": ((9, 8), None, np.uint8, (1, 13), BARE | {"order": 2}),
     **{
         f"{schedule}-{how}": ((9, 10), None, np.uint8, (8, 9), options | {"schedule": schedule})
         for schedule in ("coloring-fixed", "synchronous", "checkerboard", "block:3x4", "luby", "random-subset:0.3")
@@ -71,11 +78,54 @@ CASES = {
         for schedule in ("raster", "random-scan")
         for how, options in (("exact", EXACT | {"levels": 1, "xi": -4.0}), ("few", FEW))
     },
-    "block": ((9, 8), None, np.uint8, (3, 17), {"schedule": "block", "order": 1, "levels": 1}),
+    "block": ((9, 8), None, np.uint8, (3, 17), BARE | {"schedule": "block", "order": 1, "levels": 1}),
     "random-subset": ((9, 10), None, np.uint8, (8, 9), FEW | {"schedule": "random-subset", "boundary": "open"}),
+    **{
+        f"{option}-{how}": ((12, 11), None, np.uint8, (9, 10), options | {option: value})
+        for option, value in (("balance", 0.5), ("structure", 2.0), ("novelty", 1.0), ("finish", 1.5))
+        for how, options in (("exact", EXACT), ("few", FEW))
+    },
+    "balance-cap": ((12, 13), None, np.uint8, (11, 10), FEW | {"balance": 0.1, "order": 1, "coarsest": "same"}),
+    "balance-order-9": ((13, 14), None, np.uint8, (9, 8), FEW | {"balance": 1.0, "order": 9, "schedule": "block:3x4"}),
+    "balance-all-phases": ((14, 13), None, np.uint8, (8, 9), EXACT | {"balance": 1.0, "phases": "all"}),
+    "balance-gibbs": ((12, 11), 2, np.uint16, (8, 9), FEW | {"balance": 0.3, "relaxation": "gibbs", "bandwidth": 0.5}),
+    "balance-density": ((9, 10), None, np.uint8, (6, 7), DENSITY | {"balance": 0.5, "levels": 2, "bandwidth": 0.3}),
+    "structure-colour": ((12, 11), 3, np.uint8, (8, 7), FEW | {"structure": 0.7, "boundary": "open"}),
+    "structure-beyond-top": ((13, 12), None, np.float32, (8, 9), FEW | {"structure": 50.0}),
+    "structure-beyond-8-bit": ((13, 12), None, np.uint8, (8, 9), FEW | {"structure": 50.0}),
+    "structure-density": ((10, 11), None, np.uint8, (6, 7), DENSITY | {"structure": 3.0, "levels": 2}),
+    "structure-density-gibbs": ((9, 10), None, np.uint8, (6, 7), DENSITY | {"structure": 3.0, "relaxation": "gibbs"}),
+    "novelty-colour": ((12, 11), 3, np.uint8, (8, 9), EXACT | {"novelty": 0.05, "levels": 1, "boundary": "open"}),
+    "novelty-density": ((9, 10), None, np.uint8, (6, 7), DENSITY | {"novelty": 0.4, "coarsest": "same"}),
+    "novelty-no-mode": ((9, 10), None, np.uint8, (6, 7), EXACT | {"novelty": 9.0, "coarsest": "same", "levels": 1}),
+    "finish-colour": ((12, 11), 3, np.uint8, (8, 7), EXACT | {"finish": 0.8, "boundary": "open"}),
+    "finish-16-bit": ((12, 11), 2, np.uint16, (8, 7), FEW | {"finish": 2.2}),
+    "finish-float32": ((12, 11), None, np.float32, (3, 7), FEW | {"finish": 1.1, "levels": 1, "edges": "reflect"}),
+    "finish-nobody-else": ((12, 11), None, np.uint8, (8, 7), FEW | {"finish": 0.3}),
+    "finish-density": ((9, 10), None, np.uint8, (6, 7), DENSITY | {"finish": 1.0}),
+    "more": ((14, 13), None, np.uint8, (9, 10), MORE),
+    "more-three-levels": ((24, 25), None, np.uint8, (12, 11), MORE | {"levels": 3}),
+    "more-colour": ((13, 14), 3, np.uint8, (9, 8), MORE | {"boundary": "open", "exhaustive": 0}),
+    "more-16-bit": ((14, 13), None, np.uint16, (8, 9), MORE | {"order": 5, "similar": 2}),
+    "more-float32": ((13, 12), 2, np.float32, (9, 8), MORE | {"schedule": "block:3x4", "phases": "all"}),
+    "more-whole": ((16, 15), None, np.uint8, (9, 8), MORE | {"edges": "whole", "phases": "all", "balance": 2.0}),
+    "more-exact": ((12, 11), None, np.uint8, (9, 8), MORE | {"search": "exact", "schedule": "random-scan", "xi": -8.0}),
+    "more-gibbs": ((12, 11), None, np.uint16, (8, 9), MORE | {"relaxation": "gibbs", "bandwidth": 0.5}),
+    "more-gibbs-few": ((12, 11), 2, np.float32, (8, 9), MORE | {"relaxation": "gibbs", "search": "coherent"}),
+    "more-density": ((10, 9), 2, np.uint8, (6, 7), MORE | {"pixel": "density", "xi": -4.0, "bandwidth": 0.4}),
+    "more-gibbs-density": ((10, 9), None, np.uint8, (7, 6), DENSITY | MORE_OF_A_DENSITY),
+    "exact-of-many": ((36, 35), None, np.uint8, (6, 5), MORE | {"levels": 1, "search": "exact", "xi": -4.0}),
+    "exact-of-many-same": ((36, 35), 2, np.uint8, (5, 6), MORE | {"levels": 1, "coarsest": "same", "xi": -4.0}),
+    "similar-of-many": ((37, 36), None, np.uint8, (7, 8), FEW | {"similar": 3, "balance": 0.5}),
+    "similar-from-nowhere": ((35, 34), None, np.uint8, (6, 5), FEW | {"similar": 5, "phases": "all", "order": 1}),
+    "similar-whole": ((38, 37), None, np.uint8, (6, 5), FEW | {"similar": 2, "edges": "whole", "phases": "all"}),
+    "similar-of-too-few": ((5, 6), None, np.uint8, (8, 7), FEW | {"similar": 40, "edges": "reflect"}),
 }
 
-ON_A_DEVICE = ("exact-colour", "paper", "few-similar", "few-gibbs-density")
+ON_A_DEVICE = (
+    *("exact-colour", "paper", "few-similar", "few-gibbs-density"),
+    *("more-colour", "more-density", "exact-of-many-same", "similar-of-many", "similar-of-too-few"),
+)
 
 
 def run(sample_shape, channels, dtype, shape, options, device=REFERENCE):
@@ -104,13 +154,29 @@ def test_a_run_on_a_device_is_algorithm_1(machine, name):
     assert_same_bits(run(*CASES[name], machine)[0], plainly(*CASES[name]))
 
 
-CLOSE = {"order": 8, "relaxation": "gibbs", "bandwidth": 0.0005, "coherence": 0.0, "xi": -8.0}
+@pytest.mark.parametrize("given", [{}, {"finish": 1.5}], ids=["default", "given"])
+@pytest.mark.parametrize("colours", [16, 17])
+def test_a_map_of_categories_keeps_its_own(colours, given):
+    """Sixteen different pixels or fewer are one: unless it is asked for, no finish makes a new one of them."""
+    numbers = np.random.default_rng(3).integers(0, colours, (9, 10))
+    numbers.ravel()[:colours] = np.arange(colours)
+    sample = np.stack([numbers % 4 * 60, numbers // 4 * 50], -1).astype(np.uint8)
+    options = MORE | {"levels": 1} | given
+    image, output = simdtex.synthesize(
+        sample, (8, 7), channel_axis=-1, rng=SEED, device=REFERENCE, full_output=True, **options
+    )
+    assert_same_bits([image, output.source, output.temperature], plain_mrf.synthesize(sample, (8, 7), SEED, **options))
+    own = {tuple(pixel) for pixel in sample.reshape(-1, 2).tolist()}
+    assert (own >= {tuple(pixel) for pixel in image.reshape(-1, 2).tolist()}) == (colours == 16 and not given)
+
+
+CLOSE = BARE | {"order": 8, "relaxation": "gibbs", "bandwidth": 0.0005, "coherence": 0.0, "xi": -8.0}
 """Candidates that differ by the same few amounts differ in the rounding alone; so narrow a Gaussian tells."""
 # The sample's grey levels and channels, and options.
 SUMS = {
     "exact": (3, 1, {"search": "exact", "levels": 1}),
     "all": (2, 3, {"search": "coherent", "levels": 1}),
-    "few": (3, 1, {"search": "coherent", "levels": 2, "exhaustive": 0, "chance": 60}),
+    "few": (3, 1, {"search": "coherent", "levels": 2, "exhaustive": 0, "chance": 60, "order": 18}),
 }
 
 
@@ -158,7 +224,12 @@ CHANGES = {
         (FEW | {"relaxation": "gibbs", "coarsest": "same"}, 0.5, 1.0),
         (DENSITY | {"coarsest": "same"}, 0.15, 1.0),
     ],
-    "coherence": [(EXACT, None, 0.0), (FEW, None, 1.0), (FEW, None, 0.0), (FEW | {"relaxation": "gibbs"}, None, 3.0)],
+    "coherence": [(EXACT, 1.0, 0.0), (FEW, 0.2, 1.0), (FEW, 0.2, 0.0), (FEW | {"relaxation": "gibbs"}, 0.2, 3.0)],
+    "overview": [({"order": 2}, 256, 90), ({"order": 2, "search": "exact"}, 91, 90)],
+    "balance": [(EXACT, 0.0, 0.5), (FEW, 0.0, 0.5), (MORE, 0.5, 0.6), (DENSITY, 0.0, 0.5)],
+    "structure": [(EXACT, 0.0, 0.5), (FEW, 0.0, 2.0), (MORE, 2.0, 1.5), (DENSITY, 0.0, 2.0)],
+    "novelty": [(EXACT, 0.0, 1.0), (FEW, 0.0, 1.0), (MORE, 1.0, 0.5), (DENSITY, 0.0, 1.0)],
+    "finish": [(EXACT, 0.0, None), (FEW, 0.0, 0.8), (MORE, None, 1.4), (DENSITY, None, 1.5)],
     "xi": [(EXACT, -1.0, -4.0), (FEW, -1.0, -4.0), (FEW, -1.0, -1.1)],
     "free_sweeps": [(EXACT, 2, 0), (FEW, 2, 0), (FEW | {"relaxation": "gibbs"}, 2, 1)],
     "pixel": [(EXACT, "source", "density"), (FEW | {"relaxation": "gibbs"}, "source", "density")],

@@ -39,8 +39,13 @@ REFUSED = [
     ),
     ("order", 0, "order 0 has no neighbours; give 1 "),
     ("levels", 0, "levels is 0; give 1 or more"),
+    ("overview", 0, "overview is 0; give 1 or more"),
     ("bandwidth", 0, "bandwidth is 0; give a number above 0"),
     ("coherence", -0.1, "coherence is -0.1; give a number of at least 0"),
+    *(
+        (name, -0.1, f"{name} is -0.1; give a number of at least 0")
+        for name in ("balance", "structure", "novelty", "finish")
+    ),
     ("xi", 0, "xi is 0; give a number below 0"),
     ("xi", math.nan, "xi is nan; give a number of at least -inf"),
     ("free_sweeps", -1, "free_sweeps is -1; give 0 or more"),
@@ -62,7 +67,8 @@ def test_every_option_is_refused_by_its_name(name, value, words):
 
 def test_the_least_of_every_option_is_accepted():
     least = {"order": 1, "levels": 1, "coherence": 0, "free_sweeps": 0}
-    mrf.make_options(**least, suggesting=1, similar=0, chance=0, exhaustive=0)
+    mrf.make_options(**least, suggesting=1, similar=0, chance=0, exhaustive=0, overview=1)
+    mrf.make_options(balance=0, structure=0, novelty=0, finish=0)
 
 
 def test_a_list_finds_no_mode_of_a_density():
@@ -73,13 +79,24 @@ def test_a_list_finds_no_mode_of_a_density():
 
 def test_options_resolve():
     def resolved(**given):
-        found = mrf.make_options(**given).resolved()
-        return found.search, found.coherence
+        found = mrf.make_options(**given).resolved(np.arange(17).reshape(1, 17, 1))
+        return found.search, found.finish
 
-    assert resolved() == ("coherent", 0.2)
-    assert resolved(relaxation="gibbs") == resolved(pixel="density") == ("exact", 1.0)
-    assert resolved(search="exact", coherence=0.5) == ("exact", 0.5)
-    assert resolved(search="coherent", relaxation="gibbs") == ("coherent", 0.2)
+    assert resolved() == ("coherent", 1.5)
+    assert resolved(relaxation="gibbs") == ("exact", 1.5)
+    assert resolved(pixel="density") == ("exact", 0.0)
+    assert resolved(search="exact", finish=0.5) == ("exact", 0.5)
+    assert resolved(search="coherent", relaxation="gibbs", finish=0) == ("coherent", 0)
+    assert resolved(pixel="density", finish=0.5) == ("exact", 0.5)
+
+
+def test_a_sample_of_sixteen_different_pixels_is_a_map_of_categories():
+    late = np.zeros((300, 300, 2), np.uint8)
+    late[299, 284:, 1] = np.arange(16)  # in its last few pixels, and one of them is the 0 of all others
+    for changed, finish in ((16, 0.0), (17, 1.5)):
+        late[0, 0] = (7, 0) if changed == 17 else 0
+        assert mrf.make_options().resolved(late).finish == finish
+    assert mrf.make_options(finish=1.5).resolved(late[1:]).finish == 1.5
 
 
 # -- levels -------------------------------------------------------------------------------------------------------
@@ -102,6 +119,8 @@ def test_a_neighbourhood_that_does_not_fit():
     [
         ((16, 16), (64, 64), {"order": 1}, 2),  # 8 x 8 candidates are 64
         ((15, 16), (64, 64), {"order": 1}, 1),
+        ((32, 33), (64, 64), {"order": 1, "overview": 256}, 2),
+        ((31, 33), (64, 64), {"order": 1, "overview": 256}, 1),
         ((15, 16), (64, 64), {"order": 1, "phases": "all"}, 4),
         ((64, 64), (5, 64), {"order": 1}, 2),
         ((64, 64), (4, 64), {"order": 1}, 1),
@@ -116,7 +135,7 @@ def test_a_neighbourhood_that_does_not_fit():
     ],
 )
 def test_how_many_levels(sample, shape, given, expected):
-    options = mrf.make_options(**given)
+    options = mrf.make_options(**{"overview": 64} | given)
     offsets = neighbourhood_offsets(options.order)
     if isinstance(expected, int):
         assert number_of_levels(sample, offsets, shape, options) == expected
@@ -146,10 +165,15 @@ def test_the_memory_that_is_asked_for(monkeypatch):
     asked = []
     monkeypatch.setattr(type(REFERENCE), "require", lambda self, needed: asked.append(needed))
     prepared()
-    prepared(similar=3, schedule="block", levels=1)
+    prepared(similar=3, schedule="block", levels=1, structure=0)
     laid_out(REFERENCE, texture((24, 25), 3), (20, 23), mrf.Options(order=2, levels=1), 5)
     coarse, fine = (24 + 8) * (25 + 8), (24 + 2) * (25 + 2)  # with the margin of the coarsest level
-    assert asked == [460 * (12 + 8) + coarse * 165, 460 * (12 + 16) + fine * 177, 460 * (12 + 12) + fine * 193]
+    each = 14, 159  # for every channel and pixel of the sample; the structure channel is one
+    assert asked == [
+        460 * (12 + 10) + coarse * (2 * each[0] + each[1]),
+        460 * (12 + 16) + fine * (each[0] + each[1] + 3 * 4),
+        460 * (12 + 14) + fine * (4 * each[0] + each[1]),
+    ]
 
 
 @pytest.mark.parametrize(
@@ -200,7 +224,7 @@ def test_neighbours_that_relax_together_are_counted_once(monkeypatch):
     run, told, work = prepared(schedule="synchronous", search="exact"), [], []
     level = run.level(2)
     monkeypatch.setattr(type(REFERENCE), "sync", lambda self, more=0: work.append(more))
-    for scratch, pieces in ((REFERENCE.scratch, 1), (8 * (600 + 8 * 2) * 7, 5)):  # 7 sites at once
+    for scratch, pieces in ((REFERENCE.scratch, 1), (8 * (600 + 8 * 3) * 7, 5)):  # 7 sites at once
         monkeypatch.setattr(REFERENCE, "scratch", scratch)
         _, info = sweep(level, enter(level, begin(run)), watch=lambda *seen: told.append(seen[-1]))
         assert info.ended is False  # only a run knows
@@ -208,7 +232,7 @@ def test_neighbours_that_relax_together_are_counted_once(monkeypatch):
         assert [part.sites for part in told] == sites
         assert [part.steps for part in told] == [1] + [0] * (pieces - 1)
         assert [part.last for part in told] == [False] * (pieces - 1) + [True]
-        assert sum(work) == 30 * 2 * 600 * 8
+        assert sum(work) == 30 * 2 * 600 * 8 * 2  # channels, one of them that of the structure
         told.clear()
         work.clear()
 
@@ -352,7 +376,7 @@ def test_a_run_is_counted(given):
         assert report["candidates"] == 600
         few = given.get("search") != "exact" and number < 2
         assert (0 < report["weighed"] <= 13) if few else report["weighed"] == 600
-        assert report["fma"] == round(report["weighed"] * report["relaxations"]) * 16
+        assert report["fma"] == round(report["weighed"] * report["relaxations"]) * 16 * 2
     assert sum(report["relaxations"] for report in statistics["levels"]) == statistics["accounting"]["sites"]
     assert statistics["accounting"]["emulated"] is False
     assert statistics["options"]["levels"] == 3

@@ -220,7 +220,7 @@ def test_each_candidate_costs_its_price():
     assert cheap, "and somewhere does not"
 
 
-def test_each_continued_neighbour_costs():
+def test_each_neighbour_that_is_continued_or_taken_again_costs():
     p = problem(4, order=4, shape=(10, 11), edges="reflect", sample_shape=(9, 10))
     cost = np.float32(2 * p.sample.variance)
     rule, sites = relaxation(REFERENCE, p, exhaustive=True, coherence=0.0), p.sites
@@ -229,19 +229,19 @@ def test_each_continued_neighbour_costs():
     most = 0
     for s, site in enumerate(p.where()):
         i, j = site
-        count = dict.fromkeys(p.positions(), 0)
+        costs = {position: [] for position in p.positions()}
         near = plain.neighbours(i, j, p.order, p.grid.rows, p.grid.cols, p.grid.torus)
         for (di, dj), r in zip(plain.offsets(p.order), near, strict=True):
             if r is not None and p.field.temperature[r] < 1024:
                 row, col = p.source()[r]
-                continued = (int(row) - di, int(col) - dj)
-                count[continued] = count.get(continued, 0) + 1
+                costs.setdefault((int(row) - di, int(col) - dj), []).append(cost)
+                costs.setdefault((int(row), int(col)), []).append(4 * cost)
         for n, position in enumerate(p.positions()):
             expected = plainly.distance[n, s]
-            for _ in range(count[position]):
-                expected = np.float32(expected + cost)
+            for each in costs[position]:
+                expected = np.float32(expected + each)
             assert charged.distance[n, s] == expected
-            most = max(most, count[position])
+            most = max(most, len(costs[position]))
     assert most > 1
 
 

@@ -55,8 +55,8 @@ def test_a_window_relaxes_as_the_whole(any_device, name, how, boundary, number):
                 top, left = min(top, grid.rows - rows), min(max(0, left), grid.cols - cols)
             small = run.level(number, (top, left, rows, cols))
             window = small.setting.grid
-            inner = State(*cut(before, run.grid(number), window), None, number).on(machine)
-            inner = enter(small, inner)
+            inner = State(*cut(before, run.grid(number), window), None, None, number).on(machine)
+            inner = enter(small, inner)._replace(price=before.price)  # that of the whole's use
             inner = inner._replace(schedule=inner.schedule._replace(sweep=before.schedule.sweep))
             inner, _ = sweep(small, inner, free=done == 3)
             ours = inner.off(machine).field

@@ -25,7 +25,7 @@ typedef struct {
     int top;                      // highest legal grey level
     int draws;                    // whether a site draws or takes the mode
     int xi;                       // of equation (13), in 1/1024
-    float novelty;                // what a candidate costs for each neighbour whose source it continues
+    float novelty;                // what a candidate costs for each neighbour that it continues
 } Level;
 
 #endif

@@ -30,6 +30,9 @@ from simdtex.ops.neighbourhood import Field, neighbourhood
 from simdtex.ops.square import Square
 from simdtex.ops.temperature import temperature
 
+AGAIN = np.float32(4)
+"""What it costs a candidate to be a neighbour's source, over what continuing it costs: as in kernels/relax.cl."""
+
 KEPT = 1024
 """Distances that a work-item can keep; where there are more candidates, several kernels weigh them."""
 
@@ -74,13 +77,15 @@ def copied(
     grid: Grid,
     novelty: np.float32,
 ) -> None:
-    """Charge each candidate for every neighbour whose source it continues, in place; neighbours in canonical order."""
+    """Charge each candidate for every neighbour whose source it continues, or is; in place, in canonical order."""
     r = grid.neighbours(sites, offsets)
-    p = continuing(candidates, field.source.ravel()[r])
-    touched = (r >= 0) & (field.temperature.ravel()[r] < 1024) & (p >= 0)
+    source = field.source.ravel()[r]
+    touched = (r >= 0) & (field.temperature.ravel()[r] < 1024)
+    following, same = (np.where(touched, p, -1) for p in (continuing(candidates, source), candidates.index_of[source]))
     for k in range(len(r)):
-        here = np.flatnonzero(touched[k])
-        distance[p[k, here], here] += novelty
+        for numbers, cost in ((following[k], novelty), (same[k], AGAIN * novelty)):
+            here = np.flatnonzero(numbers >= 0)
+            distance[numbers[here], here] += cost
 
 
 class Listed(NamedTuple):
@@ -203,9 +208,9 @@ class Relaxation(NamedTuple):
 
     ``grid``, ``offsets`` its lattice and neighbourhood; ``proposal`` the candidates; ``favour`` 1 / (1 + coherence),
     by which the distance of those is multiplied that continue a neighbour's source; ``novelty`` what is added to it for
-    each neighbour whose source is continued; ``price`` (n or more,) float32 what is added to that of each candidate
-    (`simdtex.ops.use`); ``choice`` what it takes of them; ``xi`` of equation (13) in 1/1024; ``seed`` and ``level`` the
-    keys of its random numbers.
+    each neighbour whose source is continued, and `AGAIN` times that for each whose source the candidate is; ``price``
+    (n or more,) float32 what is added to that of each candidate (`simdtex.ops.use`); ``choice`` what it takes of them;
+    ``xi`` of equation (13) in 1/1024; ``seed`` and ``level`` the keys of its random numbers.
     """
 
     grid: Grid

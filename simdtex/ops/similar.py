@@ -80,7 +80,7 @@ def _best(
     n, k, pixels, pitch = candidates.size, moves.shape[1], candidates.index_of.size, candidates.cols
     here = positions[p].astype(np.int64)
     if everyone:
-        numbers = np.repeat(np.arange(n)[:, None], p.size, 1)
+        numbers = np.repeat(np.pad(np.arange(n), (0, max(0, k - n)), constant_values=-1)[:, None], p.size, 1)
     else:
         proposed = []
         for a in (-1, 0, 1):
@@ -99,7 +99,7 @@ def _best(
     d = square.distance(numbers, x, np.ones(at.shape, np.float32), offsets)
     order = np.lexsort((numbers, d), axis=0)[:k]
     best = np.take_along_axis(numbers, order, 0)
-    return np.pad(np.where(best < 0, p, best), ((0, k - len(best)), (0, 0)), constant_values=-1).T
+    return np.where(best < 0, p, best).T
 
 
 def _at(index_of: NDArray[np.int32], pixel: NDArray[np.integer], pixels: int) -> NDArray[np.int64]:

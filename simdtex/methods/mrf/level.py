@@ -139,7 +139,7 @@ class Run:
         if options.search == "exact" or coarsest or candidates.size <= options.exhaustive:
             proposal = Everything(candidates, strip_of(machine, sample, *self.where(number)))
         else:
-            likes = min(options.similar, candidates.size - 1)
+            likes = options.similar
             similar = self.similar(number).numbers if likes else machine.put(np.zeros((1, 1), np.int32))
             few = (min(options.suggesting, len(offsets)), options.chance)
             proposal = Listed(candidates, square_of(machine, sample, *self.where(number)), similar, likes, *few)

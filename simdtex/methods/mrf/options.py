@@ -70,10 +70,12 @@ class Options:
         lambda N C sigma^2 min(4, u - 1), u their use over the fair share. 0: nobody counts.
     structure : float
         Weight of a channel that tells how far a pixel is from the sample's edges, matched like the others and not
-        shown; its standard deviation in units of the sample's. 0, and with ``pixel="density"``: there is none.
+        shown; its standard deviation in units of the sample's, or less where grey levels would not hold it. 0, and with
+        ``pixel="density"``: there is none.
     novelty : float
-        mu: at the coarsest level a candidate costs mu C sigma^2 for each neighbour whose source it continues, where
-        a site takes a sample's pixel and there are 1024 candidates or fewer.
+        mu: at the coarsest level a candidate costs mu C sigma^2 for each neighbour whose source it continues, and four
+        times that for each whose source it is, where a site takes a sample's pixel and there are 1024 candidates or
+        fewer.
     finish : float, optional
         Each output pixel is the mean of what its neighbours' sources say of it, with Gaussian weights of this
         standard deviation, pixels; 0: it is its own source's. None: 1.5, but 0 where a sample has 16 different pixels
