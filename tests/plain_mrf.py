@@ -37,7 +37,7 @@ DEFAULTS = {
 }
 PAPER = {
     **{"relaxation": "gibbs", "bandwidth": 1.0, "coherence": 0.0, "free_sweeps": 0, "pixel": "density"},
-    **{"edges": "whole", "coarsest": "same", "search": "exact", "suggesting": 24, "overview": 64},
+    **{"edges": "whole", "coarsest": "same", "search": "exact", "overview": 64},
     **{"balance": 0.0, "structure": 0.0, "novelty": 0.0, "finish": 0.0},
 }
 

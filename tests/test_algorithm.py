@@ -227,7 +227,7 @@ CHANGES = {
     "coherence": [(EXACT, 1.0, 0.0), (FEW, 0.2, 1.0), (FEW, 0.2, 0.0), (FEW | {"relaxation": "gibbs"}, 0.2, 3.0)],
     "overview": [({"order": 2}, 256, 90), ({"order": 2, "search": "exact"}, 91, 90)],
     "balance": [(EXACT, 0.0, 0.5), (FEW, 0.0, 0.5), (MORE, 0.5, 0.6), (DENSITY, 0.0, 0.5)],
-    "structure": [(EXACT, 0.0, 0.5), (FEW, 0.0, 2.0), (MORE, 2.0, 1.5), (DENSITY, 0.0, 2.0)],
+    "structure": [(EXACT, 0.0, 0.5), (FEW, 0.0, 2.0), (MORE, 2.0, 1.5)],
     "novelty": [(EXACT, 0.0, 1.0), (FEW, 0.0, 1.0), (MORE, 1.0, 0.5), (DENSITY, 0.0, 1.0)],
     "finish": [(EXACT, 0.0, None), (FEW, 0.0, 0.8), (MORE, None, 1.4), (DENSITY, None, 1.5)],
     "xi": [(EXACT, -1.0, -4.0), (FEW, -1.0, -4.0), (FEW, -1.0, -1.1)],
