@@ -210,7 +210,7 @@ class Level:
     favour : float32
         1 / (1 + coherence).
     novelty : float32
-        What a candidate costs for each neighbour whose source it continues.
+        What a candidate costs for each neighbour whose source it continues; at levels but the coarsest 0.
     rate : float
         lambda N C sigma^2: what a candidate costs whose surroundings are used twice as often as their share.
     extent : (int, int)

@@ -208,8 +208,8 @@ class Options:
 def few(pixels: NDArray[Any]) -> bool:
     """Whether a sample (rows, cols, channels) has at most `CATEGORIES` different pixels: then it is a map of them."""
     flat, seen = pixels.reshape(-1, pixels.shape[-1]), np.zeros((0, pixels.shape[-1]), pixels.dtype)
-    for first in range(0, len(flat), 2**16):
-        seen = np.unique(np.concatenate([seen, flat[first : first + 2**16]]), axis=0)
+    for part in np.split(flat, range(2**8, len(flat), 2**16)):  # the first, a small one, tells of most
+        seen = np.unique(np.concatenate([seen, part]), axis=0)
         if len(seen) > CATEGORIES:
             return False
     return True
