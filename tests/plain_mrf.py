@@ -29,7 +29,7 @@ MOST_KEPT = 1024  # candidates of a level that knows novelty, at most
 COMPARED = 1024  # candidates of which each is compared with all, at most
 
 DEFAULTS = {
-    **{"order": 18, "levels": None, "overview": 256, "relaxation": "icm", "bandwidth": 0.15, "coherence": 0.5},
+    **{"order": 18, "levels": None, "overview": 128, "relaxation": "icm", "bandwidth": 0.15, "coherence": 0.5},
     **{"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": None, "xi": -1.0},
     **{"free_sweeps": 2, "pixel": "source", "phases": "decimated", "edges": "auto", "coarsest": "gibbs"},
     **{"schedule": "coloring", "boundary": "torus", "search": "auto", "suggesting": 12, "similar": 0, "chance": 4},
@@ -259,7 +259,7 @@ class Level:
 
         self.rate = o.balance * len(self.offsets) * len(y) * variance(y)
         anew = coarsest and n <= MOST_KEPT and (self.gibbs or o.pixel == "source")
-        self.novelty = float32(o.novelty * len(y) * variance(y) if anew else 0)
+        self.novelty = float32(o.novelty * min(1.0, 256 / n) * len(y) * variance(y) if anew else 0)
 
     def pixel(self, s):
         """The pixel of X that a site of the level's lattice is."""

@@ -225,7 +225,7 @@ CHANGES = {
         (DENSITY | {"coarsest": "same"}, 0.15, 1.0),
     ],
     "coherence": [(EXACT, 1.0, 0.0), (FEW, 0.2, 1.0), (FEW, 0.2, 0.0), (FEW | {"relaxation": "gibbs"}, 0.2, 3.0)],
-    "overview": [({"order": 2}, 256, 90), ({"order": 2, "search": "exact"}, 91, 90)],
+    "overview": [({"order": 2}, 128, 90), ({"order": 2, "search": "exact"}, 91, 90)],
     "balance": [(EXACT, 0.0, 0.5), (FEW, 0.0, 0.5), (MORE, 0.5, 0.6), (DENSITY, 0.0, 0.5)],
     "structure": [(EXACT, 0.0, 0.5), (FEW, 0.0, 2.0), (MORE, 2.0, 1.5)],
     "novelty": [(EXACT, 0.0, 1.0), (FEW, 0.0, 1.0), (MORE, 1.0, 0.5), (DENSITY, 0.0, 1.0)],

@@ -24,6 +24,9 @@ from simdtex.ops.similar import Lattice, Table, most_similar
 from simdtex.ops.square import square_of
 from simdtex.schedules import Setting
 
+WHOLE = 256
+"""Candidates of a coarsest level whose neighbourhoods see much of the sample's layout; of more they see less."""
+
 TOGETHER = 2**16
 """Sites that one kernel relaxes between two looks at the clock."""
 
@@ -148,6 +151,7 @@ class Run:
         h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, candidates.size, dimensions)  # (8)
         draws = options.relaxation == "gibbs" or (coarsest and options.coarsest == "gibbs")
         anew = coarsest and candidates.size <= KEPT and (draws or options.pixel == "source")
+        novelty = options.novelty * min(1.0, WHOLE / candidates.size) if anew else 0.0
         independent = self.schedule.independent(grid, offsets)
         return Level(
             number=number,
@@ -158,7 +162,7 @@ class Run:
             proposal=proposal,
             choice=Choice(draws, options.pixel == "density", lcpdf.window(h, sample.top)),
             favour=np.float32(1 / (1 + options.coherence)),
-            novelty=np.float32(options.novelty * sample.channels * sample.variance if anew else 0),
+            novelty=np.float32(novelty * sample.channels * sample.variance),
             rate=options.balance * len(offsets) * sample.channels * sample.variance,
             extent=(rows.size, cols.size),
             around=int(offsets.max()) * (grid.step if options.phases == "all" else 1),

@@ -73,9 +73,9 @@ class Options:
         shown; its standard deviation in units of the sample's, or less where grey levels would not hold it. 0, and with
         ``pixel="density"``: there is none.
     novelty : float
-        mu: at the coarsest level a candidate costs mu C sigma^2 for each neighbour whose source it continues, and four
-        times that for each whose source it is, where a site takes a sample's pixel and there are 1024 candidates or
-        fewer.
+        mu: at the coarsest level, of n candidates, one costs mu C sigma^2 min(1, 256 / n) for each neighbour whose
+        source it continues, and four times that for each whose source it is, where a site takes a sample's pixel and n
+        is 1024 or less.
     finish : float, optional
         Each output pixel is the mean of what its neighbours' sources say of it, with Gaussian weights of this
         standard deviation, pixels; 0: it is its own source's. None: 1.5, but 0 where a sample has 16 different pixels
@@ -127,7 +127,7 @@ class Options:
 
     order: int = 18
     levels: int | None = None
-    overview: int = 256
+    overview: int = 128
     relaxation: str = "icm"
     bandwidth: float = 0.15
     coherence: float = 0.5
