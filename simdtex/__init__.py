@@ -4,7 +4,7 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from simdtex.experiments import quality
+    from simdtex import quality
     from simdtex.machine import open_machine
     from simdtex.machine.devices import DeviceError, devices
     from simdtex.methods.pyramid.mixtures import mix
@@ -41,7 +41,7 @@ _HOMES = {
 }
 """Where the public names live; each is loaded when it is asked for first, so that the command line starts at once."""
 
-_MODULES = {"quality": "simdtex.experiments.quality"}
+_MODULES = {"quality": "simdtex.quality"}
 """The public names that are modules themselves."""
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The figures of merit against their definitions written as loops."""
 
+import importlib
 from dataclasses import asdict
 
 import numpy as np
@@ -426,8 +427,11 @@ def test_measure_computes_what_is_asked_for():
         quality.measure(sample, output, figures=["repeats"])
 
 
-def test_the_public_name_is_the_module():
-    assert simdtex.quality is quality
+def test_the_public_name_has_all_that_the_module_has():
+    public = importlib.import_module("simdtex.quality")
+    assert simdtex.quality is public
+    assert set(public.__all__) == set(quality.__all__)
+    assert all(getattr(public, name) is getattr(quality, name) for name in quality.__all__)
     assert all(hasattr(quality, name) for name in quality.__all__)
     assert set(quality.FIGURES) <= set(quality.__all__)
 

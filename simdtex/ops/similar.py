@@ -57,49 +57,37 @@ def _reference(
     moves: NDArray[np.int32],
     everyone: bool,
 ) -> NDArray[np.int32]:
-    n, k = candidates.size, moves.shape[1]
-    here, most = candidates.positions[:n], max(1, 2**20 // (n if everyone else 9 * k))
-    found = [
-        _best(np.arange(first, min(n, first + most)), here, offsets, candidates, square, step, kin, moves, everyone)
-        for first in range(0, n, most)
-    ]
-    return np.concatenate(found).astype(np.int32)
-
-
-def _best(
-    p: NDArray[np.int64],
-    positions: NDArray[np.int32],
-    offsets: NDArray[np.int32],
-    candidates: Candidates,
-    square: Square,
-    step: int,
-    kin: NDArray[np.int32],
-    moves: NDArray[np.int32],
-    everyone: bool,
-) -> NDArray[np.int64]:
     n, k, pixels, pitch = candidates.size, moves.shape[1], candidates.index_of.size, candidates.cols
-    here = positions[p].astype(np.int64)
-    if everyone:
-        numbers = np.repeat(np.pad(np.arange(n), (0, max(0, k - n)), constant_values=-1)[:, None], p.size, 1)
-    else:
+    positions = candidates.positions[:n].astype(np.int64)
+
+    def looked_at(p: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Numbers of the candidates that each of p is compared with."""
+        if everyone:
+            return np.repeat(np.pad(np.arange(n), (0, max(0, k - n)), constant_values=-1)[:, None], p.size, 1)
         proposed = []
         for a in (-1, 0, 1):
             for b in (-1, 0, 1):
-                kind = _at(candidates.index_of, here + a * step * pitch + b * step, pixels)
+                kind = _at(candidates.index_of, positions[p] + a * step * pitch + b * step, pixels)
                 kind = np.where(kind >= 0, kin[kind], -1)
-                q = np.where(kind >= 0, here + moves[kind].T, -1)
+                q = np.where(kind >= 0, positions[p] + moves[kind].T, -1)
                 proposed.append(_at(candidates.index_of, q, pixels))
-        numbers = np.concatenate(proposed)
-    q = positions[np.maximum(numbers, 0)]
-    near = (abs(q // pitch - here // pitch) <= APART * step) & (abs(q % pitch - here % pitch) <= APART * step)
-    numbers = np.sort(np.where(near, -1, numbers), 0)
-    numbers[1:][numbers[1:] == numbers[:-1]] = -1
-    at = square.at[p] + (offsets @ np.array([square.down, 1]))[:, None]
-    x = np.moveaxis(square.levels[:, at], 0, 1).astype(np.float32)
-    d = square.distance(numbers, x, np.ones(at.shape, np.float32), offsets)
-    order = np.lexsort((numbers, d), axis=0)[:k]
-    best = np.take_along_axis(numbers, order, 0)
-    return np.where(best < 0, p, best).T
+        return np.concatenate(proposed)
+
+    def best(p: NDArray[np.int64]) -> NDArray[np.int64]:
+        numbers, here = looked_at(p), positions[p]
+        q = positions[np.maximum(numbers, 0)]
+        near = (abs(q // pitch - here // pitch) <= APART * step) & (abs(q % pitch - here % pitch) <= APART * step)
+        numbers = np.sort(np.where(near, -1, numbers), 0)
+        numbers[1:][numbers[1:] == numbers[:-1]] = -1
+        at = square.at[p] + (offsets @ np.array([square.down, 1]))[:, None]
+        x = np.moveaxis(square.levels[:, at], 0, 1).astype(np.float32)
+        d = square.distance(numbers, x, np.ones(at.shape, np.float32), offsets)
+        found = np.take_along_axis(numbers, np.lexsort((numbers, d), axis=0)[:k], 0)
+        return np.where(found < 0, p, found).T
+
+    most = max(1, 2**20 // (n if everyone else 9 * k))
+    pieces = [best(np.arange(first, min(n, first + most))) for first in range(0, n, most)]
+    return np.concatenate(pieces).astype(np.int32)
 
 
 def _at(index_of: NDArray[np.int32], pixel: NDArray[np.integer], pixels: int) -> NDArray[np.int64]:
