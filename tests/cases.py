@@ -13,6 +13,7 @@ from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
 from simdtex.ops.nearest import strip_of
 from simdtex.ops.neighbourhood import Field, neighbourhood
+from simdtex.ops.similar import lattice_of
 from simdtex.ops.square import square_of
 from simdtex.schedules import Setting
 
@@ -71,6 +72,9 @@ class Problem(NamedTuple):
 
     def square(self, machine):
         return square_of(machine, self.sample, self.offsets, self.grid.spacing, self.phases, self.edges)
+
+    def lattice(self):
+        return lattice_of(self.sample, self.offsets, self.grid.spacing, self.phases, self.edges)
 
     def price(self, dear=1.0):
         """Of each candidate, padded to whole blocks: some cost nothing, some much in terms of a distance."""

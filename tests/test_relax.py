@@ -13,7 +13,7 @@ from simdtex.ops import lcpdf
 from simdtex.ops.coloring import coloring
 from simdtex.ops.commit import commit
 from simdtex.ops.relax import Choice, Everything, Listed, Relaxation, relax, relax_apart
-from simdtex.ops.similar import Lattice, most_similar
+from simdtex.ops.similar import most_similar
 from simdtex.schedules import Coloring
 
 PLAIN = {"suggesting": 12, "similar": 0, "chance": 4}
@@ -26,12 +26,9 @@ def proposal(machine, p, exhaustive=False, **options):
         return Everything(candidates, p.strip(machine))
     few = PLAIN | options
     likes = min(few["similar"], candidates.size - 1)
-    where = (p.offsets, p.grid.step, p.phases, p.edges)
-    step = p.grid.step if p.phases == "decimated" else 1
-    lattice = Lattice(*p.sample.lines(*where), step, p.sample.positions(*where))
     square, similar = p.square(machine), machine.put(np.zeros((1, 1), np.int32))
     if likes:
-        similar = most_similar(machine, p.offsets, candidates, square, lattice, likes).numbers
+        similar = most_similar(machine, p.offsets, candidates, square, p.lattice(), likes).numbers
     return Listed(candidates, square, similar, likes, min(few["suggesting"], len(p.offsets)), few["chance"])
 
 

@@ -9,17 +9,11 @@ import simdtex
 from simdtex.methods.mrf.options import make_options
 from simdtex.methods.mrf.synthesis import laid_out
 from simdtex.ops import similar as module
-from simdtex.ops.similar import Lattice, most_similar
-
-
-def lattice(p):
-    where = (p.offsets, p.grid.spacing, p.phases, p.edges)
-    step = p.grid.spacing if p.phases == "decimated" else 1
-    return Lattice(*p.sample.lines(*where), step, p.sample.positions(*where))
+from simdtex.ops.similar import most_similar
 
 
 def found_by(machine, p, k, above=None):
-    return most_similar(machine, p.offsets, p.candidates(machine), p.square(machine), lattice(p), k, above)
+    return most_similar(machine, p.offsets, p.candidates(machine), p.square(machine), p.lattice(), k, above)
 
 
 def numbers(machine, p, k, above=None):

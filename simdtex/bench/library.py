@@ -23,7 +23,7 @@ from simdtex.model.sample import Candidates
 from simdtex.ops import lcpdf
 from simdtex.ops.candidates import Sampled, Structure, candidates
 from simdtex.ops.charge import charge
-from simdtex.ops.coherence import coherence, continuing
+from simdtex.ops.coherence import coherence, continuing, sources
 from simdtex.ops.commit import commit
 from simdtex.ops.filters import filters
 from simdtex.ops.neighbourhood import Field, Neighbourhoods, neighbourhood
@@ -141,9 +141,8 @@ class Library(Reference):
         *_: Any,
     ) -> lcpdf.Distances:
         """As the twin does it, but only the favoured distances are touched."""
-        r = grid.neighbours(sites, offsets)
-        p = continuing(candidates, field.source.ravel()[r])
-        k, s = np.nonzero((r >= 0) & (field.temperature.ravel()[r] < 1024) & (p >= 0))
+        p = continuing(candidates, sources(grid.neighbours(sites, offsets), field))
+        k, s = np.nonzero(p >= 0)
         distances.distance[p[k, s], s] *= favour  # one that is proposed twice is written twice, with the same value
         return distances
 

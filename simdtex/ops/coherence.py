@@ -13,10 +13,17 @@ from simdtex.ops.lcpdf import Distances
 from simdtex.ops.neighbourhood import Field
 
 
+def sources(r: NDArray[np.int32], field: Field) -> NDArray[np.int32]:
+    """The sources of neighbours (N, S); -1 where there is no neighbour, or one that no relaxation has touched."""
+    touched = (r >= 0) & (field.temperature.ravel()[r] < 1024)
+    found: NDArray[np.int32] = np.where(touched, field.source.ravel()[r], np.int32(-1))
+    return found
+
+
 def continuing(candidates: Candidates, source: NDArray[np.int32]) -> NDArray[np.int32]:
     """The number of the candidate that continues the source of neighbour k, (N, S); -1 where there is none."""
     p = source - candidates.reach[:, None]
-    inside = (p >= 0) & (p < candidates.index_of.size)
+    inside = (source >= 0) & (p >= 0) & (p < candidates.index_of.size)
     numbers: NDArray[np.int32] = np.where(inside, candidates.index_of[np.where(inside, p, 0)], -1)
     return numbers
 
@@ -30,9 +37,8 @@ def _reference(
     grid: Grid,
     favour: np.float32,
 ) -> Distances:
-    r = grid.neighbours(sites, offsets)
-    p = continuing(candidates, field.source.ravel()[r])
-    k, s = np.nonzero((r >= 0) & (field.temperature.ravel()[r] < 1024) & (p >= 0))
+    p = continuing(candidates, sources(grid.neighbours(sites, offsets), field))
+    k, s = np.nonzero(p >= 0)
     coherent = np.zeros(distances.distance.shape, bool)
     coherent[p[k, s], s] = True
     d = distances.distance

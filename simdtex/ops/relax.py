@@ -21,7 +21,7 @@ from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates
 from simdtex.ops import lcpdf
 from simdtex.ops.charge import charge
-from simdtex.ops.coherence import coherence, continuing
+from simdtex.ops.coherence import coherence, continuing, sources
 from simdtex.ops.commit import commit
 from simdtex.ops.lcpdf import Distances, Relaxed, Window
 from simdtex.ops.level import constants
@@ -78,11 +78,9 @@ def copied(
     novelty: np.float32,
 ) -> None:
     """Charge each candidate for every neighbour whose source it continues, or is; in place, in canonical order."""
-    r = grid.neighbours(sites, offsets)
-    source = field.source.ravel()[r]
-    touched = (r >= 0) & (field.temperature.ravel()[r] < 1024)
-    following, same = (np.where(touched, p, -1) for p in (continuing(candidates, source), candidates.index_of[source]))
-    for k in range(len(r)):
+    source = sources(grid.neighbours(sites, offsets), field)
+    following, same = continuing(candidates, source), np.where(source >= 0, candidates.index_of[source], -1)
+    for k in range(len(source)):
         for numbers, cost in ((following[k], novelty), (same[k], AGAIN * novelty)):
             here = np.flatnonzero(numbers >= 0)
             distance[numbers[here], here] += cost
@@ -132,9 +130,7 @@ class Listed(NamedTuple):
             numbers[size[new], np.flatnonzero(new)] = number[new]
             size[new] += 1
 
-        touched = (r >= 0) & (field.temperature.ravel()[r] < 1024)
-        suggestions = np.where(touched, continuing(self.candidates, field.source.ravel()[r]), -1)
-        for suggestion in suggestions[: self.suggesting]:
+        for suggestion in continuing(self.candidates, sources(r, field))[: self.suggesting]:
             add(suggestion)
         suggested = np.arange(self.slots)[:, None] < size
         add(self.candidates.index_of[field.source.ravel()[sites]])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Machine, Operation
-from simdtex.model.sample import Candidates
+from simdtex.model.sample import Candidates, Sample
 from simdtex.ops.square import Square
 
 FEW = 1024
@@ -39,6 +39,12 @@ class Lattice(NamedTuple):
     cols: NDArray[np.int32]
     step: int
     positions: NDArray[np.int32]
+
+
+def lattice_of(sample: Sample, offsets: NDArray[np.int32], spacing: int, phases: str, edges: str) -> Lattice:
+    """Where the candidates of a level lie: see `simdtex.model.sample.Sample.positions`."""
+    where = (offsets, spacing, phases, edges)
+    return Lattice(*sample.lines(*where), spacing if phases == "decimated" else 1, sample.positions(*where))
 
 
 class Table(NamedTuple):

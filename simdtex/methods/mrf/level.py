@@ -20,8 +20,8 @@ from simdtex.ops import active, lcpdf
 from simdtex.ops.nearest import strip_of
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import KEPT, Choice, Everything, Listed
-from simdtex.ops.similar import Lattice, Table, most_similar
-from simdtex.ops.square import square_of
+from simdtex.ops.similar import Table, lattice_of, most_similar
+from simdtex.ops.square import Square, square_of
 from simdtex.schedules import Setting
 
 WHOLE = 256
@@ -142,13 +142,15 @@ class Run:
         if options.search == "exact" or coarsest or candidates.size <= options.exhaustive:
             proposal = Everything(candidates, strip_of(machine, sample, *self.where(number)))
         else:
-            likes = options.similar
-            similar = self.similar(number).numbers if likes else machine.put(np.zeros((1, 1), np.int32))
+            likes, square = options.similar, square_of(machine, sample, *self.where(number))
+            nobody = np.zeros((1, 1), np.int32)
+            similar = self.similar(number, candidates, square).numbers if likes else machine.put(nobody)
             few = (min(options.suggesting, len(offsets)), options.chance)
-            proposal = Listed(candidates, square_of(machine, sample, *self.where(number)), similar, likes, *few)
+            proposal = Listed(candidates, square, similar, likes, *few)
         rows, cols = sample.lines(*self.where(number))
         dimensions = sample.channels * (len(offsets) + 1)
-        h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, candidates.size, dimensions)  # (8)
+        variance = sample.variance
+        h = options.bandwidth * lcpdf.optimal_bandwidth(variance, candidates.size, dimensions)  # (8)
         draws = options.relaxation == "gibbs" or (coarsest and options.coarsest == "gibbs")
         anew = coarsest and candidates.size <= KEPT and (draws or options.pixel == "source")
         novelty = options.novelty * min(1.0, WHOLE / candidates.size) if anew else 0.0
@@ -162,8 +164,8 @@ class Run:
             proposal=proposal,
             choice=Choice(draws, options.pixel == "density", lcpdf.window(h, sample.top)),
             favour=np.float32(1 / (1 + options.coherence)),
-            novelty=np.float32(novelty * sample.channels * sample.variance),
-            rate=options.balance * len(offsets) * sample.channels * sample.variance,
+            novelty=np.float32(novelty * sample.channels * variance),
+            rate=options.balance * len(offsets) * sample.channels * variance,
             extent=(rows.size, cols.size),
             around=int(offsets.max()) * (grid.step if options.phases == "all" else 1),
             xi=min(-1, round(options.xi * 1024)),
@@ -180,14 +182,17 @@ class Run:
         """The candidates of a level."""
         return self.sample.candidates(self.machine, *self.where(number), self.planes)
 
-    def similar(self, number: int) -> Table:
-        """The candidates of a level most similar to each: made with the help of the level above, once."""
+    def similar(self, number: int, candidates: Candidates | None = None, square: Square | None = None) -> Table:
+        """The candidates of a level most similar to each: made with the help of the level above, once.
+
+        ``candidates`` and ``square`` are those of the level where somebody has them already.
+        """
         if number not in self.tables:
             above = self.similar(number + 1) if number < self.levels - 1 else None
-            step = 2**number if self.options.phases == "decimated" else 1
-            lattice = Lattice(*self.sample.lines(*self.where(number)), step, self.sample.positions(*self.where(number)))
-            square = square_of(self.machine, self.sample, *self.where(number))
-            candidates, likes = self.candidates(number), self.options.similar
+            lattice = lattice_of(self.sample, *self.where(number))
+            candidates = candidates or self.candidates(number)
+            square = square or square_of(self.machine, self.sample, *self.where(number))
+            likes = self.options.similar
             self.tables[number] = most_similar(self.machine, self.offsets, candidates, square, lattice, likes, above)
         return self.tables[number]
 

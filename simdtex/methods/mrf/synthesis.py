@@ -71,8 +71,13 @@ def synthesize(
     for level, state, info in anneal(run, watch=observer.part):
         observer.sweep(level, state, info)
     assert state is not None  # there is a level, and it has a sweep
-    values, source, temperatures = (Grid(*shape).view(machine.get(plane)) for plane in state.field)
-    image = finished(run, state.source, source) if run.options.finish else run.sample.picture(values, source)
+    grid = Grid(*shape)
+    source, temperatures = (grid.view(machine.get(plane)) for plane in (state.source, state.temperature))
+    if run.options.finish:
+        image = finished(run, state.source, source)
+    else:
+        image = run.sample.picture(grid.view(machine.get(state.values)), source)
+    place = run.sample.place(source)
     meter, account = observer.meter, observer.account
     statistics = {
         "device": machine.name,
@@ -82,9 +87,9 @@ def synthesize(
         "device_seconds": device_seconds(machine, worked),
         "accounting": account.report() | {"emulated": run.emulated, "launches": machine.launches - launches},
         "levels": meter.reports,
-        "use": effective_use(run.sample.place(source), pixels.shape).as_dict(),
+        "use": effective_use(place, pixels.shape).as_dict(),
     }
-    return image, Output(run.sample.place(source), temperatures / 1024, observer.stages, statistics)
+    return image, Output(place, temperatures / 1024, observer.stages, statistics)
 
 
 def laid_out(machine: Machine, pixels: NDArray[Any], shape: tuple[int, int], options: Options, seed: int) -> Run:
