@@ -5,18 +5,20 @@
 //
 //   sum_r w_r (Y[p_r + (s - r)] - Y[p_s]) / sum_r w_r,
 //
-// over those r whose p_r + (s - r) lies in the sample, s among them. All in whole numbers, so where all continue one
+// over those r whose p_r + (s - r) lies in the sample, s among them. What is from nowhere says nothing, and stays. All in whole numbers, so where all continue one
 // another nothing changes. Rounded to 1 / scale of a grey level, half up.
 //
 // source  (H, W)               pixel index in the sample of each site's source
 // offsets (N, 2), weights (N,) of the sites around, itself included
 // sample  (C, plane)           grey levels; `pitch` pixels to a row, a margin around rows x cols of them
+// inside  (plane,)             whether a pixel of it is known and may be used
 // out     (C, count)           for the sites first .. first + count - 1, row by row
 // One work-item per site.
 __kernel void finish(const Lattice g, const int first, const int count, __global const int *restrict source,
                      __global const int2 *restrict offsets, __global const int *restrict weights, const int N,
                      __global const float *restrict sample, const int plane, const int pitch, const int margin,
-                     const int rows, const int cols, const int scale, __global short *restrict out)
+                     const int rows, const int cols, __global const uchar *restrict inside, const int scale,
+                     __global short *restrict out)
 {
     const int n = get_global_id(0);
     if (n >= count)
@@ -29,16 +31,19 @@ __kernel void finish(const Lattice g, const int first, const int count, __global
     for (int k = 0; k < N; ++k) {
         const int a = offsets[k].x, b = offsets[k].y;
         const int r = a == 0 && b == 0 ? SITE(g, i, j) : neighbour(g, i, j, a, b);
-        if (r < 0)
+        if (r < 0 || source[r] < 0)
             continue;
         const int row = source[r] / pitch - a, col = source[r] % pitch - b;
-        if (row < margin || row >= margin + rows || col < margin || col >= margin + cols)
+        if (row < margin || row >= margin + rows || col < margin || col >= margin + cols ||
+            !inside[row * pitch + col])
             continue;
         total += weights[k];
         for (int c = 0; c < C; ++c)
-            sum[c] += (long)weights[k] * ((int)sample[c * plane + row * pitch + col] - (int)sample[c * plane + own]);
+            sum[c] += (long)weights[k] * ((int)sample[c * plane + row * pitch + col] - (int)sample[c * plane + max(own, 0)]);
     }
-    for (int c = 0; c < C; ++c) {
+    for (int c = 0; c < C && own < 0; ++c)
+        out[c * count + n] = 0;
+    for (int c = 0; c < C && own >= 0; ++c) {
         const long twice = 2 * scale * sum[c] + total, by = twice / (2 * total);
         out[c * count + n] = (short)(by - (by * 2 * total > twice ? 1 : 0));
     }

@@ -106,12 +106,35 @@ __kernel void lcpdf_draw(__global const float *restrict distance, __global const
     }
     const int from = candidates[chosen];
     choice[s] = from;
-    for (int c = 0; c < C; ++c) {
+    for (int c = 0; c < MADE; ++c) {
         int x = (int)sample[c * plane + from];
         if (radius >= 0)
             x += step_from(noise, radius, x, top, draw4(seed, level, turn, place, PURPOSE_DRAW, 1 + c).x);
         values[c * S + s] = (ushort)x;
     }
+}
+
+// ICM over sample positions: the nearest candidate, of several the first. Where a bound is of no use, as it knows nothing
+// of confidences of their own; elsewhere nearest.cl keeps no distance.
+__kernel void lcpdf_least(__global const float *restrict distance, __global const float *restrict nearest,
+                          const int blocks, const int S, const int P, const float scale,
+                          __global const float *restrict sample, const int plane,
+                          __global const int *restrict candidates, __global int *restrict choice,
+                          __global ushort *restrict values LANES_ARG)
+{
+    const int s = LANE;
+    if (IDLE(s))
+        return;
+    const float smallest = smallest_of(nearest, blocks, P, s);
+    int b = 0;
+    while (nearest[b * P + s] > smallest)
+        ++b;
+    int p = b * BLOCK;
+    while (DISTANCE(p) > smallest)
+        ++p;
+    choice[s] = candidates[p];
+    for (int c = 0; c < MADE; ++c)
+        values[c * S + s] = (ushort)sample[c * plane + candidates[p]];
 }
 
 // f(x) for one grey level: the weights per grey level, smoothed by the kernel of equation (7), level 0 first.

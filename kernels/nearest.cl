@@ -120,7 +120,7 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
     certain[s] = (float)(1024 - hottest) * 0x1p-10f;
     vstore16(feature, s, features);
     // The bound.
-    const int own = index_of[source[sites[s]]];
+    const int own = number_of(index_of, source[sites[s]]);
     float best = INFINITY;
     int at = 0x7fffffff;
     if (own >= 0) {

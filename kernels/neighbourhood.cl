@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma OPENCL FP_CONTRACT OFF
+#include "common/beside.h"
 #include "common/lanes.h"
 #include "common/lattice.h"
 
@@ -7,30 +8,42 @@
 //
 // For site s and neighbour r = N_s[k]:  u = 1 - t_r  and  xu = x_r * (1 - t_r), exact in float32 because pixels
 // are integers below 2^12 and temperatures integer multiples of 2^-10. A neighbour outside an open lattice has u = 0.
+// With -D OWN each channel has its u, and where there are guides the site itself comes last: common/beside.h.
 //
 // sites       (S,)        pixel index of each site
-// values      (C, H, W)   working grey levels
+// values      (C, H, W)   working grey levels; the first `made` channels are no guides
 // temperature (H, W)      in 1/1024
 // offsets     (N, 2)      (row, column) on the level's grid, canonical order
-// confidence  (N, P)      out: u; P is S rounded up to whole vectors, the rest is 0
-// weighted    (N, C, P)   out: x * u
-// One work-item per (site, neighbour).
+// confidence  (N, P)      out: u; P is S rounded up to whole vectors, the rest is 0. -D OWN: (terms, C, P)
+// weighted    (terms, C, P)   out: x * u; terms is N, or N + 1 where there are guides
+// One work-item per (site, term).
 __kernel void neighbourhood(__global const int *restrict sites, const int S, const int P,
                             __global const ushort *restrict values, __global const ushort *restrict temperature,
-                            const int channels, const int plane, __global const int2 *restrict offsets, const int N, const Lattice g,
+                            const int channels, const int made, const int plane, __global const int2 *restrict offsets,
+                            const int N, const int terms, const float centre, const Lattice g,
                             __global float *restrict confidence, __global float *restrict weighted LANES_ARG)
 {
     const int s = LANE;
     if (s < 0 || s >= P)
         return;
     const int site = s < S ? sites[s] : 0, i = ROW_OF(g, site), j = COL_OF(g, site);
-    ALONG(k, N)
+    ALONG(k, terms)
     {
-        const int2 o = offsets[k];
-        const int r = s < S ? neighbour(g, i, j, o.x, o.y) : -1;
-        const float u = r < 0 ? 0.0f : (float)(1024 - temperature[r]) * 0x1p-10f;
+        const int2 o = k < N ? offsets[k] : (int2)(0, 0);
+        const int r = s >= S ? -1 : k < N ? neighbour(g, i, j, o.x, o.y) : site;
+        const float u = r < 0 || k == N ? 0.0f : (float)(1024 - temperature[r]) * 0x1p-10f;
+#ifdef OWN
+        const float guide = r < 0 ? 0.0f : k < N ? 1.0f : centre;
+        for (int c = 0; c < channels; ++c) {
+            const ushort x = r < 0 ? 0 : values[c * plane + r];
+            const float uc = confidence_of(c < made, x, u, guide);
+            confidence[(k * channels + c) * P + s] = uc;
+            weighted[(k * channels + c) * P + s] = (float)x * uc;
+        }
+#else
         confidence[k * P + s] = u;
         for (int c = 0; c < channels; ++c)
             weighted[(k * channels + c) * P + s] = r < 0 ? 0.0f : (float)values[c * plane + r] * u;
+#endif
     }
 }

@@ -26,6 +26,7 @@
 #define LEVEL ushort
 #endif
 #include "common/lanes.h"
+#include "common/beside.h"
 #include "common/vector.h"
 #include "common/choose.h"
 #include "common/cool.h"
@@ -53,6 +54,21 @@
 #define STEP 4 // vectors of candidates in registers together
 #endif
 
+// Confidence and weighted value of each channel at pixel r, the k-th of those that are looked at; -1: nobody.
+#ifdef OWN
+#define GATHER(k, r, certain, guide)                                                                                   \
+    for (int c = 0; c < C; ++c) {                                                                                      \
+        const ushort x = r < 0 ? 0 : values[c * g.area + r];                                                           \
+        u[(k) * C + c] = confidence_of(c < MADE, x, certain, guide);                                                   \
+        xu[(k) * C + c] = (float)x * u[(k) * C + c];                                                                   \
+    }
+#else
+#define GATHER(k, r, certain, guide)                                                                                   \
+    u[k] = certain;                                                                                                    \
+    for (int c = 0; c < C; ++c)                                                                                        \
+        xu[(k) * C + c] = r < 0 ? 0.0f : (float)values[c * g.area + r] * u[k];
+#endif
+
 // strip       (C, size)  the sample's pixels of this level, row by row: candidates that follow one another side by side
 // strip_reach (N,)       pixel offset of each neighbour there
 __kernel __attribute__((vec_type_hint(vec))) void
@@ -72,22 +88,23 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
     const ulong place = place_of(g.lattice, i, j);
 
     // 6.2.2.1: the neighbourhood, and which candidates continue a neighbour's source.
-    float u[N], xu[N * C];
+    float u[(N + 1) * CONFIDENCES], xu[(N + 1) * C];
     int list[N], next[N], same[N], m = 0, sum = g.xi, members = 0;
     ulong seen = 0;
     const int neighbours = g.neighbours;
     for (int k = 0; k < neighbours; ++k) {
         const int r = neighbour(g.lattice, i, j, offsets[k].x, offsets[k].y);
         const int t = r < 0 ? UNTOUCHED : temperature[r];
-        u[k] = (float)(1024 - t) * 0x1p-10f;
-        for (int c = 0; c < C; ++c)
-            xu[k * C + c] = r < 0 ? 0.0f : (float)values[c * g.area + r] * u[k];
+        const float certain = (float)(1024 - t) * 0x1p-10f;
+        GATHER(k, r, certain, r < 0 ? 0.0f : 1.0f);
         sum += r < 0 ? 0 : t;
         members += r < 0 ? 0 : 1;
         next[k] = t < UNTOUCHED ? continuing(index_of, source[r], reach[k], g.pixels) : -1;
-        same[k] = t < UNTOUCHED ? index_of[source[r]] : -1;
+        same[k] = t < UNTOUCHED ? number_of(index_of, source[r]) : -1;
         m = proposed(next[k], list, m, &seen);
     }
+    if (G)
+        GATHER(neighbours, site, 0.0f, g.centre);
 
     // All candidates, V side by side, neighbours in canonical order; the last of a row are overwritten by the next row's.
     float d[ALL + V];
@@ -101,14 +118,17 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
             y[q] = strip + g.first + n / wide * g.pitch + n % wide * V;
             sums[q] = 0.0f;
         }
-        for (int k = 0; k < neighbours; ++k)
+        for (int k = 0; k < neighbours + (G > 0); ++k) {
+            const int reached = k < neighbours ? strip_reach[k] : 0;
 #pragma unroll
             for (int c = 0; c < C; ++c)
 #pragma unroll
                 for (int q = 0; q < STEP; ++q) {
-                    const vec e = GAP(LOAD(y[q] + c * g.size + strip_reach[k]), (vec)u[k], (vec)xu[k * C + c]);
+                    const vec e = GAP(LOAD(y[q] + c * g.size + reached), (vec)u[k * CONFIDENCES + CONFIDENT(c)],
+                                      (vec)xu[k * C + c]);
                     sums[q] = fma(e, e, sums[q]);
                 }
+        }
 #pragma unroll
         for (int q = 0; q < STEP; ++q) {
             const int n = min(b + q, g.strip_rows * wide - 1);
@@ -132,7 +152,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
 #define PIXEL(k) (g.first + (k) / g.strip_cols * g.pitch + (k) % g.strip_cols)
     CHOOSE(chosen, g, d, g.candidates, strip, g.size, noise, turn, place)
     const int out = PLACE(s, site), step = STRIDE(S, g);
-    for (int c = 0; c < C; ++c)
+    for (int c = 0; c < MADE; ++c)
         NEW(values)[c * step + out] = (ushort)grey_level(g, (int)strip[c * g.size + PIXEL(chosen)], c, noise, turn, place);
     NEW(source)[out] = positions[chosen];
     NEW(temperature)[out] = cooled_to(sum, members); // 6.2.2.3
@@ -151,6 +171,21 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
 //   3. the K positions of the sample most similar to each of those so far;
 //   4. `chance` positions at random, and one where there would be none at all.
 //
+// Lane n of a cell gets what is known at pixel r.
+#ifdef OWN
+#define PUT(cell, n, r, certain, guide)                                                                                \
+    for (int c = 0; c < C; ++c) {                                                                                      \
+        const ushort x = values[c * g.area + r];                                                                       \
+        U(cell, c, n) = confidence_of(c < MADE, x, certain, guide);                                                    \
+        XU(cell, c, n) = (float)x * U(cell, c, n);                                                                     \
+    }
+#else
+#define PUT(cell, n, r, certain, guide)                                                                                \
+    U(cell, 0, n) = certain;                                                                                           \
+    for (int c = 0; c < C; ++c)                                                                                        \
+        XU(cell, c, n) = (float)values[c * g.area + r] * certain;
+#endif
+
 // disc    (CELLS, 16)  1 on the neighbourhood, 0 elsewhere
 // at      (count,)     place of each candidate in `levels`
 // levels  (C, plane)   grey levels of the sample, columns apart by the level's step side by side
@@ -199,9 +234,19 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
                 const int cell = a * CHUNKS + k, from = max(row[a], 0) + (j - RADIUS + 16 * k) * h.spacing;
                 const float16 in = row[a] < 0 ? (float16)0.0f : vload16(cell, disc);
                 const float16 t = spread(temperature + from, h.spacing);
-                u[cell] = (1024.0f - t) * 0x1p-10f * in;
+                const float16 certain = (1024.0f - t) * 0x1p-10f * in;
+#ifdef OWN
+                const float16 guide = in + (row[a] < 0 ? 0.0f : g.centre) * middle(a, k);
+                for (int c = 0; c < C; ++c) {
+                    const float16 x = spread(values + c * g.area + from, h.spacing);
+                    u[cell * C + c] = select(c < MADE ? certain : guide, (float16)0.0f, x == (float)UNKNOWN);
+                    xu[cell * C + c] = x * u[cell * C + c];
+                }
+#else
+                u[cell] = certain;
                 for (int c = 0; c < C; ++c)
-                    xu[cell * C + c] = spread(values + c * g.area + from, h.spacing) * u[cell];
+                    xu[cell * C + c] = spread(values + c * g.area + from, h.spacing) * certain;
+#endif
                 heat += t * in;
                 inside += in;
             }
@@ -212,7 +257,8 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
     {
         for (int cell = 0; cell < CELLS; ++cell)
             for (int n = 0; n < 16; ++n) {
-                U(cell, n) = 0.0f;
+                for (int c = 0; c < CONFIDENCES; ++c)
+                    U(cell, c, n) = 0.0f;
                 for (int c = 0; c < C; ++c)
                     XU(cell, c, n) = 0.0f;
             }
@@ -225,10 +271,10 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
             sum += t;
             ++members;
             const float ur = (float)(1024 - t) * 0x1p-10f;
-            U(cell, n) = ur;
-            for (int c = 0; c < C; ++c)
-                XU(cell, c, n) = (float)values[c * g.area + r] * ur;
+            PUT(cell, n, r, ur, 1.0f);
         }
+        if (G)
+            PUT(RADIUS * CHUNKS + RADIUS / 16, RADIUS % 16, site, 0.0f, g.centre);
     }
 
     // The list.
@@ -240,7 +286,7 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
             m = proposed(continuing(index_of, source[r], reach[k], g.pixels), list, m, &seen);
     }
     const int suggested = m;
-    m = proposed(index_of[source[site]], list, m, &seen);
+    m = proposed(number_of(index_of, source[site]), list, m, &seen);
     const int own = m;
     for (int k = 0; k < own; ++k)
         for (int n = 0; n < g.similar; ++n)
@@ -262,7 +308,7 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
 #define PIXEL(k) at[list[k]]
     CHOOSE(chosen, g, d, m, levels, g.plane, noise, turn, place)
     const int out = PLACE(s, site), step = STRIDE(S, g);
-    for (int c = 0; c < C; ++c)
+    for (int c = 0; c < MADE; ++c)
         NEW(values)[c * step + out] = (ushort)grey_level(g, (int)levels[c * g.plane + PIXEL(chosen)], c, noise, turn, place);
     NEW(source)[out] = positions[list[chosen]];
     NEW(temperature)[out] = cooled_to(sum, members); // 6.2.2.3

@@ -53,7 +53,7 @@ __kernel void similar(const int count, const int pixels, const int pitch, const 
     __global const ushort *y = levels + at[p] - RADIUS * down - RADIUS;
     for (int cell = 0; cell < CELLS; ++cell)
         for (int n = 0; n < 16; ++n) {
-            U(cell, n) = disc[cell * 16 + n];
+            U(cell, 0, n) = disc[cell * 16 + n];
             for (int c = 0; c < C; ++c)
                 XU(cell, c, n) = (float)y[c * plane + cell / CHUNKS * down + cell % CHUNKS * 16 + n] * disc[cell * 16 + n];
         }

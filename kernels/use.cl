@@ -16,7 +16,7 @@ __kernel void use(const Lattice g, const int sites, __global const int *restrict
     if (n >= sites)
         return;
     const int site = SITE(g, n / g.cols, n % g.cols);
-    const int p = temperature[site] < UNTOUCHED ? index_of[source[site]] : -1;
+    const int p = temperature[site] < UNTOUCHED ? number_of(index_of, source[site]) : -1;
     if (p >= 0)
         atomic_inc(counts + p);
 }

@@ -8,10 +8,17 @@
 #define UNTOUCHED 1024 // t = 1 in 1/1024
 
 // Number of the candidate that continues pixel `source` of the sample, `reach` pixels before it; -1 where there is none.
+// A site whose value is given may be from nowhere in the sample: its source is -1.
 inline int continuing(__global const int *restrict index_of, const int source, const int reach, const int pixels)
 {
     const int p = source - reach;
-    return p < 0 || p >= pixels ? -1 : index_of[p];
+    return source < 0 || p < 0 || p >= pixels ? -1 : index_of[p];
+}
+
+// Number of the candidate that pixel `source` is; -1 where it is none, or from nowhere.
+inline int number_of(__global const int *restrict index_of, const int source)
+{
+    return source < 0 ? -1 : index_of[source];
 }
 
 #endif

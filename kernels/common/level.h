@@ -26,6 +26,7 @@ typedef struct {
     int draws;                    // whether a site draws or takes the mode
     int xi;                       // of equation (13), in 1/1024
     float novelty;                // what a candidate costs for each neighbour that it continues
+    float centre;                 // confidence of a guide at the site itself
 } Level;
 
 #endif

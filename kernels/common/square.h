@@ -5,6 +5,7 @@
 // and n + 8 are added, n and n + 4, n and n + 2, n and n + 1.
 #ifndef SIMDTEX_SQUARE_H
 #define SIMDTEX_SQUARE_H
+#include "common/beside.h"
 #include "common/distance.h"
 #include "common/lattice.h"
 
@@ -36,8 +37,8 @@ inline float folded(__private float *a)
             a[n] += a[n + half_];
     return a[0];
 }
-#define SQUARE float u[CELLS * 16], xu[CELLS * C * 16]
-#define U(cell, lane) u[(cell) * 16 + (lane)]
+#define SQUARE float u[CELLS * CONFIDENCES * 16], xu[CELLS * C * 16]
+#define U(cell, c, lane) u[((cell) * CONFIDENCES + CONFIDENT(c)) * 16 + (lane)]
 #define XU(cell, c, lane) xu[((cell) * C + (c)) * 16 + (lane)]
 #define SQUARE_ARG __private const float *u, __private const float *xu
 #else
@@ -48,10 +49,19 @@ inline float folded(const float16 a)
     const float2 d = c.lo + c.hi;
     return d.x + d.y;
 }
-#define SQUARE float16 u[CELLS], xu[CELLS * C]
-#define U(cell, lane) ((__private float *)(u + (cell)))[lane]
+#define SQUARE float16 u[CELLS * CONFIDENCES], xu[CELLS * C]
+#define U(cell, c, lane) ((__private float *)(u + (cell) * CONFIDENCES + CONFIDENT(c)))[lane]
 #define XU(cell, c, lane) ((__private float *)(xu + (cell) * C + (c)))[lane]
 #define SQUARE_ARG __private const float16 *u, __private const float16 *xu
+
+// 1 in the lane of cell k of row a that is the site itself, 0 elsewhere.
+inline float16 middle(const int a, const int k)
+{
+    float16 lanes = 0.0f;
+    if (a == RADIUS && k == RADIUS / 16)
+        ((__private float *)&lanes)[RADIUS % 16] = 1.0f;
+    return lanes;
+}
 
 // Every first or second of what follows p, 16 of them.
 inline float16 spread(__global const ushort *p, const int spacing)
@@ -72,7 +82,7 @@ inline float distance_in_lanes(const int q, SQUARE_ARG, __global const ushort *r
     for (int cell = 0; cell < CELLS; ++cell)
         for (int c = 0; c < C; ++c)
             for (int n = 0; n < 16; ++n) {
-                const float un = u[cell * 16 + n];
+                const float un = U(cell, c, n);
                 if (un == 0.0f) // would add 0
                     continue;
                 const float yn = (float)y[c * plane + cell / CHUNKS * down + cell % CHUNKS * 16 + n];
@@ -86,7 +96,7 @@ inline float distance_in_lanes(const int q, SQUARE_ARG, __global const ushort *r
 #pragma unroll
         for (int c = 0; c < C; ++c) {
             const float16 yn = convert_float16(vload16(0, y + c * plane + cell / CHUNKS * down + cell % CHUNKS * 16));
-            const float16 e = GAP(yn, u[cell], xu[cell * C + c]);
+            const float16 e = GAP(yn, u[cell * CONFIDENCES + CONFIDENT(c)], xu[cell * C + c]);
             d = fma(e, e, d);
         }
 #endif

@@ -4,6 +4,7 @@
 // search.
 #ifndef SIMDTEX_WEIGH_H
 #define SIMDTEX_WEIGH_H
+#include "common/beside.h"
 #include "common/distance.h"
 #include "common/vector.h"
 
@@ -11,7 +12,7 @@
 #define STEP 4 // candidates that are kept in registers together
 #endif
 
-// confidence (N, P), weighted (N, C, P)   from neighbourhood.cl, from the first site on
+// confidence (N, P), weighted (N, C, P)   from neighbourhood.cl, from the first site on; -D OWN: confidence (N, C, P)
 // sample     (C, plane)                   working grey levels as float
 // candidates (STEP,)                      pixel index in the sample
 // reach      (N,)                         pixel offset in the sample of each neighbour
@@ -28,9 +29,9 @@ inline void weigh(__global const float *restrict confidence, __global const floa
     }
     for (int k = 0; k < N; ++k) {
         const int o = reach[k];
-        const vec u = LOAD(confidence + k * P);
 #pragma unroll
         for (int c = 0; c < C; ++c) {
+            const vec u = LOAD(confidence + (k * CONFIDENCES + CONFIDENT(c)) * P);
             const vec xu = LOAD(weighted + (k * C + c) * P);
 #pragma unroll
             for (int q = 0; q < STEP; ++q) {

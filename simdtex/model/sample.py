@@ -3,12 +3,16 @@
 
 from __future__ import annotations
 
-from math import log2
+from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.model.guide import Beside
+from simdtex.model.pictures import Pictures
+from simdtex.model.scale import Scale, highest
 from simdtex.model.structure import structure
 
 BLOCK = 64
@@ -30,7 +34,7 @@ class Candidates(NamedTuple):
     ``pixels`` (C, rows * cols) float32 working grey levels, margin and all; ``positions`` (n rounded up to
     blocks,) int32 pixel index of each p, row by row; ``size`` n; ``reach`` (N,) int32 pixel offset of each
     neighbour; ``index_of`` (rows * cols,) int32 place of a pixel in ``positions`` or -1; ``rows``, ``cols`` of the
-    sample with its margin.
+    sample with its margin; ``guides`` the last channels that are guides.
     """
 
     pixels: Any
@@ -40,34 +44,48 @@ class Candidates(NamedTuple):
     index_of: Any
     rows: int
     cols: int
+    guides: int = 0
+
+    @property
+    def made(self) -> int:
+        """Channels that are no guides."""
+        return int(self.pixels.shape[0]) - self.guides
 
 
 class Sample:
-    """A sample image in working grey levels.
+    """A sample in working grey levels: one picture, or several one below another.
 
-    Eight-bit pixels are their own working levels. Other types are mapped onto 0..top, `top` being 4095 or, for
-    neighbourhoods of more than 512 values, the largest 2**b - 1 for which the distance of equation (12) is exact
-    (see `Notes`). Pixels of the output are taken from the sample itself, or moved from there by the finish in steps of
-    an eighth of a level, so nothing is lost there.
+    Pixels become working levels as `simdtex.model.scale` says. Pixels of the output are taken from the sample itself, or
+    moved from there by the finish in steps of an eighth of a level, so nothing is lost there.
 
     Parameters
     ----------
-    pixels : (height, width, channels) array
-        As given by the user; any real type, finite.
+    pixels : (height, width, channels) array, or Pictures
+        As given by the user; any real type.
     values : int
         Values to a neighbourhood: channels times neighbours.
     margin : int
-        Pixels by which the sample is continued, by reflection, on every side for the sake of the neighbourhoods of
+        Pixels by which each picture is continued, by reflection, on every side for the sake of the neighbourhoods of
         its outer pixels. Nothing is ever taken from the margin itself.
     weight : float
         Of the structure channel (`simdtex.model.structure`), which is matched like the others and never shown; 0: none.
+    step : int
+        Pixels from site to site at the coarsest level; every picture begins at a multiple.
+    beside : sequence of Beside
+        Guides: their channels come last.
+    unsure : float
+        Share of a candidate's neighbours that may be unknown.
 
     Attributes
     ----------
     shown : int
-        Channels of a picture.
+        Channels of a picture, as far as the working levels show one.
     channels : int
         Channels that are matched: those, and the structure channel.
+    guides : (G, H, W) uint16 array
+        Working levels of the output's guides.
+    boxes : list of (int, int, int)
+        Of each picture its first row, its rows and its columns.
 
     Notes
     -----
@@ -76,41 +94,82 @@ class Sample:
     each term, has the bits of a device's fma.
     """
 
-    def __init__(self, pixels: NDArray[Any], values: int, margin: int = 0, weight: float = 0.0) -> None:
-        self.pixels, self.shown = pixels, pixels.shape[-1]
-        planes = np.moveaxis(pixels, -1, 0)
-        if pixels.dtype in (np.bool_, np.uint8):
-            self.top, self.unit = 255, 1.0
-            levels = planes.astype(np.uint16)
-        else:
-            self.top = 2 ** min(12, int((33 - log2(values)) / 2)) - 1
-            stretched, self.unit = stretch(planes, self.top)
-            levels = stretched.astype(np.uint16)
+    def __init__(
+        self,
+        pixels: NDArray[Any] | Pictures,
+        values: int,
+        margin: int = 0,
+        weight: float = 0.0,
+        step: int = 1,
+        beside: Sequence[Beside] = (),
+        unsure: float = 0.25,
+    ) -> None:
+        self.pictures = pixels if isinstance(pixels, Pictures) else Pictures((pixels,))
+        self.scale, self.unsure = Scale(self.pictures, values), unsure
+        self.top, self.unit, self.direct = self.scale.top, self.scale.unit, self.scale.direct
+        levels = [self.scale.levels(picture) for picture in self.pictures.pixels]
+        self.shown, spread = len(levels[0]), variance(*levels)
+        guides = [one.planes(self.scale, spread * self.shown, highest(values)) for one in beside]
         if weight:
-            levels = np.concatenate([levels, structure(levels, weight, variance(levels), max(self.top, STEPS))[None]])
-        self._lay(levels, margin)
+            more = structure(levels, weight, spread, max(self.top, STEPS))
+            levels = [np.concatenate([here, one[None]]) for here, one in zip(levels, more, strict=True)]
+        channels = len(levels[0])
+        for guide in guides:
+            levels = [np.concatenate(pair) for pair in zip(levels, guide.samples, strict=True)]
+        self.guides = np.concatenate([guide.output for guide in guides]) if guides else np.zeros((0, 1, 1), np.uint16)
+        self._lay(levels, margin, step)
+        self.channels = channels
+        self.pixels = self._stacked(list(self.pictures.pixels), self.pictures.pixels[0].flat[0])
 
     @classmethod
     def of_levels(cls, levels: NDArray[Any], count: int) -> Sample:
         """A grey sample that is given in working levels 0 .. count - 1 already."""
         sample = cls.__new__(cls)
-        sample.pixels, sample.shown = levels[..., None], 1
-        sample.top, sample.unit = count - 1, 1.0
-        sample._lay(levels[None].astype(np.uint16), 0)
+        sample.pixels, sample.shown, sample.pictures = levels[..., None], 1, Pictures((levels[..., None],))
+        sample.top, sample.unit, sample.direct, sample.unsure = count - 1, 1.0, True, 0.0
+        sample.guides = np.zeros((0, 1, 1), np.uint16)
+        sample._lay([levels[None].astype(np.uint16)], 0)
         return sample
 
-    def _lay(self, levels: NDArray[np.uint16], margin: int) -> None:
-        self.levels, self.margin, self.channels = levels, margin, len(levels)
-        self.height, self.width = levels.shape[1:]
-        around = ((0, 0), (margin, margin), (margin, margin))
-        padded = np.pad(levels, around, mode="reflect" if min(levels.shape[1:]) > 1 else "edge")
-        self.rows, self.cols = padded.shape[1:]
-        self.working = np.ascontiguousarray(padded).reshape(self.channels, -1)
+    def _lay(self, levels: Sequence[NDArray[np.uint16]], margin: int, step: int = 1) -> None:
+        self.margin, self.channels, self.boxes = margin, len(levels[0]), []
+        self._allowed: dict[tuple[Any, ...], NDArray[np.bool_] | None] = {}
+        self.__dict__.pop("variance", None)
+        top = 0
+        for one in levels:
+            self.boxes.append((top, *one.shape[1:]))
+            top += -(-(one.shape[1] + 2 * margin) // step) * step
+        self.height, self.width = sum(self.boxes[-1][:2]), max(cols for *_, cols in self.boxes)
+        self.rows, self.cols = self.height + 2 * margin, self.width + 2 * margin
+        canvas = np.zeros((len(levels[0]), self.rows, self.cols), np.uint16)
+        for (first, rows, cols), one in zip(self.boxes, levels, strict=True):
+            around = ((0, 0), (margin, margin), (margin, margin))
+            padded = np.pad(one, around, mode="reflect" if min(rows, cols) > 1 else "edge")
+            canvas[:, first : first + rows + 2 * margin, : cols + 2 * margin] = padded
+        self.levels = canvas[:, margin : margin + self.height, margin : margin + self.width]
+        self.working = canvas.reshape(len(canvas), -1)
 
-    @property
+    def _stacked(self, pictures: Sequence[NDArray[Any]], between: Any) -> NDArray[Any]:
+        """Arrays (rows, cols, ...), one for each picture, as one of the height and width of all, without the margin."""
+        if len(pictures) == 1:
+            return pictures[0]
+        stacked = np.full((self.height, self.width, *pictures[0].shape[2:]), between, pictures[0].dtype)
+        for (first, rows, cols), one in zip(self.boxes, pictures, strict=True):
+            stacked[first : first + rows, :cols] = one
+        return stacked
+
+    @cached_property
+    def inside(self) -> NDArray[np.bool_]:
+        """Whether a pixel (rows, cols), margins included, is one of the sample's that are known and may be used."""
+        here = [np.ones((rows, cols), bool) for _, rows, cols in self.boxes]
+        for masks in (self.pictures.known, self.pictures.usable):
+            here = [a & b for a, b in zip(here, masks, strict=True)] if masks else here
+        return np.pad(self._stacked(here, False), self.margin)
+
+    @cached_property
     def variance(self) -> float:
-        """sigma^2 of equation (8): the mean over channels of the variance of the working levels."""
-        return variance(self.levels)
+        """sigma^2 of equation (8): the mean over the matched channels of the variance of the working levels."""
+        return variance(*(self.levels[: self.channels, top : top + rows, :cols] for top, rows, cols in self.boxes))
 
     def positions(
         self,
@@ -133,6 +192,13 @@ class Sample:
             Those whose neighbourhood lies in the sample, equation (4); all, where the margin is wide enough; or
             the former at the finest level, where they are three quarters of all or more, else the latter.
         """
+        where, allowed = (offsets, spacing, phases, edges), self.allowed(offsets, spacing, phases, edges)
+        return self.everywhere(*where) if allowed is None else self.everywhere(*where)[allowed]
+
+    def everywhere(
+        self, offsets: NDArray[np.int32], spacing: int, phases: str = "decimated", edges: str = "whole"
+    ) -> NDArray[np.int32]:
+        """The same with what lies between them and may not be used: the crossings of `lines`, row by row."""
         row, col = self.lines(offsets, spacing, phases, edges)
         row, col = row + np.int32(self.margin), col + np.int32(self.margin)
         positions: NDArray[np.int32] = (row[:, None] * np.int32(self.cols) + col[None, :]).ravel()
@@ -146,12 +212,83 @@ class Sample:
         step = 1 if phases == "all" else spacing
         row = np.arange(0, self.height, step, dtype=np.int32)
         col = np.arange(0, self.width, step, dtype=np.int32)
+        if not self.pictures.clean:
+            return row, col
         whole_row = row[(row + top >= 0) & (row + bottom < self.height)]
         whole_col = col[(col + left >= 0) & (col + right < self.width)]
         few = whole_row.size * whole_col.size < ENOUGH_WHOLE * row.size * col.size
         if not (edges == "reflect" or (edges == "auto" and (spacing > 1 or few))):
             row, col = whole_row, whole_col
         return row, col
+
+    def allowed(
+        self, offsets: NDArray[np.int32], spacing: int, phases: str = "decimated", edges: str = "whole"
+    ) -> NDArray[np.bool_] | None:
+        """Which of `everywhere` are candidates, (n,); None where all are.
+
+        Those that are no pixel of a picture, unknown or not to be used are none, nor are those of whose neighbours a
+        larger share than `unsure` is unknown; where neighbourhoods must be whole, each counts within its own picture.
+        """
+        if self.pictures.clean:
+            return None
+        key = (offsets.tobytes(), spacing, phases, edges)
+        if key not in self._allowed:
+            row, col = self.lines(offsets, spacing, phases, edges)
+            found = self._permitted(offsets, spacing, edges, row, col)
+            if not found.any():
+                raise ValueError("nothing of the sample may be used at some level; give more of it, or fewer levels")
+            self._allowed[key] = found.ravel()
+        return self._allowed[key]
+
+    def _permitted(
+        self,
+        offsets: NDArray[np.int32],
+        spacing: int,
+        edges: str,
+        row: NDArray[np.int32],
+        col: NDArray[np.int32],
+    ) -> NDArray[np.bool_]:
+        margin, crossing = self.margin, np.ix_(row + self.margin, col + self.margin)
+        found: NDArray[np.bool_] = self.inside[crossing].copy()
+        (up, left), (down, right) = offsets.min(0) * spacing, offsets.max(0) * spacing
+        whole = np.zeros_like(found)
+        for top, rows, cols in self.boxes:
+            within = (row + up >= top) & (row + down < top + rows)
+            whole |= within[:, None] & ((col + left >= 0) & (col + right < cols))[None, :]
+        few = np.count_nonzero(found & whole) < ENOUGH_WHOLE * np.count_nonzero(found)
+        if not (edges == "reflect" or (edges == "auto" and (spacing > 1 or few))):
+            found &= whole
+        if self.pictures.known:
+            missing = self._stacked([~known for known in self.pictures.known], False)
+            padded = np.pad(missing, margin)
+            lines = np.flatnonzero(padded.any(1))
+            near = (row + margin + down >= lines[0]) & (row + margin + up <= lines[-1])  # who can see one
+            count = np.zeros((int(near.sum()), col.size), np.int16)
+            for a, b in offsets * spacing:
+                count += padded[np.ix_(row[near] + margin + a, col + margin + b)]
+            found[near] &= count <= self.unsure * len(offsets)
+        return found
+
+    def fair(self, offsets: NDArray[np.int32], spacing: int, phases: str, edges: str) -> NDArray[np.int64] | None:
+        """How much each of `everywhere` is to be used, (n,) whole numbers in one unit; None where all alike."""
+        allowed = self.allowed(offsets, spacing, phases, edges)
+        if allowed is None:
+            return None
+        if not self.pictures.shares:
+            return allowed.astype(np.int64)
+        picture = self.picture_of(self.everywhere(offsets, spacing, phases, edges))
+        counts = np.bincount(picture[allowed], minlength=len(self.boxes))
+        total, fair = sum(self.pictures.shares), np.zeros(allowed.size, np.int64)
+        for number, share in enumerate(self.pictures.shares):
+            each = round(2**16 * share / total * int(counts.sum()) / max(1, int(counts[number])))
+            fair[allowed & (picture == number)] = each
+        return fair
+
+    def picture_of(self, source: NDArray[np.integer]) -> NDArray[np.intp]:
+        """The number of the picture that pixel indices lie in, or below whose first row they lie."""
+        tops = np.array([top for top, *_ in self.boxes])
+        row = np.asarray(source) // self.cols - self.margin
+        return np.maximum(np.searchsorted(tops, row, "right") - 1, 0)
 
     def reach(self, offsets: NDArray[np.int32], spacing: int) -> NDArray[np.int32]:
         """Pixel offset of each neighbour, (N,), at a level whose sites are `spacing` pixels apart."""
@@ -170,25 +307,48 @@ class Sample:
         phases: str = "decimated",
         edges: str = "whole",
         planes: Any | None = None,
+        every: bool = False,
     ) -> Candidates:
-        """The candidates of a level (see `positions`) as arrays of a machine, which may have the planes already."""
+        """The candidates of a level (see `positions`) as arrays of a machine, which may have the planes already.
+
+        With ``every`` the list is that of `everywhere`, and ``index_of`` knows the candidates among them.
+        """
         positions = self.positions(offsets, spacing, phases, edges)
         index_of = np.full(self.rows * self.cols, -1, np.int32)
         index_of[positions] = np.arange(positions.size, dtype=np.int32)
+        if every and (allowed := self.allowed(offsets, spacing, phases, edges)) is not None:
+            index_of[positions] = np.flatnonzero(allowed)
+            positions = self.everywhere(offsets, spacing, phases, edges)
         padding = np.full(-positions.size % BLOCK, positions[0], np.int32)
         return Candidates(
             self.planes(machine) if planes is None else planes,
             machine.put(np.concatenate([positions, padding])),
             positions.size,
-            machine.put(self.reach(offsets, spacing)),
+            machine.put(np.pad(self.reach(offsets, spacing), (0, bool(len(self.guides))))),  # a guide's site itself
             machine.put(index_of),
             self.rows,
             self.cols,
+            len(self.guides),
         )
 
     def place(self, source: NDArray[np.int32]) -> NDArray[np.int32]:
-        """(row, column) in the user's sample of pixel indices, on a last axis."""
-        return np.stack(np.divmod(source, np.int32(self.cols)), -1) - np.int32(self.margin)
+        """(row, column) in the user's sample of pixel indices, on a last axis, with the number of the picture where
+        there are several; -1 where a pixel has no source.
+        """
+        place = np.stack(np.divmod(source, np.int32(self.cols)), -1) - np.int32(self.margin)
+        if len(self.boxes) > 1:
+            number = self.picture_of(source).astype(np.int32)
+            place[..., 0] -= np.array([top for top, *_ in self.boxes], np.int32)[number]
+            place = np.concatenate([place, number[..., None]], -1)
+        return np.where((source < 0)[..., None], np.int32(-1), place) if (source < 0).any() else place
+
+    def index(self, place: NDArray[np.integer]) -> NDArray[np.int32]:
+        """The pixel index of (row, column[, number of the picture]) on a last axis; -1 where the row is below 0."""
+        row, col = place[..., 0], place[..., 1]
+        if place.shape[-1] == 3:
+            row = row + np.array([top for top, *_ in self.boxes])[np.maximum(place[..., 2], 0)]
+        found = (row + self.margin) * self.cols + col + self.margin
+        return np.where(place[..., 0] < 0, -1, found).astype(np.int32)
 
     def picture(self, values: NDArray[Any], source: NDArray[Any]) -> NDArray[Any]:
         """The picture that working levels and sources stand for, in the sample's own type.
@@ -205,13 +365,16 @@ class Sample:
         (rows, cols, C) array
             The source's pixel, plus what the working level differs from the source's own.
         """
-        row, col = np.divmod(source, np.int32(self.cols))
-        own = self.pixels[row - np.int32(self.margin), col - np.int32(self.margin)]
-        usual = self.working[: self.shown, source]
-        if (values[: self.shown] == usual).all():
+        own, usual = self._own(source), self.working[: self.shown, source]
+        if not self.direct or (values[: self.shown] == usual).all():
             return np.ascontiguousarray(own)
         step = np.moveaxis(values[: self.shown].astype(np.int64) - usual, 0, -1)
         return moved(own, step * self.unit, self.pixels)
+
+    def _own(self, source: NDArray[np.int32]) -> NDArray[Any]:
+        row, col = np.divmod(np.maximum(source, self.margin * (self.cols + 1)), np.int32(self.cols))
+        own: NDArray[Any] = self.pixels[row - np.int32(self.margin), col - np.int32(self.margin)]
+        return own
 
     def moved(self, source: NDArray[Any], by: NDArray[np.int16]) -> NDArray[Any]:
         """The pixels of some sources, moved by what `simdtex.ops.finish` says.
@@ -228,8 +391,7 @@ class Sample:
         (rows, cols, C) array
             In the sample's own type.
         """
-        row, col = np.divmod(source, np.int32(self.cols))
-        own, change = self.pixels[row - np.int32(self.margin), col - np.int32(self.margin)], np.moveaxis(by, 0, -1)
+        own, change = self._own(source), np.moveaxis(by, 0, -1)
         if self.pixels.dtype == np.uint8:
             exact: NDArray[Any] = (own + change).astype(np.uint8)  # a mean of pixels is one
             return exact
@@ -241,25 +403,14 @@ class Sample:
         return 1 if self.top == 255 else FINE
 
 
-def variance(levels: NDArray[np.integer]) -> float:
-    """The mean over channels of the variance of working levels (C, rows, cols)."""
-    n, total = levels[0].size, 0.0
-    for channel in levels.astype(np.int64):  # integers: the same sum on every machine
-        squares, values = int((channel * channel).sum()), int(channel.sum())
+def variance(*pictures: NDArray[np.integer]) -> float:
+    """The mean over channels of the variance of working levels (C, rows, cols) of one or several pictures."""
+    n, total, channels = sum(levels[0].size for levels in pictures), 0.0, len(pictures[0])
+    for c in range(channels):  # integers: the same sum on every machine
+        planes = [levels[c].astype(np.int64) for levels in pictures]
+        squares, values = sum(int((plane * plane).sum()) for plane in planes), sum(int(p.sum()) for p in planes)
         total += (n * squares - values * values) / n**2
-    return float(total / len(levels))
-
-
-def stretch(pixels: NDArray[Any], top: int) -> tuple[NDArray[np.int64], float]:
-    """Pixels of any real type stretched over the integers 0..top, and the size of 1 in their own unit."""
-    if pixels.dtype.kind in "iu":
-        whole = pixels.astype(np.uint64)  # modulo 2**64, so a difference from the least is exact
-        half = (whole - pixels.min().astype(np.uint64)) / np.float64(2)
-    else:
-        half = pixels.astype(np.float64) / 2  # so that no difference overflows
-        half = half - half.min()
-    half_unit = float(half.max()) / top or 0.5
-    return np.rint(half / half_unit).astype(np.int64), 2 * half_unit
+    return float(total / channels)
 
 
 def moved(own: NDArray[Any], by: NDArray[np.floating[Any]], pixels: NDArray[Any]) -> NDArray[Any]:

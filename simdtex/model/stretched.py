@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.model.sample import moved, stretch
+from simdtex.model.sample import moved
+from simdtex.model.scale import stretch
 
 TOP = 2**20
 """The largest pixel. Sums of a pyramid of up to 30 levels then fit 32 bits (kernels/laplacian.cl)."""

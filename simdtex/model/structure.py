@@ -7,6 +7,7 @@ All sums are of integers, so every machine has the same bits.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import sqrt
 
 import numpy as np
@@ -19,12 +20,14 @@ FLAT = 0.85
 """Share of the pixels whose gradient is no edge."""
 
 
-def structure(levels: NDArray[np.integer], weight: float, variance: float, top: int) -> NDArray[np.uint16]:
-    """The signed distance to the edges of a sample, as working levels.
+def structure(
+    pictures: Sequence[NDArray[np.integer]], weight: float, variance: float, top: int
+) -> list[NDArray[np.uint16]]:
+    """The signed distance to the edges of a sample's pictures, as working levels.
 
     Parameters
     ----------
-    levels : (C, rows, cols) array of integers
+    pictures : sequence of (C, rows, cols) arrays of integers
         Working levels.
     weight : float
         Standard deviation of the channel, in units of the sample's.
@@ -35,30 +38,38 @@ def structure(levels: NDArray[np.integer], weight: float, variance: float, top: 
 
     Returns
     -------
-    (rows, cols) uint16 array
-        0 in the middle of the widest edge; all alike where the sample has no edge, or nothing else.
+    list of (rows, cols) uint16 arrays
+        One for each picture, on one scale: 0 in the middle of the widest edge; all alike where the sample has no edge,
+        or nothing else.
 
     Notes
     -----
-    An edge is where the squared gradient, summed over channels, of the sample smoothed by (1 4 6 4 1)/16 along rows and
+    An edge is where the squared gradient, summed over channels, of a picture smoothed by (1 4 6 4 1)/16 along rows and
     columns exceeds that of `FLAT` of all pixels. Outside, the distance is that to the nearest pixel of an edge; inside,
     minus that to the nearest pixel which is none; neither counts beyond `REACH`. Where the channel would leave 0..top,
     its weight is less. Cost: 4 REACH passes over the sample.
     """
-    gradient = sum(_gradient(channel.astype(np.int64)) for channel in levels)
-    assert isinstance(gradient, np.ndarray)
-    limit = np.partition(gradient.ravel(), int(FLAT * (gradient.size - 1)))[int(FLAT * (gradient.size - 1))]
-    edge = gradient > limit
-    squared = np.where(edge, -distance(~edge), distance(edge))
-    signed = np.sign(squared) * np.sqrt(np.abs(squared).astype(np.float64))
-    whole = np.rint(signed * 256).astype(np.int64)
-    whole -= whole.min()
-    n, total, squares = whole.size, int(whole.sum()), int((whole * whole).sum())
+    gradients = [steepness(levels) for levels in pictures]
+    every = np.concatenate([gradient.ravel() for gradient in gradients])
+    limit = np.partition(every, int(FLAT * (every.size - 1)))[int(FLAT * (every.size - 1))]
+    signed = [_signed(gradient > limit) for gradient in gradients]
+    least = min(int(one.min()) for one in signed)
+    signed = [one - least for one in signed]
+    n, total = every.size, sum(int(one.sum()) for one in signed)
+    squares, most = sum(int((one * one).sum()) for one in signed), max(int(one.max()) for one in signed)
     spread = sqrt((n * squares - total * total) / n**2)
     if not spread:
-        return np.zeros(whole.shape, np.uint16)
-    scale = min(weight * sqrt(variance) / spread, top / int(whole.max()))
-    found: NDArray[np.uint16] = np.rint(whole * scale).astype(np.uint16)
+        return [np.zeros(one.shape, np.uint16) for one in signed]
+    scale = min(weight * sqrt(variance) / spread, top / most)
+    return [np.rint(one * scale).astype(np.uint16) for one in signed]
+
+
+def _signed(edge: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """The distance to the edge, below 0 inside it, in 1/256 of a pixel."""
+    squared = np.where(edge, -distance(~edge), distance(edge))
+    found: NDArray[np.int64] = np.rint(np.sign(squared) * np.sqrt(np.abs(squared).astype(np.float64)) * 256).astype(
+        np.int64
+    )
     return found
 
 
@@ -74,6 +85,14 @@ def distance(marked: NDArray[np.bool_]) -> NDArray[np.int64]:
         nearest[:, apart:] = np.minimum(nearest[:, apart:], squared[:, :-apart] + apart * apart)
         nearest[:, :-apart] = np.minimum(nearest[:, :-apart], squared[:, apart:] + apart * apart)
     return nearest
+
+
+def steepness(levels: NDArray[np.integer]) -> NDArray[np.int64]:
+    """The squared gradient of a picture (C, rows, cols), summed over channels, as of `_gradient`."""
+    total = np.zeros(levels.shape[1:], np.int64)
+    for channel in levels:
+        total += _gradient(channel.astype(np.int64))
+    return total
 
 
 def _gradient(channel: NDArray[np.int64]) -> NDArray[np.int64]:

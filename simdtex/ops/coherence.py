@@ -22,7 +22,7 @@ def sources(r: NDArray[np.int32], field: Field) -> NDArray[np.int32]:
 
 def continuing(candidates: Candidates, source: NDArray[np.int32]) -> NDArray[np.int32]:
     """The number of the candidate that continues the source of neighbour k, (N, S); -1 where there is none."""
-    p = source - candidates.reach[:, None]
+    p = source - candidates.reach[: len(source), None]
     inside = (source >= 0) & (p >= 0) & (p < candidates.index_of.size)
     numbers: NDArray[np.int32] = np.where(inside, candidates.index_of[np.where(inside, p, 0)], -1)
     return numbers

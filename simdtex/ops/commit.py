@@ -12,14 +12,15 @@ from simdtex.ops.neighbourhood import Field
 
 
 def _reference(field: Field, sites: NDArray[np.int32], relaxed: Relaxed, cooled: NDArray[np.uint16]) -> Field:
-    field.values.reshape(len(field.values), -1)[:, sites] = relaxed.values
+    made = len(relaxed.values)
+    field.values.reshape(len(field.values), -1)[:made, sites] = relaxed.values
     field.source.ravel()[sites] = relaxed.choice
     field.temperature.ravel()[sites] = cooled
     return field
 
 
 def _launch(machine: Launcher, field: Field, sites: Array, relaxed: Relaxed, cooled: Array) -> Field:
-    channels, height, width = field.values.shape
+    (channels, _), (_, height, width) = relaxed.values.shape, field.values.shape
     machine.launch_sites(
         ("commit", "commit"),
         (sites.size,),

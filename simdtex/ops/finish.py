@@ -39,17 +39,20 @@ def _reference(
 ) -> NDArray[np.int16]:
     sites, source = grid.sites()[first : first + count], source.ravel()
     shown = sample.working[: sample.shown].astype(np.int64)
-    own = shown[:, source[sites]]
+    usable, nowhere = sample.inside.ravel(), source[sites] < 0
+    own = shown[:, np.maximum(source[sites], 0)]
     total, sums = np.zeros(count, np.int64), np.zeros(own.shape, np.int64)
     for offset, weight in zip(offsets, weights.tolist(), strict=True):
         r = grid.neighbours(sites, offset[None])[0] if offset.any() else sites
         row, col = np.divmod(source[r], np.int32(sample.cols)) - offset[:, None]
         at = np.stack([row, col]) - sample.margin
-        inside = (r >= 0) & (at >= 0).all(0) & (at[0] < sample.height) & (at[1] < sample.width)
+        inside = (r >= 0) & (source[r] >= 0) & (at >= 0).all(0) & (at[0] < sample.height) & (at[1] < sample.width)
+        inside[inside] = usable[(row * sample.cols + col)[inside]]
         said = shown[:, np.where(inside, row * sample.cols + col, 0)]
         total += weight * inside
         sums += weight * inside * (said - own)
-    return ((2 * sample.fine * sums + total) // (2 * total)).astype(np.int16)
+    by: NDArray[np.int16] = ((2 * sample.fine * sums + total) // np.maximum(2 * total, 1)).astype(np.int16)
+    return np.where(nowhere, np.int16(0), by)
 
 
 def _launch(
@@ -69,7 +72,7 @@ def _launch(
         (count,),
         *(grid.struct, i(first), i(count), source, machine.constant(offsets), machine.constant(weights)),
         *(i(len(offsets)), planes, i(planes.shape[1]), i(sample.cols), i(sample.margin)),
-        *(i(sample.height), i(sample.width), i(sample.fine), out),
+        *(i(sample.height), i(sample.width), machine.put(sample.inside.view(np.uint8)), i(sample.fine), out),
     )
     found: NDArray[np.int16] = machine.get(out)
     return found

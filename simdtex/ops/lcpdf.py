@@ -99,26 +99,27 @@ def _distance_reference(near: Neighbourhoods, candidates: Candidates) -> Distanc
     position = candidates.positions[: candidates.size]
     d = np.zeros((position.size, sites), np.float32)
     for k, offset in enumerate(candidates.reach):
-        u = confidence[k].astype(np.float64)
+        certain = confidence[k].astype(np.float64)
         for c, y in enumerate(candidates.pixels):
+            u = certain if certain.ndim == 1 else certain[c]
             e = weighted[k, c] - u * y[position + offset][:, None].astype(np.float64)
             d = (e * e + d).astype(np.float32)  # fits 53 bits, so this is the device's fma: see Sample
     return Distances(d, None, sites)
 
 
 def _distance_launch(machine: Launcher, near: Neighbourhoods, candidates: Candidates) -> Distances:
-    neighbours, _, padded = near.weighted.shape
+    terms, _, padded = near.weighted.shape
     blocks = candidates.positions.size // BLOCK
     distance = machine.empty((blocks * BLOCK, padded), np.float32)
     nearest = machine.empty((blocks, padded), np.float32)
     machine.launch_sites(
         ("lcpdf", "lcpdf_distance"),
         (padded // machine.vector, blocks),
-        *(near.confidence, near.weighted, np.int32(neighbours), np.int32(padded)),
+        *(near.confidence, near.weighted, np.int32(terms), np.int32(padded)),
         *(candidates.pixels, _plane(candidates), candidates.positions, np.int32(candidates.size)),
         *(candidates.reach, np.int32(blocks), distance, nearest),
         local=machine.tile,
-        defines=_defines(machine, candidates),
+        defines=_defines(machine, candidates) | ({"OWN": 1} if len(near.confidence.shape) > 2 else {}),
         work=touching(*near[:2], distance, fma=2 * near.weighted.size / padded * near.sites * candidates.size),
     )
     return Distances(distance, nearest, near.sites)
@@ -156,7 +157,7 @@ def _draw_reference(
     pixels = candidates.pixels[:, positions][..., None]
     taken = drawn(w, pixels, grid.places(sites), win, noisy, seed, level, turn)
     choice, places = positions[taken], grid.places(sites)
-    values = candidates.pixels[:, choice].astype(np.uint16)
+    values = candidates.pixels[: candidates.made, choice].astype(np.uint16)
     if noisy:
         values = np.stack([stepped(x, c, places, win, seed, level, turn) for c, x in enumerate(values)])
     return Relaxed(choice, values)
@@ -231,6 +232,21 @@ def _draw_launch(
 
 draw = Operation("draw", _draw_reference, _draw_launch)
 
+
+# -- iterated conditional modes -----------------------------------------------------------------------------------
+
+
+def _least_reference(distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
+    choice = candidates.positions[distances.distance.argmin(0)]
+    return Relaxed(choice, candidates.pixels[: candidates.made, choice].astype(np.uint16))
+
+
+def _least_launch(machine: Launcher, distances: Distances, candidates: Candidates, win: Window) -> Relaxed:
+    return _take(machine, "least", distances, candidates, win)
+
+
+least = Operation("least", _least_reference, _least_launch)
+"""``least(machine, distances, candidates, window)``: the nearest candidate of each site, of several the first."""
 
 # -- iterated conditional modes of a density ------------------------------------------------------------------
 
@@ -336,8 +352,8 @@ density = Operation("density", _densities_reference, _densities_launch)
 
 
 def _defines(machine: Launcher, candidates: Candidates) -> dict[str, int]:
-    channels = candidates.pixels.shape[0]
-    return {"V": machine.vector, "C": channels, "BLOCK": BLOCK, "STEP": machine.step, "HEAVIEST": HEAVIEST}
+    sizes = {"V": machine.vector, "C": candidates.pixels.shape[0], "BLOCK": BLOCK, "STEP": machine.step}
+    return sizes | {"HEAVIEST": HEAVIEST} | ({"G": candidates.guides} if candidates.guides else {})
 
 
 def _plane(candidates: Candidates) -> np.int32:
@@ -360,8 +376,8 @@ def _take(
     *arguments: Any,
 ) -> Relaxed:
     """Launch a kernel that gives each site a source and a value."""
-    channels = candidates.pixels.shape[0]
-    out = Relaxed(machine.empty((distances.sites,), np.int32), machine.empty((channels, distances.sites), np.uint16))
+    sites, made = distances.sites, candidates.made
+    out = Relaxed(machine.empty((sites,), np.int32), machine.empty((made, sites), np.uint16))
     machine.launch_sites(
         ("lcpdf", f"lcpdf_{name}"),
         (distances.sites,),

@@ -22,6 +22,7 @@ LEVEL = np.dtype(
         *((name, np.float32) for name in ("favour", "scale")),
         *((name, np.int32) for name in ("radius", "top", "draws", "xi")),
         ("novelty", np.float32),
+        ("centre", np.float32),
     ],
     align=True,
 )

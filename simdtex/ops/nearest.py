@@ -53,14 +53,12 @@ def strip_of(
     machine: Machine, sample: Sample, offsets: NDArray[np.int32], spacing: int, phases: str, edges: str
 ) -> Strip:
     """The strip of a level's candidates: see `simdtex.model.sample.Sample.positions`."""
-    positions = sample.positions(offsets, spacing, phases, edges)
+    positions = sample.everywhere(offsets, spacing, phases, edges)
     step = spacing if phases == "decimated" else 1
     row, col = (int(n) for n in divmod(positions[0], sample.cols))
-    planes = sample.working.reshape(sample.channels, sample.rows, sample.cols)[
-        :, row % step :: step, col % step :: step
-    ]
+    planes = sample.working.reshape(-1, sample.rows, sample.cols)[:, row % step :: step, col % step :: step]
     pitch = planes.shape[2]
-    pixels = np.pad(planes.reshape(sample.channels, -1).astype(np.float32), ((0, 0), (0, TAIL)))
+    pixels = np.pad(planes.reshape(len(planes), -1).astype(np.float32), ((0, 0), (0, TAIL)))
     reach = (offsets[:, 0] * np.int32(pitch) + offsets[:, 1]) * np.int32(spacing // step)
     wide = int(np.searchsorted(positions, (row + 1) * sample.cols))
     first, reaches = row // step * pitch + col // step, machine.put(reach.astype(np.int32))

@@ -26,7 +26,7 @@ from simdtex.ops.commit import commit
 from simdtex.ops.lcpdf import Distances, Relaxed, Window
 from simdtex.ops.level import constants
 from simdtex.ops.nearest import Strip, nearest
-from simdtex.ops.neighbourhood import Field, neighbourhood
+from simdtex.ops.neighbourhood import NOTHING, Beside, Field, gathered, neighbourhood
 from simdtex.ops.square import Square
 from simdtex.ops.temperature import temperature
 
@@ -58,7 +58,7 @@ class Everything(NamedTuple):
         self, sites: NDArray[np.int32], field: Field, relaxation: Relaxation, turn: int
     ) -> tuple[NDArray[np.int64], Distances]:
         """Numbers (slots, 1) of the candidates, and their distances, favoured where they continue a neighbour."""
-        near = neighbourhood.reference(sites, field, relaxation.offsets, relaxation.grid)
+        near = neighbourhood.reference(sites, field, relaxation.offsets, relaxation.grid, relaxation.beside)
         found = lcpdf.distance.reference(near, self.candidates)
         where = (sites, field, relaxation.offsets, relaxation.grid)
         found = coherence.reference(found, self.candidates, *where, relaxation.favour)
@@ -112,9 +112,10 @@ class Listed(NamedTuple):
         """Numbers (slots, S) of the candidates, -1 past the last, and their distances, infinity there."""
         r = relaxation.grid.neighbours(sites, relaxation.offsets)
         numbers, suggested = self._list(sites, r, field, relaxation, turn)
-        u = np.where(r < 0, np.float32(0), (1024 - field.temperature.ravel()[r].astype(np.float32)) / np.float32(1024))
-        x = np.moveaxis(field.values.reshape(len(field.values), -1)[:, r], 0, 1)
-        d = self.square.distance(numbers, x, u, relaxation.offsets)
+        offsets = relaxation.offsets
+        if relaxation.beside.guides:
+            offsets = np.concatenate([offsets, np.zeros((1, 2), np.int32)])
+        d = self.square.distance(numbers, *gathered(sites, r, field, relaxation.beside), offsets)
         d = np.where(suggested, d * relaxation.favour, d) + relaxation.price[np.maximum(numbers, 0)]
         return numbers, Distances(d, None, sites.size)
 
@@ -133,7 +134,8 @@ class Listed(NamedTuple):
         for suggestion in continuing(self.candidates, sources(r, field))[: self.suggesting]:
             add(suggestion)
         suggested = np.arange(self.slots)[:, None] < size
-        add(self.candidates.index_of[field.source.ravel()[sites]])
+        present = field.source.ravel()[sites]
+        add(np.where(present < 0, -1, self.candidates.index_of[present]))
         own = size.copy()
         for k in range(own.max() if self.likes else 0):
             for like in self.similar[np.maximum(numbers[k], 0)].T:
@@ -190,7 +192,7 @@ class Choice(NamedTuple):
         else:
             chosen = np.where(d == d.min(0), numbers, candidates.size).min(0)
         choice = candidates.positions[chosen]
-        values = candidates.pixels[:, choice].astype(np.uint16)
+        values = candidates.pixels[: candidates.made, choice].astype(np.uint16)
         if self.draws and self.density:
             values = np.stack([lcpdf.stepped(x, c, places, self.window, *keys) for c, x in enumerate(values)])
         return Relaxed(choice, values)
@@ -206,6 +208,7 @@ class Relaxation(NamedTuple):
     by which the distance of those is multiplied that continue a neighbour's source; ``novelty`` what is added to it for
     each neighbour whose source is continued, and `AGAIN` times that for each whose source the candidate is; ``price``
     (n or more,) float32 what is added to that of each candidate (`simdtex.ops.use`); ``choice`` what it takes of them;
+    ``beside`` which channels are guides;
     ``xi`` of equation (13) in 1/1024; ``seed`` and ``level`` the keys of its random numbers.
     """
 
@@ -219,6 +222,7 @@ class Relaxation(NamedTuple):
     xi: int
     seed: int
     level: int
+    beside: Beside = NOTHING
 
     @property
     def fused(self) -> bool:
@@ -282,7 +286,8 @@ def _apart_launch(
 ) -> tuple[Relaxed, Array]:
     if not relaxation.fused:
         return _staged(machine, sites, field, relaxation, turn)
-    relaxed = Relaxed(machine.empty((sites.size,), np.int32), machine.empty((len(field.values), sites.size), np.uint16))
+    made = len(field.values) - relaxation.beside.guides
+    relaxed = Relaxed(machine.empty((sites.size,), np.int32), machine.empty((made, sites.size), np.uint16))
     cooled = machine.empty((sites.size,), np.uint16)
     name, defines, arguments = _fused(machine, sites, field, weighed, relaxation, turn)
     machine.launch_sites(
@@ -302,16 +307,18 @@ def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxatio
     grid, offsets, proposal, choice = relaxation.grid, relaxation.offsets, relaxation.proposal, relaxation.choice
     assert isinstance(proposal, Everything)
     candidates, window = proposal.candidates, choice.window
-    if not choice.stores:
+    if not (choice.stores or relaxation.beside.own):
         terms = (relaxation.favour, relaxation.price)
         relaxed = nearest(machine, sites, field, offsets, grid, candidates, proposal.strip, *terms)
     else:
-        near = neighbourhood(machine, sites, field, offsets, grid)
+        near = neighbourhood(machine, sites, field, offsets, grid, relaxation.beside)
         distances = lcpdf.distance(machine, near, candidates)
         if relaxation.favour != 1:
             distances = coherence(machine, distances, candidates, sites, field, offsets, grid, relaxation.favour)
         distances = charge(machine, distances, candidates, relaxation.price)
-        if choice.draws:
+        if not choice.stores:
+            relaxed = lcpdf.least(machine, distances, candidates, window)
+        elif choice.draws:
             keys = (choice.density, relaxation.seed, relaxation.level, turn)
             relaxed = lcpdf.draw(machine, distances, candidates, sites, grid, window, *keys)
         else:
@@ -330,10 +337,12 @@ def _fused(
         **{"neighbours": offsets.shape[0], "pixels": candidates.index_of.size, "candidates": candidates.size},
         **{"favour": relaxation.favour, "scale": window.scale, "top": window.top, "draws": choice.draws},
         **{"radius": window.radius if choice.density else -1, "xi": relaxation.xi, "novelty": relaxation.novelty},
+        "centre": relaxation.beside.centre,
     }
     common = (offsets, candidates.reach, candidates.index_of, candidates.positions)
     noise, key = machine.constant(window.noise), np.uint32(turn)
     defines = {"C": len(field.values), "V": machine.vector} | ({"TILES": 1} if grid.tile else {})
+    defines |= relaxation.beside.defines
     own: list[Any]
     if isinstance(proposal, Everything):
         strip = proposal.strip

@@ -32,19 +32,24 @@ class Lattice(NamedTuple):
     """Where the candidates of a level lie.
 
     ``rows``, ``cols`` lines of the sample, pixels; ``step`` pixels from one to the next; ``positions`` (n,) pixel index
-    of each, on the host.
+    of each, on the host; ``number`` (rows cols,) of the candidate at each crossing, -1 where there is none.
     """
 
     rows: NDArray[np.int32]
     cols: NDArray[np.int32]
     step: int
     positions: NDArray[np.int32]
+    number: NDArray[np.int32]
 
 
 def lattice_of(sample: Sample, offsets: NDArray[np.int32], spacing: int, phases: str, edges: str) -> Lattice:
     """Where the candidates of a level lie: see `simdtex.model.sample.Sample.positions`."""
     where = (offsets, spacing, phases, edges)
-    return Lattice(*sample.lines(*where), spacing if phases == "decimated" else 1, sample.positions(*where))
+    lines, positions, allowed = sample.lines(*where), sample.positions(*where), sample.allowed(*where)
+    number = np.arange(lines[0].size * lines[1].size, dtype=np.int32)
+    if allowed is not None:
+        number = np.where(allowed, np.cumsum(allowed) - 1, -1).astype(np.int32)
+    return Lattice(*lines, spacing if phases == "decimated" else 1, positions, number)
 
 
 class Table(NamedTuple):
@@ -87,7 +92,7 @@ def _reference(
         numbers[1:][numbers[1:] == numbers[:-1]] = -1
         at = square.at[p] + (offsets @ np.array([square.down, 1]))[:, None]
         x = np.moveaxis(square.levels[:, at], 0, 1).astype(np.float32)
-        d = square.distance(numbers, x, np.ones(at.shape, np.float32), offsets)
+        d = square.distance(numbers, x, np.ones((len(at), 1, p.size), np.float32), offsets)
         found = np.take_along_axis(numbers, np.lexsort((numbers, d), axis=0)[:k], 0)
         return np.where(found < 0, p, found).T
 
@@ -178,7 +183,8 @@ def most_similar(
             np.maximum(np.searchsorted(there, here, "right") - 1, 0)
             for there, here in ((coarse.rows, lattice.rows), (coarse.cols, lattice.cols))
         )
-        kin = (row[:, None] * coarse.cols.size + col[None, :]).ravel().astype(np.int32)
+        crossing = (row[:, None] * coarse.cols.size + col[None, :]).ravel()[lattice.number >= 0]
+        kin = np.maximum(coarse.number[crossing], 0)
         moves, rounds = _moves(machine.get(above.numbers), coarse), ROUNDS
     for n in range(rounds):
         found = similar(machine, offsets, candidates, square, step, kin, moves, False)

@@ -38,8 +38,8 @@ class Square(NamedTuple):
     ) -> NDArray[np.float32]:
         """Equation (12) for each candidate, (slots, S), infinity where there is none; summed as a device does.
 
-        ``numbers`` (slots, S), -1 where there is none; ``x`` (N, C, S) grey levels of the neighbours and ``u`` (N, S),
-        1 - t of each.
+        ``numbers`` (slots, S), -1 where there is none; ``x`` (N, C, S) grey levels of the neighbours and ``u`` (N, C or
+        1, S), how certain each is; one more of both where the site itself is among ``offsets``.
         """
         radius = int(offsets.max())
         d = np.zeros((LANES, *numbers.shape), np.float32)
@@ -47,7 +47,8 @@ class Square(NamedTuple):
             row, col = offsets[k]
             apart = row * self.down + col
             for c, y in enumerate(self.levels):
-                e = (x[k, c] - y[self.at[np.maximum(numbers, 0)] + apart].astype(np.float32)) * u[k]
+                certain = u[k, c if u.shape[1] > 1 else 0]
+                e = (x[k, c] - y[self.at[np.maximum(numbers, 0)] + apart].astype(np.float32)) * certain
                 lane = (col + radius) % LANES
                 d[lane] = fma32(e, e, d[lane])
         while len(d) > 1:

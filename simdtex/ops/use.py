@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,9 +17,24 @@ CAP = 4.0
 """Excess of use over the fair share above which the price grows no more."""
 
 
+class Market(NamedTuple):
+    """Who competes for sites: the candidates of a level.
+
+    ``shape`` rows and columns of the places where they lie; ``around`` places from one to the edge of its
+    neighbourhood; ``fair`` (places,) int64 how much of each is fair, 0 where there is no candidate, or None where all
+    are alike; ``listed`` whether numbers run over the candidates alone, or over all places.
+    """
+
+    shape: tuple[int, int]
+    around: int
+    fair: NDArray[np.int64] | None = None
+    listed: bool = False
+
+
 def _reference(field: Field, grid: Grid, candidates: Candidates) -> NDArray[np.int32]:
     known = grid.view(field.temperature) < 1024
-    number = candidates.index_of[grid.view(field.source)[known]]
+    source = grid.view(field.source)[known]
+    number = candidates.index_of[source[source >= 0]]
     return np.bincount(number[number >= 0], minlength=candidates.size).astype(np.int32)
 
 
@@ -42,8 +59,7 @@ use = Operation("use", _reference, _launch)
 
 def price(
     counts: NDArray[np.integer],
-    shape: tuple[int, int],
-    radius: int,
+    market: Market,
     rate: float,
     before: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
@@ -53,10 +69,8 @@ def price(
     ----------
     counts : (n,) array of integers
         From `use`.
-    shape : (int, int)
-        Rows and columns of candidates, n of them.
-    radius : int
-        Of a neighbourhood, in candidates.
+    market : Market
+        Of n candidates, or of n places.
     rate : float
         lambda N C sigma^2, the sample's variance times neighbours and channels; 0: no candidate costs anything.
     before : (n or more,) float32 array, optional
@@ -66,7 +80,7 @@ def price(
     -------
     (n,) float32 array
         lambda N C sigma^2 min(4, max(0, u - 1)), u the use of the square around a candidate over its fair share; the
-        mean of that and of `before`, so that prices settle.
+        mean of that and of `before`, so that prices settle. Infinity at a place without a candidate.
 
     Notes
     -----
@@ -74,14 +88,18 @@ def price(
     candidate serves as many sites as any other is semi-discrete optimal transport, and its dual raises the price of
     what is asked for too often. Cost: some ten passes over the candidates, on the host.
     """
-    size, total = shape[0] * shape[1], int(counts.sum())
-    if not (rate and total):
-        found = np.zeros(size, np.float32)
-    else:
-        around, members = (_blurred(a.reshape(shape), radius) for a in (counts, np.ones(size, np.int64)))
-        excess = around.astype(np.float64) * size / (members * np.float64(total)) - 1
+    places, total = market.shape[0] * market.shape[1], int(counts.sum())
+    fair = np.ones(places, np.int64) if market.fair is None else market.fair
+    found = np.zeros(places, np.float32)
+    if rate and total:
+        used = np.zeros(places, np.int64)
+        used[fair > 0 if market.listed else slice(None)] = counts
+        around, due = (_blurred(a.reshape(market.shape), market.around) for a in (used, fair))
+        excess = around.astype(np.float64) * int(fair.sum()) / (np.maximum(due, 1) * np.float64(total)) - 1
         found = (rate * np.clip(excess, 0, CAP)).astype(np.float32).ravel()
-    return found if before is None else (found + before[:size]) / np.float32(2)
+    if market.fair is not None:
+        found = found[fair > 0] if market.listed else np.where(fair > 0, found, np.float32(np.inf))
+    return found if before is None else (found + before[: found.size]) / np.float32(2)
 
 
 def _blurred(counts: NDArray[np.integer], radius: int) -> NDArray[np.int64]:

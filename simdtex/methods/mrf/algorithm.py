@@ -89,17 +89,23 @@ def anneal(run: Run, state: State | None = None, watch: Watch | None = None) -> 
 
 
 def begin(run: Run) -> State:
-    """The state before the first level: every site a pixel of the sample at random (2), at temperature 1 (5)."""
+    """The state before the first level: every site a pixel of the sample at random (2), at temperature 1 (5), but for
+    those whose values are given, at temperature 0.
+    """
     everywhere = run.machine.put(run.sample.positions(np.zeros((1, 2), np.int32), 1))
-    field = start(run.machine, run.planes, everywhere, Grid(*run.shape), run.seed)
+    field = run.hold(start(run.machine, run.planes, everywhere, Grid(*run.shape), run.seed))
     return State(*field, price=None, schedule=None, level=run.levels - 1)
 
 
 def enter(level: Level, state: State) -> State:
-    """The state at the beginning of a level: sites kept from the level above have t = 0, all others t = 1."""
-    warm, heat = active.survey(level.machine, level.grid, state.temperature)
-    price = priced(level, state.field, None)
-    return State(*state.field, price, level.schedule.init(level.setting), level.number, warm=warm, heat=heat)
+    """The state at the beginning of a level: sites kept from the level above have t = 0, all others t = 1.
+
+    Data between the sites stand for the nearest ones from now on, and no longer for those of the level above.
+    """
+    field = level.moved(state.field)
+    warm, heat = active.survey(level.machine, level.grid, field.temperature)
+    price = priced(level, field, None)
+    return State(*field, price, level.schedule.init(level.setting), level.number, warm=warm, heat=heat)
 
 
 def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None = None) -> tuple[State, Info]:
@@ -142,7 +148,7 @@ def priced(level: Level, field: Field, before: NDArray[np.float32] | None) -> ND
     """What each candidate costs during the next sweep, from how often it is used now: the same for all sites of it."""
     candidates = level.proposal.candidates
     counts = use(level.machine, field, level.grid, candidates) if level.rate else np.zeros(candidates.size, np.int32)
-    return price(counts, level.extent, level.around, level.rate, before)
+    return price(counts, level.market, level.rate, before)
 
 
 def rule(level: Level, price: NDArray[np.float32] | None) -> Relaxation:
@@ -154,6 +160,7 @@ def rule(level: Level, price: NDArray[np.float32] | None) -> Relaxation:
         proposal=level.proposal,  # 6.2.2.1 the LCPDF, equations (6) and (12), of these candidates
         favour=level.favour,
         novelty=level.novelty,
+        beside=level.beside,
         price=level.machine.put(np.pad(price, (0, -price.size % BLOCK))),
         choice=level.choice,  # 6.2.2.2 a draw from it, or its mode
         xi=level.xi,  # 6.2.2.3 the temperature, equation (13)
@@ -198,7 +205,8 @@ def exchanged(level: Level, field: Field) -> Field:
 def picture(run: Run, grid: Grid, field: Field) -> NDArray[Any]:
     """Read the picture of a level back, in the sample's type."""
     values, source = run.machine.get(field.values), run.machine.get(field.source)
-    return run.sample.picture(grid.view(values), grid.view(source))
+    found = run.sample.picture(grid.view(values), grid.view(source))
+    return run.given.shown(found, grid) if run.given else found
 
 
 def warmth(run: Run, grid: Grid, field: Field) -> NDArray[np.float64]:

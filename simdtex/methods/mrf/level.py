@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from math import log2, prod
+from functools import cached_property
+from math import log2, prod, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,14 +15,17 @@ from numpy.typing import NDArray
 from simdtex import schedules
 from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf.options import Options
+from simdtex.model.given import NOBODY, Given, Planes, Stand, stand_ins
+from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates, Sample
 from simdtex.ops import active, lcpdf
 from simdtex.ops.nearest import strip_of
-from simdtex.ops.neighbourhood import Field
+from simdtex.ops.neighbourhood import UNTOUCHED, Beside, Field
 from simdtex.ops.relax import KEPT, Choice, Everything, Listed
 from simdtex.ops.similar import Table, lattice_of, most_similar
 from simdtex.ops.square import Square, square_of
+from simdtex.ops.use import Market
 from simdtex.schedules import Setting
 
 WHOLE = 256
@@ -87,6 +91,38 @@ class State(NamedTuple):
         return self._replace(values=values, source=source, temperature=temperature)
 
 
+class Moves(NamedTuple):
+    """What changes of what is given where a level begins.
+
+    ``released`` (n,) the sites that stood for data at the level above; ``stand`` those that do now; ``laid`` what is
+    given; ``guides`` (G, H, W) working levels; where these have gaps, ``told`` has the sites of each that are told by
+    others.
+    """
+
+    released: NDArray[np.int64]
+    stand: Stand
+    laid: Planes | None
+    guides: NDArray[np.uint16]
+    told: list[Stand]
+
+    def on(self, machine: Machine, field: Field) -> Field:
+        """The field with these changes."""
+        if not (self.released.size or self.stand.site.size or self.told):
+            return field
+        values, source, temperature = (np.array(machine.get(plane)) for plane in field)
+        matched = len(values) - len(self.guides)
+        flat = values.reshape(len(values), -1)
+        temperature.flat[self.released] = UNTOUCHED
+        if self.laid is not None:
+            given = self.laid.values.reshape(matched, -1)
+            flat[:matched, self.stand.site] = given[:, self.stand.datum]
+            source.flat[self.stand.site], temperature.flat[self.stand.site] = -1, 0
+        for plane, guide, (site, datum) in zip(values[matched:], self.guides, self.told or [], strict=bool(self.told)):
+            plane[:] = guide
+            plane.flat[site] = guide.flat[datum]
+        return Field(*(machine.put(plane) for plane in (values, source, temperature)))
+
+
 class Lists:
     """A schedule's lists of sites as a machine holds them: each is put there once."""
 
@@ -118,6 +154,8 @@ class Run:
     levels: int
     emulated: bool
     weighed: Array
+    given: Given | None = None
+    laid: Planes | None = field(default=None, repr=False)
     tables: dict[int, Table] = field(default_factory=dict, repr=False)
 
     def grid(self, number: int) -> Grid:
@@ -137,11 +175,13 @@ class Run:
         """
         options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
         grid = self.grid(number).window(*window) if window else self.grid(number)
-        candidates, coarsest = self.candidates(number), number == self.levels - 1
+        coarsest, count = number == self.levels - 1, sample.positions(*self.where(number)).size
         proposal: Everything | Listed
-        if options.search == "exact" or coarsest or candidates.size <= options.exhaustive:
-            proposal = Everything(candidates, strip_of(machine, sample, *self.where(number)))
+        if options.search == "exact" or coarsest or count <= options.exhaustive:
+            every = sample.candidates(machine, *self.where(number), self.planes, every=True)
+            proposal = Everything(every, strip_of(machine, sample, *self.where(number)))
         else:
+            candidates = self.candidates(number)
             likes, square = options.similar, square_of(machine, sample, *self.where(number))
             nobody = np.zeros((1, 1), np.int32)
             similar = self.similar(number, candidates, square).numbers if likes else machine.put(nobody)
@@ -150,10 +190,13 @@ class Run:
         rows, cols = sample.lines(*self.where(number))
         dimensions = sample.channels * (len(offsets) + 1)
         variance = sample.variance
-        h = options.bandwidth * lcpdf.optimal_bandwidth(variance, candidates.size, dimensions)  # (8)
+        h = options.bandwidth * lcpdf.optimal_bandwidth(variance, count, dimensions)  # (8)
         draws = options.relaxation == "gibbs" or (coarsest and options.coarsest == "gibbs")
-        anew = coarsest and candidates.size <= KEPT and (draws or options.pixel == "source")
-        novelty = options.novelty * min(1.0, WHOLE / candidates.size) if anew else 0.0
+        anew = coarsest and proposal.slots <= KEPT and (draws or options.pixel == "source")
+        novelty = options.novelty * min(1.0, WHOLE / count) if anew else 0.0
+        around = int(offsets.max()) * (grid.step if options.phases == "all" else 1)
+        fair = sample.fair(*self.where(number))
+        market = Market((rows.size, cols.size), around, fair, isinstance(proposal, Listed))
         independent = self.schedule.independent(grid, offsets)
         return Level(
             number=number,
@@ -166,13 +209,54 @@ class Run:
             favour=np.float32(1 / (1 + options.coherence)),
             novelty=np.float32(novelty * sample.channels * variance),
             rate=options.balance * len(offsets) * sample.channels * variance,
-            extent=(rows.size, cols.size),
-            around=int(offsets.max()) * (grid.step if options.phases == "all" else 1),
+            market=market,
+            beside=self.beside,
             xi=min(-1, round(options.xi * 1024)),
             in_place=independent and not self.schedule.tile and not self.emulated,
             weighed=machine.put(np.zeros((grid.height, grid.width), np.int32)) if window else self.weighed,
             lists=Lists(machine),
+            movable=self._movable(number),
+            moves=self._moves(number),
         )
+
+    @cached_property
+    def beside(self) -> Beside:
+        """Which channels are guides, and whether each value may be unknown."""
+        guides, gaps = len(self.sample.guides), False
+        if self.laid is not None:
+            gaps = bool((self.laid.values[:, self.laid.known] == UNKNOWN).any())
+        return Beside(guides, guides > 0 or gaps, np.float32(max(1, round(sqrt(len(self.offsets)) / 2))))
+
+    def hold(self, field: Field) -> Field:
+        """The field before the first level with what is given."""
+        matched, laid = self.sample.channels, self.laid
+        if laid is None and not len(self.sample.guides):
+            return field
+        values, source, temperature = (np.array(self.machine.get(plane)) for plane in field)
+        values[matched:] = self.sample.guides
+        if laid:
+            values[:matched, laid.known] = laid.values[:, laid.known]
+            source[laid.known], temperature[laid.known] = laid.source[laid.known], 0
+        return Field(*(self.machine.put(plane) for plane in (values, source, temperature)))
+
+    def _stand_ins(self, number: int) -> Stand:
+        """Who stands for whom at a level: nobody above the coarsest."""
+        if self.laid is None or number == self.levels:
+            return NOBODY
+        return stand_ins(self.laid.known, self.grid(number))
+
+    def _movable(self, number: int) -> Array | None:
+        if self.laid is None:
+            return None
+        movable = (~self.laid.known).astype(np.uint16)
+        movable.flat[self._stand_ins(number).site] = 0
+        return self.machine.put(movable)
+
+    def _moves(self, number: int) -> Moves:
+        guides = self.sample.guides
+        sparse = bool((guides == UNKNOWN).any())
+        told = [stand_ins(plane != UNKNOWN, self.grid(number)) for plane in guides] if sparse else []
+        return Moves(self._stand_ins(number + 1).site, self._stand_ins(number), self.laid, guides, told)
 
     def where(self, number: int) -> tuple[NDArray[np.int32], int, str, str]:
         """What says where the candidates of a level lie: see `simdtex.model.sample.Sample.positions`."""
@@ -222,10 +306,10 @@ class Level:
         What a candidate costs for each neighbour whose source it continues; at levels but the coarsest 0.
     rate : float
         lambda N C sigma^2: what a candidate costs whose surroundings are used twice as often as their share.
-    extent : (int, int)
-        Rows and columns of candidates.
-    around : int
-        Candidates from one to the edge of its neighbourhood.
+    market : simdtex.ops.use.Market
+        Where the candidates lie, and how much of each is fair.
+    beside : simdtex.ops.neighbourhood.Beside
+        Which channels are guides, and whether each value may be unknown.
     xi : int
         Of equation (13), in 1/1024.
     in_place : bool
@@ -234,6 +318,8 @@ class Level:
         Counts the candidates that each site has weighed.
     lists : Lists
         The schedule's lists of sites as the machine holds them.
+    moves : Moves
+        Which data stand for sites beside them.
     movable : (H, W) uint16 array of the machine, optional
         0 at sites whose values are given: free sweeps leave them alone, as all sweeps do that find their temperature 0.
         None: every site may relax.
@@ -249,13 +335,18 @@ class Level:
     favour: np.float32
     novelty: np.float32
     rate: float
-    extent: tuple[int, int]
-    around: int
+    market: Market
+    beside: Beside
     xi: int
     in_place: bool
     weighed: Array
     lists: Lists = field(repr=False)
+    moves: Moves = field(repr=False)
     movable: Array | None = None
+
+    def moved(self, field: Field) -> Field:
+        """The field at the level's beginning: data between the sites have moved to those that they stand for."""
+        return self.moves.on(self.machine, field)
 
     @property
     def machine(self) -> Machine:
@@ -272,7 +363,7 @@ class Level:
     def at_once(self) -> int:
         """Sites that are relaxed between two looks at the clock, as far as scratch memory holds what they need."""
         channels, neighbours = int(self.proposal.candidates.pixels.shape[0]), len(self.setting.offsets)
-        stores = isinstance(self.proposal, Everything) and self.choice.stores
+        stores = isinstance(self.proposal, Everything) and (self.choice.stores or self.beside.own)
         most = self.machine.chunk(self.proposal.slots, neighbours, channels, stores)
         return max(most, TOGETHER) if isinstance(self.proposal, Listed) and self.in_place else most
 
@@ -335,18 +426,19 @@ def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int
 
 
 def number_of_levels(
-    sample: tuple[int, ...], offsets: NDArray[np.int32], shape: tuple[int, int], options: Options
+    samples: Sequence[tuple[int, ...]], offsets: NDArray[np.int32], shape: tuple[int, int], options: Options
 ) -> int:
-    """M, checked against the sample's rows and columns and against M <= 1 + log2(min(Mx, My))."""
-    check_fit(sample, int(offsets.max()), options.order)
+    """M, checked against the rows and columns of the sample's pictures and against M <= 1 + log2(min(Mx, My))."""
+    for sample in samples:
+        check_fit(sample, int(offsets.max()), options.order)
     step = 1 if options.phases == "all" else 2
 
     def candidates(levels: int) -> int:
         spacing = 2 ** (levels - 1)
         margin = 0 if options.edges != "whole" else 2 * int(offsets.max()) * spacing
-        return prod(max(0, n - margin) // (spacing if step == 2 else 1) for n in sample)
+        return sum(prod(max(0, n - margin) // (spacing if step == 2 else 1) for n in sample) for sample in samples)
 
-    most = 1 + int(log2(min(*shape, *sample)))
+    most = 1 + int(log2(min(*shape, *(side for sample in samples for side in sample))))
     while most > 1 and not candidates(most):
         most -= 1
     if options.levels is None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from typing import Any
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from simdtex import schedules
 from simdtex.maspar.array import parse_array
 from simdtex.model.lattice import check_order
+from simdtex.model.pictures import Pictures
 from simdtex.options import build, one_of, real, true_or_false, whole
 
 PRESETS: dict[str, dict[str, Any]] = {
@@ -123,6 +125,9 @@ class Options:
     emulate : bool
         Whether every launch is to have one work-item per PE of the array. False packs all the same, and only
         accounts for the array.
+    unsure : float
+        Where a sample is not known everywhere: the share of a candidate's neighbours that may be unknown, 0 to 1. These
+        are taken to be as the nearest known pixel.
     """
 
     order: int = 18
@@ -152,6 +157,7 @@ class Options:
     chance: int = 4
     exhaustive: int = 64
     emulate: bool = True
+    unsure: float = 0.25
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -190,9 +196,10 @@ class Options:
         true_or_false("check_schedule", self.check_schedule)
         parse_array(self.array or "1x1", self.mapping)
         true_or_false("emulate", self.emulate)
+        real("unsure", self.unsure, 0)
 
-    def resolved(self, pixels: NDArray[Any]) -> Options:
-        """The same as it is executed: what ``search="auto"`` and ``finish=None`` mean for a sample (rows, cols, C).
+    def resolved(self, pictures: Pictures) -> Options:
+        """The same as it is executed: what ``search="auto"`` and ``finish=None`` mean for a sample.
 
         The grey levels of a density are nobody's, so nothing says how far from an edge they are: no structure channel.
         """
@@ -200,18 +207,21 @@ class Options:
         search = ("coherent" if nearest else "exact") if self.search == "auto" else self.search
         finish = self.finish
         if finish is None:
-            finish = 0.0 if self.pixel == "density" or few(pixels) else FINISH
+            categories = (pictures.categorical and any(pictures.categorical)) or few(pictures.pixels)
+            finish = 0.0 if self.pixel == "density" or categories else FINISH
         structure = 0.0 if self.pixel == "density" else self.structure
         return replace(self, search=search, finish=finish, structure=structure)
 
 
-def few(pixels: NDArray[Any]) -> bool:
-    """Whether a sample (rows, cols, channels) has at most `CATEGORIES` different pixels: then it is a map of them."""
-    flat, seen = pixels.reshape(-1, pixels.shape[-1]), np.zeros((0, pixels.shape[-1]), pixels.dtype)
-    for part in np.split(flat, range(2**8, len(flat), 2**16)):  # the first, a small one, tells of most
-        seen = np.unique(np.concatenate([seen, part]), axis=0)
-        if len(seen) > CATEGORIES:
-            return False
+def few(pictures: Sequence[NDArray[Any]]) -> bool:
+    """Whether a sample, pictures (rows, cols, C), has at most `CATEGORIES` different pixels: a map of them."""
+    seen = np.zeros((0, pictures[0].shape[-1]), pictures[0].dtype)
+    for picture in pictures:
+        flat = picture.reshape(-1, picture.shape[-1])
+        for part in np.split(flat, range(2**8, len(flat), 2**16)):  # the first, a small one, tells of most
+            seen = np.unique(np.concatenate([seen, part]), axis=0)
+            if len(seen) > CATEGORIES:
+                return False
     return True
 
 

@@ -15,7 +15,10 @@ from simdtex.methods.mrf.algorithm import anneal
 from simdtex.methods.mrf.level import Run, number_of_levels
 from simdtex.methods.mrf.observers import Observer
 from simdtex.methods.mrf.options import Options
+from simdtex.model.given import Given, planes
+from simdtex.model.guide import Beside, Guide
 from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.model.use import effective_use
 from simdtex.ops.finish import around, finish
@@ -28,11 +31,13 @@ AT_ONCE = 2**20
 
 def synthesize(
     machine: Machine,
-    pixels: NDArray[Any],
+    pixels: NDArray[Any] | Pictures,
     shape: tuple[int, int],
     options: Options,
     seed: int,
     callback: Callback | None = None,
+    given: Given | None = None,
+    guide: Guide | None = None,
 ) -> tuple[NDArray[Any], Output]:
     """Algorithm 1: nonparametric multiscale MRF texture synthesis.
 
@@ -40,7 +45,7 @@ def synthesize(
     ----------
     machine : Machine
         What executes the steps.
-    pixels : (rows, cols, channels) array
+    pixels : (rows, cols, channels) array, or Pictures
         Y, the sample.
     shape : (int, int)
         Rows and columns of X, the output.
@@ -49,6 +54,10 @@ def synthesize(
         Key of every random number.
     callback : callable, optional
         Called with a `simdtex.run.Relaxing` after every part of a sweep.
+    given : Given, optional
+        Sites of X whose values are given; they stay what they are.
+    guide : Guide, optional
+        What tells where to be what.
 
     Returns
     -------
@@ -66,7 +75,8 @@ def synthesize(
     the host: about 50 per output pixel.
     """
     launches, worked = machine.launches, machine.seconds
-    run = laid_out(machine, pixels, shape, options, seed)
+    pictures = pixels if isinstance(pixels, Pictures) else Pictures((pixels,))
+    run = laid_out(machine, pictures, shape, options, seed, given, guide)
     observer, state = Observer(run, callback), None
     for level, state, info in anneal(run, watch=observer.part):
         observer.sweep(level, state, info)
@@ -77,6 +87,8 @@ def synthesize(
         image = finished(run, state.source, source)
     else:
         image = run.sample.picture(grid.view(machine.get(state.values)), source)
+    if given:
+        image = given.shown(image, grid)
     place = run.sample.place(source)
     meter, account = observer.meter, observer.account
     statistics = {
@@ -87,18 +99,38 @@ def synthesize(
         "device_seconds": device_seconds(machine, worked),
         "accounting": account.report() | {"emulated": run.emulated, "launches": machine.launches - launches},
         "levels": meter.reports,
-        "use": effective_use(place, pixels.shape).as_dict(),
+        "use": used(place, pictures),
     }
     return image, Output(place, temperatures / 1024, observer.stages, statistics)
 
 
-def laid_out(machine: Machine, pixels: NDArray[Any], shape: tuple[int, int], options: Options, seed: int) -> Run:
+def used(place: NDArray[np.int32], pictures: Pictures) -> dict[str, Any] | None:
+    """How evenly the sample is used, where it is one picture and something is from there."""
+    if place.shape[-1] > 2 or (place[..., 0] < 0).all():
+        return None
+    return effective_use(place, pictures.pixels[0].shape).as_dict()
+
+
+def laid_out(
+    machine: Machine,
+    pictures: Pictures,
+    shape: tuple[int, int],
+    options: Options,
+    seed: int,
+    given: Given | None = None,
+    guide: Guide | None = None,
+) -> Run:
     """Lay out a run on a machine; the arguments are those of `synthesize`."""
-    options = options.resolved(pixels)
+    options = options.resolved(pictures)
     offsets = neighbourhood_offsets(options.order)
-    levels = number_of_levels(pixels.shape[:2], offsets, shape, options)  # 1
-    channels, margin = pixels.shape[-1] + bool(options.structure), int(offsets.max()) * 2 ** (levels - 1)
-    sample = Sample(pixels, channels * len(offsets), margin, options.structure)
+    levels = number_of_levels([picture.shape[:2] for picture in pictures.pixels], offsets, shape, options)  # 1
+    step = 2 ** (levels - 1)
+    beside: list[Beside] = [guide] if guide else []
+    if given and given.partly:
+        beside.append(given.colocated(pictures.pixels))
+    channels = pictures.channels + bool(options.structure) + sum(one.channels for one in beside)
+    values, margin = channels * len(offsets) + len(beside), int(offsets.max()) * step
+    sample = Sample(pictures, values, margin, options.structure, step, beside, options.unsure)
     schedule = schedules.get(options.schedule)
     _check_memory(machine, sample, shape, options.similar, copies=2 if schedule.tile else 1)
     emulated = bool(options.array) and options.emulate
@@ -116,6 +148,8 @@ def laid_out(machine: Machine, pixels: NDArray[Any], shape: tuple[int, int], opt
         levels=levels,
         emulated=emulated,
         weighed=machine.put(np.zeros(shape, np.int32)),
+        given=given,
+        laid=planes(given, sample) if given and given.whole.any() else None,
     )
 
 
@@ -141,7 +175,7 @@ def finished(run: Run, source: Array, seen: NDArray[np.int32]) -> NDArray[Any]:
 
 
 def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], similar: int, copies: int) -> None:
-    pixels, channels = shape[0] * shape[1], sample.channels
+    pixels, channels = shape[0] * shape[1], len(sample.working)
     within_32_bits(shape, channels * copies)
     field = copies * (6 + 2 * channels)
     machine.require(pixels * (12 + field) + sample.rows * sample.cols * (14 * channels + 159 + 4 * similar))

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What tells an output where to be what: pictures beside the sample and the output that are matched and never made.
+
+A guide's channels stand in equation (12) beside those of the pixels, with two differences: they are known everywhere,
+whatever the temperature, and the site itself counts, as much as `centre` says. So a candidate is near where its guide,
+there and around it, is that of the site: texture by numbers (Hertzmann et al. 2001), or a secondary variable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.model.scale import Scale, stretch
+
+UNKNOWN = 2**16 - 1
+"""The working level of what nobody knows: it counts for nothing (kernels/common/level.h)."""
+
+
+class Planes(NamedTuple):
+    """Working levels of a guide: a (G, rows, cols) array for each picture of the sample, and (G, H, W) of the output."""
+
+    samples: list[NDArray[np.uint16]]
+    output: NDArray[np.uint16]
+
+
+class Beside(Protocol):
+    """Something that has planes beside those of the pixels."""
+
+    @property
+    def channels(self) -> int:
+        """How many, at most."""
+        ...
+
+    def planes(self, scale: Scale, spread: float, top: int) -> Planes:
+        """Its working levels, 0..top; ``spread`` is the variance of the pixels' levels, summed over channels."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Guide:
+    """A guide, one picture of it for each of the sample and one for the output.
+
+    Parameters
+    ----------
+    samples : tuple of (rows, cols, G) arrays
+        Of the sizes of the sample's pictures.
+    output : (H, W, G) array
+        Of the output's size; NaN where it says nothing.
+    labels : bool
+        Whether its numbers are names: two differ or they do not.
+    weight : float
+        Its variance in units of the pixels'.
+    """
+
+    samples: tuple[NDArray[Any], ...]
+    output: NDArray[Any]
+    labels: bool
+    weight: float
+
+    @property
+    def channels(self) -> int:
+        """One for each of its own; of three labels or more one for each label."""
+        if not self.labels:
+            return int(self.output.shape[-1])
+        names = [self._names(channel).size for channel in range(self.output.shape[-1])]
+        return sum(1 if count < 3 else count for count in names)
+
+    def _names(self, channel: int) -> NDArray[Any]:
+        return np.unique(np.concatenate([np.unique(sample[..., channel]) for sample in self.samples]))
+
+    def planes(self, scale: Scale, spread: float, top: int) -> Planes:
+        """One channel for each of its own; of three labels or more one for each label."""
+        silent = np.isnan(self.output).any(-1) if self.output.dtype.kind == "f" else np.zeros(self.output.shape[:2], bool)
+        parts = [self._channel(channel, silent, spread, top) for channel in range(self.output.shape[-1])]
+        counts = zip(*(part.samples for part in parts), strict=True)
+        output = np.concatenate([part.output for part in parts])
+        output[:, silent] = UNKNOWN
+        return Planes([np.concatenate(those) for those in counts], output)
+
+    def _channel(self, channel: int, silent: NDArray[np.bool_], spread: float, top: int) -> Planes:
+        samples = [sample[..., channel] for sample in self.samples]
+        output = np.where(silent, samples[0].flat[0], self.output[..., channel])
+        every = np.concatenate([sample.ravel() for sample in samples])
+        if self.labels:
+            names = self._names(channel)
+            names = names[1:] if len(names) < 3 else names
+            unit = [np.stack([sample == name for name in names] or [sample != sample]) for sample in samples]
+            wanted = np.stack([output == name for name in names] or [output != output])
+        else:
+            ends = min(every.min(), output.min()), max(every.max(), output.max())
+            unit = [stretch(sample, top, ends)[0][None] for sample in samples]
+            wanted = stretch(output, top, ends)[0][None]
+        n, variance = every.size, 0.0
+        for k in range(len(wanted)):
+            total = sum(int(one[k].sum()) for one in unit)
+            squares = sum(int((one[k].astype(np.int64) ** 2).sum()) for one in unit)
+            variance += (n * squares - total * total) / n**2
+        most = 1 if self.labels else top
+        height = min(sqrt(self.weight * spread / self.output.shape[-1] / variance) * most, top) if variance else float(top)
+        if self.weight == 0:
+            height = 0.0
+        return Planes([_scaled(one, height, most) for one in unit], _scaled(wanted, height, most))
+
+
+@dataclass(frozen=True, eq=False)
+class Colocated:
+    """Data of some variables where the others are to be found: they guide the choice of those.
+
+    Parameters
+    ----------
+    samples : tuple of (rows, cols, C) arrays
+        The sample's pictures.
+    values : (H, W, C) array
+        Of the sample's type.
+    known : (H, W, C) bool array
+        Which of them are given.
+    """
+
+    samples: tuple[NDArray[Any], ...]
+    values: NDArray[Any]
+    known: NDArray[np.bool_]
+
+    @property
+    def channels(self) -> int:
+        """At most those of all variables, each with its categories."""
+        found = [np.unique(np.concatenate([s[..., v].ravel() for s in self.samples])) for v in range(self.known.shape[-1])]
+        return sum(max(1, min(len(values), 16)) for values in found)
+
+    def planes(self, scale: Scale, spread: float, top: int) -> Planes:
+        """The channels of those variables again."""
+        owner = scale.owners
+        those = [channel for channel, variable in enumerate(owner) if self.known[..., variable].any()]
+        output = scale.levels(self.values)[those]
+        for plane, channel in zip(output, those, strict=True):
+            plane[~self.known[..., owner[channel]]] = UNKNOWN
+        return Planes([scale.levels(sample)[those] for sample in self.samples], output)
+
+
+def _scaled(unit: NDArray[Any], height: float, most: int) -> NDArray[np.uint16]:
+    found: NDArray[np.uint16] = np.rint(unit * (height / most)).astype(np.uint16)
+    return found

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a sample is made of: one picture or several, what of them is known, what may be used, and what kind it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Pictures:
+    """Pictures of one type that a texture is taken from.
+
+    Parameters
+    ----------
+    pixels : tuple of (rows, cols, C) arrays
+        Of any sizes; NaN where a pixel is unknown.
+    unknown : tuple of (rows, cols) bool arrays, optional
+        What is unknown beside NaN: nothing is taken from there, and it is nobody's neighbour.
+    usable : tuple of (rows, cols) bool arrays, optional
+        Where pixels may be taken from; all of them are neighbours. None: everywhere.
+    categorical : tuple of C bools, optional
+        Whether the numbers of a variable (a channel) name categories. None: none do.
+    weights : tuple of C floats, optional
+        Of the variables, each brought to the same spread. None: all are on one scale, as colours are.
+    shares : tuple of floats, optional
+        How much of the output each picture is to be used for; they need not add up to 1. None: every pixel of all
+        pictures counts alike.
+    """
+
+    pixels: tuple[NDArray[Any], ...]
+    unknown: tuple[Mask, ...] | None = None
+    usable: tuple[Mask, ...] | None = None
+    categorical: tuple[bool, ...] | None = None
+    weights: tuple[float, ...] | None = None
+    shares: tuple[float, ...] | None = None
+    known: tuple[Mask, ...] | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Complete what is unknown by the nearest known pixel, so that a neighbourhood can be looked at."""
+        gaps = [unknown_in(picture) for picture in self.pixels]
+        if self.unknown:
+            gaps = [gap | more for gap, more in zip(gaps, self.unknown, strict=True)]
+        if not any(gap.any() for gap in gaps):
+            object.__setattr__(self, "known", None)
+            return
+        if any(gap.all() for gap in gaps):
+            raise ValueError("a sample has no known pixel; leave it out")
+        object.__setattr__(self, "known", tuple(~gap for gap in gaps))
+        object.__setattr__(self, "pixels", tuple(completed(*pair) for pair in zip(self.pixels, gaps, strict=True)))
+
+    @property
+    def clean(self) -> bool:
+        """Whether there is one picture, and all of it is known and may be used."""
+        return len(self.pixels) == 1 and self.known is None and self.usable is None
+
+    def categories(self, variable: int) -> NDArray[Any] | None:
+        """The categories of a variable in ascending order; None where it has none."""
+        if not (self.categorical and self.categorical[variable]):
+            return None
+        return np.unique(np.concatenate([self.values(variable, number) for number in range(len(self.pixels))]))
+
+    def values(self, variable: int, number: int) -> NDArray[Any]:
+        """The known values of a variable in one of the pictures, (n,)."""
+        plane = self.pixels[number][..., variable]
+        return plane[self.known[number]] if self.known else plane.ravel()
+
+    @property
+    def channels(self) -> int:
+        """Channels of working levels: one for a variable, and one for each of its categories if these are 3 or more."""
+        found = [self.categories(variable) for variable in range(self.pixels[0].shape[-1])]
+        return sum(1 if those is None or len(those) < 3 else len(those) for those in found)
+
+
+def unknown_in(picture: NDArray[Any]) -> Mask:
+    """Where a picture (rows, cols, C) is NaN in any channel."""
+    if picture.dtype.kind != "f":
+        return np.zeros(picture.shape[:2], bool)
+    found: Mask = np.isnan(picture).any(-1)
+    return found
+
+
+def completed(picture: NDArray[Any], unknown: Mask) -> NDArray[Any]:
+    """The picture (rows, cols, C) with each unknown pixel replaced by the nearest known one."""
+    if not unknown.any():
+        return picture
+    row, col = ndimage.distance_transform_edt(unknown, return_distances=False, return_indices=True)
+    filled: NDArray[Any] = np.ascontiguousarray(picture[row, col])
+    return filled

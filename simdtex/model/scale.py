@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""From pixels to working levels: the whole numbers that equation (12) compares.
+
+Eight-bit pixels are their own levels. Other types are stretched over 0..top, all channels alike, as colours are. With
+weights each variable is brought to the same spread, times its weight. A variable of categories has a channel for each,
+0 or as high as makes any two categories differ alike: then (12) counts the neighbours that differ.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from math import log2, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.model.pictures import Pictures
+
+EXACT = 12
+"""Bits of a working level at most."""
+
+
+class Scale:
+    """How the pixels of a sample become working levels.
+
+    Parameters
+    ----------
+    pictures : Pictures
+    values : int
+        Values to a neighbourhood: channels of working levels times neighbours.
+
+    Attributes
+    ----------
+    top : int
+        The highest working level.
+    unit : float
+        1 of it in the pixels' own unit, where `direct`.
+    direct : bool
+        Whether the channels of working levels are those of the pixels.
+    """
+
+    def __init__(self, pictures: Pictures, values: int) -> None:
+        pixels, self.unit = pictures.pixels, 1.0
+        self._channels = variables = pixels[0].shape[-1]
+        self.direct = not (pictures.weights or (pictures.categorical and any(pictures.categorical)))
+        eight = all(picture.dtype in (np.bool_, np.uint8) for picture in pixels)
+        self.top = 255 if eight and self.direct else highest(values)
+        self._variables: list[_Stretched | _Categories] = []
+        self._common: _Stretched | None = None
+        if not self.direct:
+            for variable in range(variables):
+                categories = pictures.categories(variable)
+                here = np.concatenate([pictures.values(variable, number) for number in range(len(pixels))])
+                self._variables.append(_Stretched(here, self.top) if categories is None else _Categories(here))
+            weights = pictures.weights or (1.0,) * variables
+            most = max(w * one.steepness for w, one in zip(weights, self._variables, strict=True))
+            for weight, one in zip(weights, self._variables, strict=True):
+                one.scale = weight / most * self.top if most else 0.0
+        elif not eight:
+            self._common = _Stretched(_known(pictures), self.top)
+            self.unit = self._common.unit
+
+    @property
+    def owners(self) -> list[int]:
+        """The variable that each channel of working levels is of."""
+        if self.direct:
+            return list(range(self._channels))
+        return [variable for variable, one in enumerate(self._variables) for _ in range(one.channels)]
+
+    def levels(self, pixels: NDArray[Any]) -> NDArray[np.uint16]:
+        """The working levels (channels, ...) of pixels (..., C) of the sample's type; beyond its range, the nearest."""
+        planes = np.moveaxis(pixels, -1, 0)
+        if not self.direct:
+            found = [one.levels(plane) for plane, one in zip(planes, self._variables, strict=True)]
+            return np.concatenate(found).astype(np.uint16)
+        if self._common is None:
+            return planes.astype(np.uint16)
+        return self._common.stretched(planes).astype(np.uint16)
+
+
+class _Stretched:
+    """A variable on 0..top."""
+
+    scale, channels = 0.0, 1
+
+    def __init__(self, values: NDArray[Any], top: int) -> None:
+        self.ends, self.top, self._values = (values.min(), values.max()), top, values
+        _, self.unit = stretch(values[:0], top, self.ends)
+
+    @cached_property
+    def spread(self) -> float:
+        """The standard deviation."""
+        stretched = self.stretched(self._values)
+        n, total, squares = stretched.size, int(stretched.sum()), int((stretched * stretched).sum())
+        return sqrt((n * squares - total * total) / n**2)
+
+    @property
+    def steepness(self) -> float:
+        """How high its highest level is, over its spread."""
+        return self.top / self.spread if self.spread else 0.0
+
+    def stretched(self, pixels: NDArray[Any]) -> NDArray[np.int64]:
+        """Whole numbers 0..top for pixels of any shape."""
+        return stretch(np.clip(pixels, *self.ends), self.top, self.ends)[0]
+
+    def levels(self, plane: NDArray[Any]) -> NDArray[np.int64]:
+        """One channel."""
+        if not self.spread:
+            return np.zeros((1, *plane.shape), np.int64)
+        return np.rint(self.stretched(plane)[None] * (self.scale / self.spread)).astype(np.int64)
+
+
+class _Categories:
+    """A variable that names categories; one of two is a channel that has 0 or the highest level."""
+
+    scale = 0.0
+
+    def __init__(self, values: NDArray[Any]) -> None:
+        self.categories, counts = np.unique(values, return_counts=True)
+        share = [int(n) for n in counts]
+        total = sum(share)
+        differing = 1 - sum(n * n for n in share) / total**2  # of any two pixels
+        alike = 1 if len(share) == 2 else 2  # channels in which they then differ
+        self.channels = 1 if len(share) < 3 else len(share)
+        self.steepness = sqrt(2 / (alike * differing)) if differing else 0.0
+
+    def levels(self, plane: NDArray[Any]) -> NDArray[np.int64]:
+        """A channel for each category."""
+        height = round(self.scale * self.steepness)
+        those = self.categories[1:] if len(self.categories) < 3 else self.categories
+        found = [(plane == category) * height for category in those] or [np.zeros(plane.shape, np.int64)]
+        return np.stack(found).astype(np.int64)
+
+
+def highest(values: int) -> int:
+    """The highest level for which the distance of (12) over so many values is exact in float64."""
+    return int(2 ** min(EXACT, int((33 - log2(values)) / 2)) - 1)
+
+
+def stretch(pixels: NDArray[Any], top: int, ends: tuple[Any, Any] | None = None) -> tuple[NDArray[np.int64], float]:
+    """Pixels of any real type stretched over the integers 0..top, and the size of 1 in their own unit.
+
+    ``ends`` what becomes 0 and top; None: the least and the greatest pixel.
+    """
+    low, high = ends or (pixels.min(), pixels.max())
+    if pixels.dtype.kind in "iu":
+        bounds = np.array([low, high]).astype(np.uint64)  # modulo 2**64, so a difference from the least is exact
+        half = (pixels.astype(np.uint64) - bounds[:1].reshape((1,) * pixels.ndim)) / np.float64(2)
+        most = float((bounds - bounds[:1])[1] / np.float64(2))
+    else:
+        lower = np.float64(low) / 2  # so that no difference overflows
+        half, most = pixels.astype(np.float64) / 2 - lower, float(np.float64(high) / 2 - lower)
+    half_unit = most / top or 0.5
+    return np.rint(half / half_unit).astype(np.int64), 2 * half_unit
+
+
+def _known(pictures: Pictures) -> NDArray[Any]:
+    if pictures.known is None:
+        return np.concatenate([picture.ravel() for picture in pictures.pixels])
+    pairs = zip(pictures.pixels, pictures.known, strict=True)
+    return np.concatenate([picture[known].ravel() for picture, known in pairs])
