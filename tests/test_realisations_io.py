@@ -202,6 +202,17 @@ def test_failure_leaves_the_old_file_alone(tmp_path, suffix, monkeypatch):
     assert os.listdir(tmp_path) == [path.name]
 
 
+def test_a_zip_that_fails_leaves_nothing(tmp_path, monkeypatch):
+    def write(folder, *_):
+        (folder / "zarr.json").touch()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, "_write_zarr", write)
+    with pytest.raises(KeyboardInterrupt):
+        write_realisations(tmp_path / "many.zarr.zip", some())
+    assert os.listdir(tmp_path) == []
+
+
 def test_a_folder_that_is_no_store_is_left_alone(tmp_path):
     for name in ("empty.zarr", "photos.zarr"):
         (tmp_path / name).mkdir()

@@ -14,6 +14,7 @@ import zipfile
 from collections.abc import Callable, Hashable, Mapping
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -154,8 +155,6 @@ def write_realisations(path: PathLike, array: DataArray) -> None:
         coords = {key: (dims, one, stored[key]) for key, (dims, one) in coordinates.items()}
         dataset = xarray.Dataset({name: (array.dims, values, stored[None])}, coords)
         dataset.attrs = {} if array.name is None else {"array": name}
-        for one in dataset.variables.values():
-            one.encoding = {"_FillValue": None}  # else xarray gives floats one, and with it an attribute
         with image.atomic_folder(path) if suffix == ".zarr" else image.atomic_path(path) as temporary:
             _WRITERS[suffix](temporary, dataset, name)
     except OSError as error:
@@ -181,13 +180,18 @@ def _check_dimensions(array: DataArray) -> None:
 def _plain_coordinate(name: Hashable, coordinate: DataArray) -> Array:
     values = np.asarray(coordinate.values)
     if values.dtype.kind in "OT" and all(isinstance(one, str) for one in values.ravel()):
-        values = values.astype(str)
+        values = _texts(values)
     if not isinstance(name, str) or "/" in name or values.dtype.kind not in "buifU" or values.dtype == np.float16:
         raise TypeError(
             f"the coordinate {name!r} holds {values.dtype} values: give numbers or texts under a name without '/', or "
             "leave it out"
         )
-    return native(values)
+    return native(values).reshape(values.shape)  # which a single value does not keep
+
+
+def _texts(values: Array) -> Array:
+    """Texts of one length, NumPy's own kind, from whatever a library holds texts in."""
+    return np.array([str(one) for one in values.ravel()]).reshape(values.shape)
 
 
 def _plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
@@ -212,8 +216,8 @@ def _plain(value: Any, name: str) -> Any:
             raise TypeError(f"the attribute {name} has a dictionary with keys that are no texts: make them texts")
         return {key: _plain(one, name) for key, one in value.items()}
     raise TypeError(
-        f"the attribute {name} is of type {type(value).__name__}: give a text, a number, None, or a list or dictionary of "
-        "these"
+        f"the attribute {name} is of type {type(value).__name__}: give a text, a number, None, or a list or dictionary "
+        "of these"
     )
 
 
@@ -253,20 +257,23 @@ def _write_npz(
 
 
 def _write_netcdf(path: Path, dataset: Dataset, name: str) -> None:
-    encoding = {name: {"zlib": True, "complevel": 4, "chunksizes": _chunks(dataset[name].shape, dataset[name].dtype)}}
+    encoding = _encoding(dataset)
+    encoding[name] |= {"zlib": True, "complevel": 4, "chunksizes": _chunks(dataset[name].shape, dataset[name].dtype)}
     dataset.to_netcdf(path, mode="w", engine="h5netcdf", encoding=encoding)
 
 
 def _write_zarr(path: Path, dataset: Dataset, name: str) -> None:
     # objects, for Zarr has no lasting form of texts of one length; and it has none of consolidated metadata
     texts = {key: one.astype(object) for key, one in dataset.coords.items() if one.dtype.kind == "U"}
-    encoding = {name: {"chunks": _chunks(dataset[name].shape, dataset[name].dtype)}}
+    encoding = _encoding(dataset)
+    encoding[name]["chunks"] = _chunks(dataset[name].shape, dataset[name].dtype)
     dataset.assign_coords(texts).to_zarr(path, mode="w", zarr_format=3, consolidated=False, encoding=encoding)
 
 
 def _write_zip(path: Path, dataset: Dataset, name: str) -> None:
     # not Zarr's own store in a zip file, which has every file twice that is written twice
-    with image.atomic_folder(path.with_suffix(".folder")) as temporary:
+    with TemporaryDirectory(prefix=".", dir=path.parent) as folder:
+        temporary = Path(folder)
         _write_zarr(temporary, dataset, name)
         with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
             for file in sorted(temporary.rglob("*")):
@@ -279,6 +286,11 @@ _WRITERS: dict[str, Callable[[Path, Dataset, str], None]] = {
     ".zarr.zip": _write_zip,
     ".nc": _write_netcdf,
 }
+
+
+def _encoding(dataset: Dataset) -> dict[Any, dict[str, Any]]:
+    """No fill value for anything; xarray gives floats one, which comes back as an attribute."""
+    return {key: {"_FillValue": None} for key in dataset.variables}
 
 
 def _chunks(shape: tuple[int, ...], dtype: np.dtype[Any]) -> tuple[int, ...]:
@@ -329,7 +341,7 @@ def read_realisations(path: PathLike) -> DataArray:
 
 
 def _read_npz(path: Path, xarray: Any) -> Any:
-    with np.load(path, allow_pickle=False) as arrays:
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
         description = json.loads(str(arrays["description"]))
         coordinates = {
             name: (tuple(one["dimensions"]), arrays[f"coordinate {name}"], one["attributes"])
@@ -369,8 +381,8 @@ def _only(dataset: Any) -> Any:
         raise ValueError(f"it has {len(dataset.data_vars)} arrays and not one")
     array = dataset[next(iter(dataset.data_vars))]
     array = array.rename(dataset.attrs.get("array")).drop_encoding()
-    texts = {name: one.astype(str) for name, one in array.coords.items() if one.dtype.kind in "OT"}
-    array = array.assign_coords(texts)
+    texts = {name: one for name, one in array.coords.items() if one.dtype.kind in "OT"}
+    array = array.assign_coords({name: (one.dims, _texts(one.values), one.attrs) for name, one in texts.items()})
     for one in (array, *array.coords.values()):
         one.attrs = _given(one.attrs)
     return array
