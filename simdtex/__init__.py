@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from simdtex import quality
+    from simdtex.io.hard_data import place_hard_data, read_hard_data
     from simdtex.machine import open_machine
     from simdtex.machine.devices import DeviceError, devices
     from simdtex.methods.pyramid.mixtures import mix
@@ -21,7 +22,9 @@ __all__ = [
     "lcpdf",
     "mix",
     "open_machine",
+    "place_hard_data",
     "quality",
+    "read_hard_data",
     "suggest_alpha",
     "synthesize",
     "synthesize_solid",
@@ -35,6 +38,8 @@ _HOMES = {
     "lcpdf": "simdtex.synthesis",
     "mix": "simdtex.methods.pyramid.mixtures",
     "open_machine": "simdtex.machine",
+    "place_hard_data": "simdtex.io.hard_data",
+    "read_hard_data": "simdtex.io.hard_data",
     "suggest_alpha": "simdtex.synthesis",
     "synthesize": "simdtex.synthesis",
     "synthesize_solid": "simdtex.synthesis",

@@ -268,6 +268,102 @@ def test_no_bytes_escape_the_errors(tmp_path_factory, data, start):
         assert image.read(path).pixels.ndim in (2, 3)
 
 
+# ---------------------------------------------------------------- unknown pixels, alpha, masks
+
+
+def test_unknown_pixels_are_let_through_where_asked_for(tmp_path):
+    pixels = noise((5, 4, 3), np.float32)
+    pixels[1, 2, 0] = np.nan
+    for name in ("a.tif", "a.npy"):
+        image.write(tmp_path / name, pixels)
+        with pytest.raises(ValueError, match="1 value that is NaN or infinite, the first at row 1, column 2: fill"):
+            image.read(tmp_path / name)
+        np.testing.assert_array_equal(image.read(tmp_path / name, unknown=True).pixels, pixels)
+    np.testing.assert_array_equal(image.check_sample(pixels, -1, unknown=True), pixels)
+    np.testing.assert_array_equal(image.check_sample([[1, 2]], None, unknown=True), [[[1], [2]]])
+    pixels[3, 1, 2] = -np.inf
+    np.save(tmp_path / "b.npy", pixels)
+    with pytest.raises(
+        ValueError, match=r"b\.npy: .* 1 value that is infinite, the first at row 3, column 1: give NaN"
+    ):
+        image.read(tmp_path / "b.npy", unknown=True)
+
+
+@pytest.mark.parametrize(
+    ("dtype", "alpha", "transparent"),
+    [
+        ("uint8", [0, 127, 128, 255], [1, 1, 0, 0]),
+        ("uint16", [0, 32767, 32768, 65535], [1, 1, 0, 0]),
+        ("float32", [0, np.nan, 0.5, 1], [1, 1, 0, 0]),
+        ("bool", [0, 0, 1, 1], [1, 1, 0, 0]),
+    ],
+)
+@pytest.mark.parametrize("colours", [1, 3])
+def test_split_alpha(dtype, alpha, transparent, colours):
+    picture = noise((2, 2, colours + 1), dtype)
+    picture[..., -1] = np.array(alpha).reshape(2, 2)
+    pixels, mask = image.split_alpha(picture)
+    assert pixels.dtype == picture.dtype
+    np.testing.assert_array_equal(pixels, picture[..., 0] if colours == 1 else picture[..., :3])
+    assert mask.dtype == bool
+    assert mask.ravel().tolist() == transparent
+
+
+@pytest.mark.parametrize("channels", [(), (1,), (3,), (5,)])
+def test_split_alpha_of_pictures_without(channels):
+    picture = noise((3, 4, *channels), np.uint8)
+    pixels, mask = image.split_alpha(picture)
+    np.testing.assert_array_equal(pixels, picture)
+    assert mask.shape == (3, 4)
+    assert not mask.any()
+
+
+def test_split_alpha_errors():
+    with pytest.raises(ValueError, match="has the shape"):
+        image.split_alpha(np.zeros(4))
+    with pytest.raises(TypeError, match="complex"):
+        image.split_alpha(np.zeros((2, 2, 4), complex))
+
+
+MASKS = [
+    ("grey.png", np.array([[0, 127, 128, 255]], np.uint8), [0, 0, 1, 1]),
+    ("grey16.png", np.array([[0, 32767, 32768, 65535]], np.uint16), [0, 0, 1, 1]),
+    ("float.tif", np.array([[0, 0.5, 0.51, 1]], np.float32), [0, 0, 1, 1]),
+    ("bool.npy", np.array([[False, False, True, True]]), [0, 0, 1, 1]),
+    ("colour.png", np.array([[[0, 0, 0], [9, 127, 0], [0, 0, 128], [255, 255, 255]]], np.uint8), [0, 0, 1, 1]),
+    ("alpha.png", np.array([[[0, 255], [200, 127], [200, 128], [255, 255]]], np.uint8), [0, 0, 1, 1]),
+    ("rgba.png", np.array([[[0] * 4, [255] * 3 + [0], [0, 255, 0, 200], [255] * 4]], np.uint8), [0, 0, 1, 1]),
+    ("none.png", np.zeros((1, 4), np.uint8), [0, 0, 0, 0]),
+    ("all.npy", np.ones((1, 4, 1)), [1, 1, 1, 1]),
+]
+
+
+@pytest.mark.parametrize(("name", "pixels", "expected"), MASKS, ids=[name for name, *_ in MASKS])
+def test_read_mask(tmp_path, name, pixels, expected):
+    image.write(tmp_path / name, pixels)
+    mask = image.read_mask(tmp_path / name, (1, 4, 3))
+    assert mask.dtype == bool
+    assert mask.tolist() == [[bool(v) for v in expected]]
+
+
+@pytest.mark.parametrize(
+    ("pixels", "words"),
+    [
+        (np.zeros((4, 1), np.uint8), "is 1 x 4 pixels .* must be 4 x 1: bring"),
+        (np.zeros((1, 4), np.int64), "holds int64 values: save"),
+        (np.array([[0, 1, 1, 0]], np.uint8), "0 and 1 of 255: save it as bool, or multiply it by 255"),
+        (np.array([[0, 0.5, 2, 0]]), r"holds 0\.0 to 2\.0: bring"),
+        (np.array([[0, 0.5, -1, 0]]), r"holds -1\.0 to 0\.5: bring"),
+        (np.array([[0, np.nan, 1, 0]]), "NaN"),
+    ],
+)
+def test_read_mask_errors(tmp_path, pixels, words):
+    np.save(tmp_path / "mask.npy", pixels)
+    with pytest.raises(ValueError, match=rf"mask\.npy: .*{words}") as caught:
+        image.read_mask(tmp_path / "mask.npy", (1, 4))
+    assert "\n" not in str(caught.value)
+
+
 # ---------------------------------------------------------------- check_sample, parse_size
 
 
@@ -389,6 +485,20 @@ def test_failure_leaves_the_old_file_alone(tmp_path, monkeypatch):
         image.write(path, np.zeros((2, 2), np.uint8))
     assert path.read_bytes() == b"old"
     assert os.listdir(tmp_path) == ["a.png"]
+
+
+def test_a_folder_is_replaced_whole_or_left_alone(tmp_path):
+    path = tmp_path / "some.kind"
+    for content in ("first", "second"):
+        with image.atomic_folder(path) as temporary:
+            assert (temporary.parent, temporary.suffix) == (tmp_path, ".kind")
+            (temporary / content).touch()
+        assert os.listdir(path) == [content]
+    with pytest.raises(KeyboardInterrupt), image.atomic_folder(path) as temporary:
+        (temporary / "third").touch()
+        raise KeyboardInterrupt
+    assert os.listdir(path) == ["second"]
+    assert os.listdir(tmp_path) == ["some.kind"]
 
 
 def test_written_file_has_the_usual_permissions_and_follows_links(tmp_path):

@@ -8,12 +8,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from simdtex.io.image import read, write
 from simdtex.model.source_map import apply_source_map, load_source_map, save_source_map
 
 
 def some_map(seed, shape=(7, 9), sample=(5, 6)):
     rng = np.random.default_rng(seed)
     return np.stack([rng.integers(0, side, shape) for side in sample], axis=-1)
+
+
+SAMPLES = [(5, 6), (8, 3), (4, 4)]
+
+
+def several(seed, shape=(7, 9), none=0.2):
+    """A source map of three samples, and where its pixels have no source."""
+    rng = np.random.default_rng(seed)
+    of = rng.integers(0, 3, shape)
+    source = np.stack([rng.integers(0, np.array([s[axis] for s in SAMPLES])[of]) for axis in (0, 1)] + [of], axis=-1)
+    bare = rng.random(shape) < none
+    source[bare, :2] = -1
+    return source, bare
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["uint8", "uint16", "float32", "bool"]),
@@ -39,8 +53,142 @@ def test_apply_errors():
     for bad in (source[..., :1], source.astype(float), source[:0]):
         with pytest.raises(ValueError, match="rows, cols, 2"):
             apply_source_map(bad, np.zeros((5, 6)))
+    for value in (-2, 2**31):
+        wild = source.copy()
+        wild[1, 1, 1] = value
+        with pytest.raises(ValueError, match=f"the position {value}:"):
+            apply_source_map(wild, np.zeros((5, 6)))
     with pytest.raises(ValueError, match="position -1"):
         apply_source_map(source - source.min() - 1, np.zeros((5, 6)))
+
+
+# ---------------------------------------------------------------- several samples, and pixels without a source
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from(["uint8", "float32"]), st.sampled_from([(), (1,), (3,)]))
+def test_several_samples_against_a_loop(seed, dtype, channels):
+    rng = np.random.default_rng(seed)
+    source, bare = several(seed)
+    others = [(rng.random((*shape, *channels)) * 200).astype(dtype) for shape in SAMPLES]
+    fill = (rng.random((7, 9, *channels)) * 200).astype(dtype)
+    carried = apply_source_map(source, others, SAMPLES, fill=fill)
+    assert carried.dtype == dtype
+    for i, j in np.ndindex(7, 9):
+        row, col, sample = source[i, j]
+        np.testing.assert_array_equal(carried[i, j], fill[i, j] if bare[i, j] else others[sample][row, col])
+
+
+@pytest.mark.parametrize("channels", [(), (3,)])
+def test_one_sample_with_pixels_that_have_no_source(channels):
+    source = some_map(4)
+    other = np.random.default_rng(4).integers(0, 255, (5, 6, *channels), dtype=np.uint8)
+    whole = apply_source_map(source, other)
+    source[2, 3] = source[5, 0] = -1
+    bare = np.zeros((7, 9), bool)
+    bare[2, 3] = bare[5, 0] = True
+    fill = np.full((7, 9, *channels), 300.5)
+    fill[bare] = 9  # elsewhere nothing is looked at
+    for given_fill, value in ((fill, 9), (7, 7), (np.uint8(255), 255), (np.ma.MaskedArray(fill, fill > 300), 9)):
+        carried = apply_source_map(source, other, (5, 6), fill=given_fill)
+        assert carried.dtype == np.uint8
+        np.testing.assert_array_equal(carried[~bare], whole[~bare])
+        assert (carried[bare] == value).all()
+    assert np.isnan(apply_source_map(source, other.astype(np.float32), fill=np.nan)[bare]).all()
+    np.testing.assert_array_equal(apply_source_map(some_map(4), other, fill=fill), whole)
+    assert (apply_source_map(np.full((2, 2, 2), -1), other, (5, 6), fill=1) == 1).all()
+
+
+def test_no_source_and_nothing_to_take():
+    source = some_map(5)
+    source[1, 4] = -1
+    with pytest.raises(ValueError, match=r"1 pixel has no source, the first at row 1, column 4: .* fill="):
+        apply_source_map(source, np.zeros((5, 6)))
+    source[3, 3] = -1
+    with pytest.raises(ValueError, match="2 pixels have no source"):
+        apply_source_map(source, np.zeros((5, 6)))
+    masked = np.ma.masked_all((7, 9))
+    masked[1, 4] = 3
+    with pytest.raises(ValueError, match="fill is masked"):
+        apply_source_map(source, np.zeros((5, 6)), fill=masked)
+    for fill, dtype in ((0.5, np.uint8), (256, np.uint8), (-1, np.uint16), (np.nan, np.int32), (1e39, np.float32)):
+        with pytest.raises(ValueError, match=f"that {np.dtype(dtype)} cannot hold"):
+            apply_source_map(source, np.zeros((5, 6), dtype), fill=fill)
+    for fill in (np.zeros((7, 8)), np.zeros((7, 9, 3)), np.zeros(9)):
+        with pytest.raises(ValueError, match=r"fill has the shape .* give \(7, 9\), or one value"):
+            apply_source_map(source, np.zeros((5, 6)), fill=fill)
+    with pytest.raises(TypeError, match="give numbers"):
+        apply_source_map(source, np.zeros((5, 6)), fill="black")
+
+
+def test_errors_of_several_samples():
+    source, _ = several(6, none=0)
+    others = [np.zeros(shape) for shape in SAMPLES]
+    with pytest.raises(ValueError, match="pixels of sample 2, counted from 0, and the number of other maps is 2"):
+        apply_source_map(source, others[:2])
+    with pytest.raises(ValueError, match="number of other maps is 1"):
+        apply_source_map(source, others[0])
+    with pytest.raises(ValueError, match=r"other map of sample 1 is 6 x 5 pixels .* sample 3 x 8: bring"):
+        apply_source_map(source, [others[0], others[0], others[2]], SAMPLES)
+    with pytest.raises(ValueError, match=r"other map of sample 2 is 4 x 1 pixels .* at least 4 x 4: bring"):
+        apply_source_map(source, [*others[:2], np.zeros((1, 4))])
+    for sizes in (SAMPLES[:2], (5, 6, 3), (5, 6)):
+        with pytest.raises(ValueError, match="for each of 3 maps"):
+            apply_source_map(source, others, sizes)
+    with pytest.raises(ValueError, match="float64 with no channels and uint8 with no channels: bring"):
+        apply_source_map(source, [*others[:2], others[2].astype(np.uint8)])
+    with pytest.raises(ValueError, match="float64 with 3 channels and float64 with no channels: bring"):
+        apply_source_map(source, [*others[:2], np.zeros((4, 4, 3))])
+    with pytest.raises(ValueError, match="1-dimensional"):
+        apply_source_map(source, [*others[:2], np.zeros(4)])
+    for axis in range(3):
+        bad = source.copy()
+        bad[3, 3, axis] = -1
+        with pytest.raises(ValueError, match="position -1 in a row, column or sample alone"):
+            apply_source_map(bad, others)
+
+
+def test_a_sample_that_no_pixel_is_of():
+    source = np.dstack([some_map(7), np.zeros((7, 9), int)])
+    other = np.random.default_rng(7).random((5, 6))
+    for others in (other, [other], [other, np.zeros((2, 2))]):
+        np.testing.assert_array_equal(apply_source_map(source, others), apply_source_map(source[..., :2], other))
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".npy"])
+@pytest.mark.parametrize("columns", [2, 3])
+def test_files_of_maps_with_pixels_that_have_no_source(tmp_path, suffix, columns):
+    source, _ = several(8)
+    source[0, 0] = -1
+    source = source[..., :columns]
+    save_source_map(tmp_path / f"map{suffix}", source)
+    loaded = load_source_map(tmp_path / f"map{suffix}")
+    assert loaded.dtype == np.int32
+    np.testing.assert_array_equal(loaded, source)
+
+
+def test_a_png_has_the_sample_in_blue(tmp_path):
+    source, _ = several(9, none=0)
+    save_source_map(tmp_path / "map.png", source)
+    np.testing.assert_array_equal(load_source_map(tmp_path / "map.png"), source)
+    np.testing.assert_array_equal(read(tmp_path / "map.png").pixels, source)
+    source[..., 2] = 0
+    save_source_map(tmp_path / "one.png", source)
+    np.testing.assert_array_equal(load_source_map(tmp_path / "one.png"), source[..., :2])
+    save_source_map(tmp_path / "one.npy", source)
+    np.testing.assert_array_equal(load_source_map(tmp_path / "one.npy"), source)
+    source[2, 2, :2] = -1
+    with pytest.raises(ValueError, match=r"bare\.png cannot hold pixels without a source: use \.npz"):
+        save_source_map(tmp_path / "bare.png", source)
+    assert not (tmp_path / "bare.png").exists()
+
+
+def test_a_colour_picture_is_no_source_map(tmp_path):
+    write(tmp_path / "colour.png", np.full((4, 4, 3), 7, np.uint8))
+    with pytest.raises(ValueError, match=r"colour\.png is a picture of 8 bits and holds no source map"):
+        load_source_map(tmp_path / "colour.png")
+
+
+# ---------------------------------------------------------------- files
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".npy", ".png", ".NPZ"])

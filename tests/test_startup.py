@@ -15,9 +15,10 @@ from simdtex.io.image import write
 from simdtex.machine import cache, programs, runtimes
 
 HEAVY = {"pyopencl", "scipy", "skimage", "matplotlib", "tifffile", "imagecodecs", "jinja2", "nrrd", "emcee", "rich"}
+HEAVY |= {"xarray", "zarr", "h5netcdf", "pandas"}
 PUBLIC = {
     *("DeviceError", "Output", "Progress", "devices", "lcpdf", "mix", "open_machine", "quality", "suggest_alpha"),
-    *("synthesize", "synthesize_solid", "__version__"),
+    *("place_hard_data", "read_hard_data", "synthesize", "synthesize_solid", "__version__"),
 }
 COMMAND_LINE = """
 from simdtex.cli import main

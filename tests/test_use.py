@@ -6,8 +6,10 @@ from cases import REFERENCE, opencl, problem, problems
 from hypothesis import given, settings
 
 import simdtex
-from simdtex.model.use import effective_use
+from simdtex.experiments.quality import source_use
+from simdtex.model.use import counts, effective_use
 from simdtex.ops.use import price, use
+from simdtex.report.sheet import use_colours
 
 
 @given(p=problems(max_order=5))
@@ -93,3 +95,56 @@ def test_a_run_uses_the_sample_more_evenly(cl_device):
         )
         share[balance] = effective_use(output.source, sample.shape).effective_share
     assert share[0.5] > share[0.0] + 0.05
+
+
+# ---------------------------------------------------------------- counted on a source map
+
+
+def test_pixels_without_a_source_are_not_counted():
+    source = np.array([[[0, 1], [-1, -1], [2, 0]], [[0, 1], [1, 1], [-1, -1]]])
+    assert counts(source, (3, 2)).tolist() == [[0, 2], [0, 1], [1, 0]]
+    taken = source[source[..., 0] >= 0][np.newaxis]
+    assert effective_use(source, (3, 2), piece=1) == effective_use(taken, (3, 2), piece=1)
+
+
+def test_each_sample_is_counted_alone():
+    rng = np.random.default_rng(2)
+    source = np.dstack([rng.integers(0, 4, (9, 8)), rng.integers(0, 5, (9, 8)), rng.integers(0, 2, (9, 8))])
+    source[3, :, :2] = -1
+    for sample in range(3):
+        own = source[(source[..., 2] == sample) & (source[..., 0] >= 0)]
+        expected = np.zeros((4, 5), int)
+        for row, col, _ in own:
+            expected[row, col] += 1
+        assert counts(source, (4, 5), sample=sample).tolist() == expected.tolist()
+        if sample < 2:
+            found = effective_use(source, (4, 5), piece=2, sample=sample)
+            assert found == effective_use(own[np.newaxis, :, :2], (4, 5), piece=2)
+    source[0, 0] = (90, 0, 1)  # outside of the smaller sample, but not of its own
+    assert counts(source, (4, 5), sample=0).sum() == counts(source, (91, 5), sample=0).sum()
+    with pytest.raises(ValueError, match="outside a sample of 4 x 5"):
+        counts(source, (4, 5), sample=1)
+
+
+def test_errors_of_counting():
+    one, three = np.zeros((2, 2, 2), int), np.zeros((2, 2, 3), int)
+    with pytest.raises(ValueError, match="several samples: say which"):
+        counts(three, (4, 4))
+    with pytest.raises(ValueError, match="sample is 1: give None"):
+        counts(one, (4, 4), sample=1)
+    with pytest.raises(ValueError, match="sample is -1: give 0 or more"):
+        counts(three, (4, 4), sample=-1)
+    for bad in (np.array([[[-1, 0]]]), np.array([[[0, -1]]]), np.array([[[-2, -2]]]), np.array([[[0, 4]]]), one[:0]):
+        with pytest.raises(ValueError, match="outside a sample of 4 x 4"):
+            counts(bad, (4, 4))
+
+
+def test_a_sample_that_nothing_is_taken_from():
+    none = np.full((3, 3, 2), -1)
+    assert not counts(none, (4, 4)).any()
+    for figure in (effective_use, source_use):
+        with pytest.raises(ValueError, match="no pixel was taken from the sample"):
+            figure(none, (4, 4))
+    with pytest.raises(ValueError, match="no pixel was taken"):
+        effective_use(np.zeros((3, 3, 3), int), (4, 4), sample=1)
+    assert (use_colours(none, (4, 4)) == use_colours(none, (4, 4))[0, 0]).all()

@@ -13,6 +13,7 @@ import errno
 import os
 import re
 import secrets
+import shutil
 import stat
 import warnings
 from collections.abc import Collection, Iterator
@@ -29,11 +30,14 @@ from simdtex.io.decode import decode, native
 
 __all__ = [
     "Image",
+    "atomic_folder",
     "atomic_path",
     "check_sample",
     "check_writable",
     "parse_size",
     "read",
+    "read_mask",
+    "split_alpha",
     "to_display",
     "write",
 ]
@@ -61,7 +65,7 @@ class Image:
 # ---------------------------------------------------------------- reading
 
 
-def read(path: PathLike) -> Image:
+def read(path: PathLike, *, unknown: bool = False) -> Image:
     """Read a picture file as a sample, telling the format by its content and not by its name.
 
     Parameters
@@ -69,6 +73,8 @@ def read(path: PathLike) -> Image:
     path : path
         PNG, JPEG, TIFF (first page), BMP, WebP, GIF (first frame), PPM/PGM, any other format that
         Pillow knows, or a NumPy ``.npy`` of shape (rows, cols) or (rows, cols, channels).
+    unknown : bool
+        Whether float pixels may be NaN, which says that they are unknown.
 
     Returns
     -------
@@ -81,8 +87,8 @@ def read(path: PathLike) -> Image:
     Raises
     ------
     ValueError
-        The file is missing, a folder, empty, truncated, not an image, or holds NaN or infinite
-        pixels.
+        The file is missing, a folder, empty, truncated, not an image, or holds infinite pixels, or
+        NaN where none may be unknown.
 
     Notes
     -----
@@ -105,10 +111,97 @@ def read(path: PathLike) -> Image:
         ) from None
     channel_axis = -1 if pixels.ndim == 3 else None
     try:
-        check_sample(pixels, channel_axis)
+        check_sample(pixels, channel_axis, unknown=unknown)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: {error}") from None
     return Image(native(pixels), channel_axis)
+
+
+def split_alpha(pixels: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
+    """Take a picture and its alpha channel apart, if it has one.
+
+    Parameters
+    ----------
+    pixels : array_like, (rows, cols) or (rows, cols, channels)
+        The last of two or four channels is alpha; a picture of any other number has none.
+
+    Returns
+    -------
+    pixels : ndarray, (rows, cols) or (rows, cols, channels)
+        The picture without alpha, its values unchanged: (rows, cols) of two channels, (rows, cols, 3) of four.
+    transparent : ndarray of bool, (rows, cols)
+        Where alpha is below half of full (255 in 8 bits, 65535 in 16, 1 in floats), or NaN.
+
+    Raises
+    ------
+    TypeError
+        The values are not real numbers.
+    ValueError
+        The array has neither two nor three axes.
+
+    Examples
+    --------
+    >>> colour, hole = split_alpha(np.array([[[1, 2, 3, 255], [4, 5, 6, 0]]], np.uint8))
+    >>> colour.shape, hole.tolist()
+    ((1, 2, 3), [[False, True]])
+    """
+    values = np.asarray(pixels)
+    if values.dtype.kind not in "buif":
+        raise TypeError(f"the picture holds {values.dtype} values: give integers or real floats")
+    if values.ndim not in (2, 3):
+        raise ValueError(f"the picture has the shape {values.shape}: give (rows, cols) or (rows, cols, channels)")
+    if values.ndim == 2 or values.shape[2] not in (2, 4):
+        return values, np.zeros(values.shape[:2], dtype=bool)
+    return values[..., 0] if values.shape[2] == 2 else values[..., :3], ~(values[..., -1] >= _half(values.dtype))
+
+
+def _half(dtype: np.dtype[Any]) -> float:
+    """Half of full scale; of integers it is between two of them."""
+    return np.iinfo(dtype).max / 2 if dtype.kind in "iu" else 0.5
+
+
+def read_mask(path: PathLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Read a picture that says of every pixel whether it is meant.
+
+    Parameters
+    ----------
+    path : path
+        A picture as for `read`, grey or colour, of bool, 8 bits, 16 bits, or floats from 0 to 1.
+    shape : (rows, cols)
+        The size it must have; what comes after is not looked at.
+
+    Returns
+    -------
+    ndarray of bool, (rows, cols)
+        True where any channel is brighter than half of full scale; a pixel whose alpha is below half is not meant,
+        whatever its colour.
+
+    Raises
+    ------
+    ValueError
+        The file cannot be read as by `read`, is of another size or type, has floats outside of 0 to 1, or no brighter
+        value than 1 of 255 or 65535, which is a mask of 0 and 1 saved as integers.
+    """
+    name = os.fspath(path)
+    pixels = read(path).pixels
+    rows, cols = shape[:2]
+    if pixels.shape[:2] != (rows, cols):
+        raise ValueError(
+            f"{name}: the mask is {pixels.shape[1]} x {pixels.shape[0]} pixels (width x height) and must be "
+            f"{cols} x {rows}: bring it to that size"
+        )
+    if pixels.dtype.kind != "f" and pixels.dtype not in (bool, np.uint8, np.uint16):
+        raise ValueError(
+            f"{name}: the mask holds {pixels.dtype} values: save it as bool, 8 or 16 bits, or floats 0 to 1"
+        )
+    colours, transparent = split_alpha(pixels)
+    if pixels.dtype.kind == "f" and not (colours.min() >= 0 and colours.max() <= 1):
+        raise ValueError(f"{name}: the mask holds {colours.min()} to {colours.max()}: bring its floats to 0 to 1")
+    if pixels.dtype.kind == "u" and colours.max() == 1:
+        full = np.iinfo(pixels.dtype).max
+        raise ValueError(f"{name}: the mask holds 0 and 1 of {full}: save it as bool, or multiply it by {full}")
+    bright = colours > _half(pixels.dtype)
+    return (bright if bright.ndim == 2 else bright.any(axis=2)) & ~transparent
 
 
 def _file_bytes(name: str) -> bytes:
@@ -136,7 +229,7 @@ def _one_line(error: BaseException) -> str:
 # ---------------------------------------------------------------- checking
 
 
-def check_sample(array: ArrayLike, channel_axis: int | None) -> Array:
+def check_sample(array: ArrayLike, channel_axis: int | None, *, unknown: bool = False) -> Array:
     """Check that an array can serve as a sample, and bring its channels last.
 
     Parameters
@@ -146,6 +239,8 @@ def check_sample(array: ArrayLike, channel_axis: int | None) -> Array:
         real float type.
     channel_axis : int or None
         The axis that holds the channels; negative counts from the end.
+    unknown : bool
+        Whether floats may be NaN, which says that they are unknown.
 
     Returns
     -------
@@ -158,7 +253,7 @@ def check_sample(array: ArrayLike, channel_axis: int | None) -> Array:
     TypeError
         The values are not real numbers, or `channel_axis` is not an integer.
     ValueError
-        The number of axes does not fit, an axis is empty, or a value is NaN or infinite.
+        The number of axes does not fit, an axis is empty, or a value is infinite, or NaN where none may be unknown.
     """
     try:
         pixels = np.asarray(array)
@@ -182,21 +277,21 @@ def check_sample(array: ArrayLike, channel_axis: int | None) -> Array:
     if pixels.size == 0:
         raise ValueError(f"the sample is empty, of shape {pixels.shape}: give at least one pixel")
     planes = pixels[..., np.newaxis] if channel_axis is None else np.moveaxis(pixels, channel_axis, -1)
-    _check_finite(planes)
+    _check_finite(planes, unknown)
     return native(planes)
 
 
-def _check_finite(planes: Array) -> None:
+def _check_finite(planes: Array, unknown: bool) -> None:
     if planes.dtype.kind != "f":
         return
-    bad = ~np.isfinite(planes)
+    bad = np.isinf(planes) if unknown else ~np.isfinite(planes)
     count = int(np.count_nonzero(bad))
     if count:
         row, column = (int(i) for i in np.unravel_index(int(bad.argmax()), bad.shape)[:2])
         what = "value that is" if count == 1 else "values that are"
-        raise ValueError(
-            f"the sample has {count} {what} NaN or infinite, the first at row {row}, column {column}: fill them first"
-        )
+        kind = "infinite" if unknown else "NaN or infinite"
+        remedy = "give NaN where they are unknown" if unknown else "fill them first"
+        raise ValueError(f"the sample has {count} {what} {kind}, the first at row {row}, column {column}: {remedy}")
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -363,6 +458,41 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
         os.replace(temporary, target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_folder(path: PathLike) -> Iterator[Path]:
+    """Give an empty folder beside `path`, and rename it to `path` when the block succeeds.
+
+    A folder that is at `path` is replaced whole at the end; whether it may be is for the caller to check. Whatever ends
+    the block early, Ctrl-C included, removes the temporary folder and leaves `path` as it was.
+
+    Parameters
+    ----------
+    path : path
+        The folder to write; a link is followed. The temporary name has the same suffix.
+
+    Yields
+    ------
+    Path
+        An empty folder to be filled.
+    """
+    target = Path(os.path.realpath(path))
+    temporary, old = (target.with_name(f".{secrets.token_hex(8)}{target.suffix}") for _ in range(2))
+    try:
+        temporary.mkdir()
+        yield temporary
+        try:
+            if target.exists():
+                target.rename(old)
+            temporary.rename(target)
+        except BaseException:
+            if old.exists() and not target.exists():
+                old.rename(target)
+            raise
+    finally:
+        for folder in (temporary, old):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def write(path: PathLike, array: ArrayLike) -> None:

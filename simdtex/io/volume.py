@@ -10,11 +10,8 @@ from __future__ import annotations
 import errno
 import os
 import re
-import secrets
-import shutil
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -140,7 +137,7 @@ def write(path: PathLike, volume: ArrayLike, channel_axis: int | None = None) ->
     if suffix not in (".npz", ".npy") and values.ndim == 4 and values.shape[3] == 1:
         values = values[..., 0]
     try:
-        with _folder(Path(path)) if not suffix else image.atomic_path(path) as temporary:
+        with image.atomic_folder(path) if not suffix else image.atomic_path(path) as temporary:
             _ENCODERS[suffix](temporary, values)
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error)
@@ -164,27 +161,6 @@ def _checked(volume: ArrayLike, channel_axis: int | None) -> Array:
             )
         values = np.moveaxis(values, channel_axis, -1)
     return native(values)
-
-
-@contextmanager
-def _folder(target: Path) -> Iterator[Path]:
-    """Give an empty folder beside `target`, and rename it to `target` when the block succeeds."""
-    target = Path(os.path.realpath(target))
-    temporary, old = (target.with_name(f".{secrets.token_hex(8)}") for _ in range(2))
-    try:
-        temporary.mkdir()
-        yield temporary
-        try:
-            if target.exists():
-                target.rename(old)
-            temporary.rename(target)
-        except BaseException:
-            if old.exists() and not target.exists():
-                old.rename(target)
-            raise
-    finally:
-        for folder in (temporary, old):
-            shutil.rmtree(folder, ignore_errors=True)
 
 
 def _write_npz(path: Path, values: Array) -> None:

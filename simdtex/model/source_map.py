@@ -2,7 +2,9 @@
 """The source map: for every output pixel, the sample position it was taken from.
 
 With it the arrangement of one synthesis carries over to any other map of the same material, and
-it shows what was copied from where. It is an integer array (rows, cols, 2) of (row, column).
+it shows what was copied from where. It is an integer array (rows, cols, 2) of (row, column), or
+(rows, cols, 3) of (row, column, sample) where there are several samples, counted from 0. A pixel
+that was given and not taken from any sample has no source: its row and column are -1.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 import os
 import zipfile
 import zlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,19 +30,28 @@ SOURCE_SUFFIXES = (".npz", ".npy", ".png")
 
 
 def apply_source_map(
-    source: ArrayLike, other_map: ArrayLike, sample_shape: tuple[int, ...] | None = None
+    source: ArrayLike,
+    other_map: ArrayLike | Sequence[ArrayLike],
+    sample_shape: tuple[int, ...] | Sequence[tuple[int, ...]] | None = None,
+    *,
+    fill: ArrayLike | None = None,
 ) -> NDArray[Any]:
     """Arrange another map of the material as the sample was arranged, pixel for pixel.
 
     Parameters
     ----------
-    source : array_like of int, (rows, cols, 2)
-        The (row, column) in the sample of every output pixel.
+    source : array_like of int, (rows, cols, 2) or (rows, cols, 3)
+        The (row, column) in the sample of every output pixel, or (row, column, sample) of several samples; row and
+        column are -1 where a pixel has no source.
     other_map : array_like, (sample rows, sample cols) or (sample rows, sample cols, channels)
-        A normal, height or other map laid over the sample; any type, any number of channels.
+        A normal, height or other map laid over the sample; any type, any number of channels. For a source map of
+        several samples a list or tuple of such maps, one for each sample, all of one type and number of channels.
     sample_shape : (rows, cols), optional
-        The size of the sample. Without it, only that every position lies within `other_map` is
-        checked.
+        The size of the sample; a list of sizes where `other_map` is a list. Without it, only that every position lies
+        within `other_map` is checked.
+    fill : array_like, (rows, cols) or (rows, cols, channels), or scalar; optional
+        What to take where a pixel has no source: values of the size of the output and the channels of `other_map`,
+        which its type can hold. Only these pixels are looked at.
 
     Returns
     -------
@@ -49,26 +61,99 @@ def apply_source_map(
 
     Raises
     ------
+    TypeError
+        `fill` holds no numbers.
     ValueError
-        `other_map` is not as large as the sample, or an argument has another shape.
+        `other_map` is not as large as the sample, there are not as many maps as samples, a pixel has no source and
+        there is no `fill`, or an argument has another shape.
     """
     positions = _checked(source)
-    values = np.asarray(other_map)
-    if values.ndim not in (2, 3):
-        raise ValueError(f"the other map is {values.ndim}-dimensional: give (rows, cols) or (rows, cols, channels)")
-    rows, cols = values.shape[:2]
-    if sample_shape is not None and (rows, cols) != tuple(sample_shape[:2]):
+    maps, shapes = _maps(positions, other_map, sample_shape)
+    first = maps[0]
+    none = positions[..., 0] < 0
+    of = positions[..., 2] if positions.shape[2] == 3 else np.zeros(none.shape, dtype=np.int32)
+    for k, (values, shape) in enumerate(zip(maps, shapes, strict=True)):
+        named = "the other map" if len(maps) == 1 else f"the other map of sample {k}"
+        _check_size(named, values, positions[(of == k) & ~none], shape)
+    missing = int(np.count_nonzero(none))
+    if len(maps) == 1 and not missing and fill is None:
+        return first[positions[..., 0], positions[..., 1]]
+    carried = np.empty((*none.shape, *first.shape[2:]), dtype=first.dtype)
+    for k, values in enumerate(maps):
+        here = (of == k) & ~none
+        carried[here] = values[positions[here, 0], positions[here, 1]]
+    if fill is not None:
+        carried[none] = _filling(fill, none, carried)
+    elif missing:
+        row, col = (int(n) for n in np.argwhere(none)[0])
         raise ValueError(
-            f"the other map is {cols} x {rows} pixels (width x height) and the sample "
-            f"{sample_shape[1]} x {sample_shape[0]}: bring it to the sample's size"
+            f"{missing} pixel{'s have' if missing > 1 else ' has'} no source, the first at row {row}, column {col}: "
+            "give the values to take there with fill="
         )
-    last_row, last_col = (int(v) for v in positions.max(axis=(0, 1)))
+    return carried
+
+
+def _maps(
+    positions: SourceMap, other_map: Any, sample_shape: Any
+) -> tuple[list[NDArray[Any]], list[tuple[int, ...] | None]]:
+    """The map of each sample and the sample's size, or None where it is not known."""
+    if positions.shape[2] == 3 and isinstance(other_map, (list, tuple)):
+        maps = [np.asarray(one) for one in other_map]
+        shapes = [None] * len(maps) if sample_shape is None else list(sample_shape)
+    else:
+        maps, shapes = [np.asarray(other_map)], [sample_shape]
+    wanted = 1 + (int(positions[..., 2].max(initial=0)) if positions.shape[2] == 3 else 0)
+    if len(maps) < wanted:
+        raise ValueError(
+            f"the source map has pixels of sample {wanted - 1}, counted from 0, and the number of other maps is "
+            f"{len(maps)}: give a list with one for each sample"
+        )
+    if len(shapes) != len(maps) or any(shape is not None and np.ndim(shape) != 1 for shape in shapes):
+        raise ValueError(
+            f"sample_shape is {sample_shape!r}: give a list with (rows, cols) for each of {len(maps)} maps"
+        )
+    for values in maps:
+        if values.ndim not in (2, 3):
+            raise ValueError(f"the other map is {values.ndim}-dimensional: give (rows, cols) or (rows, cols, channels)")
+    kinds = {(values.dtype, values.shape[2:]) for values in maps}
+    if len(kinds) > 1:
+        named = sorted(f"{dtype} with {channels[0] if channels else 'no'} channels" for dtype, channels in kinds)
+        raise ValueError(f"the other maps are {' and '.join(named)}: bring them to one type and number of channels")
+    return maps, shapes
+
+
+def _check_size(name: str, values: NDArray[Any], places: SourceMap, shape: tuple[int, ...] | None) -> None:
+    rows, cols = values.shape[:2]
+    if shape is not None and (rows, cols) != tuple(shape[:2]):
+        raise ValueError(
+            f"{name} is {cols} x {rows} pixels (width x height) and the sample "
+            f"{shape[1]} x {shape[0]}: bring it to the sample's size"
+        )
+    last_row, last_col = (int(v) for v in places[:, :2].max(axis=0, initial=-1))
     if last_row >= rows or last_col >= cols:
         raise ValueError(
-            f"the other map is {cols} x {rows} pixels (width x height) and the sample at least "
+            f"{name} is {cols} x {rows} pixels (width x height) and the sample at least "
             f"{last_col + 1} x {last_row + 1}: bring it to the sample's size"
         )
-    return values[positions[..., 0], positions[..., 1]]
+
+
+def _filling(fill: ArrayLike, none: NDArray[np.bool_], carried: NDArray[Any]) -> NDArray[Any]:
+    """What to take where there is no source, in the map's type."""
+    given: Any = np.ma.asarray(fill)
+    if given.dtype.kind not in "buifc":
+        raise TypeError(f"fill holds {given.dtype} values: give numbers of the other map's type")
+    if given.ndim and given.shape != carried.shape:
+        raise ValueError(f"fill has the shape {given.shape}: give {carried.shape}, or one value")
+    wanted = np.ma.asarray(given[none] if given.ndim else given)
+    if np.ma.getmaskarray(wanted).any():
+        raise ValueError("fill is masked where a pixel has no source: give a value for each of these pixels")
+    values = wanted.data
+    with np.errstate(invalid="ignore", over="ignore"):
+        cast = values.astype(carried.dtype)
+    whole = carried.dtype.kind in "bui"
+    if not (cast == values).all() if whole else (np.isinf(cast) & np.isfinite(values)).any():
+        raise ValueError(f"fill has values that {carried.dtype} cannot hold: give those of the other map's type")
+    return cast
 
 
 def save_source_map(path: PathLike, source: ArrayLike) -> None:
@@ -77,9 +162,9 @@ def save_source_map(path: PathLike, source: ArrayLike) -> None:
     Parameters
     ----------
     path : path
-        ``.npz`` (compressed, under the name ``source``), ``.npy``, or ``.png`` (16-bit colour:
-        red the row, green the column, blue 0; for samples up to 65536 pixels a side).
-    source : array_like of int, (rows, cols, 2)
+        ``.npz`` (compressed, under the name ``source``), ``.npy``, or ``.png`` (16-bit colour: red the row, green the
+        column, blue the sample, or 0; for samples up to 65536 pixels a side, where every pixel has a source).
+    source : array_like of int, (rows, cols, 2) or (rows, cols, 3)
 
     Raises
     ------
@@ -95,10 +180,12 @@ def save_source_map(path: PathLike, source: ArrayLike) -> None:
         with atomic_path(path) as temporary, temporary.open("wb") as file:
             np.savez_compressed(file, source=positions)
     else:
+        if positions.min() < 0:
+            raise ValueError(f"{os.fspath(path)} cannot hold pixels without a source: use .npz")
         if positions.max() > 65535:
             raise ValueError(f"{os.fspath(path)} cannot hold positions over 65535: use .npz")
         colours = np.zeros((*positions.shape[:2], 3), dtype=np.uint16)
-        colours[..., :2] = positions
+        colours[..., : positions.shape[2]] = positions
         write(path, colours)
 
 
@@ -112,7 +199,8 @@ def load_source_map(path: PathLike) -> SourceMap:
 
     Returns
     -------
-    ndarray of int32, (rows, cols, 2)
+    ndarray of int32, (rows, cols, 2) or (rows, cols, 3)
+        A ``.png`` whose blue is 0 throughout is of one sample, (rows, cols, 2).
 
     Raises
     ------
@@ -122,8 +210,10 @@ def load_source_map(path: PathLike) -> SourceMap:
     name = os.fspath(path)
     if Path(path).suffix.lower() != ".npz" or not Path(path).is_file():
         pixels = read(path).pixels
-        if pixels.ndim == 3 and pixels.shape[2] == 3 and not pixels[..., 2].any():
+        if pixels.dtype.kind == "u" and pixels.shape[2:] == (3,) and not pixels[..., 2].any():
             pixels = pixels[..., :2]
+        elif pixels.dtype == np.uint8:
+            raise ValueError(f"{name} is a picture of 8 bits and holds no source map: give one saved by simdtex")
     else:
         try:
             with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
@@ -138,13 +228,29 @@ def load_source_map(path: PathLike) -> SourceMap:
 
 def _checked(source: ArrayLike) -> SourceMap:
     positions = np.asarray(source)
-    if positions.ndim != 3 or positions.shape[2] != 2 or positions.size == 0 or positions.dtype.kind not in "iu":
+    if (
+        positions.ndim != 3
+        or positions.shape[2] not in (2, 3)
+        or positions.size == 0
+        or positions.dtype.kind not in "iu"
+    ):
         raise ValueError(
-            f"a source map is (rows, cols, 2) integers, not {positions.shape} of "
+            f"a source map is (rows, cols, 2) or (rows, cols, 3) integers, not {positions.shape} of "
             f"{positions.dtype}: pass the one of a run"
         )
     low, high = int(positions.min()), int(positions.max())
-    if low < 0 or high > np.iinfo(np.int32).max:
-        wrong = low if low < 0 else high
+    if low < -1 or high > np.iinfo(np.int32).max:
+        wrong = low if low < -1 else high
         raise ValueError(f"the source map has the position {wrong}: pass the one of a finished run")
+    if low < 0 and not _is_whole(positions < 0):
+        raise ValueError(
+            "the source map has the position -1 in a row, column or sample alone, and no source is -1 in both row and "
+            "column: pass the one of a finished run"
+        )
     return np.ascontiguousarray(positions, dtype=np.int32)
+
+
+def _is_whole(negative: NDArray[np.bool_]) -> bool:
+    """Whether row and column are negative together, and a sample only with them."""
+    none = negative[..., 0]
+    return bool((none == negative[..., 1]).all() and (negative[..., 2:] <= none[..., np.newaxis]).all())

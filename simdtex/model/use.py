@@ -34,15 +34,18 @@ class Use(NamedTuple):
         return {"effective_share": self.effective_share, "most_used": self.most_used._asdict()}
 
 
-def counts(source: ArrayLike, sample_shape: tuple[int, ...]) -> NDArray[np.intp]:
+def counts(source: ArrayLike, sample_shape: tuple[int, ...], *, sample: int | None = None) -> NDArray[np.intp]:
     """How many output pixels each pixel of the sample was taken for.
 
     Parameters
     ----------
-    source : array_like of int, (rows, cols, 2)
-        For every output pixel, the (row, column) of the sample that it was taken from.
+    source : array_like of int, (rows, cols, 2) or (rows, cols, 3)
+        For every output pixel, the (row, column) of the sample that it was taken from, or (row, column, sample) of
+        several samples; a pixel whose row and column are -1 has no source and is not counted.
     sample_shape : (rows, cols)
         The size of the sample, pixels.
+    sample : int, optional
+        The sample that is counted, from 0; needed where the source map is of several.
 
     Returns
     -------
@@ -51,21 +54,35 @@ def counts(source: ArrayLike, sample_shape: tuple[int, ...]) -> NDArray[np.intp]
     Raises
     ------
     ValueError
-        `source` is no source map, or points outside the sample.
+        `source` is no source map, points outside the sample, or is of several samples and none is named.
     """
     rows, cols = sample_shape[:2]
     positions = np.asarray(source)
-    if positions.ndim != 3 or positions.shape[2] != 2 or positions.dtype.kind not in "iu":
-        raise ValueError("the source map is not (rows, cols, 2) integers: pass the one of the run")
+    if positions.ndim != 3 or positions.shape[2] not in (2, 3) or positions.dtype.kind not in "iu":
+        raise ValueError("the source map is not (rows, cols, 2) or (rows, cols, 3) integers: pass the one of the run")
+    several = positions.shape[2] == 3
+    if several and sample is None:
+        raise ValueError("the source map is of several samples: say which is counted with sample=0, sample=1 and so on")
+    if sample is not None and (sample < 0 or (sample > 0 and not several)):
+        raise ValueError(
+            f"sample is {sample}: {'give 0 or more' if several else 'give None, the source map is of one'}"
+        )
     row, col = (positions[..., axis].astype(np.intp) for axis in (0, 1))
-    if positions.size == 0 or min(row.min(), col.min()) < 0 or row.max() >= rows or col.max() >= cols:
+    counted = (row != -1) | (col != -1)
+    if several:
+        counted &= positions[..., 2] == sample
+    row, col = row[counted], col[counted]
+    low, last_row, last_col = (np.minimum(row, col).min(initial=0), row.max(initial=0), col.max(initial=0))
+    if positions.size == 0 or low < 0 or last_row >= rows or last_col >= cols:
         raise ValueError(
             f"the source map points outside a sample of {rows} x {cols} pixels: pass the sample that it was made from"
         )
-    return np.bincount((row * cols + col).ravel(), minlength=rows * cols).reshape(rows, cols)
+    return np.bincount(row * cols + col, minlength=rows * cols).reshape(rows, cols)
 
 
-def effective_use(source: ArrayLike, sample_shape: tuple[int, ...], piece: int = PIECE) -> Use:
+def effective_use(
+    source: ArrayLike, sample_shape: tuple[int, ...], piece: int = PIECE, *, sample: int | None = None
+) -> Use:
     r"""How evenly the output uses the pieces of its sample, and which one it uses most.
 
     The sample is cut into pieces of about 8 x 8 pixels. With :math:`u_p` the number of output
@@ -80,13 +97,17 @@ def effective_use(source: ArrayLike, sample_shape: tuple[int, ...], piece: int =
 
     Parameters
     ----------
-    source : array_like of int, (rows, cols, 2)
-        For every output pixel, the (row, column) of the sample that it was taken from.
+    source : array_like of int, (rows, cols, 2) or (rows, cols, 3)
+        For every output pixel, the (row, column) of the sample that it was taken from, or (row, column, sample) of
+        several samples; a pixel whose row and column are -1 has no source and is not counted.
     sample_shape : (rows, cols)
         The size of the sample, pixels.
     piece : int
         Side of a piece, pixels: each side of the sample is cut into as many parts as come nearest
         to this length, which differ by one pixel at most.
+    sample : int, optional
+        The sample whose use is told, from 0, by the pixels taken from it alone; needed where the source map is of
+        several.
 
     Returns
     -------
@@ -100,7 +121,8 @@ def effective_use(source: ArrayLike, sample_shape: tuple[int, ...], piece: int =
     Raises
     ------
     ValueError
-        `source` is no source map, or points outside the sample; `piece` is less than 1.
+        `source` is no source map, points outside the sample, or is of several samples and none is named; no pixel was
+        taken from the sample; `piece` is less than 1.
 
     Notes
     -----
@@ -109,7 +131,9 @@ def effective_use(source: ArrayLike, sample_shape: tuple[int, ...], piece: int =
     """
     if piece < 1:
         raise ValueError(f"piece is {piece}: give its side in pixels, 1 or more")
-    uses = counts(source, sample_shape)
+    uses = counts(source, sample_shape, sample=sample)
+    if not uses.any():
+        raise ValueError("no pixel was taken from the sample, so its use has no figures: pass the map of another run")
     row, col = (_starts(length, piece) for length in uses.shape)
     taken = np.add.reduceat(np.add.reduceat(uses, row, axis=0), col, axis=1)
     tall, wide = np.diff([*row, uses.shape[0]]), np.diff([*col, uses.shape[1]])

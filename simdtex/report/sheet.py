@@ -330,7 +330,7 @@ def use_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
         `source` is no source map, or points outside the sample.
     """
     uses = np.log1p(counts(source, sample_shape))
-    return heat(uses / uses.max())
+    return heat(uses / (uses.max() or 1.0))
 
 
 def _srgb(lightness: NDArray[Any], a: NDArray[Any], b: NDArray[Any]) -> Picture:

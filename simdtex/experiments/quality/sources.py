@@ -26,7 +26,7 @@ def source_use(source: ArrayLike, sample_shape: tuple[int, ...]) -> SourceUse:
     Parameters
     ----------
     source : array_like of int, (rows, cols, 2)
-        For every output pixel, the (row, column) of the sample that it was taken from.
+        For every output pixel, the (row, column) of the sample that it was taken from, or -1 and -1 for none.
     sample_shape : (rows, cols)
         The size of the sample, pixels.
 
@@ -37,8 +37,15 @@ def source_use(source: ArrayLike, sample_shape: tuple[int, ...]) -> SourceUse:
     entropy : float
         Of the distribution of use over the sample's pixels, over its largest value, the logarithm
         of their number: 1 where all are used alike, 0 where one is used alone.
+
+    Raises
+    ------
+    ValueError
+        `source` is no source map, points outside the sample, or has no pixel with a source.
     """
     uses = counts(source, sample_shape).ravel()
+    if not uses.any():
+        raise ValueError("no pixel was taken from the sample, so its use has no figures: pass the map of another run")
     used = uses[uses > 0] / uses.sum()
     entropy = float(-(used * np.log(used)).sum() / np.log(len(uses))) if len(uses) > 1 else 1.0
     return SourceUse(share=len(used) / len(uses), entropy=max(0.0, min(1.0, entropy)))

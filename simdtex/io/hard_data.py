@@ -1,0 +1,328 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Hard data: values that are known at some points, read from a table and placed on the sites of a picture.
+
+x is the column and y the row, in pixels: (0, 0) is the centre of the first pixel and row 0 is at the top. A
+value that is NaN is unknown.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+__all__ = ["HardData", "place_hard_data", "read_hard_data"]
+
+PathLike = str | os.PathLike[str]
+Floats = NDArray[np.float64]
+
+_EXACT = 2**53 - 1
+"""Integers up to here are exact in float64, which the values are read as; no larger one is rounded to one of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class HardData:
+    """A table of known values, a row for each datum; `len` is how many.
+
+    Attributes
+    ----------
+    points : ndarray of float64, (data, 2)
+        x and y of each datum, pixels.
+    values : ndarray of float64, (data, variables)
+        NaN where a variable is unknown.
+    names : tuple of str
+        The name of each variable.
+    lines : tuple of int, or None
+        The line of the file that each datum is from, counted from 1; None if it is from no text.
+    """
+
+    points: Floats
+    values: Floats
+    names: tuple[str, ...]
+    lines: tuple[int, ...] | None = None
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def where(self, row: int) -> str:
+        """Say in words where a datum stands: in a line of the file, or in a row, counted from 0."""
+        return f"row {row}" if self.lines is None else f"line {self.lines[row]}"
+
+
+# ---------------------------------------------------------------- reading
+
+
+def read_hard_data(path: PathLike) -> HardData:
+    """Read a table of known values.
+
+    Parameters
+    ----------
+    path : path
+        A text with a datum in each line: x, y and a value, or one value for each of several variables. Cells are
+        separated by semicolons, tabs, commas or blanks, whichever of these comes first in this list and is in the first
+        line. Numbers have a decimal point. An empty cell, or NaN, is an unknown value. A first line with names
+        for x and y is a header, which names the variables. From ``#`` to the end of a line is a comment. Or a NumPy
+        ``.npy`` of real numbers, (data, 3 or more), with the same columns.
+
+    Returns
+    -------
+    HardData
+        The rows in the order of the file. Variables without a name are ``value``, or ``value 1`` and so on.
+
+    Raises
+    ------
+    ValueError
+        The file is missing, no table, has no rows, or a row is wrong; it names the line.
+
+    Notes
+    -----
+    About 8 s for a million rows of text.
+    """
+    name = os.fspath(path)
+    try:
+        if Path(path).suffix.lower() == ".npy":
+            return _table(_array(Path(path)))
+        with open(path, encoding="utf-8-sig", newline=None) as text:
+            return _parsed(text.read().split("\n"))
+    except FileNotFoundError:
+        raise ValueError(f"{name} does not exist: check the path of the hard data") from None
+    except IsADirectoryError:
+        raise ValueError(f"{name} is a folder: give the path of a table in it") from None
+    except UnicodeDecodeError:
+        raise ValueError(f"{name} is no text in UTF-8: save the table as CSV in UTF-8") from None
+    except OSError as error:
+        raise ValueError(f"{name} cannot be read ({error.strerror}): check the path") from None
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
+def _array(path: Path) -> Any:
+    try:
+        with path.open("rb") as file:
+            return np.load(file, allow_pickle=False)
+    except (ValueError, EOFError):
+        raise ValueError("it is damaged, or holds no array of numbers: write it with numpy.save") from None
+
+
+def _parsed(text: Sequence[str]) -> HardData:
+    """The table in the lines of a text."""
+    kept = [(number, line) for number, line in enumerate((one.partition("#")[0] for one in text), 1) if line.strip()]
+    if not kept:
+        raise ValueError("the table is empty: give a line with x, y and a value for each datum")
+    between = next((one for one in ";\t," if one in kept[0][1]), None)
+    rows = [(number, _cells(line, number, between)) for number, line in kept]
+    columns = len(rows[0][1])
+    if columns < 3:
+        raise ValueError(
+            f"line {rows[0][0]} has {columns} cell{'s' * (columns != 1)}: give x, y and one value or more, with "
+            "commas, semicolons, tabs or blanks between them"
+        )
+    header: list[str] | None = None
+    if all(cell[:1].isalpha() and not _is_number(cell) for cell in rows[0][1][:2]):
+        header = rows.pop(0)[1]
+        _check_order(header)
+    if not rows:
+        raise ValueError("the table has a header and no rows: give a line with x, y and a value for each datum")
+    numbers = np.empty((len(rows), columns))
+    for k, (number, cells) in enumerate(rows):
+        if len(cells) != columns:
+            raise ValueError(f"line {number} has {len(cells)} cells and those before it {columns}: give as many in all")
+        for column, cell in enumerate(cells):
+            if not cell and column >= 2:
+                numbers[k, column] = np.nan
+                continue
+            if not _is_number(cell):
+                raise ValueError(
+                    f"line {number} has {cell!r} in column {column + 1}, which is no number: write numbers with a "
+                    "decimal point" + (", and leave the cell of an unknown value empty" if column >= 2 else "")
+                )
+            numbers[k, column] = float(cell)
+    return HardData(numbers[:, :2], numbers[:, 2:], _names(columns - 2, header), tuple(number for number, _ in rows))
+
+
+def _cells(line: str, number: int, between: str | None) -> list[str]:
+    if between is None:
+        return line.split()
+    try:
+        return [
+            cell.strip() for cell in next(csv.reader([line], delimiter=between, strict=True, skipinitialspace=True))
+        ]
+    except csv.Error as error:
+        raise ValueError(f"line {number} cannot be taken apart ({error}): check its quotation marks") from None
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return "_" not in cell  # Python's way to write thousands, and nobody else's
+
+
+def _check_order(header: Sequence[str]) -> None:
+    """A header that names x and y must have them in front; other names of coordinates are not known."""
+    names = [name.lower() for name in header]
+    if ("x" in names and names[0] != "x") or ("y" in names and names[1] != "y") or names[0] in ("row", "rows"):
+        raise ValueError(
+            f"the columns are {', '.join(header)}: put them in the order x (the column), y (the row), and the values"
+        )
+
+
+def _names(variables: int, header: Sequence[str] | None = None) -> tuple[str, ...]:
+    plain = ["value"] if variables == 1 else [f"value {k + 1}" for k in range(variables)]
+    names = tuple(given or name for given, name in zip(header[2:], plain, strict=True)) if header else tuple(plain)
+    twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
+    if twice is not None:
+        raise ValueError(f"two columns are named {twice}: give each variable a name of its own")
+    return names
+
+
+def _table(array: Any) -> HardData:
+    """The table in an array of rows."""
+    masked = np.ma.getmaskarray(array) if isinstance(array, np.ma.MaskedArray) else None
+    try:
+        numbers = np.asarray(array)
+    except ValueError:
+        raise ValueError("the rows of hard data are of unequal length: give x, y and the same values in each") from None
+    if numbers.size == 0:
+        raise ValueError("the hard data has no rows: give x, y and a value for each datum")
+    if numbers.dtype.kind not in "buif":
+        raise TypeError(f"the hard data holds {numbers.dtype} values: give real numbers")
+    if numbers.ndim != 2 or numbers.shape[1] < 3:
+        raise ValueError(f"the hard data has the shape {numbers.shape}: give (data, 3) of x, y, value, or more values")
+    found = numbers.astype(np.float64)
+    if masked is not None:
+        found[masked] = np.nan
+    return HardData(found[:, :2], found[:, 2:], _names(numbers.shape[1] - 2))
+
+
+# ---------------------------------------------------------------- placing
+
+
+def place_hard_data(
+    table: HardData | ArrayLike, shape: Sequence[int], dtype: DTypeLike | None = None
+) -> np.ma.MaskedArray:
+    """Place known values on the sites of a picture.
+
+    Parameters
+    ----------
+    table : HardData or array_like, (data, 3 or more)
+        x, y and the value of each datum, or one value for each of several variables; NaN is unknown. x is the column
+        and y the row, in pixels: (0, 0) is the centre of the first pixel, and row 0 is at the top. A datum belongs to
+        the nearest site; halfway between two, to the one at the right or below (1.5 goes to 2, -0.5 to 0).
+    shape : (rows, cols)
+        The size of the picture.
+    dtype : dtype, optional
+        The type of the values, which must be the training image's; None is float64. Integers must be exact; floats
+        are rounded to the type.
+
+    Returns
+    -------
+    MaskedArray, (rows, cols) or (rows, cols, variables)
+        The values where they are known, masked where they are not; without the last axis where there is one variable.
+        ``filled()`` has NaN in place of what is unknown, or 0 if the type is not of floats.
+
+    Raises
+    ------
+    TypeError
+        The table or the type is not of real numbers.
+    ValueError
+        A coordinate is not finite, a datum is outside of the picture, two data at one site have different values, the
+        type cannot hold a value, or nothing is known; it names the row.
+
+    Examples
+    --------
+    >>> known = place_hard_data([[0, 1, 7], [2.4, 0.6, 9]], (2, 3), "uint8")
+    >>> print(known)
+    [[-- -- --]
+     [7 -- 9]]
+    """
+    data = table if isinstance(table, HardData) else _table(table)
+    rows, cols = _checked_shape(shape)
+    kind = np.dtype(np.float64 if dtype is None else dtype).newbyteorder("=")
+    if kind.kind not in "buif":
+        raise TypeError(f"dtype is {kind}: give bool, or a type of integers or real floats")
+    if not len(data):
+        raise ValueError("the hard data has no rows: give x, y and a value for each datum")
+    sites = _sites(data, rows, cols)
+    values = _cast(data, kind)
+    known = ~np.isnan(data.values)
+    if not known.any():
+        raise ValueError("the hard data has no known value: give a number for one datum at least")
+    variables = data.values.shape[1]
+    placed = np.zeros((rows * cols, variables), dtype=kind)
+    mask = np.ones((rows * cols, variables), dtype=bool)
+    for k in range(variables):
+        rows_known = np.flatnonzero(known[:, k])
+        here = sites[rows_known]
+        placed[here, k], mask[here, k] = values[rows_known, k], False
+        wrong = np.flatnonzero(placed[here, k] != values[rows_known, k])
+        if len(wrong):
+            one = int(rows_known[wrong[0]])
+            other = int(rows_known[(here == sites[one]) & (values[rows_known, k] != values[one, k])][0])
+            i, j = divmod(int(sites[one]), cols)
+            raise ValueError(
+                f"{data.where(one)} and {data.where(other)} of the hard data are both at row {i}, column {j} of the "
+                f"picture and have {values[one, k]} and {values[other, k]} for {data.names[k]}: keep one of them"
+            )
+    form = (rows, cols) if variables == 1 else (rows, cols, variables)
+    unknown = np.nan if kind.kind == "f" else 0
+    return np.ma.MaskedArray(placed.reshape(form), mask=mask.reshape(form), fill_value=unknown)
+
+
+def _checked_shape(shape: Sequence[int]) -> tuple[int, int]:
+    try:
+        rows, cols = shape
+        whole = all(isinstance(side, (int, np.integer)) and not isinstance(side, bool) and side >= 1 for side in shape)
+    except (TypeError, ValueError):
+        whole = False
+    if not whole:
+        raise ValueError(f"shape is {shape!r}: give (rows, cols) of the picture, integers of 1 or more")
+    return int(rows), int(cols)
+
+
+def _sites(data: HardData, rows: int, cols: int) -> NDArray[np.intp]:
+    """The number of each datum's site, row by row."""
+    wrong = ~np.isfinite(data.points).all(axis=1)
+    if wrong.any():
+        row = int(wrong.argmax())
+        x, y = data.points[row]
+        raise ValueError(f"{data.where(row)} of the hard data is at x {x}, y {y}: give finite coordinates")
+    low = np.floor(data.points)
+    nearest = low + (data.points - low >= 0.5)  # not floor(x + 0.5), which rounds the sum first
+    wrong = ((nearest < 0) | (nearest > (cols - 1, rows - 1))).any(axis=1)
+    if wrong.any():
+        row = int(wrong.argmax())
+        x, y = data.points[row]
+        raise ValueError(
+            f"{data.where(row)} of the hard data is at x {x}, y {y}, outside of a picture of {cols} x {rows} pixels "
+            f"(width x height): give x from -0.5 to below {cols - 0.5}, y from -0.5 to below {rows - 0.5}"
+        )
+    sites: NDArray[np.intp] = (nearest[:, 1] * cols + nearest[:, 0]).astype(np.intp)
+    return sites
+
+
+def _cast(data: HardData, kind: np.dtype[Any]) -> NDArray[Any]:
+    """The values in another type; what is unknown is 0."""
+    values = np.where(np.isnan(data.values), 0.0, data.values)
+    if kind.kind == "f":
+        with np.errstate(over="ignore"):
+            wrong = np.isinf(values.astype(kind))
+    else:
+        least, most = (0, 1) if kind.kind == "b" else (np.iinfo(kind).min, np.iinfo(kind).max)
+        wrong = (values != np.floor(values)) | (values < max(least, -_EXACT)) | (values > min(most, _EXACT))
+    if wrong.any():
+        row, variable = (int(k) for k in np.argwhere(wrong)[0])
+        remedy = "finite values" if kind.kind == "f" else "0 and 1" if kind.kind == "b" else "integers"
+        remedy += " below 2**53" if kind.kind in "iu" and kind.itemsize == 8 else " within its range"
+        raise ValueError(
+            f"{data.where(row)} of the hard data has {values[row, variable]} for {data.names[variable]}, which {kind} "
+            f"cannot hold: give {remedy}, or a dtype that holds it"
+        )
+    return values.astype(kind)

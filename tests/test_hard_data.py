@@ -1,0 +1,285 @@
+"""Hard data comes from a table to its sites, and what is wrong with it is named with its line."""
+
+import doctest
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import simdtex
+from simdtex.io import hard_data
+from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
+
+NAN = float("nan")
+
+
+def table(tmp_path, text, name="wells.csv"):
+    path = tmp_path / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+# ---------------------------------------------------------------- reading
+
+
+SAME = [
+    "x,y,facies\n1,2,3\n4.5,-0.25,6e1\n",
+    "X, Y, facies\n1, 2, 3\n4.5, -0.25, 60\n",
+    "x;y;facies\r\n1;2;3\r\n4.5;-0.25;60\r\n",
+    "x\ty\tfacies\n1\t2\t3\n4.5\t-0.25\t60",
+    "# wells of 2019, in pixels\n\nx  y  facies # the last one is a guess\n  1 2  3\n\n 4.5   -.25 60 #\n",
+    '"x","y","facies"\n"1","2","3"\n4.5,-0.25,"60"\n',
+    "\ufeffx,y,facies\n1,2,3\n4.5,-0.25,60\n",
+]
+
+
+@pytest.mark.parametrize("text", SAME)
+def test_a_table_is_the_same_however_it_is_written(tmp_path, text):
+    data = read_hard_data(table(tmp_path, text))
+    assert data.points.tolist() == [[1, 2], [4.5, -0.25]]
+    assert data.values.tolist() == [[3], [60]]
+    assert data.names == ("facies",)
+    assert len(data) == 2
+
+
+@pytest.mark.parametrize("text", ["1,2,3\n4,5,6\n", "1 2 3\n4 5 6\n", "#x y facies\n1;2;3\n4;5;6\n"])
+def test_a_header_is_optional(tmp_path, text):
+    data = read_hard_data(table(tmp_path, text, "wells.txt"))
+    assert (data.points.tolist(), data.values.tolist()) == ([[1, 2], [4, 5]], [[3], [6]])
+    assert data.names == ("value",)
+
+
+def test_several_variables_and_unknown_values(tmp_path):
+    text = "x,y,porosity,,facies\n0,0,0.2,7,\n1,0,,NaN,3\n2,0,nan, ,4\n"
+    data = read_hard_data(table(tmp_path, text))
+    assert data.names == ("porosity", "value 2", "facies")
+    np.testing.assert_array_equal(data.values, [[0.2, 7, NAN], [NAN, NAN, 3], [NAN, NAN, 4]])
+    assert read_hard_data(table(tmp_path, "1 2 3 4")).names == ("value 1", "value 2")
+
+
+@pytest.mark.parametrize("dtype", ["float32", "int16", "float64"])
+def test_an_array_of_numpy(tmp_path, dtype):
+    array = np.array([[0, 1, 2, 3], [4, 5, 6, 7]], dtype)
+    np.save(tmp_path / "wells.npy", array)
+    data = read_hard_data(tmp_path / "wells.npy")
+    assert (data.points.tolist(), data.values.tolist()) == ([[0, 1], [4, 5]], [[2, 3], [6, 7]])
+    assert data.names == ("value 1", "value 2")
+
+
+@given(st.lists(st.tuples(*[st.floats(allow_nan=False, allow_infinity=False)] * 4), min_size=1, max_size=5))
+def test_numbers_are_read_to_the_last_digit(tmp_path_factory, rows):
+    path = tmp_path_factory.getbasetemp() / "any.csv"
+    path.write_text("\n".join(",".join(map(repr, row)) for row in rows))
+    data = read_hard_data(path)
+    assert np.column_stack([data.points, data.values]).tolist() == [list(row) for row in rows]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "the table is empty: give a line"),
+        ("# nothing\n\n", "the table is empty"),
+        ("x,y,value\n", "a header and no rows"),
+        ("1,2\n3,4\n", "line 1 has 2 cells: give x, y and one value or more"),
+        ("abc\n", "line 1 has 1 cell: give"),
+        ("x,y,value\n\n1,2,3\n4,5\n", "line 4 has 2 cells and those before it 3"),
+        ("1,2,3\n4,5,6,7\n", "line 2 has 4 cells and those before it 3"),
+        ("x,y,value\n1,2,sand\n", "line 2 has 'sand' in column 3, which is no number: .* leave the cell .* empty"),
+        ("1,2,3\n1,,3\n", "line 2 has '' in column 2, which is no number: write"),
+        ("1,5;2,5;3\n", "line 1 has '1,5' in column 1, .* decimal point$"),
+        ("1,2,1_000\n", "line 1 has '1_000' in column 3"),
+        ("x,2,3\n1,2,3\n", "line 1 has 'x' in column 1"),
+        ("y,x,value\n1,2,3\n", "the columns are y, x, value: put them in the order x"),
+        ("id,x,y,value\n1,2,3,4\n", "the columns are id, x, y, value: put them in the order x"),
+        ("row,col,value\n1,2,3\n", "put them in the order x"),
+        ("x,y,a,a\n1,2,3,4\n", "two columns are named a: give"),
+        ('x,y,value\n1,2,"3\n', "line 2 cannot be taken apart .* quotation marks"),
+        (b"x,y,value\n1,2,\xff\n", "is no text in UTF-8"),
+        (b"\x00\x01\x02", "line 1 has 1 cell"),
+    ],
+)
+def test_tables_that_are_wrong(tmp_path, text, words):
+    with pytest.raises(ValueError, match=rf"wells\.csv.* {words}") as caught:
+        read_hard_data(table(tmp_path, text))
+    assert "\n" not in str(caught.value)
+
+
+def test_files_that_are_no_tables(tmp_path):
+    with pytest.raises(ValueError, match="does not exist: check"):
+        read_hard_data(tmp_path / "none.csv")
+    with pytest.raises(ValueError, match="is a folder"):
+        read_hard_data(tmp_path)
+    for array, words in (
+        (np.zeros((0, 3)), "has no rows"),
+        (np.zeros((4, 2)), r"shape \(4, 2\): give"),
+        (np.zeros(3), r"shape \(3,\): give"),
+        (np.array([["1", "2", "3"]]), "<U1 values: give real numbers"),
+        (np.zeros((2, 3), complex), "complex128 values"),
+    ):
+        np.save(tmp_path / "a.npy", array)
+        with pytest.raises(ValueError, match=rf"a\.npy: .*{words}"):
+            read_hard_data(tmp_path / "a.npy")
+    for content in (b"", b"1,2,3\n", (tmp_path / "a.npy").read_bytes()[:90]):
+        (tmp_path / "b.npy").write_bytes(content)
+        with pytest.raises(ValueError, match=r"b\.npy: it is damaged, or holds no array"):
+            read_hard_data(tmp_path / "b.npy")
+
+
+# ---------------------------------------------------------------- placing
+
+
+def plainly(rows, shape, variables):
+    """Site by site: which datum is nearest to it, in exact halves."""
+    placed = {}
+    for x, y, *values in rows:
+        for site in np.ndindex(shape):
+            if site[1] - 0.5 <= x < site[1] + 0.5 and site[0] - 0.5 <= y < site[0] + 0.5:
+                placed |= {(*site, k): v for k, v in enumerate(values) if v == v}
+    found = np.full((*shape, variables), NAN)
+    for site, value in placed.items():
+        found[site] = value
+    return found
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(-2, 13), st.integers(-2, 9), *[st.sampled_from([NAN, 1.0, 250.0])] * 2),
+        min_size=1,
+        max_size=12,
+        unique_by=lambda row: ((row[0] + 2) // 4, (row[1] + 2) // 4),
+    ),
+    st.sampled_from(["uint8", "float32", "float64", "int64", None]),
+    st.integers(1, 2),
+)
+def test_placing_against_a_loop(quarters, dtype, variables):
+    rows = [(x / 4, y / 4, *values[:variables]) for x, y, *values in quarters]
+    expected = plainly(rows, (3, 4), variables)
+    if np.isnan(expected).all():
+        return
+    placed = place_hard_data(rows, (3, 4), dtype)
+    assert placed.dtype == (dtype or "float64")
+    assert placed.shape == ((3, 4) if variables == 1 else (3, 4, 2))
+    assert placed.mask.shape == placed.shape
+    np.testing.assert_array_equal(placed.mask, np.isnan(expected).reshape(placed.shape))
+    np.testing.assert_array_equal(placed.compressed(), expected[~np.isnan(expected)])
+
+
+def test_x_is_the_column_and_halves_go_up():
+    below = np.nextafter(0.5, 0)
+    for x, column in ((-0.5, 0), (-1e-20, 0), (below, 0), (0.5, 1), (1.5, 2), (2.4999, 2)):
+        placed = place_hard_data([[x, 1, 7]], (2, 3), np.uint8)
+        assert np.argwhere(~placed.mask).tolist() == [[1, column]]
+    assert place_hard_data([[below, below, 7]], (2, 3))[0, 0] == 7
+
+
+def test_what_is_filled_in():
+    rows = [[0, 0, 1]]
+    assert place_hard_data(rows, (1, 2), "uint8").filled().tolist() == [[1, 0]]
+    np.testing.assert_array_equal(place_hard_data(rows, (1, 2), "float32").filled(), [[1, NAN]])
+
+
+def test_from_a_file_to_its_sites(tmp_path):
+    path = table(tmp_path, "x,y,porosity,facies\n2,0,0.25,\n0,1,,3\n")
+    placed = simdtex.place_hard_data(simdtex.read_hard_data(path), (2, 3), "float32")
+    assert placed.shape == (2, 3, 2)
+    assert np.argwhere(~placed.mask).tolist() == [[0, 2, 0], [1, 0, 1]]
+    assert placed.compressed().tolist() == [0.25, 3]
+
+
+def test_data_that_agree_at_one_site_are_one():
+    placed = place_hard_data([[1, 1, 5, NAN], [1.2, 0.9, 5, 8], [1, 1, NAN, 8]], (2, 2))
+    assert placed[1, 1].tolist() == [5, 8]
+    assert placed.count() == 2
+    assert place_hard_data([[0, 0, 0.1], [0, 0, 0.1 + 1e-12]], (1, 1), "float32").count() == 1, "the same in this type"
+
+
+def test_masked_numbers_are_unknown():
+    rows = np.ma.MaskedArray([[0, 0, 5, 6], [1, 0, 7, 8]], [[0, 0, 1, 0], [0, 0, 0, 1]])
+    assert place_hard_data(rows, (1, 2), "int16").filled().tolist() == [[[0, 6], [7, 0]]]
+
+
+@pytest.mark.parametrize(
+    ("row", "words"),
+    [
+        ("nan,0,1", "line 3 of the hard data is at x nan, y 0.0: give finite"),
+        ("0,-inf,1", "line 3 of the hard data is at x 0.0, y -inf: give finite"),
+        (
+            "-0.6,0,1",
+            r"line 3 .* at x -0\.6, y 0\.0, outside of a picture of 4 x 3 .*give x from -0.5 to below 3.5, y .* 2.5",
+        ),
+        ("3.5,0,1", r"line 3 .* at x 3\.5, y 0\.0, outside of"),
+        ("0,2.5,1", r"line 3 .* at x 0\.0, y 2\.5, outside of"),
+        ("1e300,0,1", "line 3 .* outside of"),
+        (
+            "0,0,0.5",
+            "line 3 of the hard data has 0.5 for facies, which uint8 cannot hold: give integers within its range",
+        ),
+        ("0,0,256", "has 256.0 for facies, which uint8 cannot hold"),
+        ("0,0,-1", "has -1.0 for facies, which uint8 cannot hold"),
+        ("0,0,inf", "has inf for facies, which uint8 cannot hold"),
+        (
+            "2.2,1,9",
+            "line 2 and line 3 of the hard data are both at row 1, column 2 .* have 7 and 9 for facies: keep one",
+        ),
+    ],
+)
+def test_data_that_are_wrong(tmp_path, row, words):
+    data = read_hard_data(table(tmp_path, f"x,y,facies\n2,1,7\n{row}\n0,1,3\n"))
+    with pytest.raises(ValueError, match=words) as caught:
+        place_hard_data(data, (3, 4), "uint8")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("value", "dtype", "remedy"),
+    [
+        (70000.0, "float16", "finite values"),
+        (1e39, "float32", "finite values"),
+        (np.inf, "float64", "finite values"),
+        (2, "bool", "0 and 1 within"),
+        (2.0**53, "int64", r"integers below 2\*\*53"),
+        (-(2.0**60), "int64", r"integers below 2\*\*53"),
+        (2**53 + 1, "uint64", r"integers below 2\*\*53"),
+        (2.0**31, "int32", "integers within its range"),
+    ],
+)
+def test_values_that_a_type_cannot_hold(value, dtype, remedy):
+    with pytest.raises(ValueError, match=rf"row 1 of the hard data .* {dtype} cannot hold: give {remedy}"):
+        place_hard_data([[0, 0, 0], [1, 0, value]], (1, 2), dtype)
+
+
+def test_the_largest_values_that_a_type_can_hold():
+    for value, dtype in ((255, "uint8"), (2**53 - 1, "int64"), (-(2**31), "int32"), (1, "bool"), (65504, "float16")):
+        assert place_hard_data([[0, 0, value]], (1, 1), dtype)[0, 0] == value
+
+
+def test_arguments_that_are_wrong():
+    good = [[0, 0, 1]]
+    for shape in ((0, 4), (3,), 5, (3.0, 4), (3, 4, 1), (True, 4), None):
+        with pytest.raises(ValueError, match=r"shape is .*: give \(rows, cols\)"):
+            place_hard_data(good, shape)
+    for dtype in (complex, "U3", object):
+        with pytest.raises(TypeError, match="dtype is"):
+            place_hard_data(good, (1, 1), dtype)
+    for rows, words in (
+        ([], "has no rows"),
+        (np.zeros((0, 3)), "has no rows"),
+        ([[0, 0]], r"shape \(1, 2\)"),
+        ([[0, 0, 1], [1, 1]], "unequal length"),
+        ([[0, 0, NAN]], "no known value"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            place_hard_data(rows, (2, 2))
+    with pytest.raises(ValueError, match="has no rows"):
+        place_hard_data(HardData(np.zeros((0, 2)), np.zeros((0, 1)), ("a",)), (2, 2))
+    with pytest.raises(TypeError, match="object values: give real numbers"):
+        place_hard_data([[0, 0, None]], (2, 2))
+    with pytest.raises(ValueError, match="row 0 and row 2 of the hard data"):
+        place_hard_data([[0, 0, 1], [0, 1, 1], [0, 0, 2]], (2, 2))
+
+
+def test_the_examples_run():
+    result = doctest.testmod(hard_data)
+    assert result.attempted
+    assert not result.failed
