@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import import_module
 from math import isqrt
 from typing import Any, Literal, overload
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.envelope import check_shape, executed, with_channels_last
+from simdtex.inputs import check_inputs
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, open_machine
 from simdtex.model.lattice import Grid, neighbourhood_offsets
@@ -39,6 +41,10 @@ def synthesize(
     *,
     method: str = "mrf",
     channel_axis: int | None = None,
+    mask: ArrayLike | Sequence[ArrayLike] | None = None,
+    known: ArrayLike | None = None,
+    known_source: ArrayLike | None = None,
+    guide: tuple[Any, Any] | None = None,
     rng: int | np.random.Generator | None = None,
     device: str | Machine | None = None,
     callback: Callback | None = None,
@@ -49,8 +55,9 @@ def synthesize(
 
     Parameters
     ----------
-    sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
-        The texture; any real type, any size that holds a neighbourhood, finite.
+    sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array; or a list of such
+        The texture; any real type, any size that holds a neighbourhood. With ``mrf`` a float sample may have NaN where
+        it is unknown, and there may be several samples of one type, of any sizes.
     shape : (int, int)
         Rows and columns of the output, each 1 or more; smaller or larger than the sample.
     method : {"mrf", "multires", "pyramid"}
@@ -58,6 +65,18 @@ def synthesize(
         multiresolution sampling (1997); or Heeger and Bergen's pyramid matching (1995).
     channel_axis : int, optional
         The axis of the sample that holds channels; None for a grey sample.
+    mask : (rows, cols) bool array, or a list of such, optional
+        ``mrf``: where pixels of the sample may be taken from; the others are still neighbours.
+    known : array of `shape` (and the channel axis), optional
+        ``mrf``: values of the output that are given, and stay as they are to the bit: a masked array, or floats with
+        NaN where nothing is known. Of several variables (channels) some may be known and others not.
+    known_source : (rows, cols, 2) int array, optional
+        ``mrf``: the (row, column) of the sample that known pixels are from, -1 for those from elsewhere; of several
+        samples (row, column, sample). Such pixels suggest how to go on.
+    guide : (array, array), optional
+        ``mrf``: a picture of labels or numbers, (rows, cols) or (rows, cols, G), of the sample's size, and another of
+        the output's: where the latter has what, pixels come from where the former has the same. NaN in the latter
+        leaves it open. Of several samples, a list of pictures.
     rng : int or numpy.random.Generator, optional
         The seed. The same seed gives the same bytes on every device. None takes a fresh one.
     device : str, optional
@@ -71,7 +90,8 @@ def synthesize(
         Of the method. ``mrf``: ``preset``, ``order``, ``levels``, ``overview``, ``relaxation``, ``bandwidth``,
         ``coherence``, ``balance``, ``structure``, ``novelty``, ``finish``, ``xi``, ``free_sweeps``, ``pixel``,
         ``phases``, ``edges``, ``coarsest``, ``schedule``, ``check_schedule``, ``boundary``, ``array``, ``mapping``,
-        ``search``, ``suggesting``, ``similar``, ``chance``, ``exhaustive``, ``emulate``; see
+        ``search``, ``suggesting``, ``similar``, ``chance``, ``exhaustive``, ``emulate``, ``categorical``, ``weights``,
+        ``shares``, ``proportions``, ``guide_weight``, ``labels``, ``unsure``; see
         `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``strain``, ``target``, ``thresholds``,
         ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``phase``, ``boundary``, ``edges``,
         ``joins``; see `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``, ``levels``, ``orientations``,
@@ -109,14 +129,23 @@ def synthesize(
     (80, 96)
     """
     one_of("method", method, METHODS)
-    pixels = check_sample(sample, channel_axis)
     size = check_shape(shape)
+    inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
+    if method != "mrf" and not inputs.plain:
+        raise ValueError(
+            f"the method {method} takes one sample that is known everywhere, no mask, no known values and no guide; "
+            'give method="mrf"'
+        )
     package = import_module(f"simdtex.methods.{method}")
     chosen = package.make_options(**with_channels_last(options, channel_axis))
     seed = as_seed(rng)
 
     def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
-        result: tuple[NDArray[Any], Output] = package.synthesize(machine, pixels, size, chosen, seed, seen)
+        result: tuple[NDArray[Any], Output]
+        if method == "mrf":
+            result = package.synthesize(machine, inputs.pictures, size, chosen, seed, seen, inputs.given, inputs.guide)
+        else:
+            result = package.synthesize(machine, inputs.pictures.pixels[0], size, chosen, seed, seen)
         return result
 
     return executed(device, channel_axis, callback, full_output, run)

@@ -77,6 +77,7 @@ ROOMS = [
         "experiments",
         "synthesis",
         "methods",
+        "inputs",
         "envelope",
         "schedules",
     ),

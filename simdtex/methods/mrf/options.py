@@ -125,6 +125,22 @@ class Options:
     emulate : bool
         Whether every launch is to have one work-item per PE of the array. False packs all the same, and only
         accounts for the array.
+    categorical : bool or tuple of int
+        Whether the sample's numbers name categories: two differ or they do not, and none is ever a mean of others. A
+        tuple names the variables (channels) of which that is so.
+    weights : tuple of float, optional
+        One for each variable (channel): each is brought to the same spread, times its weight. None: all are on one
+        scale, as colours are, but for categories.
+    shares : tuple of float, optional
+        One for each of several samples: how much of the output they are to be used for, kept by the price on use. None:
+        every pixel of all samples counts alike.
+    proportions : tuple of float, optional
+        Of a sample of categories: how much of the output each category, in ascending order, is to be, kept by a price.
+        None: as comes of the sample and of what is given.
+    guide_weight : float
+        Variance of the guide in units of the sample's.
+    labels : bool, optional
+        Whether the guide's numbers are names. None: integers of at most 16 different values are.
     unsure : float
         Where a sample is not known everywhere: the share of a candidate's neighbours that may be unknown, 0 to 1. These
         are taken to be as the nearest known pixel.
@@ -157,6 +173,12 @@ class Options:
     chance: int = 4
     exhaustive: int = 64
     emulate: bool = True
+    categorical: bool | tuple[int, ...] = False
+    weights: tuple[float, ...] | None = None
+    shares: tuple[float, ...] | None = None
+    proportions: tuple[float, ...] | None = None
+    guide_weight: float = 1.0
+    labels: bool | None = None
     unsure: float = 0.25
 
     def __post_init__(self) -> None:
@@ -196,7 +218,37 @@ class Options:
         true_or_false("check_schedule", self.check_schedule)
         parse_array(self.array or "1x1", self.mapping)
         true_or_false("emulate", self.emulate)
+        real("guide_weight", self.guide_weight, 0)
+        if self.labels is not None:
+            true_or_false("labels", self.labels)
         real("unsure", self.unsure, 0)
+        for name in ("weights", "shares", "proportions"):
+            _numbers(name, getattr(self, name))
+        if not isinstance(self.categorical, bool):
+            if not isinstance(self.categorical, tuple) or not self.categorical:
+                raise TypeError(f"categorical must be True, False or a tuple of channels, not {self.categorical!r}")
+            for channel in self.categorical:
+                whole("a channel of categorical", channel, 0)
+        if self.pixel == "density":
+            for name in ("categorical", "weights"):
+                if getattr(self, name):
+                    raise ValueError(f'{name} goes with pixels of the sample; give pixel="source"')
+        if self.categorical and self.finish:
+            raise ValueError(f"finish={self.finish:g} takes means, and of categories there are none; leave it out")
+
+    def of(self, pictures: Pictures) -> Pictures:
+        """The pictures of a sample with what these options say of their kind."""
+        variables, count = pictures.pixels[0].shape[-1], len(pictures.pixels)
+        kinds = (self.categorical,) * variables if isinstance(self.categorical, bool) else None
+        if isinstance(self.categorical, tuple):
+            if max(self.categorical) >= variables:
+                raise ValueError(f"categorical names channel {max(self.categorical)} of {variables}; give 0 to {variables - 1}")
+            kinds = tuple(channel in self.categorical for channel in range(variables))
+        if self.weights and len(self.weights) != variables:
+            raise ValueError(f"there are {len(self.weights)} weights and {variables} variables; give one for each")
+        if self.shares and len(self.shares) != count:
+            raise ValueError(f"there are {len(self.shares)} shares and {count} samples; give one for each")
+        return replace(pictures, categorical=kinds, weights=self.weights, shares=self.shares)
 
     def resolved(self, pictures: Pictures) -> Options:
         """The same as it is executed: what ``search="auto"`` and ``finish=None`` mean for a sample.
@@ -225,7 +277,20 @@ def few(pictures: Sequence[NDArray[Any]]) -> bool:
     return True
 
 
+def _numbers(name: str, value: Any) -> None:
+    """Raise unless a value is None or a tuple of numbers of which one is above 0."""
+    if value is None:
+        return
+    if not isinstance(value, tuple) or not value:
+        raise TypeError(f"{name} must be a tuple of numbers, not {value!r}")
+    for number in value:
+        real(f"one of {name}", number, 0)
+    if not any(value):
+        raise ValueError(f"{name} are all 0; give a number above 0")
+
+
 def make_options(preset: str = "default", **given: Any) -> Options:
     """Options from a preset and what the user gave; unknown names are a TypeError that lists the valid ones."""
     one_of("preset", preset, PRESETS)
+    given = {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
     return build(Options, "mrf", PRESETS[preset] | given, also=("preset",))

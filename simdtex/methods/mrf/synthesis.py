@@ -14,6 +14,7 @@ from simdtex.maspar.array import parse_array
 from simdtex.methods.mrf.algorithm import anneal
 from simdtex.methods.mrf.level import Run, number_of_levels
 from simdtex.methods.mrf.observers import Observer
+from simdtex.methods.mrf.options import CATEGORIES as MOST
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given, planes
 from simdtex.model.guide import Beside, Guide
@@ -28,6 +29,9 @@ from simdtex.run import Callback, Output, device_seconds
 AT_ONCE = 2**20
 """Sites that are finished together."""
 
+LABELS = 64
+"""Labels of a guide, at most: each is a channel."""
+
 
 def synthesize(
     machine: Machine,
@@ -37,7 +41,7 @@ def synthesize(
     seed: int,
     callback: Callback | None = None,
     given: Given | None = None,
-    guide: Guide | None = None,
+    guide: tuple[tuple[NDArray[Any], ...], NDArray[Any]] | None = None,
 ) -> tuple[NDArray[Any], Output]:
     """Algorithm 1: nonparametric multiscale MRF texture synthesis.
 
@@ -56,8 +60,8 @@ def synthesize(
         Called with a `simdtex.run.Relaxing` after every part of a sweep.
     given : Given, optional
         Sites of X whose values are given; they stay what they are.
-    guide : Guide, optional
-        What tells where to be what.
+    guide : (tuple of (rows, cols, G) arrays, (H, W, G) array), optional
+        What tells where to be what: for each picture of the sample, and for X.
 
     Returns
     -------
@@ -75,8 +79,9 @@ def synthesize(
     the host: about 50 per output pixel.
     """
     launches, worked = machine.launches, machine.seconds
-    pictures = pixels if isinstance(pixels, Pictures) else Pictures((pixels,))
-    run = laid_out(machine, pictures, shape, options, seed, given, guide)
+    pictures = options.of(pixels if isinstance(pixels, Pictures) else Pictures((pixels,)))
+    check_categories(pictures, given, options)
+    run = laid_out(machine, pictures, shape, options, seed, given, check_guide(guide, options))
     observer, state = Observer(run, callback), None
     for level, state, info in anneal(run, watch=observer.part):
         observer.sweep(level, state, info)
@@ -104,11 +109,70 @@ def synthesize(
     return image, Output(place, temperatures / 1024, observer.stages, statistics)
 
 
+def check_categories(pictures: Pictures, given: Given | None, options: Options) -> None:
+    """Raise where a category is given that the sample does not have, or a share of one."""
+    for variable in range(pictures.pixels[0].shape[-1]):
+        categories = pictures.categories(variable)
+        if categories is None:
+            continue
+        if given:
+            told = np.unique(given.values[given.known[..., variable], variable])
+            strange = told[~np.isin(told, categories)]
+            if strange.size:
+                raise ValueError(
+                    f"known has the category {strange[0]} and the sample has {_listed(categories)}; give one of these"
+                )
+        if len(categories) > MOST:
+            raise ValueError(f"a variable has {len(categories)} categories; give {MOST} or fewer, or leave categorical out")
+    if options.proportions:
+        found = pictures.categories(0)
+        if found is None or pictures.pixels[0].shape[-1] > 1:
+            raise ValueError("proportions are of one variable of categories; give categorical=True, or leave them out")
+        if len(found) != len(options.proportions):
+            raise ValueError(
+                f"there are {len(options.proportions)} proportions and {len(found)} categories, {_listed(found)}; "
+                "give one for each"
+            )
+
+
+def check_guide(guide: tuple[tuple[NDArray[Any], ...], NDArray[Any]] | None, options: Options) -> Guide | None:
+    """The guide with its kind and weight; raises where it names a label that the sample lacks."""
+    if guide is None:
+        return None
+    if options.pixel == "density":
+        raise ValueError('a guide chooses among pixels of the sample; give pixel="source"')
+    samples, output = guide
+    labels = options.labels
+    if labels is None:
+        integers = all(one.dtype.kind in "iu" for one in (*samples, output))
+        labels = integers and all(np.unique(one).size <= MOST for one in samples)
+    if labels:
+        for channel in range(output.shape[-1]):
+            there = np.unique(np.concatenate([np.unique(one[..., channel]) for one in samples]))
+            told = np.unique(output[..., channel])
+            told = told[~np.isnan(told)] if told.dtype.kind == "f" else told
+            strange = told[~np.isin(told, there)]
+            if strange.size:
+                raise ValueError(
+                    f"the guide of the output asks for the label {strange[0]} and that of the sample has "
+                    f"{_listed(there)}; give labels that the sample has"
+                )
+            if there.size > LABELS:
+                raise ValueError(f"the guide has {there.size} labels; give {LABELS} or fewer, or labels=False")
+    return Guide(samples, output, labels, options.guide_weight)
+
+
+def _listed(values: NDArray[Any]) -> str:
+    """Up to ten values in words."""
+    words = [str(value) for value in values[:10]]
+    return ", ".join(words) + (", ..." if len(values) > 10 else "")
+
+
 def used(place: NDArray[np.int32], pictures: Pictures) -> dict[str, Any] | None:
     """How evenly the sample is used, where it is one picture and something is from there."""
     if place.shape[-1] > 2 or (place[..., 0] < 0).all():
         return None
-    return effective_use(place, pictures.pixels[0].shape).as_dict()
+    return effective_use(place[place[..., 0] >= 0][None], pictures.pixels[0].shape).as_dict()
 
 
 def laid_out(
