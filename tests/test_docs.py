@@ -91,7 +91,8 @@ PYTHON |= {code: "README.md" for code in fenced(README, "python")}  # the pages 
 @pytest.mark.parametrize(
     ("code", "page"), PYTHON.items(), ids=[f"{page}-{i}" for i, page in enumerate(PYTHON.values())]
 )
-def test_python_runs(any_device, code, page):
+def test_python_runs(any_device, code, page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     assert small(code) != code, "the sizes of this block are not known to the test"
     exec(compile(small(code), page, "exec"), {"__name__": page})
 

@@ -13,7 +13,7 @@ from simdtex.io import realisations as module
 from simdtex.io.realisations import check_realisations_path, read_realisations, write_realisations
 
 SUFFIXES = [".zarr", ".zarr.zip", ".nc", ".npz"]
-TYPES = ["uint8", "int16", "uint16", "int32", "int64", "uint64", "float32", "float64", "bool"]
+TYPES = ["uint8", "int16", "uint64", "float32", "float64", "bool"]
 
 ATTRIBUTES = {
     "text": "sand and clay",
@@ -155,7 +155,7 @@ def test_a_zip_has_every_file_once(tmp_path):
     assert len(set(names)) == len(names)
 
 
-@pytest.mark.parametrize(("size", "expected"), [(2**22, (3, 5, 4)), (179, (2, 5, 4)), (79, (1, 4, 4)), (1, (1, 1, 4))])
+@pytest.mark.parametrize(("size", "expected"), [(179, (2, 5, 4)), (79, (1, 4, 4)), (1, (1, 1, 4))])
 def test_chunks_are_of_whole_realisations_or_rows(tmp_path, size, expected, monkeypatch):
     monkeypatch.setattr(module, "_CHUNK", size)
     array = some("int32")
