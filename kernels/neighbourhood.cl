@@ -13,13 +13,14 @@
 // sites       (S,)        pixel index of each site
 // values      (C, H, W)   working grey levels; the first `made` channels are no guides
 // temperature (H, W)      in 1/1024
+// source      (H, W)      pixel index in the sample; -D OWN: below 0 where a site is hard data
 // offsets     (N, 2)      (row, column) on the level's grid, canonical order
 // confidence  (N, P)      out: u; P is S rounded up to whole vectors, the rest is 0. -D OWN: (terms, C, P)
 // weighted    (terms, C, P)   out: x * u; terms is N, or N + 1 where there are guides
 // One work-item per (site, term).
 __kernel void neighbourhood(__global const int *restrict sites, const int S, const int P,
                             __global const ushort *restrict values, __global const ushort *restrict temperature,
-                            const int channels, const int made, const int plane, __global const int2 *restrict offsets,
+                            __global const int *restrict source, const float hard, const int channels, const int made, const int plane, __global const int2 *restrict offsets,
                             const int N, const int terms, const float centre, const Lattice g,
                             __global float *restrict confidence, __global float *restrict weighted LANES_ARG)
 {
@@ -33,10 +34,11 @@ __kernel void neighbourhood(__global const int *restrict sites, const int S, con
         const int r = s >= S ? -1 : k < N ? neighbour(g, i, j, o.x, o.y) : site;
         const float u = r < 0 || k == N ? 0.0f : (float)(1024 - temperature[r]) * 0x1p-10f;
 #ifdef OWN
+        const float certain = weighed_as(u, r < 0 ? 0 : source[r], hard);
         const float guide = r < 0 ? 0.0f : k < N ? 1.0f : centre;
         for (int c = 0; c < channels; ++c) {
             const ushort x = r < 0 ? 0 : values[c * plane + r];
-            const float uc = confidence_of(c < made, x, u, guide);
+            const float uc = confidence_of(c < made, x, certain, guide);
             confidence[(k * channels + c) * P + s] = uc;
             weighted[(k * channels + c) * P + s] = (float)x * uc;
         }

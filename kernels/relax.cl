@@ -95,7 +95,11 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
     for (int k = 0; k < neighbours; ++k) {
         const int r = neighbour(g.lattice, i, j, offsets[k].x, offsets[k].y);
         const int t = r < 0 ? UNTOUCHED : temperature[r];
+#ifdef OWN
+        const float certain = weighed_as((float)(1024 - t) * 0x1p-10f, r < 0 ? 0 : source[r], g.hard);
+#else
         const float certain = (float)(1024 - t) * 0x1p-10f;
+#endif
         GATHER(k, r, certain, r < 0 ? 0.0f : 1.0f);
         sum += r < 0 ? 0 : t;
         members += r < 0 ? 0 : 1;
@@ -234,8 +238,9 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
                 const int cell = a * CHUNKS + k, from = max(row[a], 0) + (j - RADIUS + 16 * k) * h.spacing;
                 const float16 in = row[a] < 0 ? (float16)0.0f : vload16(cell, disc);
                 const float16 t = spread(temperature + from, h.spacing);
-                const float16 certain = (1024.0f - t) * 0x1p-10f * in;
 #ifdef OWN
+                const float16 heavy = select((float16)1.0f, (float16)g.hard, spread_int(source + from, h.spacing) < 0);
+                const float16 certain = (1024.0f - t) * 0x1p-10f * in * heavy;
                 const float16 guide = in + (row[a] < 0 ? 0.0f : g.centre) * middle(a, k);
                 for (int c = 0; c < C; ++c) {
                     const float16 x = spread(values + c * g.area + from, h.spacing);
@@ -243,6 +248,7 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
                     xu[cell * C + c] = x * u[cell * C + c];
                 }
 #else
+                const float16 certain = (1024.0f - t) * 0x1p-10f * in;
                 u[cell] = certain;
                 for (int c = 0; c < C; ++c)
                     xu[cell * C + c] = spread(values + c * g.area + from, h.spacing) * certain;
@@ -270,7 +276,11 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
             const int t = temperature[r], cell = a * CHUNKS + b / 16, n = b % 16;
             sum += t;
             ++members;
+#ifdef OWN
+            const float ur = weighed_as((float)(1024 - t) * 0x1p-10f, source[r], g.hard);
+#else
             const float ur = (float)(1024 - t) * 0x1p-10f;
+#endif
             PUT(cell, n, r, ur, 1.0f);
         }
         if (G)

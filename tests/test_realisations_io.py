@@ -34,6 +34,7 @@ ATTRIBUTES = {
     "options": {"order": 8, "levels": None, "parts": [1, 2.5, "x", [True]], "inner": {"a": {}}},
     "list": [1, 2, 3],
     "none": [],
+    "long": "é" * 70000,  # more than a header of HDF5 holds
 }
 
 
@@ -93,8 +94,17 @@ def test_half_floats(tmp_path, suffix):
     array = some("float16")
     write_realisations(tmp_path / f"many{suffix}", array)
     same(read_realisations(tmp_path / f"many{suffix}"), array)
-    with pytest.raises(ValueError, match=r"\.nc cannot hold float16 values: end its name in \.zarr or \.npz"):
+    with pytest.raises(ValueError, match=r"\.nc cannot hold float16 values: end its name in \.npz instead"):
         write_realisations(tmp_path / "many.nc", array)
+
+
+def test_types_are_checked_before_there_is_an_array(tmp_path):
+    for suffix in SUFFIXES:
+        check_realisations_path(tmp_path / f"many{suffix}", np.float32)
+    for suffix in SUFFIXES[:3]:
+        if np.dtype(np.longdouble).itemsize > 8:
+            with pytest.raises(ValueError, match=r"cannot hold .* end its name in \.npz"):
+                check_realisations_path(tmp_path / f"many{suffix}", np.longdouble)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -294,7 +304,9 @@ def test_libraries_that_are_not_installed(tmp_path, monkeypatch, missing, suffix
         (some().astype(complex), TypeError, "complex128 values"),
         (some().astype("U3"), TypeError, "<U3 values"),
         (some(name=3), ValueError, "the name of the realisations is 3"),
-        (some(name="seconds"), ValueError, "the name of the realisations is 'seconds'"),
+        (some(name="seconds"), ValueError, "'seconds' is the name of the realisations and of one of their coordinates"),
+        (some().drop_vars("x").rename("x"), ValueError, "'x' is the name of the realisations and of one"),
+        (some().assign_coords(realisations=1), ValueError, "'realisations' is the name of the realisations and of"),
         (some(attrs={"a": object()}), TypeError, "the attribute a is of type object: give"),
         (some(attrs={"a": {"b": [{1, 2}]}}), TypeError, "the attribute a is of type set"),
         (some(attrs={"a": {1: 2}}), TypeError, "the attribute a has a dictionary with keys that are no texts"),
@@ -302,6 +314,7 @@ def test_libraries_that_are_not_installed(tmp_path, monkeypatch, missing, suffix
         (some(attrs={3: 1}), TypeError, "the attribute 3 has no text for a name"),
         (some(attrs={"": 1}), TypeError, "the attribute '' has no text for a name"),
         (some(attrs={"_FillValue": 0}), ValueError, "the attribute _FillValue has a name that the file formats use"),
+        (some(attrs={"NAME": "a"}), ValueError, "the attribute NAME has a name that the file formats use"),
         (some().assign_coords(a=("y", [1j] * 5)), TypeError, "the coordinate 'a' holds complex128"),
         (some().assign_coords(a=("y", [None] * 5)), TypeError, "the coordinate 'a' holds object"),
         (some().assign_coords({"a/b": 1}), TypeError, "the coordinate 'a/b' .* without '/'"),

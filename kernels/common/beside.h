@@ -19,6 +19,12 @@
 #define CONFIDENT(c) 0
 #endif
 
+// The confidence of a site of confidence u: hard data, which are from nowhere in the sample, count more.
+inline float weighed_as(const float u, const int source, const float hard)
+{
+    return source < 0 ? u * hard : u;
+}
+
 // The confidence of a value: `u` of channels that are made, `guide` of others.
 inline float confidence_of(const bool made, const ushort x, const float u, const float guide)
 {

@@ -27,6 +27,7 @@ typedef struct {
     int xi;                       // of equation (13), in 1/1024
     float novelty;                // what a candidate costs for each neighbour that it continues
     float centre;                 // confidence of a guide at the site itself
+    float hard;                   // confidence of hard data
 } Level;
 
 #endif

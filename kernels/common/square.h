@@ -68,6 +68,14 @@ inline float16 spread(__global const ushort *p, const int spacing)
 {
     return convert_float16(spacing == 1 ? vload16(0, p) : (ushort16)(vload16(0, p).even, vload16(1, p).even));
 }
+
+#ifdef OWN
+// The same of whole numbers.
+inline int16 spread_int(__global const int *p, const int spacing)
+{
+    return spacing == 1 ? vload16(0, p) : (int16)(vload16(0, p).even, vload16(1, p).even);
+}
+#endif
 #endif
 
 // Equation (12): d of the candidate at place q of `levels`, the sample whose rows are `down` apart.

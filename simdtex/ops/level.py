@@ -23,6 +23,7 @@ LEVEL = np.dtype(
         *((name, np.int32) for name in ("radius", "top", "draws", "xi")),
         ("novelty", np.float32),
         ("centre", np.float32),
+        ("hard", np.float32),
     ],
     align=True,
 )

@@ -33,12 +33,14 @@ class Beside(NamedTuple):
     """Which channels stand beside those of the pixels: kernels/common/beside.h.
 
     ``guides`` how many, the last ones; ``own`` whether each value has a confidence of its own, as guides have and where
-    values may be unknown; ``centre`` that of a guide at the site itself.
+    values may be unknown; ``centre`` that of a guide at the site itself; ``hard`` that of hard data, which are from
+    nowhere in the sample.
     """
 
     guides: int = 0
     own: bool = False
     centre: np.float32 = np.float32(1)
+    hard: np.float32 = np.float32(1)
 
     @property
     def defines(self) -> dict[str, int]:
@@ -66,6 +68,8 @@ def gathered(
 ) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
     """Values (terms, C, S) and their confidences (terms, C or 1, S), of neighbours r (N, S) and, for guides, the site."""
     u = (1024 - field.temperature.ravel()[r].astype(np.float32)) / np.float32(1024)
+    if beside.own:
+        u = np.where((r >= 0) & (field.source.ravel()[r] < 0), u * beside.hard, u)
     u = np.where(r < 0, np.float32(0), u)[:, None]
     channels = len(field.values)
     if beside.guides:
@@ -98,7 +102,7 @@ def _launch(
     machine.launch_sites(
         ("neighbourhood", "neighbourhood"),
         (padded, terms),
-        *(sites, np.int32(count), np.int32(padded), field.values, field.temperature),
+        *(sites, np.int32(count), np.int32(padded), field.values, field.temperature, field.source, beside.hard),
         *(np.int32(channels), np.int32(channels - beside.guides), np.int32(prod(field.values.shape[1:])), offsets),
         *(np.int32(neighbours), np.int32(terms), beside.centre, grid.struct, confidence, weighted),
         defines={"OWN": 1} if beside.own else {},

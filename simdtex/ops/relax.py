@@ -337,7 +337,7 @@ def _fused(
         **{"neighbours": offsets.shape[0], "pixels": candidates.index_of.size, "candidates": candidates.size},
         **{"favour": relaxation.favour, "scale": window.scale, "top": window.top, "draws": choice.draws},
         **{"radius": window.radius if choice.density else -1, "xi": relaxation.xi, "novelty": relaxation.novelty},
-        "centre": relaxation.beside.centre,
+        **{"centre": relaxation.beside.centre, "hard": relaxation.beside.hard},
     }
     common = (offsets, candidates.reach, candidates.index_of, candidates.positions)
     noise, key = machine.constant(window.noise), np.uint32(turn)

@@ -222,10 +222,9 @@ class Run:
     @cached_property
     def beside(self) -> Beside:
         """Which channels are guides, and whether each value may be unknown."""
-        guides, gaps = len(self.sample.guides), False
-        if self.laid is not None:
-            gaps = bool((self.laid.values[:, self.laid.known] == UNKNOWN).any())
-        return Beside(guides, guides > 0 or gaps, np.float32(max(1, round(sqrt(len(self.offsets)) / 2))))
+        guides, hard = len(self.sample.guides), self.laid is not None and bool((self.laid.source < 0)[self.laid.known].any())
+        centre = np.float32(max(1, round(sqrt(len(self.offsets)) / 2)))
+        return Beside(guides, guides > 0 or hard, centre, np.float32(round(8 * sqrt(self.options.data_weight)) / 8))
 
     def hold(self, field: Field) -> Field:
         """The field before the first level with what is given."""

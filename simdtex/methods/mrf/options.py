@@ -137,6 +137,8 @@ class Options:
     proportions : tuple of float, optional
         Of a sample of categories: how much of the output each category, in ascending order, is to be, kept by a price.
         None: as comes of the sample and of what is given.
+    data_weight : float
+        How many neighbours a known site counts for that is from nowhere in the sample: hard data.
     guide_weight : float
         Variance of the guide in units of the sample's.
     labels : bool, optional
@@ -177,6 +179,7 @@ class Options:
     weights: tuple[float, ...] | None = None
     shares: tuple[float, ...] | None = None
     proportions: tuple[float, ...] | None = None
+    data_weight: float = 16.0
     guide_weight: float = 1.0
     labels: bool | None = None
     unsure: float = 0.25
@@ -218,6 +221,7 @@ class Options:
         true_or_false("check_schedule", self.check_schedule)
         parse_array(self.array or "1x1", self.mapping)
         true_or_false("emulate", self.emulate)
+        real("data_weight", self.data_weight, 0)
         real("guide_weight", self.guide_weight, 0)
         if self.labels is not None:
             true_or_false("labels", self.labels)

@@ -193,7 +193,8 @@ def laid_out(
     if given and given.partly:
         beside.append(given.colocated(pictures.pixels))
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in beside)
-    values, margin = channels * len(offsets) + len(beside), int(offsets.max()) * step
+    heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or beside else 1.0  # in sums of squares
+    values, margin = round(heavy * (channels * len(offsets) + len(beside))), int(offsets.max()) * step
     sample = Sample(pictures, values, margin, options.structure, step, beside, options.unsure)
     schedule = schedules.get(options.schedule)
     _check_memory(machine, sample, shape, options.similar, copies=2 if schedule.tile else 1)
