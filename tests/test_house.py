@@ -75,6 +75,7 @@ ROOMS = [
         "__init__",
         "quality",
         "experiments",
+        "filling",
         "synthesis",
         "methods",
         "inputs",

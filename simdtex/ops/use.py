@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,8 @@ CAP = 4.0
 """Excess of use over the fair share above which the price grows no more."""
 
 
-class Market(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Market:
     """Who competes for sites: the candidates of a level.
 
     ``shape`` rows and columns of the places where they lie; ``around`` places from one to the edge of its
@@ -29,6 +31,12 @@ class Market(NamedTuple):
     around: int
     fair: NDArray[np.int64] | None = None
     listed: bool = False
+
+    @cached_property
+    def due(self) -> tuple[NDArray[np.int64], int]:
+        """What is fair in the square around each place, and altogether."""
+        fair = np.ones(self.shape, np.int64) if self.fair is None else self.fair.reshape(self.shape)
+        return _blurred(fair, self.around), int(fair.sum())
 
 
 def _reference(field: Field, grid: Grid, candidates: Candidates) -> NDArray[np.int32]:
@@ -89,16 +97,16 @@ def price(
     what is asked for too often. Cost: some ten passes over the candidates, on the host.
     """
     places, total = market.shape[0] * market.shape[1], int(counts.sum())
-    fair = np.ones(places, np.int64) if market.fair is None else market.fair
+    there = np.ones(places, bool) if market.fair is None else market.fair > 0
     found = np.zeros(places, np.float32)
     if rate and total:
         used = np.zeros(places, np.int64)
-        used[fair > 0 if market.listed else slice(None)] = counts
-        around, due = (_blurred(a.reshape(market.shape), market.around) for a in (used, fair))
-        excess = around.astype(np.float64) * int(fair.sum()) / (np.maximum(due, 1) * np.float64(total)) - 1
+        used[there if market.listed else slice(None)] = counts
+        around, (due, whole) = _blurred(used.reshape(market.shape), market.around), market.due
+        excess = around.astype(np.float64) * whole / (np.maximum(due, 1) * np.float64(total)) - 1
         found = (rate * np.clip(excess, 0, CAP)).astype(np.float32).ravel()
     if market.fair is not None:
-        found = found[fair > 0] if market.listed else np.where(fair > 0, found, np.float32(np.inf))
+        found = found[there] if market.listed else np.where(there, found, np.float32(np.inf))
     return found if before is None else (found + before[: found.size]) / np.float32(2)
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Paget and Longstaff's nonparametric multiscale Markov random field (1998)."""
 
-from simdtex.methods.mrf.level import check_fit
+from simdtex.methods.mrf.level import check_fit, number_of_levels
 from simdtex.methods.mrf.options import PRESETS, Options, make_options
 from simdtex.methods.mrf.synthesis import synthesize
 
-__all__ = ["PRESETS", "Options", "check_fit", "make_options", "synthesize"]
+__all__ = ["PRESETS", "Options", "check_fit", "make_options", "number_of_levels", "synthesize"]

@@ -1,0 +1,342 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What is missing of a picture, made from the rest of it: `fill`, and `extend`."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from math import ceil, log2
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
+
+from simdtex.envelope import executed
+from simdtex.inputs import check_mask, check_samples
+from simdtex.io.image import check_sample
+from simdtex.machine import Machine
+from simdtex.methods import mrf
+from simdtex.methods.mrf.options import Options
+from simdtex.model.given import Given
+from simdtex.model.lattice import neighbourhood_offsets
+from simdtex.model.pictures import Mask, Pictures, unknown_in
+from simdtex.options import one_of, whole
+from simdtex.random import as_seed
+from simdtex.run import Callback, Output
+
+REACH = 128
+"""How far around its window a hole is filled from, at least, pixels."""
+
+LEAST = 16
+"""Candidates at the coarsest level of a hole, at least: what is known around it tells the layout."""
+
+FEW = 16
+"""Windows that are made one by one; where holes are in more places, one window holds them all."""
+
+
+class Window(NamedTuple):
+    """A part of a picture that is worked on: its rows and columns, and in how many levels."""
+
+    rows: slice
+    cols: slice
+    levels: int
+
+
+def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
+    """Windows that hold the holes of a picture and what their sites look at.
+
+    Parameters
+    ----------
+    hole : (rows, cols) bool array
+    radius : int
+        Of a neighbourhood.
+    levels : int, optional
+        Of the multigrid. None: so many that at the coarsest a site in the middle of its hole sees the rim.
+
+    Returns
+    -------
+    list of Window
+        From top to bottom. Windows that overlap are one.
+    """
+    deepest = ndimage.distance_transform_cdt(np.pad(hole, 1), metric="chessboard")[1:-1, 1:-1]
+    wanted = levels or 1 + max(0, ceil(log2(max(1, int(deepest.max())) / radius)))
+    around = radius * 2 ** (wanted - 1) + 1
+    near = ndimage.binary_dilation(hole, np.ones((3, 3), bool), iterations=around)
+    found = ndimage.find_objects(ndimage.label(near, np.ones((3, 3)))[0])
+    area = sum((r.stop - r.start) * (c.stop - c.start) for r, c in found)
+    if len(found) > FEW or area > near.size // 2:
+        rows, cols = (np.flatnonzero(near.any(axis)) for axis in (1, 0))
+        found = [(slice(int(rows[0]), int(rows[-1]) + 1), slice(int(cols[0]), int(cols[-1]) + 1))]
+    return [Window(r, c, wanted) for r, c in found]
+
+
+class Job(NamedTuple):
+    """A picture with holes.
+
+    ``pixels`` (rows, cols, C); ``hole`` (rows, cols) what is to be made; ``sample`` what it is made from, None for what
+    is around; ``reach`` how far around, pixels.
+    """
+
+    pixels: NDArray[Any]
+    hole: Mask
+    sample: Pictures | None
+    reach: int | None
+
+
+def fill(
+    image: ArrayLike,
+    mask: ArrayLike | None = None,
+    *,
+    sample: ArrayLike | None = None,
+    reach: int | None = None,
+    channel_axis: int | None = None,
+    rng: int | np.random.Generator | None = None,
+    device: str | Machine | None = None,
+    callback: Callback | None = None,
+    full_output: bool = False,
+    **options: Any,
+) -> NDArray[Any] | tuple[NDArray[Any], Output]:
+    """Fill the holes of a picture with more of what is around them.
+
+    Parameters
+    ----------
+    image : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
+        The picture; any real type.
+    mask : (rows, cols) bool array, optional
+        True where the picture is to be made. None: where `image` is NaN.
+    sample : array of the image's type, optional
+        The texture to fill with, or a list of several. None: the rest of the picture.
+    reach : int, optional
+        How far around a hole the picture is its sample, pixels. None: 128, or twice the hole's longer side if that is
+        more. It makes no difference where there is a `sample`.
+    channel_axis : int, optional
+        The axis of the image that holds channels; None for a grey one.
+    rng, device, callback
+        As in `simdtex.synthesize`.
+    full_output : bool
+        Return the source map, temperatures and statistics too.
+    **options
+        Of the method ``mrf``: see `simdtex.methods.mrf.Options`.
+
+    Returns
+    -------
+    image : array of the image's shape and type
+        Outside the holes the image itself, to the bit.
+    output : simdtex.run.Output
+        Only with ``full_output=True``. ``source`` is in pixels of the image, where there is no `sample`: known pixels
+        are from themselves. With one it is in pixels of that, and -1 at known ones.
+
+    Raises
+    ------
+    ValueError, TypeError
+        What is wrong and what would be right, in one sentence.
+
+    Notes
+    -----
+    Known pixels are sites of temperature 0 that nothing relaxes: Algorithm 1 does the rest. Each hole, with as much
+    around it as its sites look at, is a lattice of its own, unless the picture wraps around
+    (``boundary="torus"``) or holes are many. Cost: that of `simdtex.synthesize` for the holes' pixels, and of a sample
+    of the surroundings' size.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from skimage import data
+    >>> import simdtex
+    >>> gravel = data.gravel()[:96, :96]
+    >>> hole = np.zeros(gravel.shape, bool)
+    >>> hole[40:56, 30:60] = True
+    >>> filled = simdtex.fill(gravel, hole, rng=1)
+    >>> bool((filled[~hole] == gravel[~hole]).all())
+    True
+    """
+    pixels = check_sample(image, channel_axis, unknown=True)
+    hole = unknown_in(pixels) if mask is None else check_mask("mask", mask, pixels.shape[:2]) | unknown_in(pixels)
+    if not hole.any():
+        raise ValueError("the mask leaves nothing to fill; set it True where the picture is to be made")
+    if hole.all():
+        raise ValueError("the mask leaves nothing known; set it False where the picture is to be kept")
+    if reach is not None:
+        whole("reach", reach, 1)
+    given = None if sample is None else _check_sample(sample, channel_axis, pixels)
+    chosen = mrf.make_options(**{"boundary": "open", **options})
+    seed = as_seed(rng)
+    job = Job(pixels, hole, given, reach)
+
+    def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
+        return filled(machine, job, chosen, seed, seen)
+
+    return executed(device, channel_axis, callback, full_output, run)
+
+
+def extend(
+    image: ArrayLike,
+    *,
+    top: int = 0,
+    bottom: int = 0,
+    left: int = 0,
+    right: int = 0,
+    tile: bool | str = False,
+    band: int | None = None,
+    channel_axis: int | None = None,
+    rng: int | np.random.Generator | None = None,
+    device: str | Machine | None = None,
+    callback: Callback | None = None,
+    full_output: bool = False,
+    **options: Any,
+) -> NDArray[Any] | tuple[NDArray[Any], Output]:
+    """Continue a picture beyond its edges, or make it seamless.
+
+    Parameters
+    ----------
+    image : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
+        The picture, which is also the sample; any real type.
+    top, bottom, left, right : int
+        Pixels to add on each side.
+    tile : bool or {"x", "y"}
+        Whether the result wraps around: in both directions, or along the columns (x) or rows (y) alone. Where nothing
+        is added in such a direction, a band along its edges is made anew.
+    band : int, optional
+        Width of that band on either side of the seam, pixels. None: an eighth of the shorter side, 8 to 64.
+    channel_axis : int, optional
+        The axis of the image that holds channels; None for a grey one.
+    rng, device, callback, full_output, **options
+        As in `fill`.
+
+    Returns
+    -------
+    image : array of the image's type
+        ``top + rows + bottom`` by ``left + cols + right``; the image itself, but for the bands, at (top, left).
+    output : simdtex.run.Output
+        Only with ``full_output=True``; ``source`` is in pixels of the image.
+
+    Raises
+    ------
+    ValueError, TypeError
+        What is wrong and what would be right, in one sentence.
+
+    Examples
+    --------
+    >>> from skimage import data
+    >>> import simdtex
+    >>> grass = data.grass()[:64, :64]
+    >>> simdtex.extend(grass, right=16, bottom=8, rng=1).shape
+    (72, 80)
+    """
+    pixels = check_sample(image, channel_axis)
+    rows, cols = pixels.shape[:2]
+    for name, value in {"top": top, "bottom": bottom, "left": left, "right": right}.items():
+        whole(name, value, 0)
+    one_of("tile", tile, (True, False, "x", "y"))
+    tall, wide = tile in (True, "y"), tile in (True, "x")
+    if not (tile or top or bottom or left or right):
+        raise ValueError("there is nothing to add; give top, bottom, left or right, or tile=True")
+    width = min(64, max(8, min(rows, cols) // 8)) if band is None else band
+    whole("band", width, 1)
+    canvas = np.zeros((top + rows + bottom, left + cols + right, pixels.shape[2]), pixels.dtype)
+    canvas[top : top + rows, left : left + cols] = pixels
+    hole = np.ones(canvas.shape[:2], bool)
+    across, along = (width if wide and not (left or right) else 0), (width if tall and not (top or bottom) else 0)
+    if 2 * across >= cols or 2 * along >= rows:
+        raise ValueError(f"band={width} leaves nothing of a picture of {rows}x{cols} (rows x columns); give a narrower one")
+    hole[top + along : top + rows - along, left + across : left + cols - across] = False
+    options = {"boundary": "torus" if tile else "open"} | options
+    chosen = mrf.make_options(**options)
+    seed = as_seed(rng)
+    place = np.full((*hole.shape, 2), -1, np.int32)
+    place[top : top + rows, left : left + cols] = np.stack(np.indices((rows, cols)), -1)
+    place[hole] = -1
+    given = Given(canvas, np.repeat(~hole[..., None], canvas.shape[2], -1), place)
+
+    def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
+        return mrf.synthesize(machine, Pictures((pixels,)), hole.shape, chosen, seed, seen, given)
+
+    return executed(device, channel_axis, callback, full_output, run)
+
+
+def filled(
+    machine: Machine, job: Job, options: Options, seed: int, callback: Callback | None
+) -> tuple[NDArray[Any], Output]:
+    """Make one window of a picture after the other; the arguments are those of `fill`."""
+    began, shape = time.perf_counter(), job.hole.shape
+    image, temperature = job.pixels.copy(), np.zeros(shape)
+    several = job.sample is not None and len(job.sample.pixels) > 1
+    place = np.full((*shape, 3 if several else 2), -1, np.int32)
+    if job.sample is None:
+        place[:] = np.moveaxis(np.indices(shape), 0, -1)
+    radius = int(neighbourhood_offsets(options.order).max())
+    everything = [Window(slice(0, shape[0]), slice(0, shape[1]), options.levels or 0)]
+    parts = everything if options.boundary == "torus" else windows(job.hole, radius, options.levels)
+    runs: list[dict[str, Any]] = []
+    for number, window in enumerate(parts):
+        seen = callback and _pasting(callback, image, window, number, len(parts))
+        here, made, output = _window(machine, job, window, options, seed, seen)
+        at = (window.rows, window.cols)
+        hole = job.hole[at]
+        assert output.source is not None and output.temperature is not None
+        image[at][hole], temperature[at][hole] = made[hole], output.temperature[hole]
+        place[at][hole] = output.source[hole] + (np.array(here, np.int32) if job.sample is None else 0)
+        runs.append(output.statistics | {"window": [s for part in at for s in (part.start, part.stop)]})
+    statistics = {
+        **{name: runs[0][name] for name in ("device", "seed", "options")},
+        **{"seconds": time.perf_counter() - began, "windows": runs, "levels": runs[0]["levels"]},
+        "device_seconds": sum(run["device_seconds"] for run in runs) if runs[0]["device_seconds"] is not None else None,
+    }
+    return image, Output(place, temperature, [], statistics)
+
+
+def _window(
+    machine: Machine, job: Job, window: Window, options: Options, seed: int, callback: Callback | None
+) -> tuple[tuple[int, int], NDArray[Any], Output]:
+    """Fill one window: where its sample begins in the picture, and what `simdtex.methods.mrf.synthesize` returns."""
+    at, (rows, cols) = (window.rows, window.cols), job.hole.shape
+    hole = job.hole[at]
+    known = np.repeat(~hole[..., None], job.pixels.shape[2], -1)
+    if job.sample is not None:
+        pictures, corner, place = job.sample, (0, 0), None
+    else:
+        lines, columns = (np.flatnonzero(hole.any(axis)) for axis in (1, 0))
+        sides = lines[-1] - lines[0] + 1, columns[-1] - columns[0] + 1
+        reach = job.reach or max(REACH, 2 * max(sides))
+        top, left = max(0, window.rows.start - reach), max(0, window.cols.start - reach)
+        around = (slice(top, min(rows, window.rows.stop + reach)), slice(left, min(cols, window.cols.stop + reach)))
+        pictures, corner = Pictures((job.pixels[around],), unknown=(job.hole[around],)), (top, left)
+        inside = np.indices(hole.shape) + np.array([window.rows.start - top, window.cols.start - left])[:, None, None]
+        place = np.moveaxis(inside, 0, -1).astype(np.int32)
+    if options.levels is None and window.levels:
+        sizes = [picture.shape[:2] for picture in pictures.pixels]
+        offsets = neighbourhood_offsets(options.order)
+        most = mrf.number_of_levels(sizes, offsets, hole.shape, replace(options, overview=LEAST))
+        options = replace(options, levels=min(window.levels, most))
+    given = Given(np.where(known, job.pixels[at], 0).astype(job.pixels.dtype), known, place)
+    made, output = mrf.synthesize(machine, pictures, hole.shape, options, seed, callback, given)
+    return corner, made, output
+
+
+def _pasting(callback: Callback, image: NDArray[Any], window: Window, number: int, count: int) -> Callback:
+    """A callback that sees the whole picture, and the work on all its windows."""
+
+    def seen(progress: Any) -> Any:
+        def pasted() -> NDArray[Any]:
+            picture = image.copy()
+            made, step = progress.image(), 2**progress.level
+            picture[window.rows, window.cols] = np.kron(made, np.ones((step, step, 1), made.dtype))[
+                : window.rows.stop - window.rows.start, : window.cols.stop - window.cols.start
+            ]
+            return picture
+
+        return callback(replace(progress, image=pasted, fraction=(number + progress.fraction) / count))
+
+    return seen
+
+
+def _check_sample(sample: Any, channel_axis: int | None, pixels: NDArray[Any]) -> Pictures:
+    pictures = check_samples(sample, channel_axis)
+    one = pictures.pixels[0]
+    if one.dtype != pixels.dtype or one.shape[2] != pixels.shape[2]:
+        raise ValueError(
+            f"the sample has {one.shape[2]} channels of {one.dtype} and the picture {pixels.shape[2]} of {pixels.dtype}; "
+            "give both one type"
+        )
+    return pictures
