@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The skeleton of a figure as a graph of arms, and how arms that are no more than bumps are taken off it."""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+Mask = NDArray[np.bool_]
+Tip = tuple[int, int]
+
+ALL = np.ones((3, 3), bool)
+RING = 4.0  # an arm longer than this may return to the junction that it leaves, pixels
+
+
+@dataclass
+class Arm:
+    """A line of the skeleton: its length, the largest half-width along it, its junctions, and its free ends."""
+
+    length: float
+    half_width: float
+    junctions: list[int]
+    tips: list[Tip] = field(default_factory=list)
+
+
+@dataclass
+class Graph:
+    """Arms by number, the half-width at each junction, and the arms that meet there (one that returns, twice)."""
+
+    arms: dict[int, Arm]
+    half_width: dict[int, float]
+    meeting: dict[int, list[int]]
+
+
+def graph(lines: Mask, distance: NDArray[np.float64]) -> Graph:
+    """Take a skeleton apart into arms, which end free or at junctions.
+
+    Parameters
+    ----------
+    lines : bool array, (rows, cols)
+        The skeleton, one pixel wide, False along the border.
+    distance : float array, (rows, cols)
+        Of each pixel to the ground: the half-width of the figure at its skeleton, pixels.
+
+    Returns
+    -------
+    Graph
+    """
+    around = ndimage.convolve(lines.astype(np.int64), ALL.astype(np.int64), mode="constant") - 1
+    crossing = lines & (around > 2)
+    nodes, node_count = ndimage.label(crossing, structure=ALL)
+    labels, count = ndimage.label(lines & ~crossing, structure=ALL)
+    numbers = np.arange(1, count + 1)
+    lengths = _lengths(labels, count)
+    widths = ndimage.maximum(distance, labels, numbers) if count else np.empty(0)
+    arms = {int(n): Arm(float(lengths[n]), float(widths[n - 1]), []) for n in numbers}
+    at_nodes = ndimage.maximum(distance, nodes, np.arange(1, node_count + 1)) if node_count else np.empty(0)
+    half_width = {node: float(at_nodes[node - 1]) for node in range(1, node_count + 1)}
+    meeting: dict[int, list[int]] = {node: [] for node in half_width}
+    for row, col in np.argwhere((labels > 0) & (around == 1)):
+        arms[int(labels[row, col])].tips.append((int(row), int(col)))
+    for number, touched in _contacts(labels, nodes).items():
+        arm = arms[number]
+        arm.junctions = _ends(touched, arm)
+        if len(arm.junctions) + len(arm.tips) < 2:
+            del arms[number]  # a corner of a thick crossing
+            continue
+        for node in arm.junctions:
+            meeting[node].append(number)
+    return Graph(arms, half_width, meeting)
+
+
+def _ends(touched: list[int], arm: Arm) -> list[int]:
+    """The junctions of an arm, of those that its pixels touch: one for each end that is not free."""
+    distinct = sorted(set(touched))
+    if not arm.tips and len(distinct) == 1 and len(touched) > 1 and arm.length > RING:
+        return distinct * 2
+    return distinct[: 2 - len(arm.tips)]
+
+
+def _lengths(labels: NDArray[np.int32], count: int) -> NDArray[np.float64]:
+    """Length of each line, pixels: 1 for a step along an axis, the root of 2 for one across."""
+    found = np.zeros(count + 1)
+    along = [(labels[1:], labels[:-1]), (labels[:, 1:], labels[:, :-1])]
+    for first, second in along:
+        found += np.bincount(first[(first > 0) & (second > 0)], minlength=count + 1)
+    # a step across counts only where there is no way around the corner
+    upper, lower = labels[:-1], labels[1:]
+    for first, second, corners in (
+        (upper[:, :-1], lower[:, 1:], (upper[:, 1:], lower[:, :-1])),
+        (upper[:, 1:], lower[:, :-1], (upper[:, :-1], lower[:, 1:])),
+    ):
+        step = (first > 0) & (second > 0) & (corners[0] == 0) & (corners[1] == 0)
+        found += np.sqrt(2.0) * np.bincount(first[step], minlength=count + 1)
+    return found
+
+
+def _contacts(labels: NDArray[np.int32], nodes: NDArray[np.int32]) -> dict[int, list[int]]:
+    """For each arm the junctions that its pixels touch, once for each pixel."""
+    largest = ndimage.maximum_filter(nodes, footprint=ALL, mode="constant")
+    # a pixel may touch two junctions: the one of the largest number, and that of the smallest
+    smallest = ndimage.minimum_filter(np.where(nodes > 0, nodes, nodes.max() + 1), footprint=ALL, mode="nearest")
+    found: dict[int, list[int]] = {}
+    for row, col in np.argwhere((labels > 0) & (largest > 0)):
+        touched = {int(largest[row, col]), int(smallest[row, col])}
+        found.setdefault(int(labels[row, col]), []).extend(sorted(touched))
+    return found
+
+
+def prune(skeleton: Graph, bump: float, keep: Mask) -> None:
+    """Take off, in place, the arms that end free and are short for the width of what they leave, shortest first.
+
+    Where two arms are left at a junction they become one, so that a line is not worn away by the bumps along it.
+
+    Parameters
+    ----------
+    skeleton : Graph
+    bump : float
+        An arm stays if it is longer than so many half-widths of the figure at its junction.
+    keep : bool array, (rows, cols)
+        Where an arm's end keeps the arm, whatever its length.
+    """
+    queue: list[tuple[float, int]] = []
+
+    def ask(number: int) -> None:
+        arm = skeleton.arms[number]
+        if len(arm.tips) == 1 and len(arm.junctions) == 1 and not keep[arm.tips[0]]:
+            heapq.heappush(queue, (arm.length, number))
+
+    for number in skeleton.arms:
+        ask(number)
+    while queue:
+        length, number = heapq.heappop(queue)
+        arm = skeleton.arms.get(number)
+        if arm is None or arm.length != length or len(arm.junctions) != 1 or len(arm.tips) != 1:
+            continue  # it has changed since
+        node = arm.junctions[0]
+        if length > bump * skeleton.half_width[node]:
+            continue
+        del skeleton.arms[number]
+        skeleton.meeting[node].remove(number)
+        left = skeleton.meeting[node]
+        if len(left) == 2 and left[0] != left[1]:
+            ask(_joined(skeleton, node))
+
+
+def _joined(skeleton: Graph, node: int) -> int:
+    """Make one arm of the two that meet at a junction; its number."""
+    first, second = skeleton.meeting.pop(node)
+    one, two = skeleton.arms[first], skeleton.arms.pop(second)
+    one.junctions.remove(node)
+    two.junctions.remove(node)
+    one.length += two.length + 1.0  # the junction's pixel
+    one.half_width = max(one.half_width, two.half_width, skeleton.half_width[node])
+    one.tips += two.tips
+    for other in two.junctions:
+        here = skeleton.meeting[other]
+        here[here.index(second)] = first
+    one.junctions += two.junctions
+    return first
