@@ -9,6 +9,7 @@ right, lags are pixels. No figure is enough alone: see the page on ensembles.
 from __future__ import annotations
 
 from simdtex.experiments.ensemble.arrays import categories_of
+from simdtex.experiments.ensemble.channels import channels
 from simdtex.experiments.ensemble.connections import Connectivity, connectivity
 from simdtex.experiments.ensemble.distance import Anodi, anodi
 from simdtex.experiments.ensemble.ends import dead_end_places, dead_ends
@@ -20,6 +21,7 @@ __all__ = [
     "Connectivity",
     "anodi",
     "categories_of",
+    "channels",
     "connectivity",
     "dead_end_places",
     "dead_ends",

@@ -13,24 +13,22 @@ from simdtex.experiments.ensemble.skeleton import Mask, graph, prune
 
 MARGIN = 8  # pixels along the border where an end does not count
 HOLE = 16  # holes of at most so many pixels are filled
-BUMP = 3.0  # half-widths: an arm must reach a width beyond the bank of what it leaves
 LONG = 4.0  # half-widths: a piece by itself must be twice as long as it is wide
 
 
 def dead_ends(image: ArrayLike, category: int, margin: int = MARGIN) -> float:
     """Dead ends of a category in 10,000 pixels.
 
-    A dead end is a free end of the category's skeleton, inside the picture, of an arm that is longer than the channel
-    is wide:
+    A dead end is a free end of the category's skeleton, inside the picture, of an arm that is longer than wide:
 
     1. Holes of at most 16 pixels are filled, and the picture is continued beyond its border by its border pixels, so
        that a channel which leaves it goes on.
     2. Of the skeleton (`skimage.morphology.skeletonize`) the arms that end free are taken off, shortest first, which
-       are not longer than 3 half-widths of the figure at the junction that they leave: one half-width to the bank, and
-       one width beyond it. Where two arms are left at a junction they become one. So the corners of an end, the bumps
+       do not reach further than their own mean width beyond the bank of what they leave; the bank is a half-width of
+       the figure away from the junction. Where two arms are left at a junction they become one. So the corners of an end, the bumps
        of a bank and blobs do not count, and the bumps along an arm do not wear it away.
     3. The free ends that are left count if they lie at least `margin` pixels inside the border. A piece that meets
-       no other counts only if its skeleton is longer than 4 half-widths, two widths.
+       no other counts only if its skeleton is longer than 4 of its largest half-widths, two widths.
 
     Parameters
     ----------
@@ -74,11 +72,11 @@ def dead_end_places(image: ArrayLike, category: int, margin: int = MARGIN) -> ND
     outside = np.pad(np.zeros(pixels.shape, bool), beyond + 1, constant_values=True)
     distance = ndimage.distance_transform_edt(np.pad(figure[1:-1, 1:-1], 1, mode="edge"))
     skeleton = graph(skeletonize(figure), distance)
-    prune(skeleton, BUMP, outside)
+    prune(skeleton, outside)
     places = [
         tip
         for arm in skeleton.arms.values()
-        if len(arm.tips) < 2 or arm.length > LONG * arm.half_width
+        if len(arm.tips) < 2 or arm.length > LONG * arm.largest
         for tip in arm.tips
     ]
     found = np.array(sorted(places), dtype=np.intp).reshape(-1, 2) - (beyond + 1)

@@ -19,10 +19,15 @@ RING = 4.0  # an arm longer than this may return to the junction that it leaves,
 
 @dataclass
 class Arm:
-    """A line of the skeleton: its length, the largest half-width along it, its junctions, and its free ends."""
+    """A line of the skeleton: its length, its pixels, half-widths along it, its junctions, and its free ends.
+
+    Half-widths are the sum over the pixels and the largest.
+    """
 
     length: float
-    half_width: float
+    pixels: int
+    half_widths: float
+    largest: float
     junctions: list[int]
     tips: list[Tip] = field(default_factory=list)
 
@@ -56,8 +61,9 @@ def graph(lines: Mask, distance: NDArray[np.float64]) -> Graph:
     labels, count = ndimage.label(lines & ~crossing, structure=ALL)
     numbers = np.arange(1, count + 1)
     lengths = _lengths(labels, count)
-    widths = ndimage.maximum(distance, labels, numbers) if count else np.empty(0)
-    arms = {int(n): Arm(float(lengths[n]), float(widths[n - 1]), []) for n in numbers}
+    sizes, sums = np.bincount(labels.ravel()), np.bincount(labels.ravel(), weights=distance.ravel())
+    widest = ndimage.maximum(distance, labels, numbers) if count else np.empty(0)
+    arms = {int(n): Arm(float(lengths[n]), int(sizes[n]), float(sums[n]), float(widest[n - 1]), []) for n in numbers}
     at_nodes = ndimage.maximum(distance, nodes, np.arange(1, node_count + 1)) if node_count else np.empty(0)
     half_width = {node: float(at_nodes[node - 1]) for node in range(1, node_count + 1)}
     meeting: dict[int, list[int]] = {node: [] for node in half_width}
@@ -111,16 +117,14 @@ def _contacts(labels: NDArray[np.int32], nodes: NDArray[np.int32]) -> dict[int, 
     return found
 
 
-def prune(skeleton: Graph, bump: float, keep: Mask) -> None:
-    """Take off, in place, the arms that end free and are short for the width of what they leave, shortest first.
+def prune(skeleton: Graph, keep: Mask) -> None:
+    """Take off, in place, the arms that end free and are no more than bumps, shortest first.
 
-    Where two arms are left at a junction they become one, so that a line is not worn away by the bumps along it.
+    An arm stays if it reaches further than its own mean width beyond the bank of the figure at its junction. Where two arms are left at a junction they become one, so that a line is not worn away by the bumps along it.
 
     Parameters
     ----------
     skeleton : Graph
-    bump : float
-        An arm stays if it is longer than so many half-widths of the figure at its junction.
     keep : bool array, (rows, cols)
         Where an arm's end keeps the arm, whatever its length.
     """
@@ -139,7 +143,7 @@ def prune(skeleton: Graph, bump: float, keep: Mask) -> None:
         if arm is None or arm.length != length or len(arm.junctions) != 1 or len(arm.tips) != 1:
             continue  # it has changed since
         node = arm.junctions[0]
-        if length > bump * skeleton.half_width[node]:
+        if length > skeleton.half_width[node] + 2.0 * arm.half_widths / arm.pixels:
             continue
         del skeleton.arms[number]
         skeleton.meeting[node].remove(number)
@@ -155,7 +159,9 @@ def _joined(skeleton: Graph, node: int) -> int:
     one.junctions.remove(node)
     two.junctions.remove(node)
     one.length += two.length + 1.0  # the junction's pixel
-    one.half_width = max(one.half_width, two.half_width, skeleton.half_width[node])
+    one.pixels += two.pixels + 1
+    one.half_widths += two.half_widths + skeleton.half_width[node]
+    one.largest = max(one.largest, two.largest, skeleton.half_width[node])
     one.tips += two.tips
     for other in two.junctions:
         here = skeleton.meeting[other]
