@@ -14,11 +14,13 @@ from simdtex.experiments.ensemble.connections import Connectivity, connectivity
 from simdtex.experiments.ensemble.distance import Anodi, anodi
 from simdtex.experiments.ensemble.ends import dead_end_places, dead_ends
 from simdtex.experiments.ensemble.maps import deviation, entropy, mean, share_maps, shares
+from simdtex.experiments.ensemble.summary import Summary, summary
 from simdtex.experiments.ensemble.variograms import variogram
 
 __all__ = [
     "Anodi",
     "Connectivity",
+    "Summary",
     "anodi",
     "categories_of",
     "channels",
@@ -30,5 +32,6 @@ __all__ = [
     "mean",
     "share_maps",
     "shares",
+    "summary",
     "variogram",
 ]

@@ -55,19 +55,18 @@ def graph(lines: Mask, distance: NDArray[np.float64]) -> Graph:
     -------
     Graph
     """
-    around = ndimage.convolve(lines.astype(np.int64), ALL.astype(np.int64), mode="constant") - 1
-    crossing = lines & (around > 2)
+    around = ndimage.convolve(lines.astype(np.uint8), ALL.astype(np.uint8), mode="constant")
+    crossing = lines & (around > 3)  # itself and three more
     nodes, node_count = ndimage.label(crossing, structure=ALL)
     labels, count = ndimage.label(lines & ~crossing, structure=ALL)
     numbers = np.arange(1, count + 1)
     lengths = _lengths(labels, count)
     sizes, sums = np.bincount(labels.ravel()), np.bincount(labels.ravel(), weights=distance.ravel())
-    widest = ndimage.maximum(distance, labels, numbers) if count else np.empty(0)
-    arms = {int(n): Arm(float(lengths[n]), int(sizes[n]), float(sums[n]), float(widest[n - 1]), []) for n in numbers}
-    at_nodes = ndimage.maximum(distance, nodes, np.arange(1, node_count + 1)) if node_count else np.empty(0)
-    half_width = {node: float(at_nodes[node - 1]) for node in range(1, node_count + 1)}
+    widest, at_nodes = _largest(distance, labels, count), _largest(distance, nodes, node_count)
+    arms = {int(n): Arm(float(lengths[n]), int(sizes[n]), float(sums[n]), float(widest[n]), []) for n in numbers}
+    half_width = {node: float(at_nodes[node]) for node in range(1, node_count + 1)}
     meeting: dict[int, list[int]] = {node: [] for node in half_width}
-    for row, col in np.argwhere((labels > 0) & (around == 1)):
+    for row, col in np.argwhere((labels > 0) & (around == 2)):
         arms[int(labels[row, col])].tips.append((int(row), int(col)))
     for number, touched in _contacts(labels, nodes).items():
         arm = arms[number]
@@ -86,6 +85,14 @@ def _ends(touched: list[int], arm: Arm) -> list[int]:
     if not arm.tips and len(distinct) == 1 and len(touched) > 1 and arm.length > RING:
         return distinct * 2
     return distinct[: 2 - len(arm.tips)]
+
+
+def _largest(values: NDArray[np.float64], labels: NDArray[np.int32], count: int) -> NDArray[np.float64]:
+    """The largest value of each label; that of 0 is not asked for."""
+    found = np.zeros(count + 1)
+    marked = labels > 0
+    np.maximum.at(found, labels[marked], values[marked])
+    return found
 
 
 def _lengths(labels: NDArray[np.int32], count: int) -> NDArray[np.float64]:
