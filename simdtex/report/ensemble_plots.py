@@ -21,7 +21,7 @@ Array = NDArray[Any]
 Floats = NDArray[np.float64]
 
 MOST_PANELS = 6  # categories drawn, those with the largest shares of the training image
-SHOWN_SIDE = 256  # images smaller than this are enlarged by a whole factor, pixels
+SHOWN_SIDE = 300  # images smaller than this are enlarged by a whole factor, pixels
 SIDE = 3.4  # of a map's longer side, inches
 THEIRS, OWN = "#0072B2", "#D55E00"  # realisations, and the training image
 END = (214, 0, 110)  # the mark of a dead end, sRGB; no category has it
@@ -58,16 +58,16 @@ def magnified(picture: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
 
 def factor_of(*shapes: tuple[int, ...]) -> int:
     """The factor by which images of these shapes are enlarged, one for all."""
-    return max(1, SHOWN_SIDE // max(max(shape[:2]) for shape in shapes))
+    return -(-SHOWN_SIDE // max(max(shape[:2]) for shape in shapes))
 
 
 def marked(picture: NDArray[np.uint8], places: NDArray[np.intp], factor: int) -> NDArray[np.uint8]:
     """An enlarged picture with a ring around places of the one that it was made of."""
     rows, cols = np.indices(picture.shape[:2])
-    shown, radius = picture.copy(), 7.5
+    shown, radius = picture.copy(), 4.0 * factor + 4.0
     for row, col in places * factor + factor // 2:
         apart = np.hypot(rows - row, cols - col)
-        shown[(apart >= radius - 2.5) & (apart <= radius)] = END
+        shown[(apart >= radius - 3.0) & (apart <= radius)] = END
     return shown
 
 
@@ -102,7 +102,7 @@ def _maps(
     values: Sequence[Floats | None],
 ) -> Plot:
     rows, cols = panels[0].shape
-    across = min(3, len(panels))
+    across = 2 if len(panels) == 4 else min(3, len(panels))
     down = -(-len(panels) // across)
     wide, high = SIDE * cols / max(rows, cols), SIDE * rows / max(rows, cols)
     figure = new_figure(across * max(wide, 1.6) + 1.2, down * (max(high, 1.0) + 0.45))
@@ -147,7 +147,7 @@ def lagged(found: Summary, table: Floats, names: Sequence[str], label: str) -> P
             panel.plot(found.lags, own, color=OWN, linewidth=1.8, linestyle="--", label="training image")
             title = f"{name}, {_GOES[axis]}" if name else _GOES[axis]
             tidy(panel, title, "lag, pixels" if row == len(names) - 1 else "", label if axis == 1 else "")
-            panel.set_ylim(bottom=0)
+        panels[0].set_ylim(0, 1.05 * (np.nanmax(table[:, row]) or 1.0) if np.isfinite(table[:, row]).any() else 1.0)
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False, fontsize=9, labelcolor=INK)
     return figure
@@ -175,7 +175,8 @@ def strips(found: Summary) -> Plot:
         panel.set_yticks(range(len(shown)), [f"category {found.categories[k]}" for k in shown])
         panel.set_ylim(len(shown) - 0.5, -0.5)
         if np.isfinite(table[shown]).any():
-            panel.set_xlim(0, 1.08 * (np.nanmax(table[shown]) or 1.0))
+            most = float(np.nanmax(table[shown])) or 1.0
+            panel.set_xlim(-0.04 * most, 1.08 * most)
     handles, labels = axes[0, 0].get_legend_handles_labels()
     one = dict(zip(labels, handles, strict=True))
     figure.legend(one.values(), one.keys(), loc="outside upper center", ncols=3, frameon=False, fontsize=9)

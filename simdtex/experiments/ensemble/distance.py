@@ -87,9 +87,9 @@ def anodi(
     -----
     After Tan, Tahmasebi and Caers, "Comparing training-image based algorithms using an analysis of distance",
     Mathematical Geosciences 46, 2014, and simpler: patterns are counted exactly, also where the paper puts them into
-    clusters; coarse levels take every second pixel instead of resampling the image; and the distance is the square root of
-    the divergence. The paper compares two algorithms by the quotient of their ratios; the ratio here is that of one
-    ensemble, so two ensembles can be compared if they are of the same size.
+    clusters; coarse levels take every second pixel instead of resampling the image; and the distance is the square
+    root of the divergence. The paper compares two algorithms by the quotient of their ratios; the ratio here is that
+    of one ensemble, so that two ensembles can be compared if they are of the same size.
 
     Histograms of finite images differ by chance even where the law is the same, the more so the smaller they are:
     compare ensembles of the same numbers of pixels. About a second for 50 realisations of 250 x 250 pixels in two

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
@@ -25,8 +27,8 @@ def dead_ends(image: ArrayLike, category: int, margin: int = MARGIN) -> float:
        that a channel which leaves it goes on.
     2. Of the skeleton (`skimage.morphology.skeletonize`) the arms that end free are taken off, shortest first, which
        do not reach further than their own mean width beyond the bank of what they leave; the bank is a half-width of
-       the figure away from the junction. Where two arms are left at a junction they become one. So the corners of an end, the bumps
-       of a bank and blobs do not count, and the bumps along an arm do not wear it away.
+       the figure away from the junction. Where two arms are left at a junction they become one. So the corners of an
+       end, the bumps of a bank and blobs do not count, and the bumps along an arm do not wear it away.
     3. The free ends that are left count if they lie at least `margin` pixels inside the border. A piece that meets
        no other counts only if its skeleton is longer than 4 of its largest half-widths, two widths.
 
@@ -55,7 +57,7 @@ def dead_ends(image: ArrayLike, category: int, margin: int = MARGIN) -> float:
     """
     rows, cols = np.shape(image)[:2] if np.ndim(image) == 2 else (0, 0)
     found = dead_end_places(image, category, margin)
-    return 1e4 * len(found) / ((rows - 2 * margin) * (cols - 2 * margin))
+    return float(1e4 * len(found) / ((rows - 2 * margin) * (cols - 2 * margin)))
 
 
 def dead_end_places(image: ArrayLike, category: int, margin: int = MARGIN) -> NDArray[np.intp]:
@@ -71,7 +73,8 @@ def dead_end_places(image: ArrayLike, category: int, margin: int = MARGIN) -> ND
     figure = np.pad(np.pad(_filled(pixels == category), beyond, mode="edge"), 1)
     outside = np.pad(np.zeros(pixels.shape, bool), beyond + 1, constant_values=True)
     distance = ndimage.distance_transform_edt(np.pad(figure[1:-1, 1:-1], 1, mode="edge"))
-    skeleton = graph(skeletonize(figure), distance)
+    lines: Any = skeletonize  # skimage tells no types
+    skeleton = graph(lines(figure), distance)
     prune(skeleton, outside)
     places = [
         tip

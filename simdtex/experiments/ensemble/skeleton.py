@@ -127,7 +127,8 @@ def _contacts(labels: NDArray[np.int32], nodes: NDArray[np.int32]) -> dict[int, 
 def prune(skeleton: Graph, keep: Mask) -> None:
     """Take off, in place, the arms that end free and are no more than bumps, shortest first.
 
-    An arm stays if it reaches further than its own mean width beyond the bank of the figure at its junction. Where two arms are left at a junction they become one, so that a line is not worn away by the bumps along it.
+    An arm stays if it reaches further than its own mean width beyond the bank of the figure at its junction. Where two
+    arms are left at a junction they become one, so that a line is not worn away by the bumps along it.
 
     Parameters
     ----------
