@@ -149,7 +149,8 @@ DRAWN = {
     "Y with three ends": (lines(((50, 20), MIDDLE), (MIDDLE, (15, 90)), (MIDDLE, (85, 90))), 3),
     "disc": (lines((MIDDLE, (50, 61)), width=40), 0),
     "blob": (lines((MIDDLE, (50, 70)), width=24), 0),
-    "bump": (lines((LEFT, (50, 140)), (MIDDLE, (44, 60))), 0),
+    "wide across": (lines((LEFT, (50, 140)), width=30), 0),
+    "bump": (lines((LEFT, (50, 140)), (MIDDLE, (42, 60))), 0),
     "stub": (lines((LEFT, (50, 140)), (MIDDLE, (30, 60))), 1),
     "ring": (lines((MIDDLE, (50, 61)), width=60) - lines((MIDDLE, (50, 61)), width=44), 0),
     "near the border": (lines((LEFT, (50, 118))), 0),
@@ -177,7 +178,7 @@ def test_a_flat_end_counts_once_where_it_is():
 
 def test_rough_banks_and_holes_make_no_dead_ends():
     rng = np.random.default_rng(3)
-    for image, expected in ((lines((LEFT, (50, 140))), 0), (lines((LEFT, (50, 80))), 1)):
+    for image, expected in 5 * ((lines((LEFT, (50, 140))), 0), (lines((LEFT, (70, 80))), 1)):
         rough = image.copy()
         grown = np.pad(image, 1, mode="edge")
         bank = (image == 0) & (grown[:-2, 1:-1] | grown[2:, 1:-1] | grown[1:-1, :-2] | grown[1:-1, 2:]).astype(bool)
@@ -253,6 +254,17 @@ def test_continuous_values_are_cut_by_the_quantiles_of_the_training_image():
     # all below the median against half below it
     expected = np.sqrt((np.log2(1 / 0.75) + 0.5 * np.log2(0.5 / 0.75) + 0.5 * np.log2(0.5 / 0.25)) / 2)
     assert darker.likeness == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("ones", [2, 8])
+def test_frequent_values_are_classes_of_their_own(ones):
+    training = np.zeros((10, 10))
+    training[:ones] = 1
+    found = ensemble.anodi(np.full((1, 10, 10), training[5, 5]), training, side=1, levels=1)
+    share = training.mean() if training[5, 5] else 1 - training.mean()
+    middle = (1 + share) / 2
+    expected = (np.log2(1 / middle) + share * np.log2(share / middle) + (1 - share)) / 2
+    assert found.likeness == pytest.approx(np.sqrt(expected))
 
 
 # ---------------------------------------------------------------- the summary

@@ -67,7 +67,8 @@ def anodi(
     categories : sequence of int, optional
         As in `categories_of`; those of the training image by default.
     classes : int
-        Continuous values are cut into so many classes, by quantiles of the training image.
+        Continuous values are cut into so many classes, by quantiles of the training image. A value that is frequent
+        enough to be such a quantile is a class of its own.
     side : int, optional
         Pixels of a pattern each way; by default 4 for two categories, 3 for up to five, and 2 for more.
     levels : int
@@ -97,7 +98,7 @@ def anodi(
     """
     array, image = as_ensemble(ensemble), as_image(training, "training image")
     index, own, count = _classified(array, image, categories, classes)
-    width = side or (4 if count <= 2 else 3 if count <= 5 else 2)
+    width = side or _side(count if categories_of(image, categories).size else classes)
     if width < 1 or count**width**2 >= 1 << 62 or levels < 1:
         raise ValueError(f"side {side} or levels {levels} is out of range: give 1 or more, and a side of 4 or less")
     least = min(*array.shape[1:], *image.shape)
@@ -122,8 +123,18 @@ def _classified(
         return as_index(array, values, "ensemble"), as_index(image, values, "training image"), len(values)
     if classes < 2:
         raise ValueError(f"classes is {classes}: give 2 or more")
-    bounds = np.quantile(image, np.arange(1, classes) / classes)
-    return np.searchsorted(bounds, array, side="right"), np.searchsorted(bounds, image, side="right"), classes
+    bounds = np.unique(np.quantile(image, np.arange(1, classes) / classes))
+
+    def cut(values: Array) -> NDArray[np.intp]:
+        # a value that is a bound is a class of its own, or one that is frequent would be one with its neighbours
+        return np.searchsorted(bounds, values, side="left") + np.searchsorted(bounds, values, side="right")
+
+    return cut(array), cut(image), 2 * len(bounds) + 1
+
+
+def _side(count: int) -> int:
+    """Of patterns of so many categories or classes, where none is given."""
+    return 4 if count <= 2 else 3 if count <= 5 else 2
 
 
 def _distances(images: list[NDArray[np.intp]], count: int, side: int, spread: int) -> Floats:

@@ -71,11 +71,10 @@ def dead_end_places(image: ArrayLike, category: int, margin: int = MARGIN) -> ND
         raise ValueError(f"the margin of {margin} leaves nothing of {pixels.shape[0]} x {pixels.shape[1]} pixels")
     beyond = 2 * max(margin, MARGIN)
     figure = np.pad(np.pad(_filled(pixels == category), beyond, mode="edge"), 1)
-    outside = np.pad(np.zeros(pixels.shape, bool), beyond + 1, constant_values=True)
     distance = ndimage.distance_transform_edt(np.pad(figure[1:-1, 1:-1], 1, mode="edge"))
     lines: Any = skeletonize  # skimage tells no types
     skeleton = graph(lines(figure), distance)
-    prune(skeleton, outside)
+    prune(skeleton)
     places = [
         tip
         for arm in skeleton.arms.values()
@@ -92,6 +91,4 @@ def _filled(figure: Mask) -> Mask:
     holes, _ = ndimage.label(~figure)
     small = np.bincount(holes.ravel()) <= HOLE
     small[0] = False
-    edge = np.concatenate([holes[0], holes[-1], holes[:, 0], holes[:, -1]])
-    small[edge] = False  # no hole, but ground that goes on outside
     return np.asarray(figure | small[holes], dtype=np.bool_)

@@ -34,10 +34,11 @@ class Arm:
 
 @dataclass
 class Graph:
-    """Arms by number, the half-width at each junction, and the arms that meet there (one that returns, twice)."""
+    """Arms by number, the half-width and a place of each junction, and the arms there (one that returns, twice)."""
 
     arms: dict[int, Arm]
     half_width: dict[int, float]
+    places: dict[int, Tip]
     meeting: dict[int, list[int]]
 
 
@@ -76,7 +77,9 @@ def graph(lines: Mask, distance: NDArray[np.float64]) -> Graph:
             continue
         for node in arm.junctions:
             meeting[node].append(number)
-    return Graph(arms, half_width, meeting)
+    rows, cols = np.nonzero(nodes)
+    places = {int(nodes[row, col]): (int(row), int(col)) for row, col in zip(rows, cols, strict=True)}
+    return Graph(arms, half_width, places, meeting)
 
 
 def _ends(touched: list[int], arm: Arm) -> list[int]:
@@ -124,7 +127,7 @@ def _contacts(labels: NDArray[np.int32], nodes: NDArray[np.int32]) -> dict[int, 
     return found
 
 
-def prune(skeleton: Graph, keep: Mask) -> None:
+def prune(skeleton: Graph) -> None:
     """Take off, in place, the arms that end free and are no more than bumps, shortest first.
 
     An arm stays if it reaches further than its own mean width beyond the bank of the figure at its junction. Where two
@@ -133,14 +136,19 @@ def prune(skeleton: Graph, keep: Mask) -> None:
     Parameters
     ----------
     skeleton : Graph
-    keep : bool array, (rows, cols)
-        Where an arm's end keeps the arm, whatever its length.
     """
+    for node, here in list(skeleton.meeting.items()):  # corners of lines that are no junctions
+        if len(here) == 1:
+            skeleton.arms[here[0]].junctions.remove(node)
+            skeleton.arms[here[0]].tips.append(skeleton.places[node])
+            del skeleton.meeting[node]
+        elif _is_passed(here):
+            _joined(skeleton, node)
     queue: list[tuple[float, int]] = []
 
     def ask(number: int) -> None:
         arm = skeleton.arms[number]
-        if len(arm.tips) == 1 and len(arm.junctions) == 1 and not keep[arm.tips[0]]:
+        if len(arm.tips) == 1 and len(arm.junctions) == 1:
             heapq.heappush(queue, (arm.length, number))
 
     for number in skeleton.arms:
@@ -156,8 +164,13 @@ def prune(skeleton: Graph, keep: Mask) -> None:
         del skeleton.arms[number]
         skeleton.meeting[node].remove(number)
         left = skeleton.meeting[node]
-        if len(left) == 2 and left[0] != left[1]:
+        if _is_passed(left):
             ask(_joined(skeleton, node))
+
+
+def _is_passed(here: list[int]) -> bool:
+    """Whether two arms and no more meet."""
+    return len(here) == 2 and here[0] != here[1]
 
 
 def _joined(skeleton: Graph, node: int) -> int:
