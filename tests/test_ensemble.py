@@ -5,6 +5,7 @@ import hashlib
 
 import numpy as np
 import pytest
+from scipy.ndimage import binary_dilation, binary_erosion, distance_transform_edt
 
 from simdtex.experiments import ensemble
 from simdtex.experiments.ensemble import distance
@@ -176,15 +177,31 @@ def test_a_flat_end_counts_once_where_it_is():
     assert ensemble.dead_ends(image, 1, margin=36) == 0
 
 
-def test_rough_banks_and_holes_make_no_dead_ends():
-    rng = np.random.default_rng(3)
-    for image, expected in 5 * ((lines((LEFT, (50, 140))), 0), (lines((LEFT, (70, 80))), 1)):
+ROUGH = ["across", "inside", "Y that leaves", "Y with one end", "Y with three ends", "free"]
+
+
+@pytest.mark.parametrize("name", ROUGH)
+def test_rough_banks_make_no_dead_ends(name):
+    rng, (image, expected) = np.random.default_rng(3), DRAWN[name]
+    bank = binary_dilation(image) & ~binary_erosion(image, border_value=1)
+    for _ in range(25):
         rough = image.copy()
-        grown = np.pad(image, 1, mode="edge")
-        bank = (image == 0) & (grown[:-2, 1:-1] | grown[2:, 1:-1] | grown[1:-1, :-2] | grown[1:-1, 2:]).astype(bool)
         rough[bank] = rng.integers(0, 2, np.count_nonzero(bank))
-        rough[49, 30:90:7] = 0
         assert len(ensemble.dead_end_places(rough, 1)) == expected
+
+
+@pytest.mark.parametrize("name", ["across", "inside", "Y that leaves", "Y with one end"])
+def test_holes_and_specks_make_no_dead_ends(name):
+    rng, (image, expected) = np.random.default_rng(4), DRAWN[name]
+    for _ in range(10):
+        assert len(ensemble.dead_end_places(image ^ (rng.random(image.shape) < 0.01), 1)) == expected
+
+
+def test_a_line_that_bends_is_one_arm():
+    stairs = np.zeros((60, 60), np.uint8)
+    for step in range(10, 50):
+        stairs[step, step - 1 : step + 2] = 1  # three pixels at each step: corners that look like junctions
+    assert len(ensemble.dead_end_places(stairs, 1)) == 2
 
 
 # ---------------------------------------------------------------- distances
@@ -318,8 +335,6 @@ def test_channels_are_like_channels():
 
 
 def test_width_and_share_of_channels_are_those_that_were_asked_for():
-    from scipy.ndimage import distance_transform_edt
-
     for width in (4, 8, 12):
         image = ensemble.channels((160, 160), 3, width=width)
         # the ground is a half-width away from the middle of a channel, which few pixels are further from

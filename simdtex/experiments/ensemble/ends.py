@@ -15,7 +15,7 @@ from simdtex.experiments.ensemble.skeleton import Mask, graph, prune
 
 MARGIN = 8  # pixels along the border where an end does not count
 HOLE = 16  # holes of at most so many pixels are filled
-LONG = 4.0  # half-widths: a piece by itself must be twice as long as it is wide
+LONG = 4.0  # half-widths: a piece by itself must be longer than two widths
 
 
 def dead_ends(image: ArrayLike, category: int, margin: int = MARGIN) -> float:
@@ -26,11 +26,12 @@ def dead_ends(image: ArrayLike, category: int, margin: int = MARGIN) -> float:
     1. Holes of at most 16 pixels are filled, and the picture is continued beyond its border by its border pixels, so
        that a channel which leaves it goes on.
     2. Of the skeleton (`skimage.morphology.skeletonize`) the arms that end free are taken off, shortest first, which
-       do not reach further than their own mean width beyond the bank of what they leave; the bank is a half-width of
-       the figure away from the junction. Where two arms are left at a junction they become one. So the corners of an
-       end, the bumps of a bank and blobs do not count, and the bumps along an arm do not wear it away.
+       do not reach further than a width beyond the bank of what they leave; the bank is a half-width of the figure away
+       from the junction. The width is the arm's own mean width, or the usual one if that is larger: twice the median
+       distance of the skeleton's pixels from the ground. Where two arms are left at a junction they become one. So the
+       corners of an end, the bumps of a bank and blobs do not count, and the bumps along an arm do not wear it away.
     3. The free ends that are left count if they lie at least `margin` pixels inside the border. A piece that meets
-       no other counts only if its skeleton is longer than 4 of its largest half-widths, two widths.
+       no other counts only if its skeleton is longer than twice its largest width, or the usual one; specks do not.
 
     Parameters
     ----------
@@ -73,12 +74,14 @@ def dead_end_places(image: ArrayLike, category: int, margin: int = MARGIN) -> ND
     figure = np.pad(np.pad(_filled(pixels == category), beyond, mode="edge"), 1)
     distance = ndimage.distance_transform_edt(np.pad(figure[1:-1, 1:-1], 1, mode="edge"))
     lines: Any = skeletonize  # skimage tells no types
-    skeleton = graph(lines(figure), distance)
-    prune(skeleton)
+    drawn = lines(figure)
+    usual = float(np.median(distance[drawn])) if drawn.any() else 0.0
+    skeleton = graph(drawn, distance)
+    prune(skeleton, usual)
     places = [
         tip
         for arm in skeleton.arms.values()
-        if len(arm.tips) < 2 or arm.length > LONG * arm.largest
+        if len(arm.tips) < 2 or arm.length > LONG * max(arm.largest, usual)
         for tip in arm.tips
     ]
     found = np.array(sorted(places), dtype=np.intp).reshape(-1, 2) - (beyond + 1)

@@ -127,15 +127,18 @@ def _contacts(labels: NDArray[np.int32], nodes: NDArray[np.int32]) -> dict[int, 
     return found
 
 
-def prune(skeleton: Graph) -> None:
+def prune(skeleton: Graph, usual: float) -> None:
     """Take off, in place, the arms that end free and are no more than bumps, shortest first.
 
-    An arm stays if it reaches further than its own mean width beyond the bank of the figure at its junction. Where two
-    arms are left at a junction they become one, so that a line is not worn away by the bumps along it.
+    An arm stays if it reaches further than a width beyond the bank of the figure at its junction: its own mean width,
+    or the usual one if that is larger. Where two arms are left at a junction they become one, so that a line is not
+    worn away by the bumps along it.
 
     Parameters
     ----------
     skeleton : Graph
+    usual : float
+        Half of the usual width, pixels.
     """
     for node, here in list(skeleton.meeting.items()):  # corners of lines that are no junctions
         if len(here) == 1:
@@ -159,7 +162,7 @@ def prune(skeleton: Graph) -> None:
         if arm is None or arm.length != length or len(arm.junctions) != 1 or len(arm.tips) != 1:
             continue  # it has changed since
         node = arm.junctions[0]
-        if length > skeleton.half_width[node] + 2.0 * arm.half_widths / arm.pixels:
+        if length > skeleton.half_width[node] + 2.0 * max(arm.half_widths / arm.pixels, usual):
             continue
         del skeleton.arms[number]
         skeleton.meeting[node].remove(number)
