@@ -14,7 +14,6 @@ Mask = NDArray[np.bool_]
 Tip = tuple[int, int]
 
 ALL = np.ones((3, 3), bool)
-RING = 4.0  # an arm longer than this may return to the junction that it leaves, pixels
 
 
 @dataclass
@@ -34,11 +33,10 @@ class Arm:
 
 @dataclass
 class Graph:
-    """Arms by number, the half-width and a place of each junction, and the arms there (one that returns, twice)."""
+    """Arms by number, the half-width at each junction, and the arms that meet there; rings are none."""
 
     arms: dict[int, Arm]
     half_width: dict[int, float]
-    places: dict[int, Tip]
     meeting: dict[int, list[int]]
 
 
@@ -71,23 +69,13 @@ def graph(lines: Mask, distance: NDArray[np.float64]) -> Graph:
         arms[int(labels[row, col])].tips.append((int(row), int(col)))
     for number, touched in _contacts(labels, nodes).items():
         arm = arms[number]
-        arm.junctions = _ends(touched, arm)
+        arm.junctions = sorted(set(touched))[: 2 - len(arm.tips)]  # one for each end that is not free
         if len(arm.junctions) + len(arm.tips) < 2:
-            del arms[number]  # a corner of a thick crossing
+            del arms[number]  # a corner of a thick crossing, or a ring with one junction
             continue
         for node in arm.junctions:
             meeting[node].append(number)
-    rows, cols = np.nonzero(nodes)
-    places = {int(nodes[row, col]): (int(row), int(col)) for row, col in zip(rows, cols, strict=True)}
-    return Graph(arms, half_width, places, meeting)
-
-
-def _ends(touched: list[int], arm: Arm) -> list[int]:
-    """The junctions of an arm, of those that its pixels touch: one for each end that is not free."""
-    distinct = sorted(set(touched))
-    if not arm.tips and len(distinct) == 1 and len(touched) > 1 and arm.length > RING:
-        return distinct * 2
-    return distinct[: 2 - len(arm.tips)]
+    return Graph(arms, half_width, meeting)
 
 
 def _largest(values: NDArray[np.float64], labels: NDArray[np.int32], count: int) -> NDArray[np.float64]:
@@ -116,7 +104,7 @@ def _lengths(labels: NDArray[np.int32], count: int) -> NDArray[np.float64]:
 
 
 def _contacts(labels: NDArray[np.int32], nodes: NDArray[np.int32]) -> dict[int, list[int]]:
-    """For each arm the junctions that its pixels touch, once for each pixel."""
+    """For each arm the junctions that its pixels touch."""
     largest = ndimage.maximum_filter(nodes, footprint=ALL, mode="constant")
     # a pixel may touch two junctions: the one of the largest number, and that of the smallest
     smallest = ndimage.minimum_filter(np.where(nodes > 0, nodes, nodes.max() + 1), footprint=ALL, mode="nearest")
@@ -141,11 +129,7 @@ def prune(skeleton: Graph, usual: float) -> None:
         Half of the usual width, pixels.
     """
     for node, here in list(skeleton.meeting.items()):  # corners of lines that are no junctions
-        if len(here) == 1:
-            skeleton.arms[here[0]].junctions.remove(node)
-            skeleton.arms[here[0]].tips.append(skeleton.places[node])
-            del skeleton.meeting[node]
-        elif _is_passed(here):
+        if _is_passed(here):
             _joined(skeleton, node)
     queue: list[tuple[float, int]] = []
 
