@@ -144,6 +144,12 @@ def box(top, bottom, left, right, shape=(100, 120)):
     return image
 
 
+def lobes(shape=(100, 120)):
+    """A wide body with five lobes."""
+    rows, cols = np.indices(shape) - np.array([50, 60])[:, np.newaxis, np.newaxis]
+    return (np.hypot(rows, cols) < 25 + 7 * np.cos(5 * np.arctan2(rows, cols))).astype(np.uint8)
+
+
 MIDDLE = (50, 60)
 LEFT, UP, DOWN = (50, -20), (-30, 140), (130, 140)
 DRAWN = {
@@ -160,7 +166,7 @@ DRAWN = {
     "bump": (lines((LEFT, (50, 140)), (MIDDLE, (42, 60))), 0),
     "stub": (lines((LEFT, (50, 140)), (MIDDLE, (30, 60))), 1),
     "ring": (lines((MIDDLE, (50, 61)), width=60) - lines((MIDDLE, (50, 61)), width=44), 0),
-    "square": (lines(((6, -20), (6, 140)), ((92, -20), (92, 140))) | box(24, 76, 34, 86), 0),
+    "lobes": (lines(((6, -20), (6, 140)), ((92, -20), (92, 140))) | lobes(), 0),
     "dash": (lines((LEFT, (50, 140))) | box(20, 21, 50, 58), 0),
     "near the border": (lines((LEFT, (50, 118))), 0),
     "thin": (lines((LEFT, (50, 70)), width=1), 1),

@@ -94,13 +94,13 @@ def connected(images: Array, own: Array, found: Summary) -> list[Part]:
     names = [f"category {found.categories[k]}" for k in shown]
     curves = (
         "The connectivity function: of two pixels at a lag that both have the category, the share that lies in one "
-        "connected piece (pixels hang together by their sides). A variogram cannot tell whole channels from broken "
+        "connected component (pixels hang together by their sides). A variogram cannot tell whole channels from broken "
         "ones; here, a band below the line of the training image means that its bodies are broken, one above "
         "that they run together. A smaller image cuts bodies apart, so compare images of one size where you can."
     )
     strips = (
-        "For each category its share, its connected pieces, the share of the largest piece, and its dead ends: a "
-        "stroke for each realisation. The training image's diamond should lie among the strokes. Many pieces are "
+        "For each category its share, its connected components, the share of the largest, and its dead ends: a "
+        "stroke for each realisation. The training image's diamond should lie among the strokes. Many components are "
         "specks, and many dead ends are channels that break off."
     )
     plot = plots.lagged(found, found.connectivity[:, shown], names, "connectivity")
@@ -118,7 +118,7 @@ def _table(found: Summary) -> Table:
         for name, column in (("training image", slice(-1, None)), ("realisations", slice(0, -1))):
             tables = (found.shares, found.components, found.largest, found.dead_ends)
             rows.append([f"{category}, {name}", *(_spread(table[k, column]) for table in tables)])
-    header = ("Category", "Share", "Pieces in 10,000 pixels", "Share of the largest", "Dead ends in 10,000 pixels")
+    header = ("Category", "Share", "Components in 10,000 pixels", "Share of the largest", "Dead ends in 10,000 pixels")
     return Table("Figures of the categories", header, rows, "Realisations: mean ± standard deviation.")
 
 
@@ -168,7 +168,7 @@ def distances(found: Summary) -> list[Part]:
         "little variety."
     )
     header = ("Pixels apart", "Between realisations", "From the training image", "Ratio")
-    table = Table("Variety and likeness", header, rows, note)
+    table = Table("Distances", header, rows, note)
     plot = _figure(plots.distances(found), caption, "Realisations and training image as points", "distances.png")
     return [Text(words), table, plot]
 
