@@ -49,7 +49,7 @@ def anodi(
     training: ArrayLike,
     *,
     categories: Sequence[int] | None = None,
-    classes: int = 4,
+    classes: int = 3,
     side: int | None = None,
     levels: int = 3,
 ) -> Anodi:
@@ -70,7 +70,7 @@ def anodi(
         Continuous values are cut into so many classes, by quantiles of the training image. A value that is frequent
         enough to be such a quantile is a class of its own.
     side : int, optional
-        Pixels of a pattern each way; by default 4 for two categories, 3 for up to five, and 2 for more.
+        Pixels of a pattern each way; by default 4 for two categories or classes, 3 for three, and 2 for more.
     levels : int
         At most so many; one at which an image has no pattern is left out.
 
@@ -82,7 +82,7 @@ def anodi(
     ------
     ValueError
         The arrays have another number of axes or are too small, a value is no category, an option is out of range, or
-        there are so many different patterns that no two images share enough of them.
+        there are so many different patterns that their counts do not fit into 0.5 GB.
 
     Notes
     -----
@@ -93,8 +93,8 @@ def anodi(
     of one ensemble, so that two ensembles can be compared if they are of the same size.
 
     Histograms of finite images differ by chance even where the law is the same, the more so the smaller they are:
-    compare ensembles of the same numbers of pixels. About a second for 50 realisations of 250 x 250 pixels in two
-    categories.
+    compare ensembles of the same numbers of pixels. About a second for 50 realisations of 250 x 250 pixels of
+    channels, and up to half a minute for noise, which has every pattern.
     """
     array, image = as_ensemble(ensemble), as_image(training, "training image")
     index, own, count = _classified(array, image, categories, classes)
@@ -134,7 +134,7 @@ def _classified(
 
 def _side(count: int) -> int:
     """Of patterns of so many categories or classes, where none is given."""
-    return 4 if count <= 2 else 3 if count <= 5 else 2
+    return 4 if count <= 2 else 3 if count == 3 else 2
 
 
 def _distances(images: list[NDArray[np.intp]], count: int, side: int, spread: int) -> Floats:
