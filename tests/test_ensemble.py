@@ -1,0 +1,397 @@
+"""What an ensemble of realisations is judged by, on cases whose answers are known."""
+
+import builtins
+import hashlib
+
+import numpy as np
+import pytest
+from scipy.ndimage import binary_dilation, binary_erosion, distance_transform_edt
+
+from simdtex.experiments import ensemble
+from simdtex.experiments.ensemble import distance
+from simdtex.experiments.ensemble.ends import MARGIN
+
+
+def noise(seed, shape=(6, 40, 50), values=2):
+    return np.random.default_rng(seed).integers(0, values, shape).astype(np.uint8)
+
+
+# ---------------------------------------------------------------- categories, shares and maps
+
+
+def test_categories_are_those_of_the_training_image_unless_they_are_named():
+    image = np.array([[3, 1], [1, 7]], np.uint8)
+    assert ensemble.categories_of(image).tolist() == [1, 3, 7]
+    assert ensemble.categories_of(image, [7, 1, 3]).tolist() == [7, 1, 3]
+    assert len(ensemble.categories_of(image, [])) == 0
+    assert len(ensemble.categories_of(image.astype(float))) == 0
+    assert len(ensemble.categories_of(np.arange(17).reshape(1, 17))) == 0
+    assert len(ensemble.categories_of(np.arange(16).reshape(1, 16))) == 16
+    assert ensemble.categories_of(image > 2).tolist() == [False, True]
+
+
+def test_shares_are_counted_in_the_order_of_the_categories():
+    array = np.array([[[5, 5, 2, 9]], [[9, 9, 9, 9]]])
+    np.testing.assert_array_equal(ensemble.shares(array, [9, 5, 2]), [[0.25, 0.5, 0.25], [1, 0, 0]])
+
+
+def test_share_maps_entropy_and_mean_at_each_pixel():
+    array = np.array([[[0, 0, 0]], [[0, 1, 0]], [[0, 0, 1]], [[0, 1, 0]]])
+    maps = ensemble.share_maps(array, [0, 1])
+    np.testing.assert_array_equal(maps, [[[1, 0.5, 0.75]], [[0, 0.5, 0.25]]])
+    expected = -(0.75 * np.log2(0.75) + 0.25 * np.log2(0.25))
+    np.testing.assert_allclose(ensemble.entropy(maps), [[0, 1, expected]])
+    np.testing.assert_array_equal(ensemble.mean(array), [[0, 0.5, 0.25]])
+
+
+def test_entropy_of_four_equal_categories_is_two_bits():
+    array = np.arange(4).reshape(4, 1, 1) * np.ones((1, 2, 3), int)
+    np.testing.assert_allclose(ensemble.entropy(ensemble.share_maps(array, range(4))), np.full((2, 3), 2.0))
+
+
+def test_deviation_is_over_the_realisations():
+    array = np.array([[[1.0, 4.0]], [[3.0, 4.0]]])
+    np.testing.assert_allclose(ensemble.deviation(array), [[np.sqrt(2.0), 0.0]])
+    np.testing.assert_array_equal(ensemble.deviation(array[:1]), [[0.0, 0.0]])
+
+
+# ---------------------------------------------------------------- variograms
+
+
+def test_variogram_of_a_checkerboard():
+    board = np.indices((20, 31)).sum(axis=0) % 2
+    for axis in (0, 1):
+        np.testing.assert_allclose(ensemble.variogram(board == 1, axis, 6), [0, 0.5, 0, 0.5, 0, 0.5, 0])
+
+
+def test_variogram_of_a_slope_is_along_its_axis():
+    slope = np.tile(3.0 * np.arange(30), (12, 1))
+    np.testing.assert_allclose(ensemble.variogram(slope, 1, 5), 4.5 * np.arange(6) ** 2)
+    np.testing.assert_allclose(ensemble.variogram(slope, 0, 5), np.zeros(6))
+
+
+def test_variogram_of_noise_is_its_variance():
+    field = np.random.default_rng(1).normal(0, 2, (200, 200))
+    np.testing.assert_allclose(ensemble.variogram(field, 0, 10)[1:], 4.0, rtol=0.05)
+
+
+def test_without_gstools_one_sentence_says_so(monkeypatch):
+    real = builtins.__import__
+
+    def missing(name, *args, **kwargs):
+        if name == "gstools":
+            raise ImportError(name)
+        return real(name, *args, **kwargs)
+
+    monkeypatch.setattr(builtins, "__import__", missing)
+    with pytest.raises(ValueError, match=r"gstools is not installed; pip install 'simdtex\[simulate\]'"):
+        ensemble.variogram(np.zeros((5, 5)), 0, 2)
+
+
+# ---------------------------------------------------------------- connectivity
+
+
+def test_connectivity_of_two_bars():
+    image = np.zeros((30, 40), int)
+    image[5:8] = 4
+    image[15:18] = 4
+    along = ensemble.connectivity(image, 4, 30, 1)
+    np.testing.assert_array_equal(along.function, np.ones(31))
+    assert along.components == pytest.approx(2 * 1e4 / 1200) and along.largest == 0.5
+    down = ensemble.connectivity(image, 4, 14, 0).function
+    np.testing.assert_array_equal(down[:3], 1)
+    assert np.isnan(down[3:8]).all()  # no pair so far apart
+    np.testing.assert_array_equal(down[8:13], 0)
+
+
+def test_connectivity_of_a_broken_bar():
+    image = np.zeros((9, 20), int)
+    image[4, :8] = image[4, 10:] = 1
+    found = ensemble.connectivity(image, 1, 9, 1)
+    # at a distance of 3 there are 5 + 7 pairs within the pieces, and 7 - 8, 6 - 9 ... across: columns 7 to 10
+    assert found.function[3] == pytest.approx(12 / 13)
+    assert found.function[1] == 1 and found.largest == pytest.approx(10 / 18)
+
+
+def test_pixels_hang_together_by_sides_unless_corners_are_asked_for():
+    image = np.eye(6, dtype=int)
+    assert ensemble.connectivity(image, 1, 2, 0).components == pytest.approx(6e4 / 36)
+    assert ensemble.connectivity(image, 1, 2, 0, neighbours=8).components == pytest.approx(1e4 / 36)
+
+
+def test_connectivity_of_a_missing_category():
+    found = ensemble.connectivity(np.zeros((5, 5), int), 1, 3, 0)
+    assert np.isnan(found.function).all() and found.components == 0 and np.isnan(found.largest)
+
+
+# ---------------------------------------------------------------- dead ends
+
+
+def lines(*ends, width=8, shape=(100, 120)):
+    """Bars with round ends between (row, column)s."""
+    image = np.zeros(shape, np.uint8)
+    place = np.moveaxis(np.indices(shape), 0, -1)
+    for start, end in ends:
+        along = np.subtract(end, start)
+        share = np.clip(((place - start) @ along) / (along @ along), 0, 1)
+        image[np.linalg.norm(place - start - share[..., None] * along, axis=-1) <= width / 2] = 1
+    return image
+
+
+def box(top, bottom, left, right, shape=(100, 120)):
+    image = np.zeros(shape, np.uint8)
+    image[top:bottom, left:right] = 1
+    return image
+
+
+def lobes(shape=(100, 120)):
+    """A wide body with five lobes."""
+    rows, cols = np.indices(shape) - np.array([50, 60])[:, np.newaxis, np.newaxis]
+    return (np.hypot(rows, cols) < 25 + 7 * np.cos(5 * np.arctan2(rows, cols))).astype(np.uint8)
+
+
+MIDDLE = (50, 60)
+LEFT, UP, DOWN = (50, -20), (-30, 140), (130, 140)
+DRAWN = {
+    "across": (lines((LEFT, (50, 140))), 0),
+    "aslant": (lines(((-20, -20), (120, 140))), 0),
+    "inside": (lines((LEFT, (50, 70))), 1),
+    "free": (lines(((50, 30), (50, 90))), 2),
+    "Y that leaves": (lines((LEFT, MIDDLE), (MIDDLE, UP), (MIDDLE, DOWN)), 0),
+    "Y with one end": (lines((LEFT, MIDDLE), (MIDDLE, (15, 90)), (MIDDLE, DOWN)), 1),
+    "Y with three ends": (lines(((50, 20), MIDDLE), (MIDDLE, (15, 90)), (MIDDLE, (85, 90))), 3),
+    "disc": (lines((MIDDLE, (50, 61)), width=40), 0),
+    "blob": (lines((MIDDLE, (50, 70)), width=24), 0),
+    "wide across": (lines((LEFT, (50, 140)), width=30), 0),
+    "bump": (lines((LEFT, (50, 140)), (MIDDLE, (42, 60))), 0),
+    "stub": (lines((LEFT, (50, 140)), (MIDDLE, (30, 60))), 1),
+    "ring": (lines((MIDDLE, (50, 61)), width=60) - lines((MIDDLE, (50, 61)), width=44), 0),
+    "lobes": (lines(((6, -20), (6, 140)), ((92, -20), (92, 140))) | lobes(), 0),
+    "dash": (lines((LEFT, (50, 140))) | box(20, 21, 50, 58), 0),
+    "near the border": (lines((LEFT, (50, 118))), 0),
+    "thin": (lines((LEFT, (50, 70)), width=1), 1),
+    "nothing": (lines(), 0),
+    "everything": (lines() + 1, 0),
+}
+
+
+@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize("turned", [0, 1, 2])
+def test_dead_ends_of_drawn_figures(name, turned):
+    image, expected = DRAWN[name]
+    assert len(ensemble.dead_end_places(np.rot90(image, turned), 1)) == expected
+
+
+def test_a_flat_end_counts_once_where_it_is():
+    image = np.zeros((80, 100), np.uint8)
+    image[36:44, :70] = 1
+    (place,) = ensemble.dead_end_places(image, 1)
+    assert abs(place[0] - 40) <= 1 and 63 <= place[1] < 70
+    assert ensemble.dead_ends(image, 1) == pytest.approx(1e4 / ((80 - 2 * MARGIN) * (100 - 2 * MARGIN)))
+    assert ensemble.dead_ends(image, 1, margin=36) == 0
+
+
+ROUGH = ["across", "inside", "Y that leaves", "Y with one end", "Y with three ends", "free"]
+
+
+@pytest.mark.parametrize("name", ROUGH)
+def test_rough_banks_make_no_dead_ends(name):
+    rng, (image, expected) = np.random.default_rng(3), DRAWN[name]
+    bank = binary_dilation(image) & ~binary_erosion(image, border_value=1)
+    for _ in range(25):
+        rough = image.copy()
+        rough[bank] = rng.integers(0, 2, np.count_nonzero(bank))
+        assert len(ensemble.dead_end_places(rough, 1)) == expected
+
+
+@pytest.mark.parametrize("name", ["across", "inside", "Y that leaves", "Y with one end"])
+def test_holes_and_specks_make_no_dead_ends(name):
+    rng, (image, expected) = np.random.default_rng(4), DRAWN[name]
+    for _ in range(10):
+        assert len(ensemble.dead_end_places(image ^ (rng.random(image.shape) < 0.01), 1)) == expected
+
+
+def test_a_line_that_bends_is_one_arm():
+    stairs = np.zeros((60, 60), np.uint8)
+    for step in range(10, 50):
+        stairs[step, step - 1 : step + 2] = 1  # three pixels at each step: corners that look like junctions
+    assert len(ensemble.dead_end_places(stairs, 1)) == 2
+
+
+# ---------------------------------------------------------------- distances
+
+
+def test_identical_realisations_have_no_variety():
+    image = noise(1)[0]
+    found = ensemble.anodi(np.stack([image] * 4), noise(2)[0])
+    assert found.variety == 0 and 0 < found.likeness < 1 and found.ratio == 0
+
+
+def test_images_without_a_common_pattern_are_1_apart():
+    black, white = np.zeros((2, 12, 12), int), np.ones((12, 12), int)
+    found = ensemble.anodi(black, white, categories=[0, 1])
+    assert found.likeness == pytest.approx(1) and found.variety == 0
+
+
+def test_draws_of_one_law_have_a_ratio_of_one():
+    fields = noise(4, (9, 120, 120))
+    assert ensemble.anodi(fields[:8], fields[8]).ratio == pytest.approx(1, abs=0.02)
+    likely = np.random.default_rng(5).normal(size=(9, 80, 80))
+    assert ensemble.anodi(likely[:8], likely[8]).ratio == pytest.approx(1, abs=0.02)
+
+
+def test_distances_against_their_definition():
+    images, side = noise(6, (3, 11, 13), 3), 2
+    tables = []
+    for spread in (1, 2):
+        histograms = []
+        for image in images:
+            counts = {}
+            for i in range(11 - spread):
+                for j in range(13 - spread):
+                    pattern = tuple(image[i + a * spread, j + b * spread] for a in (0, 1) for b in (0, 1))
+                    counts[pattern] = counts.get(pattern, 0) + 1
+            histograms.append({pattern: n / sum(counts.values()) for pattern, n in counts.items()})
+        table = np.zeros((3, 3))
+        for i, p in enumerate(histograms):
+            for j, q in enumerate(histograms):
+                total = 0.0
+                for pattern in {*p, *q}:
+                    a, b = p.get(pattern, 0), q.get(pattern, 0)
+                    total += sum(x * np.log2(2 * x / (a + b)) for x in (a, b) if x) / 2
+                table[i, j] = np.sqrt(max(total, 0))
+        tables.append(table)
+    expected = (tables[0] + tables[1] / 2) / 1.5
+    found = ensemble.anodi(images[:2], images[2], side=side, levels=2)
+    np.testing.assert_allclose(found.distances, expected, atol=1e-9)
+    assert found.variety == pytest.approx(expected[0, 1])
+    assert found.likeness == pytest.approx((expected[0, 2] + expected[1, 2]) / 2)
+    assert found.ratio == pytest.approx(found.variety / found.likeness)
+    np.testing.assert_allclose(found.by_level[:, 0], [table[0, 1] for table in tables])
+
+
+def test_blocks_do_not_change_the_distances(monkeypatch):
+    images = noise(7, (7, 20, 20))
+    whole = ensemble.anodi(images[:6], images[6]).distances
+    monkeypatch.setattr(distance, "BLOCK", 1)
+    np.testing.assert_allclose(ensemble.anodi(images[:6], images[6]).distances, whole, rtol=1e-12)
+
+
+def test_continuous_values_are_cut_by_the_quantiles_of_the_training_image():
+    training = np.random.default_rng(8).normal(size=(40, 40))
+    same = ensemble.anodi(np.exp(training)[np.newaxis], np.exp(training))  # only ranks matter
+    assert same.likeness == 0 and np.isnan(same.ratio) and np.isnan(same.variety)
+    darker = ensemble.anodi((training - 10)[np.newaxis], training, classes=2, side=1, levels=1)
+    # all below the median against half below it
+    expected = np.sqrt((np.log2(1 / 0.75) + 0.5 * np.log2(0.5 / 0.75) + 0.5 * np.log2(0.5 / 0.25)) / 2)
+    assert darker.likeness == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("ones", [2, 8])
+def test_frequent_values_are_classes_of_their_own(ones):
+    training = np.zeros((10, 10))
+    training[:ones] = 1
+    found = ensemble.anodi(np.full((1, 10, 10), training[5, 5]), training, side=1, levels=1)
+    share = training.mean() if training[5, 5] else 1 - training.mean()
+    middle = (1 + share) / 2
+    expected = (np.log2(1 / middle) + share * np.log2(share / middle) + (1 - share)) / 2
+    assert found.likeness == pytest.approx(np.sqrt(expected))
+
+
+# ---------------------------------------------------------------- the summary
+
+
+def test_summary_puts_everything_together():
+    images = np.stack([ensemble.channels((48, 56), seed) for seed in range(4)])
+    training = ensemble.channels((64, 64), 9)
+    data = [(3, 5, images[0, 5, 3]), (50, 40, images[0, 40, 50])]
+    found = ensemble.summary(images, training, data=data)
+    np.testing.assert_array_equal(found.categories, [0, 1])
+    np.testing.assert_allclose(found.shares[:, -1], [1 - training.mean(), training.mean()])
+    np.testing.assert_allclose(found.shares[1, :-1], images.mean(axis=(1, 2)))
+    assert found.variograms.shape == found.connectivity.shape == (2, 2, 5, 25)
+    np.testing.assert_array_equal(found.variograms[1, 0, 2], ensemble.variogram(images[2] == 0, 1, 24))
+    np.testing.assert_array_equal(found.variograms[0, 1, -1], ensemble.variogram(training == 1, 0, 24))
+    np.testing.assert_array_equal(found.connectivity[0, 1, 3], ensemble.connectivity(images[3], 1, 24, 0).function)
+    assert found.components[0, 1] == ensemble.connectivity(images[1], 0, 1, 0).components
+    assert found.dead_ends[1, -1] == ensemble.dead_ends(training, 1)
+    misses = [sum(int(one[y, x] != value) for x, y, value in data) for one in images]
+    assert found.misses.tolist() == misses and misses[0] == 0
+
+
+def test_summary_of_continuous_values():
+    images = np.random.default_rng(2).normal(size=(3, 12, 14))
+    found = ensemble.summary(images, images[0], data=[(1, 2, 0.5)], max_lag=4)
+    assert found.variograms.shape == (2, 1, 4, 5) and found.shares.shape == (0, 4)
+    np.testing.assert_allclose(found.misses, np.abs(images[:, 2, 1] - 0.5))
+    np.testing.assert_array_equal(found.maps[0], ensemble.mean(images))
+
+
+# ---------------------------------------------------------------- channels
+
+
+def test_channels_are_the_same_bytes_everywhere():
+    digest = hashlib.sha256(ensemble.channels((96, 120), 2024).tobytes()).hexdigest()
+    assert digest == "5c4f8284690ef1a95bd8b55732f0555e3bf72c474793046a453affd913ba9901"
+
+
+def test_channels_are_like_channels():
+    ends, found = [], []
+    for seed in range(3):
+        image = ensemble.channels((250, 250), seed)
+        assert image.dtype == np.uint8 and set(np.unique(image)) == {0, 1}
+        found.append(image.mean())
+        ends.append(len(ensemble.dead_end_places(image, 1)))
+        right, down = (ensemble.variogram(image == 1, axis, 20)[8] for axis in (1, 0))
+        assert right < 0.7 * down  # they run to the right
+    assert all(0.28 <= share <= 0.335 for share in found)
+    assert all(3 <= number <= 14 for number in ends) and sum(ends) >= 15
+
+
+def test_width_and_share_of_channels_are_those_that_were_asked_for():
+    for width in (4, 8, 12):
+        image = ensemble.channels((160, 160), 3, width=width)
+        # the ground is a half-width away from the middle of a channel, which few pixels are further from
+        across = 2 * np.quantile(distance_transform_edt(image)[image > 0], 0.85)
+        assert width - 1.5 <= across <= width + 3
+    assert ensemble.channels((200, 200), 3, share=0.15).mean() == pytest.approx(0.15, abs=0.04)
+
+
+# ---------------------------------------------------------------- bad input
+
+IMAGE, FEW = np.zeros((20, 20), int), np.zeros((2, 20, 20), int)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: ensemble.shares(IMAGE, [0]), r"the ensemble has the shape \(20, 20\)"),
+        (lambda: ensemble.shares(FEW, [1]), "holds 0, which is no category"),
+        (lambda: ensemble.shares(FEW, []), "there are no categories"),
+        (lambda: ensemble.shares(FEW, [0, 0]), "named twice"),
+        (lambda: ensemble.mean(np.full((1, 2, 2), np.nan)), "not finite"),
+        (lambda: ensemble.entropy(np.ones((2, 3, 3))), "do not add up to 1"),
+        (lambda: ensemble.variogram(IMAGE, 2, 3), "axis is 2"),
+        (lambda: ensemble.variogram(IMAGE, 0, 20), "max_lag is 20: give 1 to 19"),
+        (lambda: ensemble.connectivity(IMAGE, 1, 3, 0, neighbours=6), "neighbours is 6"),
+        (lambda: ensemble.dead_ends(IMAGE, 0, margin=10), "the margin of 10 leaves nothing"),
+        (lambda: ensemble.dead_ends(FEW, 0), "the image has the shape"),
+        (lambda: ensemble.anodi(FEW, IMAGE + 1), "the ensemble holds 0, which is no category"),
+        (lambda: ensemble.anodi(FEW, np.eye(20, dtype=int), side=9), "side 9 or levels 3 is out of range"),
+        (lambda: ensemble.anodi(FEW, IMAGE[:2]), "there are no patterns of 4 x 4"),
+        (lambda: ensemble.anodi(FEW, IMAGE, categories=[], classes=1), "classes is 1"),
+        (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 2)]), "give rows of x, y and value"),
+        (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 20, 0)]), "x 1, y 20 is at no pixel"),
+        (lambda: ensemble.summary(FEW, IMAGE[:3]), "a side of 3 pixels"),
+        (lambda: ensemble.channels((20, 99), 1), "the shape is 20 x 99"),
+        (lambda: ensemble.channels((99, 99), 1, share=0.9), "share 0.9"),
+    ],
+)
+def test_bad_input_is_refused_in_a_sentence(call, words):
+    with pytest.raises(ValueError, match=words):
+        call()
+
+
+def test_other_types_are_refused():
+    with pytest.raises(TypeError, match="holds complex128"):
+        ensemble.mean(np.ones((1, 2, 2), complex))

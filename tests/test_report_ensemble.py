@@ -1,0 +1,92 @@
+"""The report of an ensemble says what the figures say."""
+
+import json
+
+import numpy as np
+import pytest
+from test_page import assert_needs_nothing_else, read_page
+
+from simdtex.experiments import ensemble
+from simdtex.report import ensemble_plots as plots
+from simdtex.report.ensemble import write_ensemble
+
+ALWAYS = {
+    "index.html",
+    "results.json",
+    "realisations.png",
+    "maps.png",
+    "entropy.png",
+    "variograms.png",
+    "distances.png",
+}
+OF_CATEGORIES = {"connectivity.png", "figures.png", "dead-ends.png"}
+
+
+def test_a_report_of_categories(tmp_path):
+    images = np.stack([ensemble.channels((48, 60), seed) for seed in range(3)])
+    training = ensemble.channels((64, 56), 7)
+    data = [(10, 20, images[0, 20, 10]), (59, 47, images[0, 47, 59])]
+    write_ensemble(tmp_path / "r", training, images, data=data, command="simdtex simulate <ti>")
+    assert {path.name for path in (tmp_path / "r").iterdir()} == ALWAYS | OF_CATEGORIES
+    page = read_page(tmp_path / "r" / "index.html")
+    assert_needs_nothing_else(page)
+    assert "3 realisations of 60 x 48 pixels, 2 categories, beside a training image of 56 x 64" in page.text
+    assert "$ simdtex simulate <ti>" in page.text
+    results = json.loads((tmp_path / "r" / "results.json").read_text(encoding="utf-8"))
+    assert results["shape"] == [3, 48, 60] and results["training_shape"] == [64, 56]
+    np.testing.assert_allclose(results["shares"][1][:3], images.mean(axis=(1, 2)))
+    found = ensemble.anodi(images, training)
+    assert results["anodi"]["ratio"] == pytest.approx(found.ratio) and f"{found.ratio:.3f}" in page.text
+    missed = int(sum(results["misses"]))
+    words = f"{missed / 6:.1%} are missed on average" if missed else "keeps the 2 hard data"
+    assert words in page.text
+    assert f"{training.mean():.3f}" in page.text
+
+
+def test_a_report_of_continuous_values(tmp_path):
+    images = np.random.default_rng(1).normal(size=(2, 20, 24))
+    write_ensemble(tmp_path / "r", images[0], images, data=[(3, 4, 0), (9, 1, 0)])
+    assert {path.name for path in (tmp_path / "r").iterdir()} == ALWAYS
+    text = read_page(tmp_path / "r" / "index.html").text
+    assert "continuous values" in text and "standard deviation of the realisations" in text
+    assert "Not every realisation keeps the 2 hard data" in text
+
+
+def test_a_single_small_realisation_of_many_categories_has_a_report(tmp_path, monkeypatch):
+    monkeypatch.setattr(plots, "MOST_PANELS", 2)
+    training = np.arange(144).reshape(12, 12) % 9
+    write_ensemble(tmp_path / "r", training, training[np.newaxis, :10, :11])
+    assert {path.name for path in (tmp_path / "r").iterdir()} == (ALWAYS | OF_CATEGORIES) - {"dead-ends.png"}
+    text = read_page(tmp_path / "r" / "index.html").text
+    assert "n/a" in text and "9 categories" in text and "There are no hard data." in text
+
+
+def test_nothing_is_written_where_the_input_is_bad(tmp_path):
+    image = np.zeros((10, 10), int)
+    with pytest.raises(ValueError, match="is at no pixel"):
+        write_ensemble(tmp_path / "r", image, image[np.newaxis], data=[(0.5, 0, 0)])
+    assert not (tmp_path / "r").exists()
+    with pytest.raises(ValueError, match="does not exist"):
+        write_ensemble(tmp_path / "no" / "r", image, image[np.newaxis])
+
+
+def test_the_two_most_common_categories_are_drawn(monkeypatch):
+    monkeypatch.setattr(plots, "MOST_PANELS", 2)
+    image = np.repeat([0, 1, 2, 3], [4, 1, 3, 8]).reshape(4, 4)
+    assert plots.drawn(ensemble.summary(image[np.newaxis], image)) == [0, 3]
+
+
+def test_dead_ends_have_a_ring_around_them():
+    picture = np.zeros((60, 60, 3), np.uint8)
+    ring = (plots.marked(picture, np.array([[10, 20]]), 2) == plots.END).all(axis=-1)
+    rows, cols = np.nonzero(ring)
+    assert (rows.min() + rows.max()) / 2 == 21 and (cols.min() + cols.max()) / 2 == 41
+    assert not ring[21, 41] and not picture.any()
+
+
+def test_the_map_of_distances_keeps_them():
+    places = np.array([[0.0, 0], [3, 0], [0, 4], [1, 1]])
+    table = np.linalg.norm(places[:, None] - places, axis=-1)
+    found = plots.scaled(table)
+    np.testing.assert_allclose(np.linalg.norm(found[:, None] - found, axis=-1), table, atol=1e-9)
+    np.testing.assert_allclose(plots.scaled(np.zeros((3, 3))), 0)
