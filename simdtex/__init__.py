@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from simdtex import quality
-    from simdtex.filling import extend, fill
+    from simdtex.jobs.filling import extend, fill
     from simdtex.io.hard_data import place_hard_data, read_hard_data
     from simdtex.machine import open_machine
     from simdtex.machine.devices import DeviceError, devices
@@ -38,8 +38,8 @@ _HOMES = {
     "Output": "simdtex.run",
     "Progress": "simdtex.run",
     "devices": "simdtex.machine.devices",
-    "extend": "simdtex.filling",
-    "fill": "simdtex.filling",
+    "extend": "simdtex.jobs.filling",
+    "fill": "simdtex.jobs.filling",
     "lcpdf": "simdtex.synthesis",
     "mix": "simdtex.methods.pyramid.mixtures",
     "open_machine": "simdtex.machine",

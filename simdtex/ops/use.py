@@ -24,13 +24,18 @@ class Market:
 
     ``shape`` rows and columns of the places where they lie; ``around`` places from one to the edge of its
     neighbourhood; ``fair`` (places,) int64 how much of each is fair, 0 where there is no candidate, or None where all
-    are alike; ``listed`` whether numbers run over the candidates alone, or over all places.
+    are alike; ``listed`` whether numbers run over the candidates alone, or over all places; ``kinds`` (places,) which
+    category each is of, and ``wanted`` the share of each in the output, where somebody asks for shares; ``strict`` what
+    one costs that is used twice as often as it is to be.
     """
 
     shape: tuple[int, int]
     around: int
     fair: NDArray[np.int64] | None = None
     listed: bool = False
+    kinds: NDArray[np.intp] | None = None
+    wanted: tuple[float, ...] = ()
+    strict: float = 0.0
 
     @cached_property
     def due(self) -> tuple[NDArray[np.int64], int]:
@@ -99,15 +104,29 @@ def price(
     places, total = market.shape[0] * market.shape[1], int(counts.sum())
     there = np.ones(places, bool) if market.fair is None else market.fair > 0
     found = np.zeros(places, np.float32)
-    if rate and total:
+    if total and (rate or market.kinds is not None):
         used = np.zeros(places, np.int64)
         used[there if market.listed else slice(None)] = counts
         around, (due, whole) = _blurred(used.reshape(market.shape), market.around), market.due
         excess = around.astype(np.float64) * whole / (np.maximum(due, 1) * np.float64(total)) - 1
         found = (rate * np.clip(excess, 0, CAP)).astype(np.float32).ravel()
+        if market.kinds is not None:
+            found += _of_kinds(used, market)
     if market.fair is not None:
         found = found[there] if market.listed else np.where(there, found, np.float32(np.inf))
     return found if before is None else (found + before[: found.size]) / np.float32(2)
+
+
+def _of_kinds(used: NDArray[np.int64], market: Market) -> NDArray[np.float32]:
+    """The price of being of a category that is used more than it is to be."""
+    assert market.kinds is not None
+    counts = np.bincount(market.kinds, used, minlength=len(market.wanted))
+    cost = np.zeros(len(market.wanted), np.float32)
+    for kind, share in enumerate(market.wanted):
+        due = share / sum(market.wanted) * int(used.sum())
+        excess = max(0.0, int(counts[kind]) / due - 1) if due else 1.0
+        cost[kind] = market.strict * min(1.0, excess)
+    return cost[market.kinds]
 
 
 def _blurred(counts: NDArray[np.integer], radius: int) -> NDArray[np.int64]:

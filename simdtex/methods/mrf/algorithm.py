@@ -147,7 +147,8 @@ def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None
 def priced(level: Level, field: Field, before: NDArray[np.float32] | None) -> NDArray[np.float32]:
     """What each candidate costs during the next sweep, from how often it is used now: the same for all sites of it."""
     candidates = level.proposal.candidates
-    counts = use(level.machine, field, level.grid, candidates) if level.rate else np.zeros(candidates.size, np.int32)
+    asked = level.rate or level.market.kinds is not None
+    counts = use(level.machine, field, level.grid, candidates) if asked else np.zeros(candidates.size, np.int32)
     return price(counts, level.market, level.rate, before)
 
 

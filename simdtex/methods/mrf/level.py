@@ -31,6 +31,9 @@ from simdtex.schedules import Setting
 WHOLE = 256
 """Candidates of a coarsest level whose neighbourhoods see much of the sample's layout; of more they see less."""
 
+STRICT = 2.0
+"""lambda of the price of a category that is used more than it is to be."""
+
 TOGETHER = 2**16
 """Sites that one kernel relaxes between two looks at the clock."""
 
@@ -196,7 +199,9 @@ class Run:
         novelty = options.novelty * min(1.0, WHOLE / count) if anew else 0.0
         around = int(offsets.max()) * (grid.step if options.phases == "all" else 1)
         fair = sample.fair(*self.where(number))
-        market = Market((rows.size, cols.size), around, fair, isinstance(proposal, Listed))
+        whole = len(offsets) * sample.channels * variance  # what two neighbourhoods differ by that have nothing in common
+        kinds = (*self._kinds(number), STRICT * whole)
+        market = Market((rows.size, cols.size), around, fair, isinstance(proposal, Listed), *kinds)
         independent = self.schedule.independent(grid, offsets)
         return Level(
             number=number,
@@ -208,7 +213,7 @@ class Run:
             choice=Choice(draws, options.pixel == "density", lcpdf.window(h, sample.top)),
             favour=np.float32(1 / (1 + options.coherence)),
             novelty=np.float32(novelty * sample.channels * variance),
-            rate=options.balance * len(offsets) * sample.channels * variance,
+            rate=options.balance * whole,
             market=market,
             beside=self.beside,
             xi=min(-1, round(options.xi * 1024)),
@@ -237,6 +242,14 @@ class Run:
             values[:matched, laid.known] = laid.values[:, laid.known]
             source[laid.known], temperature[laid.known] = laid.source[laid.known], 0
         return Field(*(self.machine.put(plane) for plane in (values, source, temperature)))
+
+    def _kinds(self, number: int) -> tuple[NDArray[np.intp] | None, tuple[float, ...]]:
+        """The category of each place where candidates may lie, and the shares that are asked for."""
+        categories, wanted = self.sample.pictures.categories(0), self.options.proportions
+        if categories is None or wanted is None:
+            return None, ()
+        row, col = self.sample.lines(*self.where(number))
+        return np.searchsorted(categories, self.sample.pixels[np.ix_(row, col)][..., 0].ravel()), wanted
 
     def _stand_ins(self, number: int) -> Stand:
         """Who stands for whom at a level: nobody above the coarsest."""

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from simdtex.envelope import executed
-from simdtex.inputs import check_mask, check_samples
+from simdtex.jobs.inputs import check_mask, check_samples
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine
 from simdtex.methods import mrf
