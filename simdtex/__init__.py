@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from simdtex import quality
-    from simdtex.jobs.filling import extend, fill
     from simdtex.io.hard_data import place_hard_data, read_hard_data
+    from simdtex.jobs.filling import extend, fill
+    from simdtex.jobs.simulation import simulate
     from simdtex.machine import open_machine
     from simdtex.machine.devices import DeviceError, devices
     from simdtex.methods.pyramid.mixtures import mix
@@ -28,6 +29,7 @@ __all__ = [
     "place_hard_data",
     "quality",
     "read_hard_data",
+    "simulate",
     "suggest_alpha",
     "synthesize",
     "synthesize_solid",
@@ -45,6 +47,7 @@ _HOMES = {
     "open_machine": "simdtex.machine",
     "place_hard_data": "simdtex.io.hard_data",
     "read_hard_data": "simdtex.io.hard_data",
+    "simulate": "simdtex.jobs.simulation",
     "suggest_alpha": "simdtex.synthesis",
     "synthesize": "simdtex.synthesis",
     "synthesize_solid": "simdtex.synthesis",

@@ -165,6 +165,37 @@ class Iterating(Progress):
         return image[len(image) // 2] if self.solid else image
 
 
+@dataclass(frozen=True, kw_only=True)
+class Simulating(Progress):
+    """The progress of `simdtex.simulate`, told after every realisation.
+
+    All is at level 0; the picture is the realisation.
+
+    Attributes
+    ----------
+    realisation : int
+        Its number.
+    finished, realisations : int
+        How many are finished, and how many are asked for.
+    """
+
+    realisation: int
+    finished: int
+    realisations: int
+
+    @property
+    def doing(self) -> str:  # noqa: D102
+        return f"realisation {self.finished} of {self.realisations}"
+
+    @property
+    def stage(self) -> str | None:  # noqa: D102
+        return f"realisation{self.realisation:04d}"
+
+    @property
+    def caption(self) -> str:  # noqa: D102
+        return f"realisation {self.realisation}"
+
+
 Callback = Callable[[Any], Any]
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.envelope import check_shape, executed, with_channels_last
-from simdtex.jobs.inputs import check_inputs
 from simdtex.io.image import check_sample
+from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine, open_machine
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample

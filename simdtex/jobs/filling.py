@@ -13,15 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from simdtex.envelope import executed
-from simdtex.jobs.inputs import check_mask, check_samples
 from simdtex.io.image import check_sample
+from simdtex.jobs.inputs import check_mask, check_samples
 from simdtex.machine import Machine
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures, unknown_in
-from simdtex.options import one_of, whole
+from simdtex.options import whole
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
@@ -228,7 +228,8 @@ def extend(
     rows, cols = pixels.shape[:2]
     for name, value in {"top": top, "bottom": bottom, "left": left, "right": right}.items():
         whole(name, value, 0)
-    one_of("tile", tile, (True, False, "x", "y"))
+    if tile not in (True, False, "x", "y"):
+        raise ValueError(f'tile is {tile!r}; give True, False, "x" or "y"')
     tall, wide = tile in (True, "y"), tile in (True, "x")
     if not (tile or top or bottom or left or right):
         raise ValueError("there is nothing to add; give top, bottom, left or right, or tile=True")
@@ -239,13 +240,15 @@ def extend(
     hole = np.ones(canvas.shape[:2], bool)
     across, along = (width if wide and not (left or right) else 0), (width if tall and not (top or bottom) else 0)
     if 2 * across >= cols or 2 * along >= rows:
-        raise ValueError(f"band={width} leaves nothing of a picture of {rows}x{cols} (rows x columns); give a narrower one")
+        raise ValueError(
+            f"band={width} leaves nothing of a picture of {rows}x{cols} (rows x columns); give a narrower one"
+        )
     hole[top + along : top + rows - along, left + across : left + cols - across] = False
     options = {"boundary": "torus" if tile else "open"} | options
     chosen = mrf.make_options(**options)
     seed = as_seed(rng)
     place = np.full((*hole.shape, 2), -1, np.int32)
-    place[top : top + rows, left : left + cols] = np.stack(np.indices((rows, cols)), -1)
+    place[top : top + rows, left : left + cols] = np.moveaxis(np.indices((rows, cols)), 0, -1)
     place[hole] = -1
     given = Given(canvas, np.repeat(~hole[..., None], canvas.shape[2], -1), place)
 
@@ -336,7 +339,7 @@ def _check_sample(sample: Any, channel_axis: int | None, pixels: NDArray[Any]) -
     one = pictures.pixels[0]
     if one.dtype != pixels.dtype or one.shape[2] != pixels.shape[2]:
         raise ValueError(
-            f"the sample has {one.shape[2]} channels of {one.dtype} and the picture {pixels.shape[2]} of {pixels.dtype}; "
-            "give both one type"
+            f"the sample has {one.shape[2]} channels of {one.dtype} and the picture {pixels.shape[2]} of "
+            f"{pixels.dtype}; give both one type"
         )
     return pictures

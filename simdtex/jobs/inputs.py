@@ -45,7 +45,7 @@ def check_inputs(
 def check_samples(sample: ArrayLike | Sequence[ArrayLike], channel_axis: int | None, mask: Any = None) -> Pictures:
     """The pictures of a sample: one array, or a list or tuple of arrays; ``mask`` says what may be used, likewise."""
     several = is_several(sample, channel_axis)
-    arrays = list(sample) if several else [sample]  # type: ignore[arg-type]
+    arrays: list[Any] = list(sample) if several else [sample]  # type: ignore[arg-type]
     pixels = [check_sample(array, channel_axis, unknown=True) for array in arrays]
     for number, picture in enumerate(pixels[1:], 1):
         if picture.dtype != pixels[0].dtype or picture.shape[2] != pixels[0].shape[2]:
@@ -77,7 +77,9 @@ def check_mask(name: str, mask: Any, shape: tuple[int, int]) -> Mask:
     if found.dtype != np.bool_:
         raise TypeError(f"{name} holds {found.dtype} values; give True and False")
     if found.shape != shape:
-        raise ValueError(f"{name} is {_size(found)} and the picture {shape[0]}x{shape[1]} (rows x columns); give one size")
+        raise ValueError(
+            f"{name} is {_size(found)} and the picture {shape[0]}x{shape[1]} (rows x columns); give one size"
+        )
     return found
 
 
@@ -90,7 +92,9 @@ def check_known(
     if array.dtype.kind not in "buif":
         raise TypeError(f"known holds {array.dtype} values; give integers or real floats")
     if array.ndim != axes:
-        raise ValueError(f"known is {array.ndim}-dimensional; give {'(rows, cols)' if axes == 2 else 'the channel axis too'}")
+        raise ValueError(
+            f"known is {array.ndim}-dimensional; give {'(rows, cols)' if axes == 2 else 'the channel axis too'}"
+        )
     array = array[..., None] if channel_axis is None else np.moveaxis(array, channel_axis, -1)
     variables, dtype = pictures.pixels[0].shape[2], pictures.pixels[0].dtype
     if array.shape != (*shape, variables):
@@ -108,7 +112,9 @@ def check_known(
         raise ValueError("known has no value; leave it out, or give numbers where something is known")
     if there.all():
         raise ValueError("known leaves nothing to do; give NaN or a masked array where the output is to be made")
-    return Given(_cast("known", values, there, dtype), there, None if source is None else check_place(source, there, pictures))
+    return Given(
+        _cast("known", values, there, dtype), there, None if source is None else check_place(source, there, pictures)
+    )
 
 
 def check_place(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.int32]:
@@ -116,7 +122,9 @@ def check_place(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.int3
     place = np.asarray(source)
     columns = 2 if len(pictures.pixels) == 1 else 3
     if place.dtype.kind not in "iu" or place.shape != (*there.shape[:2], columns):
-        raise ValueError(f"known_source is no array of integers ({there.shape[0]}, {there.shape[1]}, {columns}); give a source map")
+        raise ValueError(
+            f"known_source is no array of integers ({there.shape[0]}, {there.shape[1]}, {columns}); give a source map"
+        )
     found = place.astype(np.int32)
     number = found[..., 2] if columns == 3 else np.zeros(found.shape[:2], np.int32)
     used = (found[..., 0] >= 0) & there.all(-1)
@@ -145,13 +153,17 @@ def check_guide(
             raise ValueError(f"the guide of {which} is {_size(one)} and {which} {_size(picture)}; give one size")
         if one.shape[2] != output.shape[2]:
             raise ValueError(
-                f"the guide of the sample has {one.shape[2]} channels and that of the output {output.shape[2]}; give as many"
+                f"the guide of the sample has {one.shape[2]} channels and that of the output {output.shape[2]}; "
+                "give as many"
             )
         if one.dtype.kind == "f" and np.isnan(one).any():
-            raise ValueError("the guide of the sample has NaN; give a number everywhere, and NaN in that of the output alone")
+            raise ValueError(
+                "the guide of the sample has NaN; give a number everywhere, and NaN in that of the output alone"
+            )
     if output.shape[:2] != shape:
         raise ValueError(
-            f"the guide of the output is {_size(output)} and the output {shape[0]}x{shape[1]} (rows x columns); give one size"
+            f"the guide of the output is {_size(output)} and the output {shape[0]}x{shape[1]} (rows x columns); "
+            "give one size"
         )
     return tuple(samples), output
 
@@ -177,7 +189,9 @@ def _cast(name: str, values: NDArray[Any], there: Mask, dtype: np.dtype[Any]) ->
     if dtype.kind == "f":
         wrong &= ~np.isfinite(found)
     if wrong.any():
-        raise ValueError(f"{name} holds {kept[wrong][0]}, which the sample's type {dtype} does not; give values of that type")
+        raise ValueError(
+            f"{name} holds {kept[wrong][0]}, which the sample's type {dtype} does not; give values of that type"
+        )
     return np.asarray(found)
 
 

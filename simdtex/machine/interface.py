@@ -74,6 +74,11 @@ class Machine(Protocol):
     name: str
 
     @property
+    def kind(self) -> str:
+        """What the device is: ``"gpu"``, ``"cpu"`` or another, as `simdtex.devices` has it."""
+        ...
+
+    @property
     def launches(self) -> int:
         """Kernels enqueued so far; on the reference, operations."""
         ...

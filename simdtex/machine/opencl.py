@@ -116,6 +116,11 @@ class OpenCL:
         self._programs: dict[tuple[str, str], Any] = {}
         self._kernels: dict[tuple[str, str, str], Any] = {}
 
+    @property
+    def kind(self) -> str:
+        """Of the device."""
+        return self.info.kind
+
     def take(self, form: Form) -> None:
         """Take this form of the inner loop."""
         self.vector, self.step, self.group = form

@@ -23,7 +23,7 @@ class Reference:
         Bytes that distances may take at a time.
     """
 
-    name = "reference (NumPy)"
+    name, kind = "reference (NumPy)", "reference"
 
     def __init__(self, scratch: int = 2**24) -> None:
         self.scratch = scratch

@@ -43,8 +43,7 @@ class Given:
     @cached_property
     def whole(self) -> NDArray[np.bool_]:
         """Sites of which everything is given, (H, W)."""
-        found: NDArray[np.bool_] = self.known.all(-1)
-        return found
+        return np.asarray(self.known.all(-1))
 
     @cached_property
     def partly(self) -> bool:
@@ -58,7 +57,8 @@ class Given:
     def shown(self, picture: NDArray[Any], grid: Grid) -> NDArray[Any]:
         """The picture (rows, cols, C) of a level with what is given at its sites."""
         step = (slice(None, None, grid.spacing),) * 2
-        return np.where(self.known[step], self.values[step], picture)
+        found: NDArray[Any] = np.where(self.known[step], self.values[step], picture)
+        return found
 
 
 class Stand(NamedTuple):

@@ -15,14 +15,19 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.model.pictures import unknown_in
 from simdtex.model.scale import Scale, stretch
 
 UNKNOWN = 2**16 - 1
 """The working level of what nobody knows: it counts for nothing (kernels/common/level.h)."""
 
 
+MOST = 16
+"""Channels of working levels that a variable has, at most: one for each category."""
+
+
 class Planes(NamedTuple):
-    """Working levels of a guide: a (G, rows, cols) array for each picture of the sample, and (G, H, W) of the output."""
+    """Working levels of a guide: (G, rows, cols) arrays for the pictures of the sample, (G, H, W) for the output."""
 
     samples: list[NDArray[np.uint16]]
     output: NDArray[np.uint16]
@@ -75,7 +80,7 @@ class Guide:
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
         """One channel for each of its own; of three labels or more one for each label."""
-        silent = np.isnan(self.output).any(-1) if self.output.dtype.kind == "f" else np.zeros(self.output.shape[:2], bool)
+        silent = unknown_in(self.output)
         parts = [self._channel(channel, silent, spread, top) for channel in range(self.output.shape[-1])]
         counts = zip(*(part.samples for part in parts), strict=True)
         output = np.concatenate([part.output for part in parts])
@@ -101,9 +106,9 @@ class Guide:
             squares = sum(int((one[k].astype(np.int64) ** 2).sum()) for one in unit)
             variance += (n * squares - total * total) / n**2
         most = 1 if self.labels else top
-        height = min(sqrt(self.weight * spread / self.output.shape[-1] / variance) * most, top) if variance else float(top)
-        if self.weight == 0:
-            height = 0.0
+        height = float(top) if self.weight else 0.0
+        if variance:
+            height = min(sqrt(self.weight * spread / self.output.shape[-1] / variance) * most, top)
         return Planes([_scaled(one, height, most) for one in unit], _scaled(wanted, height, most))
 
 
@@ -128,8 +133,7 @@ class Colocated:
     @property
     def channels(self) -> int:
         """At most those of all variables, each with its categories."""
-        found = [np.unique(np.concatenate([s[..., v].ravel() for s in self.samples])) for v in range(self.known.shape[-1])]
-        return sum(max(1, min(len(values), 16)) for values in found)
+        return self.known.shape[-1] * MOST
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
         """The channels of those variables again."""

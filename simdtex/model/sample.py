@@ -55,8 +55,8 @@ class Candidates(NamedTuple):
 class Sample:
     """A sample in working grey levels: one picture, or several one below another.
 
-    Pixels become working levels as `simdtex.model.scale` says. Pixels of the output are taken from the sample itself, or
-    moved from there by the finish in steps of an eighth of a level, so nothing is lost there.
+    Pixels become working levels as `simdtex.model.scale` says. Pixels of the output are taken from the sample itself,
+    or moved from there by the finish in steps of an eighth of a level, so nothing is lost there.
 
     Parameters
     ----------
@@ -288,7 +288,8 @@ class Sample:
         """The number of the picture that pixel indices lie in, or below whose first row they lie."""
         tops = np.array([top for top, *_ in self.boxes])
         row = np.asarray(source) // self.cols - self.margin
-        return np.maximum(np.searchsorted(tops, row, "right") - 1, 0)
+        found: NDArray[np.intp] = np.maximum(np.searchsorted(tops, row, "right") - 1, 0)
+        return found
 
     def reach(self, offsets: NDArray[np.int32], spacing: int) -> NDArray[np.int32]:
         """Pixel offset of each neighbour, (N,), at a level whose sites are `spacing` pixels apart."""
@@ -332,8 +333,9 @@ class Sample:
         )
 
     def place(self, source: NDArray[np.int32]) -> NDArray[np.int32]:
-        """(row, column) in the user's sample of pixel indices, on a last axis, with the number of the picture where
-        there are several; -1 where a pixel has no source.
+        """(row, column) in the user's sample of pixel indices, on a last axis; -1 where a pixel has no source.
+
+        Where there are several pictures, the number of the picture is the third.
         """
         place = np.stack(np.divmod(source, np.int32(self.cols)), -1) - np.int32(self.margin)
         if len(self.boxes) > 1:

@@ -108,7 +108,8 @@ class _Stretched:
         """One channel."""
         if not self.spread:
             return np.zeros((1, *plane.shape), np.int64)
-        return np.rint(self.stretched(plane)[None] * (self.scale / self.spread)).astype(np.int64)
+        found: NDArray[np.int64] = np.rint(self.stretched(plane)[None] * (self.scale / self.spread)).astype(np.int64)
+        return found
 
 
 class _Categories:

@@ -66,7 +66,7 @@ class Neighbourhoods(NamedTuple):
 def gathered(
     sites: NDArray[np.int32], r: NDArray[np.int32], field: Field, beside: Beside
 ) -> tuple[NDArray[np.uint16], NDArray[np.float32]]:
-    """Values (terms, C, S) and their confidences (terms, C or 1, S), of neighbours r (N, S) and, for guides, the site."""
+    """Values (terms, C, S) and their confidences (terms, C or 1, S): of neighbours r (N, S), and of a guide's site."""
     u = (1024 - field.temperature.ravel()[r].astype(np.float32)) / np.float32(1024)
     if beside.own:
         u = np.where((r >= 0) & (field.source.ravel()[r] < 0), u * beside.hard, u)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ class Square(NamedTuple):
     def distance(
         self,
         numbers: NDArray[np.integer],
-        x: NDArray[np.floating],
+        x: NDArray[np.number[Any]],
         u: NDArray[np.float32],
         offsets: NDArray[np.int32],
     ) -> NDArray[np.float32]:

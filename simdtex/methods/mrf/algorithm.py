@@ -89,8 +89,9 @@ def anneal(run: Run, state: State | None = None, watch: Watch | None = None) -> 
 
 
 def begin(run: Run) -> State:
-    """The state before the first level: every site a pixel of the sample at random (2), at temperature 1 (5), but for
-    those whose values are given, at temperature 0.
+    """The state before the first level: every site a pixel of the sample at random (2), at temperature 1 (5).
+
+    Those whose values are given have these, at temperature 0.
     """
     everywhere = run.machine.put(run.sample.positions(np.zeros((1, 2), np.int32), 1))
     field = run.hold(start(run.machine, run.planes, everywhere, Grid(*run.shape), run.seed))

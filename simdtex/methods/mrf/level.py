@@ -199,7 +199,9 @@ class Run:
         novelty = options.novelty * min(1.0, WHOLE / count) if anew else 0.0
         around = int(offsets.max()) * (grid.step if options.phases == "all" else 1)
         fair = sample.fair(*self.where(number))
-        whole = len(offsets) * sample.channels * variance  # what two neighbourhoods differ by that have nothing in common
+        whole = (
+            len(offsets) * sample.channels * variance
+        )  # what two neighbourhoods differ by that have nothing in common
         kinds = (*self._kinds(number), STRICT * whole)
         market = Market((rows.size, cols.size), around, fair, isinstance(proposal, Listed), *kinds)
         independent = self.schedule.independent(grid, offsets)
@@ -227,7 +229,10 @@ class Run:
     @cached_property
     def beside(self) -> Beside:
         """Which channels are guides, and whether each value may be unknown."""
-        guides, hard = len(self.sample.guides), self.laid is not None and bool((self.laid.source < 0)[self.laid.known].any())
+        guides, hard = (
+            len(self.sample.guides),
+            self.laid is not None and bool((self.laid.source < 0)[self.laid.known].any()),
+        )
         centre = np.float32(max(1, round(sqrt(len(self.offsets)) / 2)))
         return Beside(guides, guides > 0 or hard, centre, np.float32(round(8 * sqrt(self.options.data_weight)) / 8))
 

@@ -226,17 +226,16 @@ class Options:
         if self.labels is not None:
             true_or_false("labels", self.labels)
         real("unsure", self.unsure, 0)
-        for name in ("weights", "shares", "proportions"):
-            _numbers(name, getattr(self, name))
+        lists = {"weights": self.weights, "shares": self.shares, "proportions": self.proportions}
+        for name, value in lists.items():
+            _numbers(name, value)
         if not isinstance(self.categorical, bool):
             if not isinstance(self.categorical, tuple) or not self.categorical:
                 raise TypeError(f"categorical must be True, False or a tuple of channels, not {self.categorical!r}")
             for channel in self.categorical:
                 whole("a channel of categorical", channel, 0)
-        if self.pixel == "density":
-            for name in ("categorical", "weights"):
-                if getattr(self, name):
-                    raise ValueError(f'{name} goes with pixels of the sample; give pixel="source"')
+        if self.pixel == "density" and (self.categorical or self.weights):
+            raise ValueError('categories and weights go with pixels of the sample; give pixel="source"')
         if self.categorical and self.finish:
             raise ValueError(f"finish={self.finish:g} takes means, and of categories there are none; leave it out")
 
@@ -246,7 +245,9 @@ class Options:
         kinds = (self.categorical,) * variables if isinstance(self.categorical, bool) else None
         if isinstance(self.categorical, tuple):
             if max(self.categorical) >= variables:
-                raise ValueError(f"categorical names channel {max(self.categorical)} of {variables}; give 0 to {variables - 1}")
+                raise ValueError(
+                    f"categorical names channel {max(self.categorical)} of {variables}; give 0 to {variables - 1}"
+                )
             kinds = tuple(channel in self.categorical for channel in range(variables))
         if self.weights and len(self.weights) != variables:
             raise ValueError(f"there are {len(self.weights)} weights and {variables} variables; give one for each")

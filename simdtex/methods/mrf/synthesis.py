@@ -123,7 +123,9 @@ def check_categories(pictures: Pictures, given: Given | None, options: Options) 
                     f"known has the category {strange[0]} and the sample has {_listed(categories)}; give one of these"
                 )
         if len(categories) > MOST:
-            raise ValueError(f"a variable has {len(categories)} categories; give {MOST} or fewer, or leave categorical out")
+            raise ValueError(
+                f"a variable has {len(categories)} categories; give {MOST} or fewer, or leave categorical out"
+            )
     if options.proportions:
         found = pictures.categories(0)
         if found is None or pictures.pixels[0].shape[-1] > 1:

@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Realisations of a random field that is told by a training image: `simulate`."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from queue import SimpleQueue
+from threading import Lock
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simdtex.envelope import check_shape, restored
+from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
+from simdtex.jobs.inputs import Inputs, check_inputs, check_samples
+from simdtex.machine import Machine, open_machine
+from simdtex.methods import mrf
+from simdtex.options import whole
+from simdtex.random import as_seed
+from simdtex.run import Callback, Simulating
+
+if TYPE_CHECKING:
+    import xarray
+
+AT_ONCE = 4
+"""Realisations that a processor works on at once, at most: each has a queue of its own."""
+
+
+def simulate(
+    training: ArrayLike,
+    n: int,
+    *,
+    shape: tuple[int, int] | None = None,
+    hard: ArrayLike | HardData | str | os.PathLike[str] | None = None,
+    guide: tuple[Any, Any] | None = None,
+    mask: ArrayLike | None = None,
+    first: int = 0,
+    jobs: int | None = None,
+    channel_axis: int | None = None,
+    rng: int | np.random.Generator | None = None,
+    device: str | None = None,
+    callback: Callback | None = None,
+    **options: Any,
+) -> xarray.DataArray:
+    """Realisations that look like a training image and honour data: multiple-point simulation.
+
+    Parameters
+    ----------
+    training : (rows, cols) or, with `channel_axis`, (rows, cols, variables) array; or a list of such
+        The training image, NaN where it is unknown. With ``categorical=True`` its numbers name categories.
+    n : int
+        How many realisations, 1 or more.
+    shape : (int, int), optional
+        Rows and columns of each. None: those of `hard`, where that is an array, else of the training image.
+    hard : array, HardData or path, optional
+        What is known: a masked array, or floats with NaN where nothing is known, of `shape`; or a table ``x,y,value``
+        (`simdtex.read_hard_data`) or its file. Every realisation has these values, to the bit.
+    guide, mask
+        As in `simdtex.synthesize`: secondary data of the training image and of the realisations, and what of the
+        training image may be used.
+    first : int
+        Number of the first realisation.
+    jobs : int, optional
+        Realisations at a time. None: one for each core of a processor, at most 4; on a GPU 1.
+    channel_axis : int, optional
+        The axis of the training image that holds variables; None for one variable.
+    rng : int or numpy.random.Generator, optional
+        The seed. A realisation depends on it and on its own number alone, whatever `n`, `first` and `jobs` are.
+    device : str, optional
+        As in `simdtex.synthesize`.
+    callback : callable, optional
+        Called with a `simdtex.run.Simulating` after every realisation.
+    **options
+        Of the method ``mrf``: see `simdtex.methods.mrf.Options`; ``boundary`` is ``"open"`` by default.
+
+    Returns
+    -------
+    xarray.DataArray
+        Dimensions ``realisation``, ``y`` (row 0 at the top), ``x`` and, with `channel_axis`, ``variable``, in the
+        training image's type. The coordinate ``seed`` is that of each realisation: `simdtex.synthesize` with it gives
+        the same. Attributes: ``seed``, ``options``, ``version``, ``device``, and SHA-256 digests of the arrays,
+        ``training_image``, ``hard_data``, ``guide`` and ``mask``, of those that are given.
+
+    Raises
+    ------
+    ValueError, TypeError
+        What is wrong and what would be right, in one sentence.
+    ModuleNotFoundError
+        xarray is missing; the sentence names the remedy.
+
+    Notes
+    -----
+    Cost: n times that of `simdtex.synthesize`, and of memory n results.
+
+    Examples
+    --------
+    >>> from simdtex.experiments.ensemble import channels
+    >>> import simdtex
+    >>> image = channels((64, 64), 1)
+    >>> found = simdtex.simulate(image, 2, shape=(32, 40), categorical=True, order=8, rng=1)
+    >>> dict(found.sizes)
+    {'realisation': 2, 'y': 32, 'x': 40}
+    """
+    xr = _xarray()
+    whole("n", n, 1)
+    whole("first", first, 0)
+    if jobs is not None:
+        whole("jobs", jobs, 1)
+    data, size = _hard(hard, shape, check_samples(training, channel_axis, mask).pixels[0], channel_axis)
+    inputs = check_inputs(training, size, channel_axis, mask, data, None, guide)
+    chosen = mrf.make_options(**{"boundary": "open", **options})
+    seed = as_seed(rng)
+    seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
+    pixels = inputs.pictures.pixels[0]
+    made = np.empty((n, *size, pixels.shape[2]), pixels.dtype)
+    finished, lock = 0, Lock()
+    machines = _machines(device, jobs, n)
+
+    def one(number: int, machine: Machine) -> None:
+        nonlocal finished
+        made[number], _ = mrf.synthesize(
+            machine, inputs.pictures, size, chosen, int(seeds[number]), None, inputs.given, inputs.guide
+        )
+        with lock:
+            finished += 1
+            if callback:
+                picture = restored(made[number], None if channel_axis is None else -1)
+                told = {"realisation": first + number, "finished": finished, "realisations": n}
+                callback(Simulating(level=0, levels=1, fraction=finished / n, image=lambda: picture, **told))
+
+    _in_turn(one, n, machines)
+    dims, arrays = ["realisation", "y", "x", "variable"], made
+    if channel_axis is None:
+        dims, arrays = dims[:3], made[..., 0]
+    coordinates: dict[str, Any] = {
+        "realisation": np.arange(first, first + n),
+        "y": np.arange(size[0]),
+        "x": np.arange(size[1]),
+        "seed": ("realisation", seeds),
+    }
+    told = _attributes(seed, chosen, machines[0].name, inputs)
+    found: xarray.DataArray = xr.DataArray(arrays, coords=coordinates, dims=dims, name="simulation", attrs=told)
+    return found
+
+
+def realisation_seed(seed: int, number: int) -> int:
+    """The seed of a realisation, from that of the simulation and its number."""
+    return int(np.random.SeedSequence(seed, spawn_key=(number,)).generate_state(1, np.uint64)[0])
+
+
+def _machines(device: str | None, jobs: int | None, n: int) -> list[Machine]:
+    first = open_machine(device)
+    if jobs is None:
+        jobs = 1 if first.kind == "gpu" else min(AT_ONCE, os.cpu_count() or 1)
+    return [first, *(open_machine(device) for _ in range(min(jobs, n) - 1))]
+
+
+def _in_turn(one: Callable[[int, Machine], None], n: int, machines: list[Machine]) -> None:
+    """Each number on a machine that is free; the first error ends it all."""
+    free: SimpleQueue[Machine] = SimpleQueue()
+    for machine in machines:
+        free.put(machine)
+
+    @contextmanager
+    def taken() -> Iterator[Machine]:
+        machine = free.get()
+        try:
+            yield machine
+        finally:
+            free.put(machine)
+
+    def job(number: int) -> None:
+        with taken() as machine:
+            one(number, machine)
+
+    with ThreadPoolExecutor(len(machines)) as workers:
+        futures = [workers.submit(job, number) for number in range(n)]
+        try:
+            for future in futures:
+                future.result()
+        except BaseException:
+            workers.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _hard(
+    hard: Any, shape: tuple[int, int] | None, training: NDArray[Any], channel_axis: int | None
+) -> tuple[NDArray[Any] | None, tuple[int, int]]:
+    """Hard data as an array, and the size of a realisation."""
+    if isinstance(hard, (str, Path, os.PathLike)):
+        hard = read_hard_data(hard)
+    if hard is None or isinstance(hard, HardData):
+        size = check_shape(training.shape[:2] if shape is None else shape)
+        placed = None if hard is None else place_hard_data(hard, size, training.dtype)
+        if placed is not None and channel_axis is not None:
+            placed = np.moveaxis(placed[..., None] if placed.ndim == 2 else placed, -1, channel_axis)
+        return placed, size
+    array = np.ma.asarray(hard)
+    if shape is None and array.ndim == (2 if channel_axis is None else 3):
+        shape = array.shape if channel_axis is None else np.moveaxis(array, channel_axis, -1).shape[:2]
+    return array, check_shape(training.shape[:2] if shape is None else shape)
+
+
+def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) -> dict[str, Any]:
+    from simdtex import __version__
+
+    told: dict[str, Any] = {"seed": seed, "version": __version__, "device": device, "options": vars(options)}
+    told["training_image"] = _digest(*inputs.pictures.pixels)
+    if inputs.given:
+        told["hard_data"] = _digest(np.where(inputs.given.known, inputs.given.values, 0), inputs.given.known)
+    if inputs.guide:
+        told["guide"] = _digest(*inputs.guide[0], inputs.guide[1])
+    if inputs.pictures.usable:
+        told["mask"] = _digest(*inputs.pictures.usable)
+    return told
+
+
+def _digest(*arrays: NDArray[Any]) -> str:
+    """SHA-256 over types, shapes and bytes in C order."""
+    found = hashlib.sha256()
+    for array in arrays:
+        found.update(f"{array.dtype.str}{array.shape}".encode())
+        found.update(np.ascontiguousarray(array).tobytes())
+    return found.hexdigest()
+
+
+def _xarray() -> Any:
+    try:
+        import xarray
+    except ModuleNotFoundError:
+        raise ModuleNotFoundError("xarray is not installed; pip install 'simdtex[simulate]'") from None
+    return xarray
