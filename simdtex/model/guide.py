@@ -133,7 +133,7 @@ class Colocated:
     @property
     def channels(self) -> int:
         """At most those of all variables, each with its categories."""
-        return self.known.shape[-1] * MOST
+        return int(self.known.shape[-1]) * MOST
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
         """The channels of those variables again."""

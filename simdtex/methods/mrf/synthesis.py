@@ -79,9 +79,7 @@ def synthesize(
     the host: about 50 per output pixel.
     """
     launches, worked = machine.launches, machine.seconds
-    pictures = options.of(pixels if isinstance(pixels, Pictures) else Pictures((pixels,)))
-    check_categories(pictures, given, options)
-    run = laid_out(machine, pictures, shape, options, seed, given, check_guide(guide, options))
+    run = laid_out(machine, pixels, shape, options, seed, given, guide)
     observer, state = Observer(run, callback), None
     for level, state, info in anneal(run, watch=observer.part):
         observer.sweep(level, state, info)
@@ -104,7 +102,7 @@ def synthesize(
         "device_seconds": device_seconds(machine, worked),
         "accounting": account.report() | {"emulated": run.emulated, "launches": machine.launches - launches},
         "levels": meter.reports,
-        "use": used(place, pictures),
+        "use": used(place, run.sample.pictures),
     }
     return image, Output(place, temperatures / 1024, observer.stages, statistics)
 
@@ -137,10 +135,8 @@ def check_categories(pictures: Pictures, given: Given | None, options: Options) 
             )
 
 
-def check_guide(guide: tuple[tuple[NDArray[Any], ...], NDArray[Any]] | None, options: Options) -> Guide | None:
+def check_guide(guide: tuple[tuple[NDArray[Any], ...], NDArray[Any]], options: Options) -> Guide:
     """The guide with its kind and weight; raises where it names a label that the sample lacks."""
-    if guide is None:
-        return None
     if options.pixel == "density":
         raise ValueError('a guide chooses among pixels of the sample; give pixel="source"')
     samples, output = guide
@@ -179,19 +175,21 @@ def used(place: NDArray[np.int32], pictures: Pictures) -> dict[str, Any] | None:
 
 def laid_out(
     machine: Machine,
-    pictures: Pictures,
+    pixels: NDArray[Any] | Pictures,
     shape: tuple[int, int],
     options: Options,
     seed: int,
     given: Given | None = None,
-    guide: Guide | None = None,
+    guide: tuple[tuple[NDArray[Any], ...], NDArray[Any]] | None = None,
 ) -> Run:
     """Lay out a run on a machine; the arguments are those of `synthesize`."""
+    pictures = options.of(pixels if isinstance(pixels, Pictures) else Pictures((pixels,)))
+    check_categories(pictures, given, options)
     options = options.resolved(pictures)
     offsets = neighbourhood_offsets(options.order)
     levels = number_of_levels([picture.shape[:2] for picture in pictures.pixels], offsets, shape, options)  # 1
     step = 2 ** (levels - 1)
-    beside: list[Beside] = [guide] if guide else []
+    beside: list[Beside] = [check_guide(guide, options)] if guide else []
     if given and given.partly:
         beside.append(given.colocated(pictures.pixels))
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in beside)
