@@ -134,8 +134,8 @@ def test_a_density_is_left_alone():
 def test_few_pixels_are_up_to_sixteen(count, expected):
     flat = np.arange(300 * 300) % count
     pixels = np.stack([flat, flat * 3], -1).reshape(300, 300, 2).astype(np.int32)
-    assert few(pixels) is expected
-    assert few(pixels[::-1]) is expected
+    assert few((pixels,)) is expected
+    assert few((pixels[::-1],)) is expected
 
 
 @pytest.mark.parametrize("value", [-1, np.inf, "soft"])

@@ -333,7 +333,7 @@ def test_the_draw_of_a_vector_follows_the_density_in_each_channel():
     """P(x) of one channel is the mixture with one factor of the kernel; legal vectors only, so far from the ends."""
     p = problem(6, order=1, channels=2, temperatures="zero", shape=(7, 8))
     levels = (p.sample.levels // 4 + 100).astype(np.uint16)
-    p.sample._lay(levels, p.sample.margin)
+    p.sample._lay([levels], p.sample.margin)
     p = p._replace(field=p.field._replace(values=p.sample.working[:, p.field.source]))
     win, h = p.window(1.0)
     _, values = draw_many(REFERENCE, p, win, True)

@@ -18,6 +18,7 @@ from simdtex.methods.mrf.meter import Meter
 from simdtex.methods.mrf.observers import expected_work
 from simdtex.methods.mrf.synthesis import laid_out
 from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.ops.relax import Everything, Listed
 
@@ -79,7 +80,7 @@ def test_a_list_finds_no_mode_of_a_density():
 
 def test_options_resolve():
     def resolved(**given):
-        found = mrf.make_options(**given).resolved(np.arange(17).reshape(1, 17, 1))
+        found = mrf.make_options(**given).resolved(Pictures((np.arange(17).reshape(1, 17, 1),)))
         return found.search, found.finish
 
     assert resolved() == ("coherent", 1.5)

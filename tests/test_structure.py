@@ -33,7 +33,7 @@ def step(side=60, at=30):
 
 def test_it_falls_towards_an_edge_from_either_side():
     levels = step().astype(np.uint16)
-    found = structure(levels, 1.0, variance(levels), STEPS)
+    found = structure([levels], 1.0, variance(levels), STEPS)[0]
     assert (found == found[0]).all(), "the edge is a column"
     line = found[0].astype(int)
     assert (line == line[::-1]).all()
@@ -46,19 +46,19 @@ def test_it_falls_towards_an_edge_from_either_side():
 @pytest.mark.parametrize("weight", [0.5, 1.0, 2.0])
 def test_its_deviation_is_its_weight_in_those_of_the_sample(weight):
     levels = np.moveaxis(texture((50, 48), 3, seed=2), -1, 0).astype(np.uint16)
-    found = structure(levels, weight, variance(levels), STEPS)
+    found = structure([levels], weight, variance(levels), STEPS)[0]
     assert found.std() == pytest.approx(weight * variance(levels) ** 0.5, rel=0.01)
 
 
 def test_it_keeps_to_the_legal_levels():
     levels = (texture((50, 48), seed=2)[None] // 8 * 8).astype(np.uint16)
-    found = structure(levels, 50.0, variance(levels), STEPS)
+    found = structure([levels], 50.0, variance(levels), STEPS)[0]
     assert (found.min(), found.max()) == (0, STEPS)
 
 
 @pytest.mark.parametrize("levels", [np.full((1, 9, 9), 7), np.zeros((3, 4, 5), int)])
 def test_a_sample_without_an_edge_has_none(levels):
-    assert not structure(levels.astype(np.uint16), 1.0, 1.0, 255).any()
+    assert not structure([levels.astype(np.uint16)], 1.0, 1.0, 255)[0].any()
 
 
 def plainly(levels):
@@ -94,7 +94,7 @@ def test_it_is_the_signed_distance():
     expected = plainly(levels)
     expected -= expected.min()
     scale = variance(levels) ** 0.5 / expected.std()
-    assert np.abs(structure(levels, 1.0, variance(levels), STEPS) - expected * scale).max() <= 1
+    assert np.abs(structure([levels], 1.0, variance(levels), STEPS)[0] - expected * scale).max() <= 1
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])

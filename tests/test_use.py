@@ -8,7 +8,7 @@ from hypothesis import given, settings
 import simdtex
 from simdtex.experiments.quality import source_use
 from simdtex.model.use import counts, effective_use
-from simdtex.ops.use import price, use
+from simdtex.ops.use import Market, price, use
 from simdtex.report.sheet import use_colours
 
 
@@ -59,7 +59,7 @@ def test_the_price_is_the_excess_over_the_fair_share(radius):
     rng = np.random.default_rng(radius)
     counts = rng.integers(0, 4, (7, 9)) * (rng.random((7, 9)) < 0.3)
     counts[2, 3] = 60
-    found = price(counts.ravel(), (7, 9), radius, 12.5)
+    found = price(counts.ravel(), Market((7, 9), radius), 12.5)
     assert found.dtype == np.float32
     assert np.allclose(found, plainly(counts, radius, 12.5), rtol=1e-6, atol=1e-6)
     if radius == 1:
@@ -68,20 +68,20 @@ def test_the_price_is_the_excess_over_the_fair_share(radius):
 
 
 def test_fair_use_costs_nothing():
-    assert not price(np.full(20, 3), (4, 5), 1, 7.0).any()
+    assert not price(np.full(20, 3), Market((4, 5), 1), 7.0).any()
 
 
 def test_a_price_is_the_mean_of_two_sweeps():
     counts, before = np.array([8, 0, 0, 0]), np.array([2, 4, 0, 6, 99], np.float32)
-    assert price(counts, (2, 2), 0, 1.0).tolist() == [3, 0, 0, 0]
-    assert price(counts, (2, 2), 0, 1.0, before).tolist() == [2.5, 2, 0, 3]
+    assert price(counts, Market((2, 2), 0), 1.0).tolist() == [3, 0, 0, 0]
+    assert price(counts, Market((2, 2), 0), 1.0, before).tolist() == [2.5, 2, 0, 3]
 
 
 def test_where_nothing_is_known_nothing_costs():
     nobody = np.zeros(6, np.int32)
-    assert price(nobody, (2, 3), 1, 5.0).tolist() == [0] * 6
-    assert price(nobody + 1, (2, 3), 1, 0.0).tolist() == [0] * 6
-    assert price(nobody, (2, 3), 1, 5.0, np.full(6, 4, np.float32)).tolist() == [2] * 6, "and a price fades"
+    assert price(nobody, Market((2, 3), 1), 5.0).tolist() == [0] * 6
+    assert price(nobody + 1, Market((2, 3), 1), 0.0).tolist() == [0] * 6
+    assert price(nobody, Market((2, 3), 1), 5.0, np.full(6, 4, np.float32)).tolist() == [2] * 6, "and a price fades"
 
 
 def test_a_run_uses_the_sample_more_evenly(cl_device):
