@@ -35,7 +35,7 @@ from simdtex.cli.options import DEVICE, QUIET, SEED, fill_options
     help="Fill with this texture, not with what is around; may be repeated.",
 )
 @click.option(
-    "--reach", type=int, help="Pixels around a hole that it is made from.  [128, or twice the hole's longer side]"
+    "--reach", type=int, help="How far around a hole it is made from, in pixels.  [128, or twice its longer side]"
 )
 @click.option(
     "--also",
@@ -124,10 +124,10 @@ def _hole(path: Path, pixels: NDArray[Any], mask: Path | None) -> tuple[NDArray[
     if pixels.dtype.kind == "f":
         hole = hole | np.isnan(pixels).reshape(*hole.shape, -1).any(-1)
     if not hole.any():
-        remedy = "paint white what is to be made" if mask else "give a --mask that says what is to be made"
-        raise ValueError(f"{what} nowhere, so there is nothing to fill; {remedy}")
+        remedy = "paint white what is to be made" if mask else "say with --mask what is to be made"
+        raise ValueError(f"nothing of {what}, so there is nothing to fill; {remedy}")
     if hole.all():
-        raise ValueError(f"{what} everywhere, so nothing of the picture is known; leave some of it")
+        raise ValueError(f"all of {what}, so nothing of the picture is known; leave some of it")
     return pixels, hole
 
 

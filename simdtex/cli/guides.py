@@ -40,8 +40,8 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> Guides:
         raise ValueError(f"--guide {text} must be SAMPLE-GUIDE=OUTPUT-GUIDE, two files")
     if len(names) != len(samples.pixels):
         raise ValueError(
-            f"--guide {text} has {len(names)} guide{'s' * (len(names) > 1)} of samples and there are "
-            f"{len(samples.pixels)} samples; give one of each, parted by commas, as GUIDE0,GUIDE1=OUTPUT-GUIDE"
+            f"--guide {text} names {len(names)} of the guides that the {len(samples.pixels)} samples have; "
+            "give one of each, parted by commas, as GUIDE0,GUIDE1=OUTPUT-GUIDE"
         )
     paths = tuple(Path(one) for one in names)
     own = [image.read(path).pixels for path in paths]
@@ -96,7 +96,7 @@ def _numbered(
     """Whole numbers in place of the samples' colours; raises where the output has another colour."""
     known = np.unique(np.concatenate([_rows(one) for one in own]), axis=0)
     names = {tuple(colour): number for number, colour in enumerate(known.tolist())}
-    told = np.unique(_rows(wanted[~open_]), axis=0)
+    told = np.unique(wanted[~open_], axis=0)
     strange = [colour for colour in told.tolist() if tuple(colour) not in names]
     if strange:
         more = f" and {len(strange) - 1} more" if len(strange) > 1 else ""

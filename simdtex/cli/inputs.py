@@ -111,12 +111,13 @@ def read_masks(paths: Sequence[Path], samples: Material) -> list[NDArray[np.bool
         return None
     if len(paths) != len(samples.pixels):
         raise ValueError(
-            f"there are {len(samples.pixels)} samples and {len(paths)} masks; give --sample-mask once for each sample"
+            f"--sample-mask is given {len(paths)} times and the number of samples is {len(samples.pixels)}; "
+            "give it once for each sample"
         )
     masks = [image.read_mask(path, shape) for path, shape in zip(paths, samples.sizes, strict=True)]
     if not any(mask.any() for mask in masks):
-        which = "the mask is" if len(masks) == 1 else "the masks are"
-        raise ValueError(f"{which} white nowhere, so nothing of the sample may be used; paint white what may")
+        named = " and ".join(map(str, paths))
+        raise ValueError(f"nothing of {named} is white, so nothing of the sample may be used; paint white what may")
     return masks
 
 
@@ -134,7 +135,7 @@ def _other_map(text: str, samples: Material) -> Also:
         raise ValueError(f"--also {text} must be MAP=OUT, the map's file and the file to write")
     if len(names) != len(samples.pixels):
         raise ValueError(
-            f"--also {text} has {len(names)} map{'s' * (len(names) > 1)} and there are {len(samples.pixels)} samples; "
+            f"--also {text} names {len(names)} of the maps that the {len(samples.pixels)} samples have; "
             "give a map of each, parted by commas, as MAP0,MAP1=OUT"
         )
     maps = read_material([Path(one) for one in names], unknown=True)

@@ -68,17 +68,17 @@ def _shared(name: str, texts: dict[str, str], *methods: str, **kinds: Any) -> Ca
 
 _MRF: dict[str, tuple[Any, str]] = {
     "--preset": (str, "default, or paper: the 1998 rules to the letter."),
-    "--order": (int, "neighbours within sqrt(order): 8 has 24, 18 has 60.  [{mrf.order}]"),
+    "--order": (int, "Neighbours within sqrt(order): 8 has 24, 18 has 60.  [{mrf.order}]"),
     "--relaxation": (str, "icm (the mode) or gibbs (a draw).  [{mrf.relaxation}]"),
-    "--bandwidth": (float, "of the Parzen kernel, in units of h_opt.  [{mrf.bandwidth}]"),
-    "--coherence": (float, "preference for continuing a neighbour's source.  [{mrf.coherence}]"),
-    "--balance": (float, "price of using parts of the sample more than others.  [{mrf.balance}]"),
-    "--structure": (float, "weight of the distance to the sample's edges.  [{mrf.structure}]"),
-    "--novelty": (float, "price of keeping the sample's layout.  [{mrf.novelty}]"),
-    "--overview": (int, "candidates at the coarsest level, at least.  [{mrf.overview}]"),
-    "--finish": (float, "pixels over which seams melt; 0: none.  [1.5; of categories 0]"),
-    "--xi": (float, "cooling, below 0; further down is faster.  [{mrf.xi}]"),
-    "--free-sweeps": (int, "sweeps over all sites after a level's equilibrium.  [{mrf.free_sweeps}]"),
+    "--bandwidth": (float, "Of the Parzen kernel, in units of h_opt.  [{mrf.bandwidth}]"),
+    "--coherence": (float, "Preference for continuing a neighbour's source.  [{mrf.coherence}]"),
+    "--balance": (float, "Price of using parts of the sample more than others.  [{mrf.balance}]"),
+    "--structure": (float, "Weight of the distance to the sample's edges.  [{mrf.structure}]"),
+    "--novelty": (float, "Price of keeping the sample's layout.  [{mrf.novelty}]"),
+    "--overview": (int, "Candidates at the coarsest level, at least.  [{mrf.overview}]"),
+    "--finish": (float, "Pixels over which seams melt; 0: none.  [1.5; of categories 0]"),
+    "--xi": (float, "Cooling, below 0; further down is faster.  [{mrf.xi}]"),
+    "--free-sweeps": (int, "Sweeps over all sites after a level's equilibrium.  [{mrf.free_sweeps}]"),
     "--pixel": (str, "source (pixels of the sample) or density (grey levels).  [{mrf.pixel}]"),
     "--phases": (str, "decimated or all: candidates at coarse levels.  [{mrf.phases}]"),
     "--coarsest": (str, "gibbs or same: how the coarsest level relaxes.  [{mrf.coarsest}]"),
@@ -91,19 +91,19 @@ _MRF: dict[str, tuple[Any, str]] = {
 """Those of ``mrf`` that no other method has."""
 
 _KINDS: dict[str, tuple[Any, str]] = {
-    "--categorical": (None, "values name categories: they differ or not, and are never mixed."),
-    "--categorical-channels": ("N,N,...", "channels, counted from 0, of which only these are categorical."),
-    "--weights": ("W,W,...", "one for each channel, all brought to one spread.  [one scale, as of colours]"),
-    "--shares": ("S,S,...", "one for each of several samples: how much it is used.  [all pixels count alike]"),
-    "--unsure": (float, "share of a pixel's neighbours in the sample that may be unknown.  [{mrf.unsure}]"),
-    "--data-weight": (float, "neighbours that a known pixel counts for.  [{mrf.data_weight:g}]"),
+    "--categorical": (None, "Values name categories: they differ or not, and are never mixed."),
+    "--categorical-channels": ("N,N,...", "The only channels that are categorical, counted from 0."),
+    "--weights": ("W,W,...", "One for each channel, all brought to one spread.  [one scale, as of colours]"),
+    "--shares": ("S,S,...", "One for each of several samples: how much it is used.  [all pixels count alike]"),
+    "--unsure": (float, "Share of a pixel's neighbours in the sample that may be unknown.  [{mrf.unsure}]"),
+    "--data-weight": (float, "Neighbours that a known pixel counts for if it is from no sample.  [{mrf.data_weight:g}]"),
 }
 """What the values of a sample are and count for."""
 
 _WANTED: dict[str, tuple[Any, str]] = {
-    "--proportions": ("P,P,...", "how much of the output each category is to be, in ascending order."),
-    "--guide-weight": (float, "variance of the guide, in units of the sample's.  [{mrf.guide_weight:g}]"),
-    "--labels/--no-labels": (None, "guides are labels, or numbers.  [labels, if they have 16 values or fewer]"),
+    "--proportions": ("P,P,...", "How much of the output each category is to be, in ascending order."),
+    "--guide-weight": (float, "Variance of the guide, in units of the sample's.  [{mrf.guide_weight:g}]"),
+    "--labels/--no-labels": (None, "What guides hold.  [labels, if they have 16 whole numbers or colours or fewer]"),
 }
 """What is wanted of an output as a whole."""
 
@@ -117,7 +117,7 @@ def _worded(
         how: dict[str, Any] = {"is_flag": True, "default": None} if kind is None else {"type": kind}
         how = {"metavar": kind} if isinstance(kind, str) else how
         if name not in without:
-            made.append(option(name, help=prefix + text if prefix else text[0].upper() + text[1:], **how))
+            made.append(option(name, help=prefix + text[0].lower() + text[1:] if prefix else text, **how))
     return made
 
 
@@ -176,25 +176,25 @@ _DEPTH = "Of the multigrid.  [as many as the sample feeds]"
 
 mrf_options = _with(
     *_worded(_MRF),
-    option("--edges", help=_EDGES["mrf"][0].upper() + _EDGES["mrf"][1:]),
+    option("--edges", help=_EDGES["mrf"]),
     option("--levels", type=int, help=_DEPTH),
-    option("--boundary", help="Torus (the result tiles) or open.  [{mrf.boundary}]"),
+    option("--boundary", help="torus (the result tiles) or open.  [{mrf.boundary}]"),
 )
 """The options of the method ``mrf`` that any command takes which makes a whole picture with it."""
 
 fill_options = _with(
     *_worded(_KINDS),
     *_worded(_MRF, without=("--overview",)),
-    option("--edges", help=_EDGES["mrf"][0].upper() + _EDGES["mrf"][1:]),
+    option("--edges", help=_EDGES["mrf"]),
     option("--levels", type=int, help="Of the multigrid.  [as many as it takes to see across the hole]"),
-    option("--boundary", help="Open, or torus: the picture tiles, and its holes go on beyond its edges.  [open]"),
+    option("--boundary", help="open, or torus: the picture tiles, and its holes go on beyond its edges.  [open]"),
 )
 """Those of ``simdtex fill``."""
 
 extend_options = _with(
     *_worded(_KINDS, without=("--shares", "--unsure", "--data-weight")),
     *_worded(_MRF),
-    option("--edges", help=_EDGES["mrf"][0].upper() + _EDGES["mrf"][1:]),
+    option("--edges", help=_EDGES["mrf"]),
     option("--levels", type=int, help=_DEPTH),
 )
 """Those of ``simdtex extend``."""
