@@ -205,7 +205,9 @@ def test_a_material_becomes_seamless(folder, flags, tile):
     photo, source = pixels(folder, "photo.png"), load_source_map(folder / "s.png")
     made = pixels(folder, "out.png")
     assert np.array_equal(made, simdtex.extend(photo, tile=tile, band=3, channel_axis=-1, rng=5, finish=0.0, **OPTIONS))
-    assert np.array_equal(pixels(folder, "normal-out.png"), pixels(folder, "normal.png")[source[..., 0], source[..., 1]])
+    assert np.array_equal(
+        pixels(folder, "normal-out.png"), pixels(folder, "normal.png")[source[..., 0], source[..., 1]]
+    )
     assert np.array_equal(made[3:-3, 3:-3], photo[3:-3, 3:-3])
     assert np.array_equal(made[3:-3], photo[3:-3]) == (tile == "y")
     assert np.array_equal(made[:, 3:-3], photo[:, 3:-3]) == (tile == "x")

@@ -96,7 +96,10 @@ _KINDS: dict[str, tuple[Any, str]] = {
     "--weights": ("W,W,...", "One for each channel, all brought to one spread.  [one scale, as of colours]"),
     "--shares": ("S,S,...", "One for each of several samples: how much it is used.  [all pixels count alike]"),
     "--unsure": (float, "Share of a pixel's neighbours in the sample that may be unknown.  [{mrf.unsure}]"),
-    "--data-weight": (float, "Neighbours that a known pixel counts for if it is from no sample.  [{mrf.data_weight:g}]"),
+    "--data-weight": (
+        float,
+        "Neighbours that a known pixel counts for if it is from no sample.  [{mrf.data_weight:g}]",
+    ),
 }
 """What the values of a sample are and count for."""
 
