@@ -83,7 +83,7 @@ def extend(
 
     `simdtex extend photo.png -o seamless.png --tile` makes of a photo a texture that tiles.
     """
-    from simdtex import filling
+    from simdtex import extend as make
     from simdtex.io import image
     from simdtex.model.source_map import save_source_map
 
@@ -111,7 +111,7 @@ def extend(
 
     began = time.perf_counter()
     with watching(quiet, stages, whole.limits) as callback:
-        extended: Any = filling.extend(
+        extended: Any = make(
             pixels,
             **sides,
             tile=tiling,

@@ -66,7 +66,7 @@ def fill(
 
     Everything outside the holes stays as it is, to the bit.
     """
-    from simdtex import filling
+    from simdtex import fill as make
     from simdtex.io import image
     from simdtex.model.source_map import save_source_map
 
@@ -86,7 +86,7 @@ def fill(
 
     began = time.perf_counter()
     with watching(quiet, None, (0.0, 1.0)) as callback:
-        filled: Any = filling.fill(
+        filled: Any = make(
             pixels,
             hole,
             sample=texture.array if texture else None,
