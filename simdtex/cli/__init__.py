@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command line: ``simdtex synth``, ``solid``, ``mix``, ``sheet``, ``schedules``, ``bench`` and the rest."""
+"""The command line: ``simdtex synth``, ``fill``, ``extend``, ``solid``, ``mix``, ``sheet`` and the rest."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ COMMANDS = {
     "bench": "Measure what devices can do at most, and what the methods take.",
     "demo": "Synthesise brick, grass and gravel from scikit-image's own pictures.",
     "devices": "List every OpenCL device, whether it works, and which one would be chosen.",
+    "extend": "Continue PICTURE beyond its edges, or make it seamless.",
+    "fill": "Fill the holes of PICTURE with more of what is around them.",
     "ising": "Relax Ising spins by each schedule and compare with the exact energy and magnetisation.",
     "mix": "Mix the textures SAMPLE...: a picture that looks a bit like each of them.",
     "schedules": "Run the same job under several schedules and compare them in a report.",

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import click
 
-from simdtex.cli.common import DEVICE, plainly, progress_bar
+from simdtex.cli.common import plainly, progress_bar
+from simdtex.cli.options import DEVICE
 
 
 @click.command()

@@ -10,7 +10,8 @@ from typing import Any
 
 import click
 
-from simdtex.cli.common import DEVICE, command_line, plainly, progress_bar
+from simdtex.cli.common import command_line, plainly, progress_bar
+from simdtex.cli.options import DEVICE
 
 SCHEDULES = (
     "coloring,coloring-fixed,luby,checkerboard,raster,random-scan,"

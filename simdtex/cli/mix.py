@@ -10,10 +10,6 @@ from typing import Any
 import click
 
 from simdtex.cli.common import (
-    DEVICE,
-    PROFILE,
-    QUIET,
-    SEED,
     check_distinct,
     given,
     last_iteration,
@@ -22,10 +18,9 @@ from simdtex.cli.common import (
     output_shape,
     plainly,
     print_profile,
-    pyramid_options,
-    stages_option,
     watching,
 )
+from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
 
 CHOSEN = ("palette", "pattern", "low", "high")
 """Options that name a sample."""

@@ -10,7 +10,8 @@ from typing import Any
 
 import click
 
-from simdtex.cli.common import DEVICE, command_line, given, mrf_options, plainly, progress_bar
+from simdtex.cli.common import command_line, given, plainly, progress_bar
+from simdtex.cli.options import DEVICE, mrf_options
 from simdtex.methods.mrf import Options
 from simdtex.schedules import TOGETHER
 

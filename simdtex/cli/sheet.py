@@ -9,17 +9,8 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.common import (
-    DEVICE,
-    candidates_per_level,
-    check_distinct,
-    given,
-    multires_options,
-    numbers,
-    output_shape,
-    plainly,
-    progress_bar,
-)
+from simdtex.cli.common import candidates_per_level, check_distinct, given, numbers, output_shape, plainly, progress_bar
+from simdtex.cli.options import DEVICE, multires_options
 
 
 @click.command()

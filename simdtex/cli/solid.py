@@ -11,21 +11,8 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.common import (
-    DEVICE,
-    PROFILE,
-    QUIET,
-    SEED,
-    check_distinct,
-    given,
-    last_iteration,
-    opened,
-    plainly,
-    print_profile,
-    pyramid_options,
-    stages_option,
-    watching,
-)
+from simdtex.cli.common import check_distinct, given, last_iteration, opened, plainly, print_profile, watching
+from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
 from simdtex.methods.pyramid import solid as method
 
 DEFAULTS = method.Options()

@@ -10,37 +10,65 @@ from typing import Any
 import click
 
 from simdtex.cli.common import (
-    DEVICE,
-    PROFILE,
-    QUIET,
-    SEED,
     candidates_per_level,
     check_distinct,
     command_line,
     given,
     last_iteration,
-    method_options,
     opened,
-    option,
     output_shape,
     plainly,
     print_profile,
-    stages_option,
     watching,
 )
+from simdtex.cli.guides import read_guides
+from simdtex.cli.inputs import (
+    channels,
+    check_source_map,
+    known_size,
+    known_values,
+    read_also,
+    read_known,
+    read_masks,
+    read_material,
+)
+from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, method_options, option, stages_option
 
 
 @click.command()
-@click.argument("sample", type=click.Path(path_type=Path))
+@click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Picture to write.")
 @click.option(
-    "--size", metavar="WIDTHxHEIGHT", help="Of the output, in pixels. Default: that of --start, else twice the sample."
+    "--size",
+    metavar="WIDTHxHEIGHT",
+    help="Of the output, in pixels. Default: that of the picture of --known, of the output's guide, or of --start, "
+    "else twice the first sample.",
 )
 @click.option(
     "--method",
     default="mrf",
     show_default=True,
     help="mrf: Paget and Longstaff 1998. multires: De Bonet 1997. pyramid: Heeger and Bergen 1995.",
+)
+@click.option(
+    "--sample-mask",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="mrf: a picture of the sample's size, white where pixels may be taken from; once for each sample.",
+)
+@click.option(
+    "--known",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="mrf: what of the output is known and stays: a table of x, y and values (.csv, .tsv, .txt, .dat), or a "
+    "picture that is transparent or NaN where it is not known.",
+)
+@click.option(
+    "--guide",
+    metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
+    help="mrf: two pictures of labels or numbers; a place of the output comes from where the first has what the second "
+    "has there. Of several samples: GUIDE0,GUIDE1=OUTPUT-GUIDE.",
 )
 @method_options
 @option(
@@ -65,7 +93,8 @@ from simdtex.cli.common import (
     "--also",
     multiple=True,
     metavar="MAP=OUT",
-    help="Carry the arrangement over to another map of the material (normal, height); may be repeated.",
+    help="Carry the arrangement over to another map of the material (normal, height); may be repeated. Of several "
+    "samples: MAP0,MAP1=OUT.",
 )
 @click.option(
     "--report",
@@ -77,10 +106,13 @@ from simdtex.cli.common import (
 @QUIET
 @plainly
 def synth(
-    sample: Path,
+    samples: tuple[Path, ...],
     output: Path,
     size: str | None,
     method: str,
+    sample_mask: tuple[Path, ...],
+    known: Path | None,
+    guide: str | None,
     start: Path | None,
     seed: int | None,
     device: str | None,
@@ -93,7 +125,10 @@ def synth(
     quiet: bool,
     **options: Any,
 ) -> None:
-    """Make more of the texture SAMPLE."""
+    """Make more of the texture SAMPLE.
+
+    The method mrf takes several samples of one type, and their pixels may be NaN where they are unknown.
+    """
     from simdtex.io import image
     from simdtex.synthesis import synthesize
 
@@ -101,33 +136,41 @@ def synth(
         raise ValueError(f"--accounting is of the method mrf, not {method}; leave it out")
     if method == "pyramid" and (source_map or also):
         raise ValueError("the method pyramid takes no pixel from the sample; leave --source-map and --also out")
-    picture = image.read(sample)
-    pixels = picture.pixels
-    height, width = pixels.shape[:2]
+    material = read_material(samples, unknown=method == "mrf")
+    pixels = material.pixels[0]
+    masks = read_masks(sample_mask, material)
+    table = read_known(known) if known else None
+    guides = read_guides(guide, material, options["labels"]) if guide else None
     begin = image.read(start).pixels if start else None
-    shape = output_shape(size, pixels, begin)
-    channels = 1 if picture.channel_axis is None else pixels.shape[-1]
-    image.check_writable(output, pixels.dtype, channels)
-    if source_map or also:
-        from simdtex.model import source_map as maps
-    if source_map:
-        image.check_writable(source_map, suffixes=maps.SOURCE_SUFFIXES)
-    others = [_other_map(text, (height, width)) for text in also]
+    shape = output_shape(size, pixels, known_size(table), guides and guides.output, begin)
+    told = known_values(table, known, shape, material) if known and table else None
+    image.check_writable(output, pixels.dtype, channels(pixels))
+    check_source_map(source_map, material, everywhere=told is None)
+    others = read_also(also, material)
+    if others and told is not None:
+        raise ValueError("known pixels are from no sample, and nothing says what a map has there; leave --also out")
     if report:
         from simdtex.report.page import check_folder
 
+        if material.several or told is not None or not material.known:
+            raise ValueError("--report shows one sample, all of it known, and what is taken from it; leave it out")
         check_folder(report)
-    outputs = [output, *(path for path in (source_map, stages, report) if path), *(path for _, path in others)]
-    inputs = [sample, *([start] if start else []), *(Path(text.partition("=")[0]) for text in also)]
-    check_distinct(outputs, inputs)
+    outputs = [output, *(path for path in (source_map, stages, report) if path), *(one.out for one in others)]
+    read = [*samples, *sample_mask, *(path for path in (known, start) if path), *(guides.paths if guides else ())]
+    check_distinct(outputs, [*read, *(path for one in others for path in one.maps.paths)])
+    if guides:
+        options["labels"] = guides.labels
 
     began = time.perf_counter()
-    with watching(quiet, stages, (float(pixels.min()), float(pixels.max()))) as callback:
+    with watching(quiet, stages, material.limits) as callback:
         made, run = synthesize(
-            pixels,
+            material.array,
             shape,
             method=method,
-            channel_axis=picture.channel_axis,
+            channel_axis=material.channel_axis,
+            mask=masks and (masks if material.several else masks[0]),
+            known=told,
+            guide=guides and guides.pair,
             rng=seed,
             device=opened(device, profile),
             callback=callback,
@@ -135,19 +178,23 @@ def synth(
             **given(options | {"start": begin}),
         )
     source: Any = run.source
-    carried = [(maps.apply_source_map(source, other, (height, width)), path) for other, path in others]
+    carried = [(one.carried(source), one.out) for one in others]
     image.write(output, made)
     for array, path in carried:
         image.write(path, array)
     if source_map:
-        maps.save_source_map(source_map, source)
+        from simdtex.model.source_map import save_source_map
+
+        save_source_map(source_map, source)
     if report:
         from simdtex.report.synthesis import write_synthesis
 
         write_synthesis(report, pixels, made, run, command_line(click.get_current_context()))
     if not quiet:
+        height, width = material.sizes[0]
+        by = f"{len(samples)} samples" if material.several else f"{width}x{height}"
         click.echo(
-            f"{output}: {shape[1]}x{shape[0]} from {width}x{height} in {time.perf_counter() - began:.1f} s "
+            f"{output}: {shape[1]}x{shape[0]} from {by} in {time.perf_counter() - began:.1f} s "
             f"on {run.statistics['device']}, seed {run.statistics['seed']}"
         )
         if method == "multires":
@@ -164,21 +211,3 @@ def synth(
         from simdtex.report.accounting import render
 
         render(run.statistics["accounting"], Console())
-
-
-def _other_map(text: str, sample: tuple[int, int]) -> tuple[Any, Path]:
-    """Read the map of ``--also MAP=OUT`` and check that it can be carried over and written."""
-    from simdtex.io import image
-
-    name, equals, out = text.partition("=")
-    if not (name and equals and out):
-        raise ValueError(f"--also {text} must be MAP=OUT, the map's file and the file to write")
-    other = image.read(name)
-    pixels = other.pixels
-    if pixels.shape[:2] != sample:
-        raise ValueError(
-            f"{name} is {pixels.shape[1]}x{pixels.shape[0]} and the sample {sample[1]}x{sample[0]}; "
-            "give --also a map of the sample's size"
-        )
-    image.check_writable(out, pixels.dtype, 1 if other.channel_axis is None else pixels.shape[-1])
-    return pixels, Path(out)

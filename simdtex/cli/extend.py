@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex extend``: a picture beyond its edges, or without a seam."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from simdtex.cli.common import check_distinct, command_line, given, plainly, watching
+from simdtex.cli.inputs import channels, check_source_map, read_also, read_material
+from simdtex.cli.options import DEVICE, QUIET, SEED, extend_options, stages_option
+
+SIDES = ("top", "bottom", "left", "right")
+
+
+@click.command()
+@click.argument("picture", type=click.Path(path_type=Path))
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Picture to write.")
+@click.option("--left", type=int, default=0, help="Pixels to add at the left.")
+@click.option("--right", type=int, default=0, help="Pixels to add at the right.")
+@click.option("--top", type=int, default=0, help="Pixels to add at the top.")
+@click.option("--bottom", type=int, default=0, help="Pixels to add at the bottom.")
+@click.option(
+    "--size",
+    metavar="WIDTHxHEIGHT",
+    help="Of the output, in pixels, in place of the above: the rest is added at the right and at the bottom.",
+)
+@click.option("--centre", is_flag=True, help="With --size: add on all sides alike.")
+@click.option(
+    "--tile",
+    is_flag=True,
+    help="Make it seamless: the output tiles. In a direction in which nothing is added, a band along the edges is made "
+    "anew.",
+)
+@click.option("--tile-x", is_flag=True, help="The same for left and right alone.")
+@click.option("--tile-y", is_flag=True, help="The same for top and bottom alone.")
+@click.option(
+    "--band",
+    type=int,
+    help="Pixels that --tile makes anew along each edge.  [an eighth of the shorter side, 8 to 64]",
+)
+@click.option(
+    "--also",
+    multiple=True,
+    metavar="MAP=OUT",
+    help="Extend another map of the material (normal, height) in the same arrangement; may be repeated.",
+)
+@click.option("--source-map", type=click.Path(path_type=Path), metavar="FILE", help="Write it: .npz, .npy, .png.")
+@stages_option("every level and sweep")
+@click.option(
+    "--report",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Write a page of the run: pictures, and how evenly it uses the picture.",
+)
+@SEED
+@DEVICE
+@extend_options
+@QUIET
+@plainly
+def extend(
+    picture: Path,
+    output: Path,
+    size: str | None,
+    centre: bool,
+    tile: bool,
+    tile_x: bool,
+    tile_y: bool,
+    band: int | None,
+    also: tuple[str, ...],
+    source_map: Path | None,
+    stages: Path | None,
+    report: Path | None,
+    seed: int | None,
+    device: str | None,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Continue PICTURE beyond its edges, or make it seamless.
+
+    `simdtex extend photo.png -o seamless.png --tile` makes of a photo a texture that tiles.
+    """
+    from simdtex import extend as make
+    from simdtex.io import image
+    from simdtex.model.source_map import save_source_map
+
+    whole = read_material([picture])
+    pixels = whole.pixels[0]
+    sides = {name: options.pop(name) for name in SIDES}
+    if size:
+        sides = _sides(size, centre, sides, whole.sizes[0])
+    elif centre:
+        raise ValueError("--centre says where the picture lies in --size; give that too")
+    tiling: bool | str = tile or (tile_x and tile_y) or ("x" if tile_x else "y" if tile_y else False)
+    if not (tiling or any(sides.values())):
+        raise ValueError("there is nothing to add; give --left, --right, --top, --bottom or --size, or --tile")
+    if band is not None and not tiling:
+        raise ValueError("--band is what --tile makes anew; leave it out, or give --tile")
+    others = read_also(also, whole)
+    image.check_writable(output, pixels.dtype, channels(pixels))
+    check_source_map(source_map, whole)
+    if report:
+        from simdtex.report.page import check_folder
+
+        check_folder(report)
+    outputs = [output, *(path for path in (source_map, stages, report) if path), *(one.out for one in others)]
+    check_distinct(outputs, [picture, *(path for one in others for path in one.maps.paths)])
+
+    began = time.perf_counter()
+    with watching(quiet, stages, whole.limits) as callback:
+        extended: Any = make(
+            pixels,
+            **sides,
+            tile=tiling,
+            band=band,
+            channel_axis=whole.channel_axis,
+            rng=seed,
+            device=device,
+            callback=callback,
+            full_output=True,
+            **given(options),
+        )
+    made, run = extended
+    carried = [(one.carried(run.source), one.out) for one in others]
+    image.write(output, made)
+    for array, path in carried:
+        image.write(path, array)
+    if source_map:
+        save_source_map(source_map, run.source)
+    if report:
+        from simdtex.report.synthesis import write_synthesis
+
+        write_synthesis(report, pixels, made, run, command_line(click.get_current_context()))
+    if not quiet:
+        (rows, cols), (height, width) = whole.sizes[0], made.shape[:2]
+        click.echo(
+            f"{output}: {width}x{height} from {cols}x{rows} in {time.perf_counter() - began:.1f} s "
+            f"on {run.statistics['device']}, seed {run.statistics['seed']}"
+        )
+
+
+def _sides(text: str, centre: bool, sides: dict[str, int], shape: tuple[int, int]) -> dict[str, int]:
+    """What is to be added on each side for an output of this size."""
+    from simdtex.io.image import parse_size
+
+    if any(sides.values()):
+        raise ValueError("--size says how much is added; leave --left, --right, --top and --bottom out")
+    more = [new - old for new, old in zip(parse_size(text), shape, strict=True)]
+    if min(more) < 0:
+        raise ValueError(
+            f"--size {text} is smaller than the picture of {shape[1]}x{shape[0]}; give no less, or crop it first"
+        )
+    top, left = (more[0] // 2, more[1] // 2) if centre else (0, 0)
+    return {"top": top, "bottom": more[0] - top, "left": left, "right": more[1] - left}

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex fill``: the holes of a picture."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.cli.common import check_distinct, given, plainly, watching
+from simdtex.cli.inputs import Material, channels, check_alike, check_source_map, read_also, read_material
+from simdtex.cli.options import DEVICE, QUIET, SEED, fill_options
+
+
+@click.command()
+@click.argument("picture", type=click.Path(path_type=Path))
+@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Picture to write.")
+@click.option(
+    "--mask",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="A picture of the same size, white where there is to be something new. Default: what is transparent or NaN in "
+    "PICTURE, and the output has no alpha.",
+)
+@click.option(
+    "--sample",
+    "samples",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Fill with this texture, not with what is around; may be repeated.",
+)
+@click.option(
+    "--reach", type=int, help="How far around a hole it is made from, in pixels.  [128, or twice its longer side]"
+)
+@click.option(
+    "--also",
+    multiple=True,
+    metavar="MAP=OUT",
+    help="Fill another map of the material (normal, height) in the same arrangement; may be repeated.",
+)
+@click.option("--source-map", type=click.Path(path_type=Path), metavar="FILE", help="Write it: .npz, .npy, .png.")
+@SEED
+@DEVICE
+@fill_options
+@QUIET
+@plainly
+def fill(
+    picture: Path,
+    output: Path,
+    mask: Path | None,
+    samples: tuple[Path, ...],
+    reach: int | None,
+    also: tuple[str, ...],
+    source_map: Path | None,
+    seed: int | None,
+    device: str | None,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Fill the holes of PICTURE with more of what is around them.
+
+    Everything outside the holes stays as it is, to the bit.
+    """
+    from simdtex import fill as make
+    from simdtex.io import image
+    from simdtex.model.source_map import save_source_map
+
+    whole = read_material([picture], unknown=True)
+    pixels, hole = _hole(picture, whole.pixels[0], mask)
+    texture = read_material(samples, unknown=True) if samples else None
+    if texture:
+        _check_texture(texture, picture, pixels)
+        if also:
+            raise ValueError("with --sample no pixel comes from the picture, nor from its maps; leave --also out")
+    others = read_also(also, whole)
+    image.check_writable(output, pixels.dtype, channels(pixels))
+    check_source_map(source_map, texture or whole, everywhere=not texture)
+    outputs = [output, *([source_map] if source_map else []), *(one.out for one in others)]
+    read = [picture, *([mask] if mask else []), *samples, *(path for one in others for path in one.maps.paths)]
+    check_distinct(outputs, read)
+
+    began = time.perf_counter()
+    with watching(quiet, None, (0.0, 1.0)) as callback:
+        filled: Any = make(
+            pixels,
+            hole,
+            sample=texture.array if texture else None,
+            reach=reach,
+            channel_axis=None if pixels.ndim == 2 else -1,
+            rng=seed,
+            device=device,
+            callback=callback,
+            full_output=True,
+            **given(options),
+        )
+    made, run = filled
+    carried = [(one.carried(run.source), one.out) for one in others]
+    image.write(output, made)
+    for array, path in carried:
+        image.write(path, array)
+    if source_map:
+        save_source_map(source_map, run.source)
+    if not quiet:
+        click.echo(
+            f"{output}: {np.count_nonzero(hole)} of {hole.size} pixels filled in {time.perf_counter() - began:.1f} s "
+            f"on {run.statistics['device']}, seed {run.statistics['seed']}"
+        )
+
+
+def _hole(path: Path, pixels: NDArray[Any], mask: Path | None) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """The picture, and where it is to be made: where the mask is white or, without one, it is transparent; or NaN."""
+    from simdtex.io.image import read_mask, split_alpha
+
+    if mask:
+        hole, what = read_mask(mask, pixels.shape), f"{mask} is white"
+    else:
+        pixels, hole = split_alpha(pixels)
+        what = f"{path} is transparent or NaN"
+    if pixels.dtype.kind == "f":
+        hole = hole | np.isnan(pixels).reshape(*hole.shape, -1).any(-1)
+    if not hole.any():
+        remedy = "paint white what is to be made" if mask else "say with --mask what is to be made"
+        raise ValueError(f"nothing of {what}, so there is nothing to fill; {remedy}")
+    if hole.all():
+        raise ValueError(f"all of {what}, so nothing of the picture is known; leave some of it")
+    return pixels, hole
+
+
+def _check_texture(texture: Material, picture: Path, pixels: NDArray[Any]) -> None:
+    """Raise unless the samples are of the picture's type, and bring them to its axes."""
+    check_alike(texture.paths[0], texture.pixels[0], picture, pixels)
+    texture.pixels[:] = [one.reshape(*one.shape[:2], *pixels.shape[2:]) for one in texture.pixels]

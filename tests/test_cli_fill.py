@@ -1,0 +1,244 @@
+"""``simdtex fill`` and ``simdtex extend``, end to end."""
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import simdtex
+from simdtex.cli import main
+from simdtex.io import image
+from simdtex.model.source_map import load_source_map
+
+OPTIONS = {"order": 2, "device": "reference"}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A picture, a map of the same material, a mask, and textures to fill with."""
+    rng = np.random.default_rng(1)
+    noise = rng.integers(0, 256, (24, 32, 3), dtype=np.uint8)
+    mask = np.zeros((24, 32), np.uint8)
+    mask[8:14, 10:17] = 255
+    image.write(tmp_path / "photo.png", noise)
+    image.write(tmp_path / "normal.png", rng.integers(0, 65536, (24, 32, 3), dtype=np.uint16))
+    image.write(tmp_path / "mask.png", mask)
+    image.write(tmp_path / "cut.png", np.dstack([np.where(mask[..., None] > 0, 9, noise), 255 - mask]).astype(np.uint8))
+    image.write(tmp_path / "texture.png", rng.integers(0, 256, (20, 16, 3), dtype=np.uint8))
+    image.write(tmp_path / "another.png", rng.integers(0, 256, (16, 20, 3), dtype=np.uint8))
+    image.write(tmp_path / "grey.png", noise[..., 0])
+    image.write(tmp_path / "white.png", np.full((24, 32), 255, np.uint8))
+    image.write(tmp_path / "black.png", np.zeros((24, 32), np.uint8))
+    image.write(tmp_path / "small.png", mask[:20])
+    holed = noise[..., 0].astype(np.float32)
+    holed[mask > 0] = np.nan
+    image.write(tmp_path / "holed.tif", holed)
+    image.write(tmp_path / "nothing.tif", np.full((24, 32), np.nan, np.float32))
+    return tmp_path
+
+
+def run(folder, *args):
+    """Run a command; what ends like a file is one of the folder."""
+    placed = [placed_in(folder, str(arg)) for arg in args]
+    return CliRunner().invoke(main, placed)
+
+
+def placed_in(folder, text):
+    if not text.endswith((".png", ".tif", ".npz", ".npy", ".jpg", ".csv")):
+        return text
+    return "=".join(",".join(f"{folder}/{name}" for name in part.split(",")) for part in text.split("="))
+
+
+def small(folder, command, *args):
+    return run(folder, command, *args, "--order", 2, "--seed", 5, "--device", "reference")
+
+
+def listing(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+
+def pixels(folder, name):
+    return image.read(folder / name, unknown=True).pixels
+
+
+def refused(folder, command, args, words):
+    before = listing(folder)
+    result = small(folder, command, *args)
+    assert result.exit_code == 2, result.output
+    assert words in result.output
+    assert len(result.output.strip().splitlines()) == 1
+    assert listing(folder) == before
+
+
+# ---------------------------------------------------------------- fill
+
+
+def test_fill_gives_the_bytes_of_the_function(folder):
+    args = ("photo.png", "--mask", "mask.png", "-o", "out.png", "--reach", 6, "--structure", 0.5)
+    result = small(folder, "fill", *args)
+    assert result.exit_code == 0, result.output
+    assert "42 of 768 pixels" in result.output and "seed 5" in result.output
+    photo, hole = pixels(folder, "photo.png"), pixels(folder, "mask.png") > 0
+    wanted = simdtex.fill(photo, hole, channel_axis=-1, rng=5, reach=6, structure=0.5, **OPTIONS)
+    made = pixels(folder, "out.png")
+    assert np.array_equal(made, wanted)
+    assert np.array_equal(made[~hole], photo[~hole]) and not np.array_equal(made, photo)
+
+
+def test_what_is_transparent_is_a_mask(folder):
+    small(folder, "fill", "photo.png", "--mask", "mask.png", "-o", "masked.png", "-q")
+    result = small(folder, "fill", "cut.png", "-o", "out.png", "-q")
+    assert result.exit_code == 0 and result.output == ""
+    made = pixels(folder, "out.png")
+    assert made.shape == (24, 32, 3)
+    assert np.array_equal(made, pixels(folder, "masked.png"))
+
+
+def test_alpha_beside_a_mask_is_a_channel(folder):
+    assert small(folder, "fill", "cut.png", "--mask", "mask.png", "-o", "out.npy").exit_code == 0
+    made, cut = pixels(folder, "out.npy"), pixels(folder, "cut.png")
+    assert made.shape == (24, 32, 4) and (made[..., 3] == 255).all()
+    assert np.array_equal(made[cut[..., 3] > 0], cut[cut[..., 3] > 0])
+
+
+def test_nan_is_a_mask(folder):
+    assert small(folder, "fill", "holed.tif", "-o", "out.tif").exit_code == 0
+    made, holed = pixels(folder, "out.tif"), pixels(folder, "holed.tif")
+    assert np.array_equal(made[~np.isnan(holed)], holed[~np.isnan(holed)])
+    assert np.array_equal(made, simdtex.fill(holed, rng=5, **OPTIONS))
+    assert not np.isnan(made).any()
+
+
+def test_fill_carries_other_maps_along(folder):
+    args = ["--mask", "mask.png", "-o", "out.png", "--also", "normal.png=normal-out.png", "--source-map", "s.npz"]
+    result = small(folder, "fill", "photo.png", *args, "--finish", 0)
+    assert result.exit_code == 0, result.output
+    source = load_source_map(folder / "s.npz")
+    for name, out in (("photo.png", "out.png"), ("normal.png", "normal-out.png")):
+        assert np.array_equal(pixels(folder, out), pixels(folder, name)[source[..., 0], source[..., 1]])
+    hole = pixels(folder, "mask.png") > 0
+    assert np.array_equal(pixels(folder, "normal-out.png")[~hole], pixels(folder, "normal.png")[~hole])
+
+
+def test_fill_with_other_textures(folder):
+    args = ["--mask", "mask.png", "-o", "out.png", "--sample", "texture.png", "--sample", "another.png"]
+    result = small(folder, "fill", "photo.png", *args, "--source-map", "s.npz", "--finish", 0, "--shares", "1,3")
+    assert result.exit_code == 0, result.output
+    source, hole = load_source_map(folder / "s.npz"), pixels(folder, "mask.png") > 0
+    textures = [pixels(folder, "texture.png"), pixels(folder, "another.png")]
+    made = pixels(folder, "out.png")
+    assert (source[~hole] == -1).all()
+    assert {int(number) for number in source[hole][:, 2]} == {0, 1}
+    for row, col in np.argwhere(hole):
+        i, j, number = source[row, col]
+        assert np.array_equal(made[row, col], textures[number][i, j])
+
+
+MASKED = ["photo.png", "--mask", "mask.png", "-o", "out.png"]
+BAD_FILL = {
+    "no alpha and no mask": (["photo.png", "-o", "out.png"], "--mask"),
+    "a mask of nothing": (["photo.png", "--mask", "black.png", "-o", "out.png"], "nothing to fill"),
+    "a mask of everything": (["photo.png", "--mask", "white.png", "-o", "out.png"], "nothing of the picture is known"),
+    "a mask of another size": (["photo.png", "--mask", "small.png", "-o", "out.png"], "32 x 24"),
+    "nothing known": (["nothing.tif", "-o", "out.tif"], "leave it out"),
+    "a missing picture": (["none.png", "-o", "out.png"], "does not exist"),
+    "a missing mask": (["photo.png", "--mask", "none.png", "-o", "out.png"], "does not exist"),
+    "a grey sample": ([*MASKED, "--sample", "grey.png"], "convert them to one type"),
+    "a sample of 16 bits": ([*MASKED, "--sample", "normal.png"], "3 channels of uint16"),
+    "samples of two kinds": ([*MASKED, "--sample", "texture.png", "--sample", "grey.png"], "convert them"),
+    "maps beside a sample": ([*MASKED, "--sample", "texture.png", "--also", "normal.png=n.png"], "leave --also out"),
+    "a map of another size": ([*MASKED, "--also", "small.png=n.png"], "32x24"),
+    "a source map that holds no -1": ([*MASKED, "--sample", "texture.png", "--source-map", "s.png"], ".npz"),
+    "the mask overwritten": (["photo.png", "--mask", "mask.png", "-o", "mask.png"], "would be overwritten"),
+    "the picture overwritten": (["photo.png", "--mask", "mask.png", "-o", "photo.png"], "would be overwritten"),
+    "the sample overwritten": (
+        ["photo.png", "--mask", "mask.png", "--sample", "texture.png", "-o", "texture.png"],
+        "would be overwritten",
+    ),
+    "the map overwritten": ([*MASKED, "--also", "normal.png=normal.png"], "would be overwritten"),
+    "one file for two": ([*MASKED, "--also", "normal.png=out.png"], "written twice"),
+    "reach": ([*MASKED, "--reach", 0], "reach is 0"),
+    "weights of too many": ([*MASKED, "--weights", "1,2"], "2 weights and 3 variables"),
+    "weights in words": ([*MASKED, "--weights", "much"], "numbers parted by commas"),
+    "shares without samples": ([*MASKED, "--shares", "1,2"], "2 shares and 1 samples"),
+    "channels in words": ([*MASKED, "--categorical-channels", "red"], "channels parted by commas"),
+    "all channels and some": ([*MASKED, "--categorical", "--categorical-channels", "0"], "give one of them"),
+    "a format without colour": (["photo.png", "--mask", "mask.png", "-o", "out.gif"], "cannot hold"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_FILL)
+def test_bad_fills_get_one_sentence_and_write_nothing(folder, case):
+    args, words = BAD_FILL[case]
+    refused(folder, "fill", args, words)
+
+
+# ---------------------------------------------------------------- extend
+
+
+def test_extend_gives_the_bytes_of_the_function(folder):
+    sides = ["--left", 3, "--right", 2, "--top", 1, "--bottom", 4]
+    result = small(folder, "extend", "photo.png", "-o", "out.png", *sides)
+    assert result.exit_code == 0, result.output
+    assert "37x29 from 32x24" in result.output
+    photo, made = pixels(folder, "photo.png"), pixels(folder, "out.png")
+    wanted = simdtex.extend(photo, left=3, right=2, top=1, bottom=4, channel_axis=-1, rng=5, **OPTIONS)
+    assert np.array_equal(made, wanted)
+    assert np.array_equal(made[1:25, 3:35], photo)
+
+
+@pytest.mark.parametrize(("centre", "at"), [([], (0, 0)), (["--centre"], (2, 3))])
+def test_a_size_adds_at_the_right_and_at_the_bottom(folder, centre, at):
+    result = small(folder, "extend", "photo.png", "-o", "out.png", "--size", "38x29", *centre)
+    assert result.exit_code == 0, result.output
+    made = pixels(folder, "out.png")
+    assert made.shape == (29, 38, 3)
+    assert np.array_equal(made[at[0] : at[0] + 24, at[1] : at[1] + 32], pixels(folder, "photo.png"))
+
+
+@pytest.mark.parametrize(
+    ("flags", "tile"), [(["--tile"], True), (["--tile-x"], "x"), (["--tile-y"], "y"), (["--tile-x", "--tile-y"], True)]
+)
+def test_a_material_becomes_seamless(folder, flags, tile):
+    args = ["photo.png", "-o", "out.png", *flags, "--band", 3, "--also", "normal.png=normal-out.png", "--finish", 0]
+    result = small(folder, "extend", *args, "--source-map", "s.png")
+    assert result.exit_code == 0, result.output
+    photo, source = pixels(folder, "photo.png"), load_source_map(folder / "s.png")
+    made = pixels(folder, "out.png")
+    assert np.array_equal(made, simdtex.extend(photo, tile=tile, band=3, channel_axis=-1, rng=5, finish=0.0, **OPTIONS))
+    assert np.array_equal(
+        pixels(folder, "normal-out.png"), pixels(folder, "normal.png")[source[..., 0], source[..., 1]]
+    )
+    assert np.array_equal(made[3:-3, 3:-3], photo[3:-3, 3:-3])
+    assert np.array_equal(made[3:-3], photo[3:-3]) == (tile == "y")
+    assert np.array_equal(made[:, 3:-3], photo[:, 3:-3]) == (tile == "x")
+
+
+def test_extend_shows_what_it_did(folder):
+    args = ["--tile", "--band", 3, "--stages", folder / "stages", "--report", folder / "report"]
+    result = small(folder, "extend", "photo.png", "-o", "out.png", *args)
+    assert result.exit_code == 0, result.output
+    assert (folder / "stages" / "sheet.png").is_file()
+    assert "simdtex extend" in (folder / "report" / "index.html").read_text(encoding="utf-8")
+
+
+PHOTO = ["photo.png", "-o", "out.png"]
+BAD_EXTEND = {
+    "nothing to add": (PHOTO, "--tile"),
+    "fewer than none": ([*PHOTO, "--left", -3], "left is -3"),
+    "smaller": ([*PHOTO, "--size", "30x40"], "smaller than the picture of 32x24"),
+    "the size it has": ([*PHOTO, "--size", "32x24"], "nothing to add"),
+    "a size and sides": ([*PHOTO, "--size", "40x40", "--left", 3], "leave --left"),
+    "a centre of nothing": ([*PHOTO, "--left", 3, "--centre"], "--size"),
+    "a band of nothing": ([*PHOTO, "--left", 3, "--band", 3], "--tile"),
+    "a band of everything": ([*PHOTO, "--tile", "--band", 12], "band=12"),
+    "a map of another size": ([*PHOTO, "--tile", "--also", "small.png=n.png"], "32x24"),
+    "NaN": (["holed.tif", "-o", "out.tif", "--left", 3], "fill them first"),
+    "the picture overwritten": (["photo.png", "-o", "photo.png", "--tile"], "would be overwritten"),
+    "the map overwritten": ([*PHOTO, "--tile", "--also", "normal.png=normal.png"], "would be overwritten"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_EXTEND)
+def test_bad_extensions_get_one_sentence_and_write_nothing(folder, case):
+    args, words = BAD_EXTEND[case]
+    refused(folder, "extend", args, words)

@@ -1,0 +1,288 @@
+"""``simdtex synth`` with several samples, masks, known values and guides, end to end."""
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import simdtex
+from simdtex.cli import main
+from simdtex.io import image
+from simdtex.model.source_map import load_source_map
+
+OPTIONS = {"order": 2, "rng": 5, "device": "reference"}
+RED, BLUE, GREEN = (255, 0, 0), (0, 0, 255), (0, 255, 0)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Samples, masks, tables, pictures of known values, and guides."""
+    rng = np.random.default_rng(2)
+    noise = rng.integers(0, 256, (24, 20), dtype=np.uint8)
+    noise[:, 10:] //= 4  # a bright half and a dark one
+    write = {
+        "sample.png": noise,
+        "second.png": rng.integers(0, 256, (16, 28), dtype=np.uint8),
+        "colour.png": rng.integers(0, 256, (24, 20, 3), dtype=np.uint8),
+        "normal.png": rng.integers(0, 65536, (24, 20, 3), dtype=np.uint16),
+        "normal2.png": rng.integers(0, 65536, (16, 28, 3), dtype=np.uint16),
+        "facies.tif": (noise > 90).astype(np.uint8) * np.uint8(3),
+        "left.png": np.where(np.arange(20) < 10, np.uint8(255), np.uint8(0)) * np.ones((24, 1), np.uint8),
+        "all.png": np.full((16, 28), 255, np.uint8),
+        "none.png": np.zeros((24, 20), np.uint8),
+    }
+    known = rng.integers(0, 256, (14, 20), dtype=np.uint8)
+    there = np.zeros((14, 20), bool)
+    there[5:9, 4:12] = True
+    write["known.png"] = np.dstack([known, there * np.uint8(255)])
+    write["known.tif"] = np.where(there, known, np.nan).astype(np.float32)
+    write["known16.png"] = np.dstack([known * np.uint16(257), there * np.uint16(65535)])
+    write["colourful.png"] = np.dstack([known, known, known, there * np.uint8(255)])
+    write["unknown.png"] = np.dstack([known, there * np.uint8(0)])
+    write["unknown.tif"] = np.where(there, np.nan, 7.5).astype(np.float32)
+    labels = np.zeros((24, 20, 3), np.uint8)
+    labels[:, :10], labels[:, 10:] = RED, BLUE
+    wanted = np.zeros((16, 18, 3), np.uint8)
+    wanted[:, :], wanted[3:13, 4:15] = RED, BLUE
+    strange = wanted.copy()
+    strange[0, 0] = GREEN
+    open_ = np.dstack([wanted, np.where(np.arange(18) < 12, np.uint8(255), np.uint8(0)) * np.ones((16, 1), np.uint8)])
+    write |= {"labels.png": labels, "wanted.png": wanted, "strange.png": strange, "open.png": open_}
+    write["labels2.png"] = np.broadcast_to(np.array(BLUE, np.uint8), (16, 28, 3))
+    write |= {"grey.png": labels[..., 0], "grey-strange.png": wanted[..., 0] // 2}
+    for name, pixels in write.items():
+        image.write(tmp_path / name, pixels)
+    tables = {
+        "wells.csv": "x,y,value\n3,4,200\n10.4,7,17\n",
+        "outside.csv": "x,y,value\n3,4,200\n40,7,17\n",
+        "disagree.csv": "x,y,value\n3,4,200\n3.2,4.1,17\n",
+        "beyond.csv": "x,y,value\n3,4,300\n",
+        "two.csv": "x,y,a,b\n3,4,200,1\n",
+        "strange.csv": "x,y,facies\n3,4,1\n",
+    }
+    for name, text in tables.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def run(folder, *args):
+    """Run a command; what ends like a file is one of the folder."""
+    placed = [placed_in(folder, str(arg)) for arg in args]
+    return CliRunner().invoke(main, placed)
+
+
+def placed_in(folder, text):
+    if not text.endswith((".png", ".tif", ".npz", ".npy", ".csv")):
+        return text
+    return "=".join(",".join(f"{folder}/{name}" for name in part.split(",")) for part in text.split("="))
+
+
+def synth(folder, *args):
+    return run(folder, "synth", *args, "--order", 2, "--seed", 5, "--device", "reference")
+
+
+def made(folder, *args):
+    result = synth(folder, *args)
+    assert result.exit_code == 0, result.output
+    return pixels(folder, "out.tif")
+
+
+def pixels(folder, name):
+    return image.read(folder / name, unknown=True).pixels
+
+
+def listing(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+
+# ---------------------------------------------------------------- samples and their masks
+
+
+def test_several_samples_and_maps_of_them(folder):
+    args = ["sample.png", "second.png", "-o", "out.tif", "--size", "18x16", "--shares", "1,2", "--finish", 0]
+    also = ["--also", "normal.png,normal2.png=carried.png", "--source-map", "s.npz"]
+    out = made(folder, *args, *also)
+    samples = [pixels(folder, "sample.png"), pixels(folder, "second.png")]
+    assert np.array_equal(out, simdtex.synthesize(samples, (16, 18), shares=(1, 2), finish=0.0, **OPTIONS))
+    source = load_source_map(folder / "s.npz")
+    maps = [pixels(folder, "normal.png"), pixels(folder, "normal2.png")]
+    carried = pixels(folder, "carried.png")
+    assert set(np.unique(source[..., 2])) == {0, 1}
+    for k, other in enumerate(maps):
+        here = source[..., 2] == k
+        assert np.array_equal(carried[here], other[source[here][:, 0], source[here][:, 1]])
+
+
+def test_a_mask_says_what_may_be_used(folder):
+    args = ["sample.png", "-o", "out.tif", "--size", "22x18", "--sample-mask", "left.png", "--source-map", "s.npz"]
+    out = made(folder, *args)
+    assert load_source_map(folder / "s.npz")[..., 1].max() < 10
+    mask = pixels(folder, "left.png") > 0
+    assert np.array_equal(out, simdtex.synthesize(pixels(folder, "sample.png"), (18, 22), mask=mask, **OPTIONS))
+
+
+def test_each_sample_has_its_mask(folder):
+    masks = ["--sample-mask", "none.png", "--sample-mask", "all.png"]
+    made(folder, "sample.png", "second.png", "-o", "out.tif", "--size", 20, *masks, "--source-map", "s.npz")
+    assert (load_source_map(folder / "s.npz")[..., 2] == 1).all()
+
+
+def test_a_sample_may_be_unknown_in_parts(folder):
+    unknown = pixels(folder, "unknown.tif")
+    out = made(
+        folder, "unknown.tif", "-o", "out.tif", "--stages", folder / "stages", "--unsure", 0.5, "--size", "24x20"
+    )
+    assert np.array_equal(out, simdtex.synthesize(unknown, (20, 24), unsure=0.5, **OPTIONS))
+    assert (out == 7.5).all()
+    refused = synth(folder, "unknown.tif", "-o", "again.tif", "--method", "multires")
+    assert refused.exit_code == 2 and "fill them first" in refused.output
+
+
+# ---------------------------------------------------------------- known values
+
+
+def test_a_table_is_kept(folder):
+    args = ["sample.png", "-o", "out.tif", "--size", "20x14", "--known", "wells.csv", "--data-weight", 4]
+    out = made(folder, *args, "--source-map", "s.npz")
+    assert out[4, 3] == 200 and out[7, 10] == 17
+    known = simdtex.place_hard_data([[3, 4, 200], [10.4, 7, 17]], (14, 20), "uint8")
+    sample = pixels(folder, "sample.png")
+    assert np.array_equal(out, simdtex.synthesize(sample, (14, 20), known=known, data_weight=4.0, **OPTIONS))
+    assert (load_source_map(folder / "s.npz")[4, 3] == -1).all()
+
+
+@pytest.mark.parametrize("name", ["known.png", "known.tif"])
+def test_a_picture_says_what_is_known_and_how_large_the_output_is(folder, name):
+    out = made(folder, "sample.png", "-o", "out.tif", "--known", name)
+    known = pixels(folder, "known.tif")
+    there = ~np.isnan(known)
+    assert out.shape == (14, 20) and out.dtype == np.uint8
+    assert np.array_equal(out[there], known[there])
+    assert np.array_equal(out, simdtex.synthesize(pixels(folder, "sample.png"), (14, 20), known=known, **OPTIONS))
+
+
+def test_categories_are_never_mixed(folder):
+    args = ["facies.tif", "-o", "out.tif", "--size", 16]
+    out = made(folder, *args, "--categorical")
+    facies = pixels(folder, "facies.tif")
+    assert set(np.unique(out)) <= {0, 3}
+    assert np.array_equal(out, simdtex.synthesize(facies, (16, 16), categorical=True, **OPTIONS))
+    assert np.array_equal(made(folder, *args, "--categorical-channels", 0), out)
+
+
+def test_channels_have_weights(folder):
+    out = made(folder, "colour.png", "-o", "out.tif", "--size", 16, "--weights", "1,0.5,2")
+    colour = pixels(folder, "colour.png")
+    wanted = simdtex.synthesize(colour, (16, 16), channel_axis=-1, weights=(1, 0.5, 2), **OPTIONS)
+    assert np.array_equal(out, wanted)
+
+
+# ---------------------------------------------------------------- guides
+
+
+def numbered(picture):
+    return (picture[..., 2] > 0).astype(np.uint8)
+
+
+def test_colours_are_labels(folder):
+    args = ["sample.png", "-o", "out.tif", "--guide", "labels.png=wanted.png", "--source-map", "s.npz"]
+    out = made(folder, *args, "--guide-weight", 4, "--novelty", 0)
+    sample, labels, wanted = (pixels(folder, name) for name in ("sample.png", "labels.png", "wanted.png"))
+    guide = numbered(labels), numbered(wanted)
+    found = simdtex.synthesize(sample, (16, 18), guide=guide, guide_weight=4.0, novelty=0.0, **OPTIONS)
+    assert np.array_equal(out, found)
+    source = load_source_map(folder / "s.npz")
+    assert (numbered(labels)[source[..., 0], source[..., 1]] == guide[1]).mean() > 0.9
+
+
+def test_colours_are_numbers_where_it_says_so(folder):
+    args = ["sample.png", "-o", "out.tif", "--guide", "labels.png=strange.png", "--no-labels"]
+    sample, labels, wanted = (pixels(folder, name) for name in ("sample.png", "labels.png", "strange.png"))
+    found = simdtex.synthesize(sample, (16, 18), guide=(labels, wanted), labels=False, **OPTIONS)
+    assert np.array_equal(made(folder, *args), found)
+
+
+def test_what_is_transparent_in_the_guide_of_the_output_is_left_open(folder):
+    out = made(folder, "sample.png", "-o", "out.tif", "--guide", "labels.png=open.png")
+    wanted = numbered(pixels(folder, "wanted.png")).astype(float)
+    wanted[:, 12:] = np.nan
+    guide = numbered(pixels(folder, "labels.png")), wanted
+    sample = pixels(folder, "sample.png")
+    assert np.array_equal(out, simdtex.synthesize(sample, (16, 18), guide=guide, labels=True, **OPTIONS))
+
+
+def test_each_sample_has_its_guide(folder):
+    args = ["sample.png", "second.png", "-o", "out.tif", "--guide", "labels.png,labels2.png=wanted.png"]
+    out = made(folder, *args)
+    samples = [pixels(folder, "sample.png"), pixels(folder, "second.png")]
+    guides = [numbered(pixels(folder, name)) for name in ("labels.png", "labels2.png")]
+    guide = guides, numbered(pixels(folder, "wanted.png"))
+    assert np.array_equal(out, simdtex.synthesize(samples, (16, 18), guide=guide, **OPTIONS))
+
+
+# ---------------------------------------------------------------- what is wrong
+
+
+OUT = ["-o", "out.tif"]
+ONE, TWO = ["sample.png", *OUT], ["sample.png", "second.png", *OUT]
+CATEGORIES = ["facies.tif", *OUT, "--categorical"]
+BAD = {
+    "samples of two kinds": (["sample.png", "colour.png", *OUT], "colour.png has 3 channels of uint8"),
+    "samples of another method": ([*TWO, "--method", "pyramid"], "takes one sample"),
+    "known values of another method": ([*ONE, "--method", "multires", "--known", "known.png"], "no known values"),
+    "an option of another method": ([*ONE, "--method", "multires", "--unsure", 1], "unknown option 'unsure'"),
+    "shares of one": ([*ONE, "--shares", "1,2"], "2 shares and 1 samples"),
+    "shares of nothing": ([*TWO, "--shares", "0,0"], "above 0"),
+    "a mask too few": ([*TWO, "--sample-mask", "left.png"], "once for each sample"),
+    "a mask too many": ([*ONE, "--sample-mask", "left.png", "--sample-mask", "all.png"], "once for each sample"),
+    "a mask of another size": ([*ONE, "--sample-mask", "all.png"], "20 x 24"),
+    "a mask of nothing": ([*ONE, "--sample-mask", "none.png"], "nothing of the sample may be used"),
+    "a map too few": ([*TWO, "--also", "normal.png=n.png"], "MAP0,MAP1=OUT"),
+    "maps of two kinds": ([*TWO, "--also", "normal.png,second.png=n.png"], "convert them to one type"),
+    "maps of another size": ([*TWO, "--also", "normal.png,normal.png=n.png"], "28x16"),
+    "a report of several": ([*TWO, "--report", "report"], "leave it out"),
+    "a missing table": ([*ONE, "--known", "nothing.csv"], "does not exist"),
+    "data outside": ([*ONE, "--known", "outside.csv"], "outside of a picture"),
+    "data that disagree": ([*ONE, "--known", "disagree.csv"], "line 2 and line 3"),
+    "data beyond the type": ([*ONE, "--known", "beyond.csv"], "uint8 cannot hold"),
+    "data of two variables": ([*ONE, "--known", "two.csv"], "2 values to a datum"),
+    "an unknown category": ([*CATEGORIES, "--known", "strange.csv"], "has the category 1"),
+    "known in 16 bits": ([*ONE, "--known", "known16.png"], "convert them to one type"),
+    "known in colour": ([*ONE, "--known", "colourful.png"], "4 channels of uint8"),
+    "known everywhere": ([*ONE, "--known", "second.png"], "nothing is left to do"),
+    "known nowhere": ([*ONE, "--known", "unknown.png"], "known nowhere"),
+    "known of another size": ([*ONE, "--known", "known.png", "--size", "20x20"], "20x14"),
+    "maps of what is known": ([*ONE, "--known", "known.png", "--also", "normal.png=n.png"], "leave --also out"),
+    "a report of what is known": ([*ONE, "--known", "known.png", "--report", "report"], "leave it out"),
+    "a source map that holds no -1": ([*ONE, "--known", "known.png", "--source-map", "s.png"], ".npz"),
+    "one guide alone": ([*ONE, "--guide", "labels.png"], "SAMPLE-GUIDE=OUTPUT-GUIDE"),
+    "a guide too few": ([*TWO, "--guide", "labels.png=wanted.png"], "GUIDE0,GUIDE1"),
+    "a guide of another size": ([*ONE, "--guide", "labels2.png=wanted.png"], "28x16"),
+    "a size beside a guide": ([*ONE, "--guide", "labels.png=wanted.png", "--size", 20], "16x18"),
+    "guides of two kinds": ([*ONE, "--guide", "grey.png=wanted.png"], "as many channels"),
+    "a strange colour": ([*ONE, "--guide", "labels.png=strange.png"], "the colour (0, 255, 0)"),
+    "a strange label": ([*ONE, "--guide", "grey.png=grey-strange.png"], "asks for the label 127"),
+    "weights of too many": ([*ONE, "--weights", "1,2"], "2 weights and 1 variables"),
+    "proportions in words": ([*CATEGORIES, "--proportions", "half"], "numbers parted by commas"),
+    "proportions of too many": ([*CATEGORIES, "--proportions", "1,2,3"], "3 proportions and 2 categories"),
+    "categories of a photo": ([*ONE, "--categorical"], "categories; give 16 or fewer"),
+    "the mask overwritten": (["sample.png", "--sample-mask", "left.png", "-o", "left.png"], "overwritten"),
+    "the data overwritten": (["sample.png", "--known", "known.png", "-o", "known.png"], "overwritten"),
+    "the guide overwritten": (["sample.png", "--guide", "grey.png=grey.png", "-o", "grey.png"], "overwritten"),
+    "the second sample overwritten": (["sample.png", "second.png", "-o", "second.png"], "overwritten"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_gets_one_sentence_and_writes_nothing(folder, case):
+    args, words = BAD[case]
+    before = listing(folder)
+    result = synth(folder, *args)
+    assert result.exit_code == 2, result.output
+    assert words in result.output
+    assert len(result.output.strip().splitlines()) == 1
+    assert listing(folder) == before
+
+
+def test_a_sample_is_asked_for(folder):
+    result = run(folder, "synth", "-o", "out.png")
+    assert result.exit_code == 2 and "SAMPLE" in result.output
