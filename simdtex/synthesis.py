@@ -91,7 +91,8 @@ def synthesize(
         ``coherence``, ``balance``, ``structure``, ``novelty``, ``finish``, ``xi``, ``free_sweeps``, ``pixel``,
         ``phases``, ``edges``, ``coarsest``, ``schedule``, ``check_schedule``, ``boundary``, ``array``, ``mapping``,
         ``search``, ``suggesting``, ``similar``, ``chance``, ``exhaustive``, ``emulate``, ``categorical``, ``weights``,
-        ``shares``, ``proportions``, ``guide_weight``, ``labels``, ``unsure``; see
+        ``shares``, ``proportions``, ``data_weight``, ``guide_weight``, ``labels``,
+        ``unsure``; see
         `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``strain``, ``target``, ``thresholds``,
         ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``phase``, ``boundary``, ``edges``,
         ``joins``; see `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``, ``levels``, ``orientations``,

@@ -346,7 +346,7 @@ def test_draws_are_legal_where_half_of_the_kernel_is_not():
     black = np.zeros((6, 6), np.uint8)
     black[0, 0] = 1
     p = problem(1, order=1)
-    p.sample._lay(black[None].astype(np.uint16), 0)
+    p.sample._lay([black[None].astype(np.uint16)], 0)
     p = p._replace(field=p.field._replace(source=np.zeros_like(p.field.source), values=p.field.values * 0))
     for h in (0.5, 40.0, 1e6):
         win = lcpdf.window(h, 255)
@@ -459,7 +459,7 @@ def test_draws_near_the_ends_of_the_levels_have_the_references_bits(machine):
     """A wide kernel around black and white pixels."""
     p = problem(8, order=1, channels=3, shape=(9, 9))
     extremes = np.where(p.sample.levels > 127, 255, 0).astype(np.uint16)
-    p.sample._lay(extremes, 0)
+    p.sample._lay([extremes], 0)
     win = lcpdf.window(90.0, 255)
 
     def run(m):

@@ -96,8 +96,8 @@ def test_a_sample_of_sixteen_different_pixels_is_a_map_of_categories():
     late[299, 284:, 1] = np.arange(16)  # in its last few pixels, and one of them is the 0 of all others
     for changed, finish in ((16, 0.0), (17, 1.5)):
         late[0, 0] = (7, 0) if changed == 17 else 0
-        assert mrf.make_options().resolved(late).finish == finish
-    assert mrf.make_options(finish=1.5).resolved(late[1:]).finish == 1.5
+        assert mrf.make_options().resolved(Pictures((late,))).finish == finish
+    assert mrf.make_options(finish=1.5).resolved(Pictures((late[1:],))).finish == 1.5
 
 
 # -- levels -------------------------------------------------------------------------------------------------------
@@ -139,11 +139,11 @@ def test_how_many_levels(sample, shape, given, expected):
     options = mrf.make_options(**{"overview": 64} | given)
     offsets = neighbourhood_offsets(options.order)
     if isinstance(expected, int):
-        assert number_of_levels(sample, offsets, shape, options) == expected
+        assert number_of_levels([sample], offsets, shape, options) == expected
     else:
         words = f"levels={options.levels} is too many for this sample, output and order; {expected}"
         with pytest.raises(ValueError, match=f"^{words}$"):
-            number_of_levels(sample, offsets, shape, options)
+            number_of_levels([sample], offsets, shape, options)
 
 
 def prepared(machine=REFERENCE, **given):

@@ -375,7 +375,8 @@ def with_value(value):
 
 BAD = [
     # the sample
-    ({"sample": with_value(np.nan)}, ValueError, "NaN|not finite"),
+    ({"sample": np.full((9, 9), np.nan)}, ValueError, "no known pixel"),
+    ({"sample": with_value(np.nan), "method": "multires"}, ValueError, "known everywhere"),
     ({"sample": with_value(np.inf)}, ValueError, "infinite|not finite"),
     ({"sample": with_value(-np.inf)}, ValueError, "infinite|not finite"),
     ({"sample": np.zeros((0, 5), np.uint8)}, ValueError, "empty"),

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 Mask = NDArray[np.bool_]
 
@@ -90,6 +89,8 @@ def completed(picture: NDArray[Any], unknown: Mask) -> NDArray[Any]:
     """The picture (rows, cols, C) with each unknown pixel replaced by the nearest known one."""
     if not unknown.any():
         return picture
-    row, col = ndimage.distance_transform_edt(unknown, return_distances=False, return_indices=True)
+    from scipy.ndimage import distance_transform_edt  # only where something is unknown: it takes long to load
+
+    row, col = distance_transform_edt(unknown, return_distances=False, return_indices=True)
     filled: NDArray[Any] = np.ascontiguousarray(picture[row, col])
     return filled
