@@ -194,6 +194,16 @@ fill_options = _with(
 )
 """Those of ``simdtex fill``."""
 
+simulate_options = _with(
+    *_worded(_KINDS),
+    *_worded(_WANTED),
+    *_worded(_MRF),
+    option("--edges", help=_EDGES["mrf"]),
+    option("--levels", type=int, help=_DEPTH),
+    option("--boundary", help="open, or torus: realisations tile.  [open]"),
+)
+"""Those of ``simdtex simulate``."""
+
 extend_options = _with(
     *_worded(_KINDS, without=("--shares", "--unsure", "--data-weight")),
     *_worded(_MRF),
