@@ -40,13 +40,6 @@ _JSON = "simdtex_json"
 """The attribute that lists those attributes which are JSON."""
 
 _RESERVED = frozenset(
-<<<<<<< HEAD
-    ("_FillValue", "missing_value", "scale_factor", "add_offset", "dtype", "_Unsigned", "coordinates", _JSON)
-)
-"""Attributes by which the formats say how numbers are stored."""
-
-# suffix: the modules needed, and a type that the format lacks
-=======
     (
         *("missing_value", "scale_factor", "add_offset", "dtype", "coordinates"),
         *("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"),
@@ -58,7 +51,6 @@ _RESERVED = frozenset(
 # suffix: bytes of the floats that the format holds; .npz holds all
 _FLOATS = {".zarr": (2, 4, 8), ".zarr.zip": (2, 4, 8), ".nc": (4, 8)}
 # suffix: the modules needed beside xarray
->>>>>>> h-b
 _NEEDED = {".zarr": ("zarr",), ".zarr.zip": ("zarr",), ".nc": ("h5py", "h5netcdf"), ".npz": ()}
 _CHUNK = 2**22  # bytes of a chunk, about, and many realisations or a part of one at most
 
@@ -97,16 +89,9 @@ def check_realisations_path(path: PathLike, dtype: DTypeLike | None = None) -> N
         image.check_writable(target, suffixes={f".{suffix.rpartition('.')[2]}"})
         if suffix == ".zarr" and target.exists():
             raise ValueError(f"{target} is a file: give another name for the folder of the store")
-<<<<<<< HEAD
-    if suffix == ".nc" and dtype is not None and np.dtype(dtype) == np.float16:
-        raise ValueError(f"{target}: .nc cannot hold float16 values: end its name in .zarr or .npz instead")
-    if dtype is not None and np.dtype(dtype) == np.longdouble and np.dtype(dtype) != np.float64 and suffix != ".npz":
-        raise ValueError(f"{target}: {suffix} cannot hold {np.dtype(dtype)} values: end its name in .npz instead")
-=======
     kind = np.dtype(np.uint8 if dtype is None else dtype)
     if kind.kind == "f" and kind.itemsize not in _FLOATS.get(suffix, (kind.itemsize,)):
         raise ValueError(f"{target}: {suffix} cannot hold {kind} values: end its name in .npz instead")
->>>>>>> h-b
     _libraries(suffix)
 
 
@@ -193,10 +178,6 @@ def _check_dimensions(array: DataArray) -> None:
         raise ValueError(f"the realisations have the shape {array.shape}: give one pixel at least")
     if array.dtype.kind not in "buif":
         raise TypeError(f"the realisations hold {array.dtype} values: give integers or real floats")
-<<<<<<< HEAD
-    if array.name is not None and (not isinstance(array.name, str) or not array.name or array.name in array.coords):
-        raise ValueError(f"the name of the realisations is {array.name!r}: give a text that no coordinate has, or None")
-=======
     name = _NAME if array.name is None else array.name
     if not isinstance(name, str) or not name or "/" in name:
         raise ValueError(f"the name of the realisations is {name!r}: give a text without '/', or None")
@@ -204,7 +185,6 @@ def _check_dimensions(array: DataArray) -> None:
         raise ValueError(
             f"{name!r} is the name of the realisations and of one of their coordinates: rename one of them"
         )
->>>>>>> h-b
 
 
 def _plain_coordinate(name: Hashable, coordinate: DataArray) -> Array:
@@ -228,11 +208,7 @@ def _plain_attributes(attributes: Mapping[Any, Any]) -> dict[str, Any]:
     for name in attributes:
         if not isinstance(name, str) or not name or "\0" in name:
             raise TypeError(f"the attribute {name!r} has no text for a name: rename it")
-<<<<<<< HEAD
-        if name in _RESERVED:
-=======
         if name in _RESERVED or name.startswith("_"):
->>>>>>> h-b
             raise ValueError(f"the attribute {name} has a name that the file formats use themselves: rename it")
     return {name: _plain(value, name) for name, value in attributes.items()}
 
