@@ -128,12 +128,8 @@ def main():
     options = parser.parse_args()
     try:
         settings = {"fill": {}} | {text: over_folder.parsed(text) for text in options.options}
-        if options.samples:
-            known = samples.folder(options.samples, options.only)
-        else:
-            known = {**samples.grey(), **samples.colour()}
-            known = {name: known[name] for name in (options.only.split(",") if options.only else known)}
-    except (ValueError, KeyError) as error:
+        known = samples.chosen(options.samples, options.only)
+    except ValueError as error:
         parser.error(str(error))
     machine = simdtex.open_machine(options.device)
     print(f"device: {machine.name}")
@@ -159,23 +155,23 @@ def main():
     report(results, options.csv)
 
 
-def report(results, path):
+def report(results, path, figures=FIGURES):
     """Print the means over seeds and holes, and write them as a table."""
     labels = list(dict.fromkeys(label for _, _, label, _, _ in results))
     names = list(dict.fromkeys(name for name, *_ in results))
     shapes = list(dict.fromkeys(shape for _, shape, *_ in results))
     table = Table()
-    header = ["picture", "filling", *FIGURES]
+    header = ["picture", "filling", *figures]
     for column in header:
-        table.add_column(column, justify="right" if column in FIGURES else "left", no_wrap=True)
+        table.add_column(column, justify="right" if column in figures else "left", no_wrap=True)
     lines = []
     groups = [(name, lambda r, name=name: r[0] == name) for name in names]
-    groups += [(f"all, {shape}", lambda r, shape=shape: r[1] == shape) for shape in shapes]
+    groups += [(f"all, {shape}", lambda r, shape=shape: r[1] == shape) for shape in shapes if len(shapes) > 1]
     groups += [("all", lambda r: True)]
     for title, of in groups:
         for label in labels:
             those = [r[4] for r in results if of(r) and r[2] == label]
-            values = [[one[figure] for one in those if figure in one] for figure in FIGURES]
+            values = [[one[figure] for one in those if figure in one] for figure in figures]
             lines.append([title, label, *(f"{np.mean(each):.2f}" if each else "" for each in values)])
             table.add_row(*lines[-1], end_section=label == labels[-1])
     Console(width=None if sys.stdout.isatty() else 120).print(table)
