@@ -20,6 +20,7 @@ import argparse
 import csv
 import sys
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +56,7 @@ def holes(shape):
     found["scratch"] = np.zeros(shape, bool)
     waypoints = [(0.2, 0.12), (0.35, 0.4), (0.62, 0.55), (0.8, 0.9)]
     corners = [(round(r * rows), round(c * cols)) for r, c in waypoints]
-    for first, second in zip(corners, corners[1:], strict=False):
+    for first, second in pairwise(corners):
         for down in (-1, 0, 1):
             line = draw.line(first[0] + down, first[1], second[0] + down, second[1])
             found["scratch"][line] = True

@@ -44,6 +44,8 @@ contact_sheet(
     folder / "sheet.png",
     columns=3,
 )
-twice = [(label, np.tile(picture, (2, 2))) for label, picture in (("as it is, 2 x 2", gravel), ("seamless, 2 x 2", tile))]
+twice = [
+    (label, np.tile(picture, (2, 2))) for label, picture in (("as it is, 2 x 2", gravel), ("seamless, 2 x 2", tile))
+]
 contact_sheet(twice, folder / "tile-sheet.png", columns=2)
 print(f"filled.png, wider.png, tile.png and two sheets are in {folder}")
