@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Simulates channels by code with and without hard data, and prints what it takes and how like the training image it is.
+"""Simulates channels with and without hard data: prints what it takes, and how like the training image it is.
 
 python benchmarks/simulation.py [--side 250] [-n 50] [--data 0 50 500] [--jobs N] [--device TEXT] [--pictures DIR]
 
@@ -81,8 +81,8 @@ def main():
         ends, own = found.dead_ends[1, :-1].mean(), found.dead_ends[1, -1]  # the training image comes last
         single = sum(alone(one, known) for one in made) / len(made) if count else 0
         print(
-            f"{count:4} {apart[count][0]:7.3f}s {apart[count][1]:6.2f} {seconds:8.1f}s {found.shares[1, :-1].mean():6.3f}"
-            f" {ends:5.2f}/{own:.2f} {single:6.1f} {found.misses.sum() if count else 0:7.0f}"
+            f"{count:4} {apart[count][0]:7.3f}s {apart[count][1]:6.2f} {seconds:8.1f}s"
+            f" {found.shares[1, :-1].mean():6.3f} {ends:5.2f}/{own:.2f} {single:6.1f} {found.misses.sum() if count else 0:7.0f}"
             f" {found.anodi.variety:8.3f} {found.anodi.likeness:9.3f} {found.anodi.ratio:6.2f}"
         )
         if options.pictures:
@@ -90,7 +90,10 @@ def main():
             share = share_maps(made, [0, 1])[1]
             shown = [np.rint(255 * one).astype(np.uint8) for one in (image, *made[:2], share)]
             gap = np.full((side, 6), 128, np.uint8)
-            write(options.pictures / f"channels-{count}.png", np.hstack([part for one in shown for part in (one, gap)][:-1]))
+            write(
+                options.pictures / f"channels-{count}.png",
+                np.hstack([part for one in shown for part in (one, gap)][:-1]),
+            )
 
 
 if __name__ == "__main__":
