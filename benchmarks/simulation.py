@@ -90,10 +90,8 @@ def main():
             share = share_maps(made, [0, 1])[1]
             shown = [np.rint(255 * one).astype(np.uint8) for one in (image, *made[:2], share)]
             gap = np.full((side, 6), 128, np.uint8)
-            write(
-                options.pictures / f"channels-{count}.png",
-                np.hstack([part for one in shown for part in (one, gap)][:-1]),
-            )
+            parts = [part for one in shown for part in (one, gap)][:-1]
+            write(options.pictures / f"channels-{count}.png", np.hstack(parts))
 
 
 if __name__ == "__main__":
