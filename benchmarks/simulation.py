@@ -82,8 +82,8 @@ def main():
         single = sum(alone(one, known) for one in made) / len(made) if count else 0
         print(
             f"{count:4} {apart[count][0]:7.3f}s {apart[count][1]:6.2f} {seconds:8.1f}s"
-            f" {found.shares[1, :-1].mean():6.3f} {ends:5.2f}/{own:.2f} {single:6.1f} {found.misses.sum() if count else 0:7.0f}"
-            f" {found.anodi.variety:8.3f} {found.anodi.likeness:9.3f} {found.anodi.ratio:6.2f}"
+            f" {found.shares[1, :-1].mean():6.3f} {ends:5.2f}/{own:.2f} {single:6.1f}"
+            f" {found.misses.sum() if count else 0:7.0f} {found.anodi.variety:8.3f} {found.anodi.likeness:9.3f} {found.anodi.ratio:6.2f}"
         )
         if options.pictures:
             options.pictures.mkdir(parents=True, exist_ok=True)
