@@ -33,7 +33,7 @@ def material(pictures, o, mask=None, known=None, known_source=None, guide=None):
 
     Y.whole = None if known is None else ~np.ma.getmaskarray(known).any(-1)
     partly = None if known is None else ~np.ma.getmaskarray(known) & ~Y.whole[..., None]
-    colocated = known is not None and partly.any()
+    colocated = known is not None and bool(partly.any())
     beside = ([] if guide is None else [labelled(guide, o)]) + [None] * colocated
     N, channels = len(plain.offsets(o.order)), sum(1 if c is None else one_hot(c) for c in Y.categories)
     channels += bool(o.structure) + sum(COLOCATED * len(Y.variables) if g is None else channels_of(g) for g in beside)
