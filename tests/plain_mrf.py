@@ -539,7 +539,7 @@ def picture(Y, X):
         n, k, m = X.source[i, j].tolist()
         if n >= 0:
             step = int(X.x[c][i, j] - Y.planes[n][c][k, m]) if Y.direct else 0
-            image[i, j, c] = moved(Y, (n, k, m, c), step, Y.unit)
+            image[i, j, c] = moved(Y, (n, k, m, c), step, Y.unit[c])
     return image
 
 
@@ -569,7 +569,7 @@ def finished(Y, X, o):
                     sums[c] += weight * int(Y.planes[n][c][k, m] - Y.planes[own[0]][c][own[1:]])
         for c in range(len(Y.variables)):
             step = (2 * fine * sums[c] + total) // (2 * total)
-            image[i, j, c] = moved(Y, (*own, c), step, Y.unit / fine)
+            image[i, j, c] = moved(Y, (*own, c), step, Y.unit[c] / fine)
     return image
 
 

@@ -78,9 +78,10 @@ def lay(Y, levels, o):
     """Where the pictures lie below one another, with margins, in one canvas: their first rows, its size and width."""
     step = 2 ** (levels - 1)
     margin, top, Y.tops = isqrt(o.order) * step, 0, []
+    apart = max(2 * margin, int(2.5 * o.finish))  # no picture is within reach of another
     for y in Y.pictures:
         Y.tops.append(top)
-        top += -(-(len(y) + 2 * margin) // step) * step
+        top += -(-(len(y) + apart) // step) * step
     Y.canvas = (Y.tops[-1] + len(Y.pictures[-1]), max(y.shape[1] for y in Y.pictures))
     Y.pitch = Y.canvas[1] + 2 * margin
 
@@ -113,44 +114,50 @@ def one_hot(names):
 
 
 def scale(Y, o):
-    """The variable of each channel; what makes pixels planes of grey levels; the highest level; 1 of it in pixels."""
+    """The variable of each channel; what makes pixels planes of grey levels; the highest level; 1 of each in pixels."""
+    ends = [(min(values), max(values)) for values in Y.variables]
     if Y.direct:
-        own, every = list(range(len(Y.variables))), [v for variable in Y.variables for v in variable]
+        variables = list(range(len(ends)))
         if Y.eight:
-            return own, lambda y: [plane.astype(int) for plane in np.moveaxis(y, -1, 0)], 255, 1.0
-        ends = min(every), max(every)
-        unit = float(Fraction(ends[1]) - Fraction(ends[0])) / Y.height or 1.0
-        return own, lambda y: [stretched(plane, ends, Y.height) for plane in np.moveaxis(y, -1, 0)], Y.height, unit
+            return variables, lambda y: [plane.astype(int) for plane in np.moveaxis(y, -1, 0)], 255, [1.0] * len(ends)
+        common = min(low for low, _ in ends), max(high for _, high in ends)
+        unit = float(Fraction(common[1]) - Fraction(common[0])) / Y.height or 1.0
+        alike = [unit] * len(ends)
+        return (
+            variables,
+            lambda y: [stretched(plane, common, Y.height) for plane in np.moveaxis(y, -1, 0)],
+            Y.height,
+            alike,
+        )
 
-    steep, owner = [], []  # how high a channel would be of which two pixels differ by sqrt(2) on average
+    spreads, steep, owner = [], [], []  # steep: how high a channel would be of which pixels vary by 1
     for v, (values, categories) in enumerate(zip(Y.variables, Y.categories, strict=True)):
+        spreads.append(deviation(stretched(np.array(values), ends[v], Y.height).tolist()))
+        differing = 1 - sum(values.count(c) ** 2 for c in categories or []) / len(values) ** 2
         if categories is None:
-            spread = deviation(stretched(np.array(values), (min(values), max(values)), Y.height).tolist())
-            steep.append(Y.height / spread if spread else 0.0)
-        else:
-            differing = 1 - sum(values.count(c) ** 2 for c in categories) / len(values) ** 2
-            channels_that_differ = 1 if len(categories) == 2 else 2
-            steep.append(sqrt(2 / (channels_that_differ * differing)) if differing else 0.0)
+            steep.append(Y.height / spreads[v] if spreads[v] else 0.0)
+        else:  # in two channels, or one, where two pixels differ
+            steep.append(sqrt(2 / ((1 if len(categories) == 2 else 2) * differing)) if differing else 0.0)
         owner += [v] * (1 if categories is None else one_hot(categories))
     weights = o.weights or [1.0] * len(steep)
     most = max(w * s for w, s in zip(weights, steep, strict=True))
+    by = [w / most * Y.height if most else 0.0 for w in weights]
 
     def levels(y):
         planes = []
         for v, plane in enumerate(np.moveaxis(y, -1, 0)):
-            values, categories = Y.variables[v], Y.categories[v]
-            factor = weights[v] / most * Y.height if most else 0.0
-            if categories is None:
-                whole = stretched(plane, (min(values), max(values)), Y.height)
-                spread = deviation(stretched(np.array(values), (min(values), max(values)), Y.height).tolist())
-                by = factor / spread if spread else 0.0
-                planes.append(np.array([[round(t * by) for t in row] for row in whole.tolist()]))
+            if Y.categories[v] is None:
+                whole, factor = stretched(plane, ends[v], Y.height), by[v] / spreads[v] if spreads[v] else 0.0
+                planes.append(np.array([[round(t * factor) for t in row] for row in whole.tolist()]))
             else:
-                planes += [(plane == c) * round(factor * steep[v]) for c in names(categories)]
-                planes += [] if len(categories) > 1 else [np.zeros(plane.shape, int)]
+                planes += [(plane == c) * round(by[v] * steep[v]) for c in names(Y.categories[v])]
+                planes += [] if len(Y.categories[v]) > 1 else [np.zeros(plane.shape, int)]
         return planes
 
-    return owner, levels, Y.height, 1.0
+    units = []  # of variables, which are the channels wherever a finish asks
+    for (low, high), spread, factor in zip(ends, spreads, by, strict=True):
+        units.append(float(high - low) / Y.height * spread / factor if factor else 0.0)
+    return owner, levels, Y.height, units
 
 
 def names(categories):
