@@ -228,7 +228,7 @@ def test_the_cases_give_every_option():
 
 # For each option: what else is given, and two values of which each gives another output.
 CHANGES = {
-    "categorical": [(EXACT, {"kinds": 3}, False, True), (FEW, {"kinds": 3, "channels": 2}, (0,), (1,))],
+    "categorical": [(EXACT, {"kinds": 3}, False, True), (FEW, {"kinds": 3, "channels": 2}, (0,), False)],
     "weights": [
         (EXACT | {"finish": 0.0}, {"channels": 2}, None, (1.0, 1.0)),
         (FEW, {"channels": 2}, (1.0, 1.0), (1.0, 0.3)),
@@ -242,8 +242,8 @@ CHANGES = {
     "guide_weight": [(EXACT, {"labels": 3}, 1.0, 0.0), (FEW, {"labels": 0}, 1.0, 0.1)],
     "labels": [(EXACT | {"labels": True}, {"labels": 3}, True, False), (FEW, {"labels": 4}, True, False)],
     "unsure": [
-        (EXACT, {"gaps": 0.2, "dtype": np.float32}, 0.25, 0.0),
-        (FEW, {"gaps": 0.2, "dtype": np.float32}, 0.1, 1.0),
+        (EXACT, {"gaps": 0.04, "dtype": np.float32}, 0.25, 0.0),
+        (FEW, {"gaps": 0.1, "dtype": np.float32}, 0.125, 1.0),
     ],
 }
 

@@ -85,8 +85,9 @@ def test_all_is_known_but_one_site(schedule, search, site):
     sample = texture((9, 10))
     known = np.ma.masked_array(texture((9, 10), seed=1), np.zeros((9, 10), bool))
     known[site] = np.ma.masked
-    image = keeps(sample, known, order=2, levels=3, schedule=schedule, search=search, exhaustive=0, finish=0.0)
-    assert image[site] in sample
+    for sweeps in (0, 2):
+        options = {"schedule": schedule, "search": search, "exhaustive": 0, "finish": 0.0, "free_sweeps": sweeps}
+        assert keeps(sample, known, order=2, levels=3, **options)[site] in sample
 
 
 @pytest.mark.parametrize("search", ["exact", "coherent"])
@@ -145,14 +146,14 @@ def test_known_answers_of_stand_ins():
 
 
 def test_a_datum_between_sites_is_felt_at_a_coarse_level_and_no_longer_after_it():
-    """Two greys: a single white datum off the lattice brings white sites there."""
+    """A checkerboard of two greys: around a single datum off the lattice is its own."""
     sample = np.repeat(np.repeat(np.uint8([[0, 255], [255, 0]]), 12, 0), 12, 1)
     known = np.ma.masked_all((16, 16), np.uint8)
     share = {}
     for colour in (0, 255):
         known[9, 9] = colour
         means = []
-        for rng in range(6):
+        for rng in range(3):
             image = simdtex.synthesize(sample, (16, 16), known=known, rng=rng, device=REFERENCE, order=4, levels=3)
             means.append(image[7:12, 7:12].mean() / 255)
         share[colour] = np.mean(means)
@@ -268,11 +269,12 @@ def test_a_source_names_its_sample(search):
 def test_shares_are_about_kept(search):
     samples = [texture((16, 16), seed=1), texture((16, 16), seed=2)]
     found = {}
-    for first in (1.0, 4.0):
+    for first in (1.0, 2.5, 4.0):
         _, output = run(samples, (24, 24), search=search, order=4, shares=(first, 5.0 - first))
         found[first] = (output.source[..., 2] == 0).mean()
-    assert abs(found[1.0] - 0.2) < 0.12
-    assert abs(found[4.0] - 0.8) < 0.12
+    assert abs(found[1.0] - 0.2) < 0.15
+    assert abs(found[2.5] - 0.5) < 0.15
+    assert abs(found[4.0] - 0.8) < 0.15
 
 
 @pytest.mark.parametrize("search", ["exact", "coherent"])
