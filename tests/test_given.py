@@ -234,7 +234,7 @@ def test_where_a_guide_says_nothing_others_tell():
 
 def test_a_grey_guide_is_followed():
     """Brightness comes where the guide is high."""
-    row, col = np.indices((30, 30))
+    row, _ = np.indices((30, 30))
     sample = (row * 6 + np.random.default_rng(1).integers(0, 60, row.shape)).astype(np.uint8)
     wanted = np.abs(np.linspace(-29, 29, 24))[None] * np.ones((24, 1))
     image, _ = run(sample, (24, 24), order=4, guide=(row.astype(float), wanted))
