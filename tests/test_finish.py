@@ -47,6 +47,33 @@ def plainly(p, sd):
     return found
 
 
+@pytest.mark.parametrize("how", [{"nowhere": 0.4}, {"masked": 0.4}, {"nowhere": 0.2, "masked": 0.6}], ids=str)
+@pytest.mark.parametrize("torus", [True, False])
+def test_what_is_from_nowhere_and_what_may_not_be_used_says_nothing(machine, how, torus):
+    p = problem(6, shape=(9, 11), sample_shape=(10, 12), channels=2, edges="reflect", torus=torus, **how)
+    usable, source, shown = p.sample.inside, p.source(), p.sample.working.reshape(-1, p.sample.rows, p.sample.cols)
+    expected, sd, alone = np.zeros((2, 9, 11), np.int16), 1.0, 0
+    for i, j in np.ndindex(9, 11):
+        total, said = 0, np.zeros(2, int)
+        if p.field.source[i, j] < 0:
+            continue
+        for a in range(-2, 3):
+            for b in range(-2, 3):
+                r, beyond = ((i + a) % 9, (j + b) % 11), not (0 <= i + a < 9 and 0 <= j + b < 11)
+                if a * a + b * b > 6.25 or (beyond and not torus) or p.field.source[r] < 0:
+                    continue
+                at = tuple(source[r] - (a, b))
+                if all(0 <= x < n for x, n in zip(at, usable.shape, strict=True)) and usable[at]:
+                    weight = round(1024 * exp(-(a * a + b * b) / 2))
+                    total += weight
+                    said += weight * (shown[(slice(None), *at)].astype(int) - shown[(slice(None), *source[i, j])])
+        alone += not total
+        expected[:, i, j] = [floor(one / total + 0.5) for one in said.tolist()] if total else 0
+    assert expected.any()
+    for m in (REFERENCE, machine):
+        assert_same_bits(finished(m, p, sd).reshape(expected.shape), expected)
+
+
 def finished(m, p, sd, first=0, count=None):
     _, field, _ = p.on(m)
     return finish(m, field.source, p.grid, p.sample.planes(m), p.sample, *around(sd), first, count or p.grid.plane)
