@@ -201,7 +201,7 @@ CASES = {
     "many": case({"levels": 1, "search": "exact", "order": 2, "xi": -8.0}, samples=((25, 24), (20, 26)), shape=(5, 6)),
     "many-known": case({"levels": 1, "coarsest": "same", "order": 2}, samples=((34, 33),), known=0.2, shape=(5, 6)),
     "many-similar": case(FEW | {"similar": 2}, samples=((25, 24), (24, 26)), masked=0.1, shape=(5, 6)),
-    "default": case({}, known=0.1, labels=2, shape=(9, 10)),
+    "default": case({}, known=0.1, labels=2, shape=(5, 6)),
 }
 
 ON_A_DEVICE = (
