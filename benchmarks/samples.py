@@ -39,3 +39,15 @@ def folder(path, only=""):
     if not found:
         raise ValueError(f"there is no picture in {path}: give a folder of samples")
     return found
+
+
+def chosen(path, only=""):
+    """The pictures of a folder, or where there is none those of `grey` and `colour`; `only` are names."""
+    if path:
+        return folder(path, only)
+    known = {**grey(), **colour()}
+    names = only.split(",") if only else list(known)
+    for name in names:
+        if name not in known:
+            raise ValueError(f"there is no sample {name}: choose of {', '.join(known)}")
+    return {name: known[name] for name in names}

@@ -12,15 +12,27 @@
 // source  (H, W)               pixel index in the sample of each site's source
 // offsets (N, 2), weights (N,) of the sites around, itself included
 // sample  (C, plane)           grey levels; `pitch` pixels to a row, a margin around rows x cols of them
+// given   (H, W)               1 where a site's value is given
+// values  (C.., area)          grey levels of the sites
 // inside  (plane,)             whether a pixel of it is known and may be used
 // out     (C, count)           for the sites first .. first + count - 1, row by row
 // One work-item per site.
+inline int within(const int row, const int col, const int pitch, const int margin, const int rows, const int cols,
+                  __global const uchar *restrict inside)
+{
+    if (row < margin || row >= margin + rows || col < margin || col >= margin + cols)
+        return -1;
+    return inside[row * pitch + col] ? row * pitch + col : -1;
+}
+
 __kernel void finish(const Lattice g, const int first, const int count, __global const int *restrict source,
                      __global const int2 *restrict offsets, __global const int *restrict weights, const int N,
                      __global const float *restrict sample, const int plane, const int pitch, const int margin,
-                     const int rows, const int cols, __global const uchar *restrict inside, const int scale,
-                     __global short *restrict out)
+                     const int rows, const int cols, __global const uchar *restrict inside,
+                     __global const uchar *restrict given, __global const ushort *restrict values, const int area,
+                     const int scale, __global short *restrict out)
 {
+#define WITHIN(row, col) within(row, col, pitch, margin, rows, cols, inside)
     const int n = get_global_id(0);
     if (n >= count)
         return;
@@ -29,19 +41,18 @@ __kernel void finish(const Lattice g, const int first, const int count, __global
     int total = 0;
     for (int c = 0; c < C; ++c)
         sum[c] = 0;
-    for (int k = 0; k < N; ++k) {
+    for (int k = 0; k < N && own >= 0; ++k) {
         const int a = offsets[k].x, b = offsets[k].y;
         const int r = a == 0 && b == 0 ? SITE(g, i, j) : neighbour(g, i, j, a, b);
-        if (r < 0 || source[r] < 0)
-            continue;
-        const int row = source[r] / pitch - a, col = source[r] % pitch - b;
-        if (row < margin || row >= margin + rows || col < margin || col >= margin + cols ||
-            !inside[row * pitch + col])
+        const int p = r < 0 || source[r] < 0 ? -1 : WITHIN(source[r] / pitch - a, source[r] % pitch - b);
+        const int q = r < 0 || !given[r] ? -1 : WITHIN(own / pitch + a, own % pitch + b);
+        if (p < 0 && q < 0)
             continue;
         total += weights[k];
-        for (int c = 0; c < C; ++c)
-            sum[c] += (long)weights[k] *
-                      ((int)sample[c * plane + row * pitch + col] - (int)sample[c * plane + max(own, 0)]);
+        for (int c = 0; c < C; ++c) {
+            const int said = p < 0 ? (int)values[c * area + r] : (int)sample[c * plane + p];
+            sum[c] += (long)weights[k] * (said - (int)sample[c * plane + (p < 0 ? q : own)]);
+        }
     }
     for (int c = 0; c < C && own < 0; ++c)
         out[c * count + n] = 0;

@@ -546,7 +546,8 @@ def picture(Y, X):
 def finished(Y, X, o):
     """Each pixel the weighted mean of what its neighbours' sources say of it: Y[p_r + s - r], r up to 2.5 sd from s.
 
-    Weights are whole 1/1024. The mean is rounded, halves up, to a grey level of 8 bits and to 1/8 of one of others.
+    Weights are whole 1/1024. The mean is rounded, halves up, to a grey level of 8 bits and to 1/8 of one of others. A
+    neighbour that is given, and whose source says nothing, says by how much the site's own source misses it.
     """
     (rows, cols), radius = X.t.shape, ceil(2.5 * o.finish)
     image = np.zeros((rows, cols, len(Y.variables)), Y.pictures[0].dtype)
@@ -560,17 +561,31 @@ def finished(Y, X, o):
             far, outside = a * a + b * b > (2.5 * o.finish) ** 2, not (0 <= r[0] < rows and 0 <= r[1] < cols)
             if far or outside or (r == (i, j) and (a, b) != (0, 0)):
                 continue
-            n, k, m = X.source[r].tolist()
-            (height, width), k, m = Y.usable[n].shape, k - a, m - b
-            if n >= 0 and 0 <= k < height and 0 <= m < width and Y.usable[n][k, m]:
-                weight = round(1024 * exp(-(a * a + b * b) / (2 * o.finish**2)))
-                total += weight
-                for c in range(len(Y.variables)):  # not the structure channel
-                    sums[c] += weight * int(Y.planes[n][c][k, m] - Y.planes[own[0]][c][own[1:]])
+            weight = round(1024 * exp(-(a * a + b * b) / (2 * o.finish**2)))
+            said, missed = usable(Y, X.source[r], (-a, -b)), usable(Y, own, (a, b)) if r in Y.given else None
+            for c in range(len(Y.variables)) if said or missed else []:  # not the structure channel
+                if said:
+                    sums[c] += weight * (level_at(Y, c, said) - level_at(Y, c, own))
+                else:
+                    sums[c] += weight * (int(X.x[c][r]) - level_at(Y, c, missed))
+            total += weight if said or missed else 0
         for c in range(len(Y.variables)):
-            step = (2 * fine * sums[c] + total) // (2 * total)
+            step = (2 * fine * sums[c] + total) // max(1, 2 * total)
             image[i, j, c] = moved(Y, (*own, c), step, Y.unit[c] / fine)
     return image
+
+
+def usable(Y, place, by):
+    """The place that is so much further on, if it may be used; there is none beside what is nowhere."""
+    n, i, j = (int(x) for x in place)
+    i, j = i + by[0], j + by[1]
+    inside = n >= 0 and 0 <= i < Y.usable[n].shape[0] and 0 <= j < Y.usable[n].shape[1]
+    return (n, i, j) if inside and Y.usable[n][i, j] else None
+
+
+def level_at(Y, c, place):
+    """The grey level of a place."""
+    return int(Y.planes[place[0]][c][place[1:]])
 
 
 def moved(Y, at, step, unit):

@@ -78,6 +78,11 @@ def material(tmp_path, monkeypatch):
     write(tmp_path / "brick-height.png", sample.astype(np.uint16) * 257)
     write(tmp_path / "hole.png", np.pad(np.full((3, 4), 255, np.uint8), ((6, 7), (5, 7))))
     write(tmp_path / "brick-normal.png", np.stack([sample] * 3, axis=-1))
+    write(tmp_path / "sample.png", sample)
+    write(tmp_path / "training.png", (sample > 128).astype(np.uint8))
+    write(tmp_path / "sample-labels.png", np.repeat([0, 1], 8).astype(np.uint8)[:, None] * np.ones(16, np.uint8))
+    write(tmp_path / "river-labels.png", np.eye(20, 24, dtype=np.uint8))
+    (tmp_path / "wells.csv").write_text("x,y,facies\n3,4,1\n9,12,0\n")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -101,7 +106,7 @@ def test_python_runs(any_device, code, page, tmp_path, monkeypatch):
 @pytest.mark.parametrize("line", commands(README))
 def test_readme_command_runs(any_device, material, line):
     words = shlex.split(small(line))
-    words += ["--order", "8"] if "synth" in words and "--method" not in words else []  # quicker
+    words += ["--order", "8"] if {"synth", "simulate"} & set(words) and "--method" not in words else []  # quicker
     words += ["--order", "8"] if {"fill", "extend"} & set(words) else []
     words += ["--band", "3"] if "extend" in words else []  # there is not more room on so small a picture
     words += ["--order", "4", "--seeds", "1"] if "schedules" in words else []
@@ -111,7 +116,7 @@ def test_readme_command_runs(any_device, material, line):
         [sys.executable, "-m", *words], env=environment, capture_output=True, text=True, timeout=120, check=False
     )
     assert done.returncode == 0, done.stderr
-    if {"synth", "fill", "extend", "solid", "mix"} & set(words):
+    if {"synth", "fill", "extend", "simulate", "solid", "mix"} & set(words):
         outputs = [words[i + 1] for i, word in enumerate(words) if word in ("-o", "--view")]
         outputs += [word.partition("=")[2] for word in words if "=" in word]
         assert outputs and all((material / name).is_file() for name in outputs)

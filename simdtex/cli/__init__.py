@@ -19,6 +19,7 @@ COMMANDS = {
     "mix": "Mix the textures SAMPLE...: a picture that looks a bit like each of them.",
     "schedules": "Run the same job under several schedules and compare them in a report.",
     "sheet": "Show what thresholds alpha / k^beta make of SAMPLE: Figures 11 and 12 of De Bonet (1997) on one sheet.",
+    "simulate": "Simulate what TRAINING_IMAGE shows: realisations that look like it and honour data.",
     "solid": "Make a solid of the texture SAMPLE: a block whose slices look like it.",
     "synth": "Make more of the texture SAMPLE.",
 }

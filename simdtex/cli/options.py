@@ -112,11 +112,18 @@ _WANTED: dict[str, tuple[Any, str]] = {
 
 
 def _worded(
-    table: dict[str, tuple[Any, str]], prefix: str = "", without: tuple[str, ...] = ()
+    table: dict[str, tuple[Any, str]],
+    prefix: str = "",
+    without: tuple[str, ...] = (),
+    defaults: dict[str, str] | None = None,
 ) -> list[Callable[[Command], Command]]:
-    """The options of a table, with a type, a metavar, or None for a flag; `prefix` stands before their help."""
+    """The options of a table, with a type, a metavar, or None for a flag; `prefix` stands before their help.
+
+    ``defaults`` those of a command, where they are not the method's.
+    """
     made: list[Callable[[Command], Command]] = []
     for name, (kind, text) in table.items():
+        text = f"{text.partition('  [')[0]}  [{defaults[name]}]" if defaults and name in defaults else text
         how: dict[str, Any] = {"is_flag": True, "default": None} if kind is None else {"type": kind}
         how = {"metavar": kind} if isinstance(kind, str) else how
         if name not in without:
@@ -185,18 +192,31 @@ mrf_options = _with(
 )
 """The options of the method ``mrf`` that any command takes which makes a whole picture with it."""
 
+_HOLES = {"--balance": "0", "--novelty": "0", "--chance": "16", "--data-weight": "4"}
+_EDGE = {"--chance": "16", "--data-weight": "4"}
+
 fill_options = _with(
-    *_worded(_KINDS),
-    *_worded(_MRF, without=("--overview",)),
+    *_worded(_KINDS, defaults=_HOLES),
+    *_worded(_MRF, without=("--overview",), defaults=_HOLES),
     option("--edges", help=_EDGES["mrf"]),
     option("--levels", type=int, help="Of the multigrid.  [as many as it takes to see across the hole]"),
     option("--boundary", help="open, or torus: the picture tiles, and its holes go on beyond its edges.  [open]"),
 )
 """Those of ``simdtex fill``."""
 
+simulate_options = _with(
+    *_worded(_KINDS),
+    *_worded(_WANTED),
+    *_worded(_MRF, defaults={"--novelty": "0.25"}),
+    option("--edges", help=_EDGES["mrf"]),
+    option("--levels", type=int, help=_DEPTH),
+    option("--boundary", help="open, or torus: realisations tile.  [open]"),
+)
+"""Those of ``simdtex simulate``."""
+
 extend_options = _with(
-    *_worded(_KINDS, without=("--shares", "--unsure", "--data-weight")),
-    *_worded(_MRF),
+    *_worded(_KINDS, without=("--shares", "--unsure"), defaults=_EDGE),
+    *_worded(_MRF, defaults=_EDGE),
     option("--edges", help=_EDGES["mrf"]),
     option("--levels", type=int, help=_DEPTH),
 )

@@ -25,6 +25,12 @@ from simdtex.options import whole
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
+OF_HOLES: dict[str, Any] = {"boundary": "open", "balance": 0.0, "novelty": 0.0, "chance": 16, "data_weight": 4.0}
+"""Where filling differs from making a texture: what lies near a hole may be used again, and the rim counts more."""
+
+OF_EDGES: dict[str, Any] = {"chance": 16, "data_weight": 4.0}
+"""The same of extending."""
+
 REACH = 128
 """How far around its window a hole is filled from, at least, pixels."""
 
@@ -117,7 +123,8 @@ def fill(
     full_output : bool
         Return the source map, temperatures and statistics too.
     **options
-        Of the method ``mrf``: see `simdtex.methods.mrf.Options`.
+        Of the method ``mrf``: see `simdtex.methods.mrf.Options`. By default ``boundary`` is ``"open"``, ``balance`` and
+        ``novelty`` are 0, ``chance`` is 16 and ``data_weight`` 4.
 
     Returns
     -------
@@ -160,7 +167,7 @@ def fill(
     if reach is not None:
         whole("reach", reach, 1)
     given = None if sample is None else _check_sample(sample, channel_axis, pixels)
-    chosen = mrf.make_options(**{"boundary": "open", **options})
+    chosen = mrf.make_options(**OF_HOLES | options)
     seed = as_seed(rng)
     job = Job(pixels, hole, given, reach)
 
@@ -202,7 +209,7 @@ def extend(
     channel_axis : int, optional
         The axis of the image that holds channels; None for a grey one.
     rng, device, callback, full_output, **options
-        As in `fill`.
+        As in `fill`; but ``balance`` and ``novelty`` are those of a texture, and ``boundary`` follows from ``tile``.
 
     Returns
     -------
@@ -244,13 +251,12 @@ def extend(
             f"band={width} leaves nothing of a picture of {rows}x{cols} (rows x columns); give a narrower one"
         )
     hole[top + along : top + rows - along, left + across : left + cols - across] = False
-    options = {"boundary": "torus" if tile else "open"} | options
-    chosen = mrf.make_options(**options)
+    chosen = mrf.make_options(**{"boundary": "torus" if tile else "open"} | OF_EDGES | options)
     seed = as_seed(rng)
     place = np.full((*hole.shape, 2), -1, np.int32)
     place[top : top + rows, left : left + cols] = np.moveaxis(np.indices((rows, cols)), 0, -1)
     place[hole] = -1
-    given = Given(canvas, np.repeat(~hole[..., None], canvas.shape[2], -1), place)
+    given = Given(canvas, np.repeat(~hole[..., None], canvas.shape[2], -1), place, suggests=bool(tile))
 
     def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
         return mrf.synthesize(machine, Pictures((pixels,)), hole.shape, chosen, seed, seen, given)
@@ -312,7 +318,7 @@ def _window(
         offsets = neighbourhood_offsets(options.order)
         most = mrf.number_of_levels(sizes, offsets, hole.shape, replace(options, overview=LEAST))
         options = replace(options, levels=min(window.levels, most))
-    given = Given(np.where(known, job.pixels[at], 0).astype(job.pixels.dtype), known, place)
+    given = Given(np.where(known, job.pixels[at], 0).astype(job.pixels.dtype), known, place, suggests=False)
     made, output = mrf.synthesize(machine, pictures, hole.shape, options, seed, callback, given)
     return corner, made, output
 

@@ -28,6 +28,9 @@ from simdtex.run import Callback, Simulating
 if TYPE_CHECKING:
     import xarray
 
+DEFAULTS: dict[str, Any] = {"boundary": "open", "novelty": 0.25}
+"""Where a simulation differs from a texture: its edges are edges, and the training image's layout may come again."""
+
 AT_ONCE = 4
 """Realisations that a processor works on at once, at most: each has a queue of its own."""
 
@@ -77,7 +80,8 @@ def simulate(
     callback : callable, optional
         Called with a `simdtex.run.Simulating` after every realisation.
     **options
-        Of the method ``mrf``: see `simdtex.methods.mrf.Options`; ``boundary`` is ``"open"`` by default.
+        Of the method ``mrf``: see `simdtex.methods.mrf.Options`; by default ``boundary`` is ``"open"`` and ``novelty``
+        0.25.
 
     Returns
     -------
@@ -91,8 +95,6 @@ def simulate(
     ------
     ValueError, TypeError
         What is wrong and what would be right, in one sentence.
-    ModuleNotFoundError
-        xarray is missing; the sentence names the remedy.
 
     Notes
     -----
@@ -114,7 +116,7 @@ def simulate(
         whole("jobs", jobs, 1)
     data, size = _hard(hard, shape, check_samples(training, channel_axis, mask).pixels[0], channel_axis)
     inputs = check_inputs(training, size, channel_axis, mask, data, None, guide)
-    chosen = mrf.make_options(**{"boundary": "open", **options})
+    chosen = mrf.make_options(**DEFAULTS | options)
     seed = as_seed(rng)
     seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
     pixels = inputs.pictures.pixels[0]
@@ -234,5 +236,5 @@ def _xarray() -> Any:
     try:
         import xarray
     except ModuleNotFoundError:
-        raise ModuleNotFoundError("xarray is not installed; pip install 'simdtex[simulate]'") from None
+        raise ValueError("xarray is not installed; pip install 'simdtex[simulate]'") from None
     return xarray

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
@@ -17,6 +16,7 @@ import pyopencl as cl
 import pyopencl.tools as cl_tools
 from numpy.typing import NDArray
 
+from simdtex.machine import programs
 from simdtex.machine.buffers import DeviceArray
 from simdtex.machine.devices import DeviceError, DeviceInfo
 from simdtex.machine.forms import Form, default
@@ -286,8 +286,7 @@ class OpenCL:
 
     def _build(self, files: tuple[str, ...], options: str) -> Any:
         source = "\n".join((kernel_folder() / f"{file}.cl").read_text(encoding="utf-8") for file in files)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", cl.CompilerWarning)
+        with programs.building():
             return cl.Program(self.context, source).build([*options.split(), *self.include])
 
     def launch_sites(

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import hashlib
 import warnings
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import RLock
 from typing import Any
 
 import pyopencl as cl
@@ -21,6 +23,20 @@ from simdtex.machine import cache
 POCL = "Portable Computing Language"
 FOLDER = "programs"
 """Of the cache folder."""
+
+
+_ONE = RLock()  # what Python does with warnings is the same for all threads
+
+
+@contextmanager
+def building() -> Iterator[None]:
+    """While a program is built: one thread at a time, and without the warning that a compiler has said something.
+
+    Intel's runtime has a log even for a clean build.
+    """
+    with _ONE, warnings.catch_warnings():
+        warnings.simplefilter("ignore", cl.CompilerWarning)
+        yield
 
 
 def build(context: cl.Context, source: str, options: list[str]) -> Any:
@@ -35,8 +51,7 @@ def build(context: cl.Context, source: str, options: list[str]) -> Any:
     pyopencl.Error
         With the compiler's words.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", cl.CompilerWarning)  # Intel's runtime has a log even for a clean build
+    with building():
         path = _place(context.devices[0], source, options)
         binary = _recall(path) if path else None
         if binary is not None:

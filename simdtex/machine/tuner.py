@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import time
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ import pyopencl as cl
 from simdtex.machine.cache import FOLDER, SWITCH, folder, keep
 from simdtex.machine.forms import Form, default, others
 from simdtex.machine.opencl import OpenCL
+from simdtex.machine.programs import building
 
 __all__ = ["FILE", "FOLDER", "SWITCH", "Form", "choose", "default", "others", "probe", "tune"]
 
@@ -63,8 +63,7 @@ def probe(machine: OpenCL, form: Form) -> Callable[[], float]:
     """The loop in this form, compiled: a function that gives its fma per second, the best of three launches."""
     items = form.group * machine.info.compute_units * (16 if machine.info.kind == "gpu" else 4)
     options = ["-D", f"V={form.vector}", "-D", f"STEP={form.step}", *machine.include]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", cl.CompilerWarning)
+    with building():
         kernel = cl.Kernel(cl.Program(machine.context, SOURCE).build(options), "tune")
     x, y = (machine.put(np.linspace(0, 1, n, dtype=np.float32)) for n in (120 * form.vector + 16, 128 + form.step))
     out = machine.empty((items * form.vector,), np.float32)

@@ -34,11 +34,15 @@ class Given:
     place : (H, W, 2 or 3) int32 array, optional
         Where in the sample each given site is from: row, column and, of several pictures, its number; -1 where from
         nowhere. None: all from nowhere.
+    suggests : bool
+        Whether sites that are from the sample suggest how to go on. Where all that they could suggest is unknown
+        itself, they are hard data instead, of which every channel is known.
     """
 
     values: NDArray[Any]
     known: NDArray[np.bool_]
     place: NDArray[np.int32] | None = None
+    suggests: bool = True
 
     @cached_property
     def whole(self) -> NDArray[np.bool_]:
@@ -137,4 +141,6 @@ def planes(given: Given, sample: Sample) -> Planes:
     known = given.values[given.whole]
     values[: sample.shown, given.whole] = sample.scale.levels(known)
     values[:, source >= 0] = sample.working[: sample.channels, source[source >= 0]]
+    if not given.suggests:
+        source[:] = -1
     return Planes(values, source, given.whole)

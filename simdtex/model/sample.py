@@ -400,7 +400,7 @@ class Sample:
         """
         own, change = self._own(source), np.moveaxis(by, 0, -1)
         if self.pixels.dtype == np.uint8 and self.direct:
-            exact: NDArray[Any] = (own + change).astype(np.uint8)  # a mean of pixels is one
+            exact: NDArray[Any] = np.clip(own.astype(np.int32) + change, 0, 255).astype(np.uint8)
             return exact
         units = self.scale.units if not self.direct else self.unit
         return moved(own, change * (units / self.fine), self.pixels)

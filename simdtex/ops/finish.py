@@ -2,12 +2,13 @@
 """The finish: each pixel becomes the weighted mean of what its neighbours' sources say of it, so that seams melt.
 
 x_s = sum_r w_r Y[p_r + (s - r)] / sum_r w_r, w_r = exp(-|r - s|^2 / 2 sd^2): the average over overlapping pieces of
-Kwatra et al. (2005). Where all continue one another it is Y[p_s] itself.
+Kwatra et al. (2005). Where all continue one another it is Y[p_s] itself. A neighbour whose value is given, and whose
+source says nothing of s, says by how much the source of s misses it: Y[p_s] + (x_r - Y[p_s + (r - s)]).
 """
 
 from __future__ import annotations
 
-from math import ceil, exp
+from math import ceil, exp, prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Sample
+from simdtex.ops.neighbourhood import Field
 
 
 def around(sd: float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
@@ -28,7 +30,8 @@ def around(sd: float) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
 
 
 def _reference(
-    source: NDArray[np.int32],
+    field: Field,
+    given: NDArray[np.uint8],
     grid: Grid,
     planes: NDArray[np.float32],
     sample: Sample,
@@ -37,27 +40,37 @@ def _reference(
     first: int,
     count: int,
 ) -> NDArray[np.int16]:
-    sites, source = grid.sites()[first : first + count], source.ravel()
-    shown = sample.working[: sample.shown].astype(np.int64)
-    usable, nowhere = sample.inside.ravel(), source[sites] < 0
-    own = shown[:, np.maximum(source[sites], 0)]
+    sites, source = grid.sites()[first : first + count], field.source.ravel()
+    shown, usable = sample.working[: sample.shown].astype(np.int64), sample.inside.ravel()
+    values = field.values[: sample.shown].reshape(sample.shown, -1).astype(np.int64)
+    place, nowhere = np.maximum(source[sites], 0), source[sites] < 0
+    own = shown[:, place]
+
+    def within(pixel: NDArray[np.int32], offset: NDArray[np.int32]) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
+        row, col = (np.stack(np.divmod(pixel, np.int32(sample.cols))) + offset[:, None]).astype(np.int64)
+        at = np.stack([row, col]) - sample.margin
+        there = (at >= 0).all(0) & (at[0] < sample.height) & (at[1] < sample.width)
+        pixels = np.where(there, row * sample.cols + col, 0)
+        return there & usable[pixels], pixels
+
     total, sums = np.zeros(count, np.int64), np.zeros(own.shape, np.int64)
     for offset, weight in zip(offsets, weights.tolist(), strict=True):
         r = grid.neighbours(sites, offset[None])[0] if offset.any() else sites
-        row, col = np.divmod(source[r], np.int32(sample.cols)) - offset[:, None]
-        at = np.stack([row, col]) - sample.margin
-        inside = (r >= 0) & (source[r] >= 0) & (at >= 0).all(0) & (at[0] < sample.height) & (at[1] < sample.width)
-        inside[inside] = usable[(row * sample.cols + col)[inside]]
-        said = shown[:, np.where(inside, row * sample.cols + col, 0)]
-        total += weight * inside
-        sums += weight * inside * (said - own)
-    by: NDArray[np.int16] = ((2 * sample.fine * sums + total) // np.maximum(2 * total, 1)).astype(np.int16)
+        told, p = within(source[r], -offset)
+        told &= (r >= 0) & (source[r] >= 0)
+        missed, q = within(place, offset)
+        missed &= (r >= 0) & ~told & (given.ravel()[r] > 0)
+        by = np.where(told, shown[:, p] - own, np.where(missed, values[:, r] - shown[:, q], 0))
+        total += weight * (told | missed)
+        sums += weight * by
+    by = ((2 * sample.fine * sums + total) // np.maximum(2 * total, 1)).astype(np.int16)
     return np.where(nowhere, np.int16(0), by)
 
 
 def _launch(
     machine: Launcher,
-    source: Array,
+    field: Field,
+    given: Array,
     grid: Grid,
     planes: Array,
     sample: Sample,
@@ -70,19 +83,20 @@ def _launch(
     machine.launch(
         machine.kernel("finish", "finish", C=sample.shown),
         (count,),
-        *(grid.struct, i(first), i(count), source, machine.constant(offsets), machine.constant(weights)),
+        *(grid.struct, i(first), i(count), field.source, machine.constant(offsets), machine.constant(weights)),
         *(i(len(offsets)), planes, i(planes.shape[1]), i(sample.cols), i(sample.margin)),
-        *(i(sample.height), i(sample.width), machine.put(sample.inside.view(np.uint8)), i(sample.fine), out),
+        *(i(sample.height), i(sample.width), machine.put(sample.inside.view(np.uint8)), given, field.values),
+        *(i(prod(field.source.shape)), i(sample.fine), out),
     )
     found: NDArray[np.int16] = machine.get(out)
     return found
 
 
 finish = Operation("finish", _reference, _launch)
-"""``finish(machine, source, grid, planes, sample, offsets, weights, first, count)``: (channels, count) int16, on the
-host.
+"""``finish(machine, field, given, grid, planes, sample, offsets, weights, first, count)``: (channels, count) int16.
 
-By how much the pixels of the sites from ``first`` on differ from their sources, in working levels of 8-bit samples, and
-in 1/8 of a working level of others. ``source`` (H, W) and ``planes``, the sample's, are of the machine.
+On the host: by how much the pixels of the sites from ``first`` on differ from their sources, in working levels of 8-bit
+samples, and in 1/8 of a working level of others. The ``field``, ``given`` (H, W) uint8, 1 where a value is given, and
+``planes``, the sample's, are of the machine.
 Cost: N channels gathers a site.
 """

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import schedules
-from simdtex.machine.interface import Array, Machine
+from simdtex.machine.interface import Machine
 from simdtex.maspar.array import parse_array
 from simdtex.methods.mrf.algorithm import anneal
 from simdtex.methods.mrf.level import Run, number_of_levels
@@ -23,6 +23,7 @@ from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.model.use import effective_use
 from simdtex.ops.finish import around, finish
+from simdtex.ops.neighbourhood import Field
 from simdtex.options import within_32_bits
 from simdtex.run import Callback, Output, device_seconds
 
@@ -87,7 +88,7 @@ def synthesize(
     grid = Grid(*shape)
     source, temperatures = (grid.view(machine.get(plane)) for plane in (state.source, state.temperature))
     if run.options.finish:
-        image = finished(run, state.source, source)
+        image = finished(run, state.field, source)
     else:
         image = run.sample.picture(grid.view(machine.get(state.values)), source)
     if given:
@@ -219,23 +220,25 @@ def laid_out(
     )
 
 
-def finished(run: Run, source: Array, seen: NDArray[np.int32]) -> NDArray[Any]:
+def finished(run: Run, field: Field, seen: NDArray[np.int32]) -> NDArray[Any]:
     """The picture with the finish (`simdtex.ops.finish`), in the sample's type.
 
     Parameters
     ----------
     run : Run
-    source : (H, W) int32 array of the machine
+    field : Field
         Of the finest level.
     seen : (rows, cols) int32 array
-        The same on the host.
+        Its sources on the host.
     """
     sample, grid, ring = run.sample, run.grid(0), around(run.options.finish or 0)
     picture = np.empty((*run.shape, sample.shown), sample.pixels.dtype)
     rows = max(1, AT_ONCE // grid.cols)
+    known = np.zeros(run.shape, bool) if run.laid is None else run.laid.known
+    given = run.machine.put(known.view(np.uint8))
     for top in range(0, grid.rows, rows):
         here = seen[top : top + rows]
-        by = finish(run.machine, source, grid, run.planes, sample, *ring, top * grid.cols, here.size)
+        by = finish(run.machine, field, given, grid, run.planes, sample, *ring, top * grid.cols, here.size)
         picture[top : top + rows] = sample.moved(here, by.reshape(-1, *here.shape))
     return picture
 

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How well holes are filled: parts of textures are cut out, filled, and compared with real texture.
+
+    python benchmarks/fill.py [--samples DIR] [--only brick,wood] [--seeds N] [--options NAME=VALUE,NAME=VALUE ...]
+                              [--holes rectangle,blob,scratch,border] [--out DIR] [--csv FILE] [--device TEXT]
+
+Textures are those of scikit-image that every study has, or the pictures of a folder. Each hole is filled by
+`simdtex.fill`, with the defaults and with every set of ``--options``, and beside it by
+`skimage.restoration.inpaint_biharmonic`; the original is measured like a filling of its own hole. ``--out`` writes a
+sheet for each texture, at 1:1. The figures, of which 1 is that of real texture:
+
+rim     mean squared distance from the 7 x 7 patches that cross the rim to the nearest patch of the known part, over
+        the same of patches of the known part; a patch is not compared with those within 8 pixels.
+inside  the same of the patches that lie in the hole.
+seam    mean absolute step between a pixel of the hole and a known one beside it, over that between known ones.
+step    the same between two pixels of the hole: below 1 the filling is blurred.
+"""
+
+import argparse
+import csv
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import over_folder
+import samples
+from numpy.lib.stride_tricks import sliding_window_view
+from rich.console import Console
+from rich.table import Table
+from scipy.ndimage import gaussian_filter
+from skimage import draw
+from skimage.restoration import inpaint_biharmonic
+
+import simdtex
+from simdtex.experiments.quality.nearest import nearest
+from simdtex.experiments.quality.pictures import as_planes, in_deviations
+
+PATCH = 7  # side of the patches, pixels
+APART = 8  # patches nearer to one another are not compared
+QUERIES = 1024  # patches of the known part that are looked up
+FAR = 1e3  # what is unknown, in sample standard deviations: no patch with it is the nearest
+FIGURES = ("rim", "inside", "seam", "step")
+
+
+def holes(shape):
+    """Holes of four shapes in a picture of that shape, by name: (rows, cols) bool arrays."""
+    rows, cols = shape
+    row, col = np.indices(shape)
+    found = {}
+    found["rectangle"] = (abs(row - rows * 0.5) < rows * 0.13) & (abs(col - cols * 0.5) < cols * 0.16)
+    noise = gaussian_filter(np.random.default_rng(3).standard_normal(shape), min(shape) / 16)
+    away = np.hypot((row / rows - 0.48) / 0.2, (col / cols - 0.52) / 0.2)
+    found["blob"] = away + 0.35 * noise / noise.std() < 1
+    found["scratch"] = np.zeros(shape, bool)
+    waypoints = [(0.2, 0.12), (0.35, 0.4), (0.62, 0.55), (0.8, 0.9)]
+    corners = [(round(r * rows), round(c * cols)) for r, c in waypoints]
+    for first, second in pairwise(corners):
+        for down in (-1, 0, 1):
+            line = draw.line(first[0] + down, first[1], second[0] + down, second[1])
+            found["scratch"][line] = True
+    found["border"] = (abs(row - rows * 0.55) < rows * 0.17) & (col >= cols * 0.78)
+    return found
+
+
+def score(original, picture, hole):
+    """The figures of a filling: a dictionary with those of `FIGURES` that the hole allows."""
+    planes, made = in_deviations(as_planes(original), as_planes(original), as_planes(picture))
+    known = planes.copy()
+    known[hole] = FAR
+    share = sliding_window_view(hole, (PATCH, PATCH)).mean((2, 3)).ravel()
+    kinds = {"known": share == 0, "rim": (share > 0) & (share < 1), "inside": share == 1}
+    distance = {}
+    for kind, which in kinds.items():
+        asked = np.flatnonzero(which)
+        if kind == "known":
+            asked = asked[:: -(-len(asked) // QUERIES)]
+        if len(asked):
+            distance[kind] = np.mean(nearest(made, asked, known, PATCH, APART).distance ** 2)
+    steps = {kind: [] for kind in ("known", "seam", "step")}
+    for axis in (0, 1):
+        size = abs(np.diff(made, axis=axis)).mean(-1)
+        ends = np.swapaxes(hole, 0, axis)
+        ends = np.swapaxes(ends[1:].astype(int) + ends[:-1], 0, axis)  # how many of the two are in the hole
+        for number, kind in enumerate(steps):
+            steps[kind].append(size[ends == number])
+    mean = {kind: np.concatenate(found).mean() for kind, found in steps.items()}
+    found = {kind: distance[kind] / distance["known"] for kind in ("rim", "inside") if kind in distance}
+    return found | {kind: mean[kind] / mean["known"] for kind in ("seam", "step")}
+
+
+def biharmonic(picture, hole):
+    """The hole filled by the biharmonic equation, in the picture's type."""
+    found = inpaint_biharmonic(picture / 255, hole, channel_axis=-1 if picture.ndim == 3 else None)
+    return np.rint(found.clip(0, 1) * 255).astype(picture.dtype)
+
+
+def cut(picture, hole):
+    """The picture with its hole in a colour that it does not have, for the eye."""
+    shown = picture if picture.ndim == 3 else np.stack([picture] * 3, -1)
+    return np.where(hole[..., None], np.array((255, 0, 255), np.uint8), shown)
+
+
+def fillings(picture, hole, settings, seeds, machine):
+    """What the hole is filled with, in turn: label, seed, picture, seconds."""
+    for label, given in settings.items():
+        for seed in range(1, seeds + 1):
+            began = time.perf_counter()
+            options = {"channel_axis": -1 if picture.ndim == 3 else None} | given
+            made = simdtex.fill(picture, hole, rng=seed, device=machine, **options)
+            yield label, seed, made, time.perf_counter() - began
+    began = time.perf_counter()
+    made = biharmonic(picture, hole)
+    yield "biharmonic", 1, made, time.perf_counter() - began
+    yield "original", 1, picture, 0.0
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--samples", type=Path, help="folder of pictures, each a texture")
+    parser.add_argument("--only", default="", help="names of textures, brick,wood")
+    parser.add_argument("--holes", default="", help="shapes, rectangle,blob; all unless given")
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--options", action="append", default=[], help="NAME=VALUE,NAME=VALUE; may be given again")
+    parser.add_argument("--out", type=Path, help="folder for the sheets")
+    parser.add_argument("--csv", type=Path, help="a file for the table, a line for each texture and filling")
+    parser.add_argument("--device")
+    options = parser.parse_args()
+    try:
+        settings = {"fill": {}} | {text: over_folder.parsed(text) for text in options.options}
+        known = samples.chosen(options.samples, options.only)
+    except ValueError as error:
+        parser.error(str(error))
+    machine = simdtex.open_machine(options.device)
+    print(f"device: {machine.name}")
+    results = []
+    for name, picture in known.items():
+        cells = []
+        for shape, hole in holes(picture.shape[:2]).items():
+            if options.holes and shape not in options.holes.split(","):
+                continue
+            cells.append((f"{name}, {shape}", cut(picture, hole), ""))
+            for label, seed, made, seconds in fillings(picture, hole, settings, options.seeds, machine):
+                if not (made[~hole] == picture[~hole]).all():
+                    sys.exit(f"{label} changed known pixels of {name}")
+                figures = score(picture, made, hole)
+                results.append((name, shape, label, seed, figures))
+                told = "  ".join(f"{figure} {value:.2f}" for figure, value in figures.items())
+                print(f"{name:12} {shape:10} {label:20} seed {seed}  {told}  {seconds:.1f} s", flush=True)
+                if seed == 1:
+                    cells.append((label, made, told))
+        if options.out:
+            options.out.mkdir(parents=True, exist_ok=True)
+            over_folder.sheet(options.out / f"fill-{name}.png", cells, 3 + len(settings))
+    report(results, options.csv)
+
+
+def report(results, path, figures=FIGURES):
+    """Print the means over seeds and holes, and write them as a table."""
+    labels = list(dict.fromkeys(label for _, _, label, _, _ in results))
+    names = list(dict.fromkeys(name for name, *_ in results))
+    shapes = list(dict.fromkeys(shape for _, shape, *_ in results))
+    table = Table()
+    header = ["picture", "filling", *figures]
+    for column in header:
+        table.add_column(column, justify="right" if column in figures else "left", no_wrap=True)
+    lines = []
+    groups = [(name, lambda r, name=name: r[0] == name) for name in names]
+    groups += [(f"all, {shape}", lambda r, shape=shape: r[1] == shape) for shape in shapes if len(shapes) > 1]
+    groups += [("all", lambda r: True)]
+    for title, of in groups:
+        for label in labels:
+            those = [r[4] for r in results if of(r) and r[2] == label]
+            values = [[one[figure] for one in those if figure in one] for figure in figures]
+            lines.append([title, label, *(f"{np.mean(each):.2f}" if each else "" for each in values)])
+            table.add_row(*lines[-1], end_section=label == labels[-1])
+    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    if path:
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows([header, *lines])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Fill holes in a picture, continue it, and make it seamless: python fill_and_extend.py [FOLDER] [--size 256].
+
+What is given of a picture comes out as it is, to the bit; only what is missing is made.
+"""
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from skimage import data, draw
+
+import simdtex
+from simdtex.io.image import write
+from simdtex.report.sheet import contact_sheet
+
+parser = argparse.ArgumentParser(description=__doc__)
+parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
+parser.add_argument("--size", type=int, default=256, help="side of the picture")
+args = parser.parse_args()
+folder = args.folder or Path(tempfile.mkdtemp(prefix="simdtex-"))
+folder.mkdir(exist_ok=True)
+
+gravel, side = data.gravel()[: args.size, : args.size], args.size
+hole = np.zeros(gravel.shape, bool)
+hole[draw.ellipse(side // 3, side // 3, side // 8, side // 5)] = True
+hole[draw.line(side // 2, side // 2, side - 9, side - 2)] = True
+
+filled = simdtex.fill(gravel, hole, rng=1)
+assert (filled[~hole] == gravel[~hole]).all()
+wider = simdtex.extend(gravel, right=side // 2, rng=1)
+assert (wider[:, :side] == gravel).all()
+tile = simdtex.extend(gravel, tile=True, rng=1)
+for label, picture in (("before", gravel), ("after", tile)):
+    print(f"seam {label}: {simdtex.quality.seam(picture):.2f} times as strong as the steps between neighbour pixels")
+
+write(folder / "filled.png", filled)
+write(folder / "wider.png", wider)
+write(folder / "tile.png", tile)
+shown = np.where(hole, 255, gravel).astype(np.uint8)
+contact_sheet(
+    [("holes", shown), ("filled", filled), ("continued to the right", wider)],
+    folder / "sheet.png",
+    columns=3,
+)
+twice = [
+    (label, np.tile(picture, (2, 2))) for label, picture in (("as it is, 2 x 2", gravel), ("seamless, 2 x 2", tile))
+]
+contact_sheet(twice, folder / "tile-sheet.png", columns=2)
+print(f"filled.png, wider.png, tile.png and two sheets are in {folder}")

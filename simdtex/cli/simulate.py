@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex simulate``: realisations of a training image."""
+
+from __future__ import annotations
+
+import time
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from simdtex.cli.common import check_distinct, command_line, given, output_shape, plainly, watching
+from simdtex.cli.guides import read_guides
+from simdtex.cli.inputs import known_size, known_values, read_known, read_masks, read_material
+from simdtex.cli.options import DEVICE, QUIET, SEED, simulate_options
+
+
+@click.command()
+@click.argument("training_image", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    type=click.Path(path_type=Path),
+    help="Where the realisations go: .zarr, .zarr.zip, .nc or .npz.",
+)
+@click.option("-n", "--number", default=1, show_default=True, type=int, help="How many realisations.")
+@click.option("--first", default=0, show_default=True, type=int, help="Number of the first one.")
+@click.option(
+    "--size",
+    metavar="WIDTHxHEIGHT",
+    help="Of a realisation, pixels. Default: that of --hard, else of TRAINING_IMAGE.",
+)
+@click.option(
+    "--hard",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Hard data, the same in every realisation: a table x,y,value (.csv), or a picture, NaN or transparent where "
+    "nothing is known.",
+)
+@click.option(
+    "--sample-mask",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="White where the training image may be used; once for each of several.",
+)
+@click.option("--guide", metavar="A[,B...]=OUT", help="Secondary data: of each training image, and of realisations.")
+@click.option("--jobs", type=int, help="Realisations at a time.  [one for each core, at most 4; on a GPU 1]")
+@click.option(
+    "--report",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Write a page: realisations, shares, entropy, variograms, connectivity, variety.",
+)
+@SEED
+@DEVICE
+@simulate_options
+@QUIET
+@plainly
+def simulate(
+    training_image: tuple[Path, ...],
+    output: Path,
+    number: int,
+    first: int,
+    size: str | None,
+    hard: Path | None,
+    sample_mask: tuple[Path, ...],
+    guide: str | None,
+    jobs: int | None,
+    report: Path | None,
+    seed: int | None,
+    device: str | None,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Simulate what TRAINING_IMAGE shows: realisations that look like it and honour data.
+
+    A realisation depends on the seed and on its own number alone.
+    """
+    from simdtex import simulate as make
+    from simdtex.io.realisations import check_realisations_path, write_realisations
+
+    material = read_material(training_image, unknown=True)
+    masks = read_masks(sample_mask, material)
+    table = read_known(hard) if hard else None
+    guides = read_guides(guide, material, options["labels"]) if guide else None
+    shape = output_shape(size, material.pixels[0], known_size(table), material.pixels[0])
+    known = known_values(table, hard, shape, material) if table is not None and hard else None
+    check_realisations_path(output, material.pixels[0].dtype)
+    if report:
+        _check_report(report, material.pixels)
+    inputs = [*training_image, *sample_mask, *([hard] if hard else []), *(guides.paths if guides else ())]
+    check_distinct([output, *([report] if report else [])], inputs)
+    if guides:
+        options["labels"] = guides.labels
+
+    began = time.perf_counter()
+    with watching(quiet, None, material.limits) as callback:
+        made = make(
+            material.array,
+            number,
+            shape=shape,
+            hard=known,
+            guide=guides and guides.pair,
+            mask=None if masks is None else (masks if material.several else masks[0]),
+            first=first,
+            jobs=jobs,
+            channel_axis=material.channel_axis,
+            rng=seed,
+            device=device,
+            callback=callback,
+            **given(options),
+        )
+    write_realisations(output, made)
+    if report:
+        from simdtex.report.ensemble import write_ensemble
+
+        categorical = bool(made.attrs["options"]["categorical"])
+        write_ensemble(
+            report,
+            material.pixels[0],
+            made.values,
+            data=None if known is None else _rows(known),
+            categories=None if categorical else [],
+            command=command_line(click.get_current_context()),
+        )
+    if not quiet:
+        seconds = time.perf_counter() - began
+        click.echo(
+            f"{output}: {number} realisation{'s' * (number != 1)} of {shape[1]}x{shape[0]} in {seconds:.1f} s "
+            f"on {made.attrs['device']}, seed {made.attrs['seed']}"
+        )
+
+
+def _check_report(folder: Path, pictures: list[Any]) -> None:
+    """Raise where a report cannot be made, before anything is simulated."""
+    from simdtex.report.page import check_folder
+
+    if len(pictures) > 1 or pictures[0].ndim > 2:
+        raise ValueError("--report is of one training image of one variable; leave it out")
+    if pictures[0].dtype.kind == "f" and np.isnan(pictures[0]).any():
+        raise ValueError("--report is of a training image that is known everywhere; leave it out")
+    if find_spec("gstools") is None:
+        raise ValueError("gstools is not installed; pip install 'simdtex[simulate]', or leave --report out")
+    check_folder(folder)
+
+
+def _rows(known: np.ma.MaskedArray[Any, Any]) -> Any:
+    """Hard data as x, y, value."""
+    row, col = np.nonzero(~np.ma.getmaskarray(known))
+    return np.stack([col, row, known.data[row, col].astype(np.float64)], -1)

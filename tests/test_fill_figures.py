@@ -1,0 +1,108 @@
+"""The figures of benchmarks/fill.py, on fillings whose fault is known."""
+
+import csv
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases import texture
+from scipy.ndimage import gaussian_filter
+
+from simdtex.io.image import write
+
+BENCHMARKS = Path(__file__).resolve().parent.parent / "benchmarks"
+
+
+@pytest.fixture
+def fill(monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import fill
+
+    return fill
+
+
+@pytest.fixture
+def cut():
+    """A noise picture and a hole in it."""
+    picture = np.random.default_rng(1).integers(0, 256, (112, 112), np.uint8)
+    hole = np.zeros(picture.shape, bool)
+    hole[40:68, 40:76] = True
+    return picture, hole
+
+
+def test_the_original_is_like_real_texture(fill, cut):
+    picture, hole = cut
+    found = fill.score(picture, picture, hole)
+    assert set(found) == set(fill.FIGURES)
+    assert all(0.9 < value < 1.1 for value in found.values()), found
+
+
+def test_a_periodic_filling_is_found_in_the_known_part(fill):
+    picture = np.tile(np.random.default_rng(1).integers(0, 256, (8, 8), np.uint8), (6, 6))
+    known = picture.copy()
+    known[40:] = np.random.default_rng(2).integers(0, 256, (8, 48), np.uint8)  # or known patches are all found too
+    hole = np.zeros(picture.shape, bool)
+    hole[12:24, 12:24] = True
+    found = fill.score(known, known, hole)
+    assert found["rim"] == found["inside"] == 0
+
+
+def test_what_is_cut_out_does_not_serve_as_the_sample(fill, cut):
+    picture, hole = cut
+    picture = picture.copy()
+    picture[hole] = 0  # were it a candidate, a black filling would be perfect inside
+    assert fill.score(picture, picture, hole)["inside"] > 0.5
+
+
+def test_a_bright_filling_has_a_seam_and_a_blurred_one_small_steps(fill, cut):
+    picture, hole = cut
+    blurred = gaussian_filter(picture.astype(float), 1.5)
+    smooth = np.where(hole, blurred, picture)
+    assert fill.score(picture, smooth, hole)["step"] < 0.5
+    soft = blurred.astype(np.uint8)
+    raised = np.where(hole, soft + np.uint8(60), soft)
+    assert fill.score(soft, soft, hole)["seam"] < 1.2
+    assert fill.score(soft, raised, hole)["seam"] > 3
+
+
+def test_holes_have_four_shapes_and_leave_most_of_a_picture(fill):
+    found = fill.holes((64, 96))
+    assert set(found) == {"rectangle", "blob", "scratch", "border"}
+    assert all(0 < hole.mean() < 0.3 for hole in found.values())
+    touching = [name for name, hole in found.items() if np.pad(hole, 1, mode="edge").sum() > np.pad(hole, 1).sum()]
+    assert touching == ["border"]
+
+
+def test_one_command_gives_the_table_and_the_sheets(fill, tmp_path, monkeypatch, capsys):
+    (tmp_path / "in").mkdir()
+    write(tmp_path / "in" / "red.png", texture((20, 20), 3))
+    words = ["fill.py", "--samples", tmp_path / "in", "--holes", "rectangle", "--options", "order=2", "--device"]
+    monkeypatch.setattr(
+        sys, "argv", [*map(str, words), "reference", *map(str, ["--out", tmp_path, "--csv", tmp_path / "t.csv"])]
+    )
+    fill.main()
+    with open(tmp_path / "t.csv", encoding="utf-8", newline="") as file:
+        lines = list(csv.DictReader(file))
+    assert [line["filling"] for line in lines] == 2 * ["fill", "order=2", "biharmonic", "original"]
+    assert (tmp_path / "fill-red.png").is_file()
+    assert "original" in capsys.readouterr().out
+
+
+def test_bad_options_are_refused(fill, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["fill.py", "--only", "velvet"])
+    with pytest.raises(SystemExit):
+        fill.main()
+    assert "no sample velvet" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("band", [4, 7])
+def test_a_wrapping_picture_has_no_seam(fill, band):
+    import tile
+
+    row, col = np.indices((48, 40))
+    picture = (127 + 60 * np.sin(2 * np.pi * row / 48) + 50 * np.cos(2 * np.pi * col / 40)).astype(np.uint8)
+    assert tile.frame(picture.shape, band).sum() == picture.size - (48 - 2 * band) * (40 - 2 * band)
+    assert tile.seamless(picture, band)["tiles"] < 1.7
+    assert tile.twice(picture).shape == (96, 80)
+    assert tile.seamless(np.maximum(picture, (row == 0) * np.uint8(255)), band)["tiles"] > 5
