@@ -195,6 +195,7 @@ CASES = {
         for k, (name, (more, inputs)) in enumerate(KINDS.items())
         for how in (BOTH if name in TWICE else [[*BOTH][k % 2]])
     },
+    "nearly-all-known": case(FEW | {"order": 1}, known=0.9, shape=(9, 5)),  # at the coarse level all
     "density-known": case({"pixel": "density", "search": "exact", "order": 1, "xi": -4.0}, known=0.15, shape=(6, 7)),
     "density-two": case({"pixel": "density", "order": 1, **GIBBS}, **TWO, known=0.1, shape=(6, 7)),
     "a-density-of-gaps": case({"pixel": "density", "order": 1, **GIBBS}, gaps=0.1, dtype=np.float32, shape=(6, 7)),
