@@ -5,8 +5,9 @@
 //
 //   sum_r w_r (Y[p_r + (s - r)] - Y[p_s]) / sum_r w_r,
 //
-// over those r whose p_r + (s - r) lies in the sample, s among them. What is from nowhere says nothing, and stays. All in whole numbers, so where all continue one
-// another nothing changes. Rounded to 1 / scale of a grey level, half up.
+// over those r whose p_r + (s - r) lies in the sample and may be used, s among them. What is from nowhere says nothing,
+// and stays, as does what nobody says anything of. All in whole numbers, so where all continue one another nothing
+// changes. Rounded to 1 / scale of a grey level, half up.
 //
 // source  (H, W)               pixel index in the sample of each site's source
 // offsets (N, 2), weights (N,) of the sites around, itself included
@@ -56,7 +57,7 @@ __kernel void finish(const Lattice g, const int first, const int count, __global
     for (int c = 0; c < C && own < 0; ++c)
         out[c * count + n] = 0;
     for (int c = 0; c < C && own >= 0; ++c) {
-        const long twice = 2 * scale * sum[c] + total, by = twice / (2 * total);
-        out[c * count + n] = (short)(by - (by * 2 * total > twice ? 1 : 0));
+        const long twice = 2 * scale * sum[c] + total, whole = max(2 * total, 1), by = twice / whole;
+        out[c * count + n] = (short)(by - (by * whole > twice ? 1 : 0));
     }
 }

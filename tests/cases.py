@@ -7,12 +7,14 @@ import numpy as np
 from hypothesis import strategies as st
 
 from simdtex.machine.reference import Reference
+from simdtex.model.guide import UNKNOWN, Guide
 from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
 from simdtex.ops.nearest import strip_of
-from simdtex.ops.neighbourhood import Field, neighbourhood
+from simdtex.ops.neighbourhood import Beside, Field, neighbourhood
 from simdtex.ops.similar import lattice_of
 from simdtex.ops.square import square_of
 from simdtex.schedules import Setting
@@ -59,13 +61,21 @@ class Problem(NamedTuple):
     sites: np.ndarray
     edges: str
     phases: str
+    nowhere: float = 0.0
+
+    @property
+    def beside(self):
+        """Guides, and hard data, which count more."""
+        guides = len(self.sample.guides)
+        return Beside(guides, guides > 0 or self.nowhere > 0, np.float32(2), np.float32(3.625))
 
     @property
     def offsets(self):
         return neighbourhood_offsets(self.order)
 
-    def candidates(self, machine):
-        return self.sample.candidates(machine, self.offsets, self.grid.spacing, self.phases, self.edges)
+    def candidates(self, machine, every=False):
+        where = (self.offsets, self.grid.spacing, self.phases, self.edges)
+        return self.sample.candidates(machine, *where, every=every)
 
     def strip(self, machine):
         return strip_of(machine, self.sample, self.offsets, self.grid.spacing, self.phases, self.edges)
@@ -76,11 +86,17 @@ class Problem(NamedTuple):
     def lattice(self):
         return lattice_of(self.sample, self.offsets, self.grid.spacing, self.phases, self.edges)
 
-    def price(self, dear=1.0):
-        """Of each candidate, padded to whole blocks: some cost nothing, some much in terms of a distance."""
-        candidates = self.candidates(REFERENCE)
+    def price(self, dear=1.0, every=False):
+        """Of each candidate, padded to whole blocks: some cost nothing, some much in terms of a distance.
+
+        With ``every`` of each place, infinity where no candidate is.
+        """
+        candidates = self.candidates(REFERENCE, every)
         scale = dear * self.sample.variance * len(self.offsets) * self.sample.channels
         price = scale * np.random.default_rng(candidates.size).choice([0, 0, 0.1, 1, 2], candidates.positions.size)
+        allowed = self.sample.allowed(self.offsets, self.grid.spacing, self.phases, self.edges)
+        if every and allowed is not None:
+            price[: candidates.size][~allowed] = np.inf
         return price.astype(np.float32)
 
     def on(self, machine):
@@ -92,7 +108,7 @@ class Problem(NamedTuple):
         """The distances of equation (12), divided for coherent candidates; and the candidates."""
         sites, field, offsets = self.on(machine)
         candidates = self.candidates(machine)
-        near = neighbourhood(machine, sites, field, offsets, self.grid)
+        near = neighbourhood(machine, sites, field, offsets, self.grid, self.beside)
         found = lcpdf.distance(machine, near, candidates)
         if strength:
             favour = np.float32(1 / (1 + strength))
@@ -144,13 +160,30 @@ def problem(
     phases="all",
     count=None,
     weight=0.0,
+    guides=0,
+    nowhere=0.0,
+    masked=0.0,
 ):
-    """A problem from a seed. A third of its sites stand beside what their neighbours were taken from."""
+    """A problem from a seed. A third of its sites stand beside what their neighbours were taken from.
+
+    ``guides`` channels of a guide, unknown at a quarter of the sites; ``nowhere`` share of the sites that are hard
+    data, whose structure is unknown; ``masked`` share of the sample's pixels that may not be used.
+    """
     rng = np.random.default_rng(seed)
     offsets = neighbourhood_offsets(order)
     pixels = texture(sample_shape, channels, dtype, seed)
     margin = int(offsets.max()) * spacing
-    sample = Sample(pixels, (channels + bool(weight)) * len(offsets), margin, weight)
+    guide = None
+    if guides:
+        silent = rng.random((*shape, 1)) < 0.25
+        told = np.where(silent, np.nan, rng.random((*shape, guides)))
+        guide = Guide((rng.random((*sample_shape, guides)),), told, False, 1.0)
+    if masked:
+        usable = (rng.random(sample_shape) >= masked,)
+        pixels = Pictures((pixels,), usable=usable)
+    heavy = 16 if guides or nowhere else 1
+    values = heavy * ((channels + bool(weight) + guides) * len(offsets) + bool(guides))
+    sample = Sample(pixels, values, margin, weight, beside=[guide] if guide else [])
     grid = Grid(*shape, spacing, torus)
     row, col = np.indices(shape)
     scattered = rng.integers(0, sample_shape, (*shape, 2))
@@ -165,8 +198,15 @@ def problem(
     }[temperatures]
     sites = grid.sites()
     sites = rng.permutation(sites)[: count or sites.size].astype(np.int32)
+    if guides:
+        values[-guides:] = sample.guides
+    if nowhere:
+        hard = rng.random(shape) < nowhere
+        source, t = np.where(hard, np.int32(-1), source), np.where(hard, 0, t)
+        if weight:
+            values[channels, hard] = UNKNOWN
     field = Field(values, source, t.astype(np.uint16))
-    return Problem(sample, order, grid, field, sites, edges, phases)
+    return Problem(sample, order, grid, field, sites, edges, phases, nowhere)
 
 
 @st.composite

@@ -1,14 +1,15 @@
 """Algorithm 1 of Paget and Longstaff (1998) as plain loops, to the byte: what whole runs of the engine must give.
 
 Nothing here shares code with the package but the random words, whose generator is tested against published vectors. A
-picture is indexed [channel][row, column], and a place is (row, column). Grey levels are integers, temperatures
-whole 1/1024. An array without a picture's shape runs over candidates p; ``float32`` stands where a result is rounded
-to it. The numbers in the comments are the algorithm's own.
+picture is indexed [channel][row, column], a site is (row, column), and a place in the sample is (number of the picture,
+row, column), (-1, -1, -1) for nowhere. Grey levels are integers, temperatures whole 1/1024. An array without a
+picture's shape runs over candidates p; ``float32`` stands where a result is rounded to it. The numbers in the comments
+are the algorithm's own.
 """
 
 from copy import deepcopy
 from fractions import Fraction
-from itertools import accumulate, product
+from itertools import product
 from math import ceil, exp, isqrt, log, log2, sqrt
 from types import SimpleNamespace
 
@@ -16,6 +17,8 @@ import numpy as np
 import plain
 from numpy import float32
 from plain_multires import within
+from plain_numbers import cumulative, exponential, fma, nearest
+from plain_sample import NOWHERE, UNKNOWN, lay, material, stand_ins
 from plain_schedules import below, schedule, words
 
 from simdtex import random
@@ -33,7 +36,8 @@ DEFAULTS = {
     **{"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": None, "xi": -1.0},
     **{"free_sweeps": 2, "pixel": "source", "phases": "decimated", "edges": "auto", "coarsest": "gibbs"},
     **{"schedule": "coloring", "boundary": "torus", "search": "auto", "suggesting": 12, "similar": 0, "chance": 4},
-    "exhaustive": 64,
+    **{"exhaustive": 64, "categorical": False, "weights": None, "shares": None, "proportions": None},
+    **{"data_weight": 16.0, "guide_weight": 1.0, "labels": None, "unsure": 0.25},
 }
 PAPER = {
     **{"relaxation": "gibbs", "bandwidth": 1.0, "coherence": 0.0, "free_sweeps": 0, "pixel": "density"},
@@ -42,32 +46,43 @@ PAPER = {
 }
 
 
-def options(pixels, preset="default", **given):
+def options(pictures, preset="default", **given):
     """All options, with what ``search="auto"`` and ``finish=None`` stand for."""
     o = SimpleNamespace(**DEFAULTS | (PAPER if preset == "paper" else {}) | given)
     if o.search == "auto":
         o.search = "coherent" if (o.relaxation, o.pixel) == ("icm", "source") else "exact"
     if o.finish is None:
-        categories = len({tuple(pixel) for row in pixels.tolist() for pixel in row}) <= CATEGORIES
+        colours = {tuple(pixel) for y in pictures for row in y.tolist() for pixel in row}
+        categories = o.categorical or len(colours) <= CATEGORIES
         o.finish = 0 if categories or o.pixel == "density" else 1.5
     if o.pixel == "density":
         o.structure = 0
     return o
 
 
-def synthesize(pixels, shape, seed, **given):
-    """Image, source (row, column) and temperature of every pixel, from a sample (rows, columns, channels)."""
-    o = options(pixels, **given)
-    y, top, unit = grey_levels(pixels, o)
-    levels = number_of_levels(pixels.shape[:2], shape, o)  # 1.
-    X, level = at_random(y, shape, seed), None  # 2., 5.
+def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, guide=None, **given):
+    """Image, source and temperature of every pixel, from a sample (rows, columns, channels) or a list of such.
+
+    ``mask`` is a list too; ``known`` a masked array (rows, columns, channels), ``guide`` a list of pictures (rows,
+    columns, channels) and one of the output's size. A source is (row, column), or (row, column, picture) of a list.
+    """
+    one = isinstance(pictures, np.ndarray)
+    pictures = [pictures] if one else pictures
+    o = options(pictures, **given)
+    Y = material(pictures, o, mask, known, known_source, guide)
+    levels = number_of_levels([y.shape[:2] for y in pictures], shape, o)  # 1.
+    lay(Y, levels, o)
+    X, level = at_random(Y, shape, seed), None  # 2., 5.
     for number in reversed(range(levels)):  # 6.
-        level = Level(number, levels, y, top, shape, seed, o, level)  # 3., 4., 6.1
+        level = Level(number, levels, Y, shape, seed, o, level)  # 3., 4., 6.1
+        place_stand_ins(level, X, Y)
         level.price = prices(level, X)
         cooling = True
 
         def active(level=level):
-            return [s for s in level.sites if not cooling or X.t[level.pixel(s)] > 0]  # noqa: B023 - as it is by then
+            if cooling:  # noqa: B023 - as it is by then
+                return [s for s in level.sites if X.t[level.pixel(s)] > 0]
+            return [s for s in level.sites if level.pixel(s) not in level.held]
 
         steps = schedule(level, active)
         while any(X.t[level.pixel(s)] > 0 for s in level.sites):  # 6.2
@@ -75,8 +90,45 @@ def synthesize(pixels, shape, seed, **given):
         cooling = False
         for _ in range(o.free_sweeps):
             sweep(level, X, steps)
-    image = finished(pixels, y, unit, X, o) if o.finish else picture(pixels, y, unit, X)
-    return image, X.source, X.t / 1024  # 7.
+    image = finished(Y, X, o) if o.finish else picture(Y, X)
+    if known is not None:
+        image = np.where(np.ma.getmaskarray(known), image, np.ma.getdata(known)).astype(image.dtype)
+    return image, X.source[..., 1:] if one else X.source[..., [1, 2, 0]], X.t / 1024  # 7.
+
+
+def at_random(Y, shape, seed):
+    """Every pixel of X one of Y's, at temperature 1; those that are known, at 0."""
+    usable = [(n, i, j) for n, one in enumerate(Y.usable) for i, j in np.argwhere(one).tolist()]
+    channels = range(len(Y.planes[0]))
+    X = SimpleNamespace(x=[np.zeros(shape, int) for _ in channels], source=np.zeros((*shape, 3), np.int32))
+    X.t = np.full(shape, 1024)
+    for s in np.ndindex(*shape):
+        word = words(seed, 0, 0, s[0] * shape[1] + s[1], random.START)
+        n, i, j = X.source[s] = usable[below(word, len(usable))]
+        for c in channels:
+            X.x[c][s] = Y.planes[n][c][i, j]
+    for s, (told, place) in Y.given.items():
+        for x, value in zip(X.x, told, strict=False):  # not the guides
+            x[s] = value
+        X.source[s], X.t[s] = place, 0
+    for x, guide in zip(X.x[Y.matched :], Y.guides, strict=True):
+        x[:] = guide
+    return X
+
+
+def place_stand_ins(level, X, Y):
+    """Where a level begins: data between its sites stand at these, and no longer at those of the level above."""
+    torus, released = level.o.boundary == "torus", level.above.stands if level.above else {}
+    for s in released:
+        X.t[s] = 1024
+    for s, datum in level.stands.items():
+        for x, value in zip(X.x, Y.given[datum][0], strict=False):
+            x[s] = value
+        X.source[s], X.t[s] = NOWHERE, 0
+    for x, guide in zip(X.x[Y.matched :], Y.guides, strict=True):
+        x[:] = guide
+        for s, datum in stand_ins(guide != UNKNOWN, level.spacing, torus).items():
+            x[s] = guide[datum]
 
 
 def sweep(level, X, steps):
@@ -96,14 +148,17 @@ def sweep(level, X, steps):
 
 def relaxed(level, X, old, s, turn):
     """What a site becomes: its grey levels, source and temperature."""
-    near = []  # of each neighbour x_r, t_r and where it was taken from
+    near = []  # of each neighbour x_r, how certain each of these is, t_r, and where it was taken from
     for r in level.near[s]:
         seen = X if r is None or level.together(s, r) else old
-        at = None if r is None else level.pixel(r)
-        near.append(None if r is None else ([int(x[at]) for x in seen.x], int(seen.t[at]), tuple(seen.source[at])))
+        near.append(None if r is None else look(level, seen, level.pixel(r)))
 
     numbers, favoured, charged = candidates_of(level, X, s, near, turn)  # 6.2.2.1: equations (6) and (12)
-    d = distances(level, near, numbers, level.lanes)
+    itself = []
+    if level.Y.guides:  # at the site itself these alone count
+        x, certain, _, _ = look(level, X, level.pixel(s))
+        itself = [(x, [0] * level.Y.matched + [level.Y.centre * u for u in certain[level.Y.matched :]])]
+    d = distances(level, near + itself, numbers, level.lanes)
     d = np.where(favoured, d * float32(1 / (1 + level.o.coherence)), d)
     d = d + level.price[numbers]
     for p, times in charged if level.novelty else []:  # neighbour by neighbour; the numbers are all candidates
@@ -114,99 +169,43 @@ def relaxed(level, X, old, s, turn):
     elif level.o.pixel == "source":
         p = min(zip(d, numbers, strict=True))[1]
         values = level.own[:, p]
-    elif len(level.own) == 1 and level.eight_bit:
+    elif len(level.planes) == 1 and level.eight_bit:
         values, p = mode(level, d, numbers)
     else:
         values, p = mode_of_vectors(level, d, numbers)
 
-    there = [t for _, t, _ in filter(None, near)]  # 6.2.2.3: equation (13)
+    there = [t for _, _, t, _ in filter(None, near)]  # 6.2.2.3: equation (13)
     xi = min(-1, round(level.o.xi * 1024))
     return values, level.places[p], max(0, xi + sum(there)) // max(1, len(there))
 
 
-# -- the sample and the levels --------------------------------------------------------------------------------
+def look(level, X, at):
+    """Grey levels of a pixel, how certain each of them is, its temperature and its source.
+
+    A pixel is as certain as it is cold, and counts for more where it is from nowhere; a guide is certain everywhere.
+    """
+    Y, t, source = level.Y, int(X.t[at]), tuple(X.source[at].tolist())
+    x = [int(plane[at]) for plane in X.x]
+    certain = (1024 - t) / 1024 * (Y.hard if Y.own and source == NOWHERE else 1)
+    u = [certain] * Y.matched + [1] * len(Y.guides)
+    return x, [0 if value == UNKNOWN else v for value, v in zip(x, u, strict=True)], t, source
 
 
-def grey_levels(pixels, o):
-    """Y as whole grey levels from 0 to top, the structure channel last; and what 1 of them is in pixels."""
-    planes = np.moveaxis(pixels, -1, 0)
-    y, top, unit = ([plane.astype(int) for plane in planes], 255, 1.0)
-    if pixels.dtype != np.uint8:
-        y, top, unit = stretched(pixels, planes, (len(planes) + (o.structure > 0)) * len(plain.offsets(o.order)))
-    if o.structure:
-        y.append(structure(y, o.structure, max(top, 1023)))
-    return y, top, unit
+# -- the levels -----------------------------------------------------------------------------------------------
 
 
-def stretched(pixels, planes, values):
-    """The same of pixels of other types than 8 bits."""
-    top = 2 ** min(12, int((33 - log2(values)) / 2)) - 1  # so that every distance is exact in float64
-    least, most = (Fraction(bound.item()) for bound in (pixels.min(), pixels.max()))
-    exact = [[[round((Fraction(v) - least) * top / (most - least)) for v in row] for row in y] for y in planes.tolist()]
-    return [np.array(plane) for plane in exact], top, float(most - least) / top
-
-
-def variance(y):
-    """sigma^2 of equation (8): the mean over channels."""
-    greys, total = [plane.ravel().tolist() for plane in y], 0.0
-    for g in greys:  # Python's own sum of doubles rounds in another way
-        total += (len(g) * sum(v * v for v in g) - sum(g) ** 2) / len(g) ** 2
-    return total / len(greys)
-
-
-def structure(y, weight, most):
-    """The signed distance to the edges of the sample, from 0 up, with this weight where that leaves 0..most alone."""
-    rows, cols = y[0].shape
-    slope = np.zeros((rows, cols), int)
-    for plane in y:
-        smooth = np.zeros((rows, cols), int)
-        for i, j, a, b in product(range(rows), range(cols), range(-2, 3), range(-2, 3)):
-            weights = (1, 4, 6, 4, 1)[a + 2] * (1, 4, 6, 4, 1)[b + 2]
-            smooth[i, j] += weights * plane[clamped(i + a, rows), clamped(j + b, cols)]
-        for i, j in product(range(rows), range(cols)):
-            down = smooth[clamped(i + 1, rows), j] - smooth[clamped(i - 1, rows), j]
-            right = smooth[i, clamped(j + 1, cols)] - smooth[i, clamped(j - 1, cols)]
-            slope[i, j] += down**2 + right**2
-    edge = slope > sorted(slope.ravel())[int(0.85 * (slope.size - 1))]
-    signed = np.zeros((rows, cols), int)  # in 1/256 of a pixel
-    for i, j in product(range(rows), range(cols)):
-        others = np.argwhere(edge != edge[i, j])
-        nearest = min([256, *((others - (i, j)) ** 2).sum(1).tolist()])  # 16 pixels at most
-        signed[i, j] = round(sqrt(nearest) * 256) * (-1 if edge[i, j] else 1)
-    signed -= signed.min()
-    spread = sqrt(variance([signed]))
-    if not spread:
-        return signed
-    scale = min(weight * sqrt(variance(y)) / spread, most / int(signed.max()))
-    return np.array([[round(v * scale) for v in row] for row in signed.tolist()])
-
-
-def clamped(i, n):
-    """Index i brought to 0 .. n-1: the outermost stands for all beyond."""
-    return min(max(i, 0), n - 1)
-
-
-def at_random(y, shape, seed):
-    """Every pixel of X one of Y's, at temperature 1."""
-    rows, cols = y[0].shape
-    source = np.zeros((*shape, 2), np.int32)
-    for i, j in np.ndindex(*shape):
-        source[i, j] = divmod(below(words(seed, 0, 0, i * shape[1] + j, random.START), rows * cols), cols)
-    x = [plane[source[..., 0], source[..., 1]] for plane in y]
-    return SimpleNamespace(x=x, source=source, t=np.full(shape, 1024))
-
-
-def number_of_levels(sample, shape, o):
+def number_of_levels(samples, shape, o):
     """M: the most at which the sample has enough candidates, and the lattice holds a neighbourhood."""
     radius = isqrt(o.order)
 
     def enough(levels, least):
         spacing = 2 ** (levels - 1)
         step = 1 if o.phases == "all" else spacing
-        rows, cols = (max(0, n - (2 * radius * spacing if o.edges == "whole" else 0)) // step for n in sample)
-        return rows * cols >= least
+        sides = [[max(0, n - (2 * radius * spacing if o.edges == "whole" else 0)) // step for n in y] for y in samples]
+        return sum(rows * cols for rows, cols in sides) >= least
 
-    most = max(m for m in range(1, 2 + int(log2(min(*sample, *shape)))) if m == 1 or enough(m, 1))
+    smallest = min(n for sides in (*samples, shape) for n in sides)
+    most = max(m for m in range(1, 2 + int(log2(smallest))) if m == 1 or enough(m, 1))
     if o.levels is not None:
         assert o.levels <= most
         return o.levels
@@ -219,9 +218,9 @@ def number_of_levels(sample, shape, o):
 class Level:
     """One level: its lattice, its neighbourhoods, its candidates and the Gaussian of equation (7)."""
 
-    def __init__(self, number, levels, y, top, shape, seed, o, above=None):
+    def __init__(self, number, levels, Y, shape, seed, o, above=None):
         """Equations (8), (10) and (11); ``above`` is the next coarser level."""
-        self.number, self.spacing, self.width, self.seed, self.o = number, 2**number, shape[1], seed, o
+        self.number, self.spacing, self.width, self.seed, self.o, self.Y = number, 2**number, shape[1], seed, o, Y
         self.rows, self.cols = plain.grid_size(shape, self.spacing)
         self.sites = list(product(range(self.rows), range(self.cols)))
         torus = o.boundary == "torus"
@@ -230,23 +229,30 @@ class Level:
         name, _, parameter = o.schedule.partition(":")
         self.tile = tuple(map(int, (parameter or "16x16").split("x"))) if name == "block" else (self.rows, self.cols)
 
-        self.places = positions(y[0].shape, self.spacing, o)
-        self.number_of = {place: p for p, place in enumerate(self.places)}
-        self.own = np.array([[plane[p] for p in self.places] for plane in y])
-        self.around = np.array([[self.beside(plane, offset) for plane in y] for offset in self.offsets])
+        self.stands = stand_ins(Y.whole, self.spacing, torus) if Y.given else {}
+        self.held = Y.given.keys() | self.stands.keys()
 
         radius, step = isqrt(o.order), 1 if o.phases == "all" else self.spacing
         self.step, self.above, self.found = step, above, None
-        self.pitch = y[0].shape[1] + 2 * radius * 2 ** (levels - 1)  # of the sample with its margin
-        self.lattice = tuple(len({place[axis] for place in self.places}) for axis in (0, 1))
+        self.places = positions(Y, self.spacing, step, o)
+        self.number_of = {place: p for p, place in enumerate(self.places)}
+        self.at = [(Y.tops[n] + i, j) for n, i, j in self.places]  # in the canvas
+        self.lines = [sorted({at[axis] for at in self.at}) for axis in (0, 1)]
+        if not Y.clean:
+            self.lines = [list(range(0, side, step)) for side in Y.canvas]
         self.blur = radius * self.spacing // step  # candidates from one to the edge of its neighbourhood
 
-        n, dimensions = len(self.places), len(y) * (len(self.offsets) + 1)
-        best = sqrt(variance(y)) * pow(4 / (n * (2 * dimensions + 1)), 1 / (dimensions + 4))  # (8)
+        self.planes = Y.planes[0]
+        self.own = np.array([[Y.planes[n][c][i, j] for n, i, j in self.places] for c in range(Y.matched)])
+        offsets = [*self.offsets, (0, 0)]  # the site itself for the sake of guides
+        self.around = np.array([[self.beside(c, offset) for c in range(len(self.planes))] for offset in offsets])
+
+        n, dimensions = len(self.places), Y.matched * (len(self.offsets) + 1)
+        best = sqrt(Y.variance) * pow(4 / (n * (2 * dimensions + 1)), 1 / (dimensions + 4))  # (8)
         h = max(o.bandwidth * best, 1e-10)
         self.scale = float32(1 / (2 * h * h))
-        self.top, self.eight_bit = top, top == 255
-        self.reach = min(top, int(h * sqrt(2 * log(2.0**33))))  # beyond which the Gaussian is nothing
+        self.top, self.eight_bit = Y.top, Y.top == 255
+        self.reach = min(Y.top, int(h * sqrt(2 * log(2.0**33))))  # beyond which the Gaussian is nothing
         gauss = [exp(-k * k / (2 * h * h)) for k in range(self.reach + 1)]
         self.gauss = np.array(gauss, float32)
         self.below_step = cumulative([gauss[abs(k)] for k in range(-self.reach, self.reach + 1)])
@@ -257,9 +263,11 @@ class Level:
         self.lanes = LANES if ALL_IN_LANES or not self.all else 1
         self.similar = similar(self) if not self.all and o.similar else None
 
-        self.rate = o.balance * len(self.offsets) * len(y) * variance(y)
-        anew = coarsest and n <= MOST_KEPT and (self.gibbs or o.pixel == "source")
-        self.novelty = float32(o.novelty * min(1.0, 256 / n) * len(y) * variance(y) if anew else 0)
+        differing = len(self.offsets) * Y.matched * Y.variance  # two neighbourhoods that have nothing in common
+        self.rate, self.strict = o.balance * differing, 2.0 * differing
+        crossings = len(self.lines[0]) * len(self.lines[1])
+        anew = coarsest and crossings <= MOST_KEPT and (self.gibbs or o.pixel == "source")
+        self.novelty = float32(o.novelty * min(1.0, 256 / n) * Y.matched * Y.variance if anew else 0)
 
     def pixel(self, s):
         """The pixel of X that a site of the level's lattice is."""
@@ -273,20 +281,35 @@ class Level:
         """Whether two sites are of one tile."""
         return all(a // side == b // side for a, b, side in zip(s, r, self.tile, strict=True))
 
-    def beside(self, plane, offset):
-        """y_r of every candidate, the sample being continued by reflection."""
-        rows, cols = plane.shape
-        there = [(i + offset[0] * self.spacing, j + offset[1] * self.spacing) for i, j in self.places]
-        return [plane[within(i, rows, False), within(j, cols, False)] for i, j in there]
+    def beside(self, c, offset):
+        """y_r of every candidate, each picture of the sample being continued by reflection."""
+        found = []
+        for n, i, j in self.places:
+            (rows, cols), there = self.Y.usable[n].shape, (i + offset[0] * self.spacing, j + offset[1] * self.spacing)
+            found.append(self.Y.planes[n][c][within(there[0], rows, False), within(there[1], cols, False)])
+        return found
 
 
-def positions(shape, spacing, o):
-    """The candidates of a level, row by row."""
-    step = 1 if o.phases == "all" else spacing
-    every = list(product(range(0, shape[0], step), range(0, shape[1], step)))
-    whole = plain.whole_positions(shape, o.order, spacing, step)
+def positions(Y, spacing, step, o):
+    """The candidates of a level, picture by picture and row by row."""
+    every, whole = [], []
+    for n, usable in enumerate(Y.usable):
+        inside = set(plain.whole_positions(usable.shape, o.order, spacing, step))
+        for i, j in product(range(0, usable.shape[0], step), range(0, usable.shape[1], step)):
+            if usable[i, j]:
+                every.append((n, i, j))
+                whole += [(n, i, j)] * ((i, j) in inside)
     reflect = o.edges == "reflect" or (o.edges == "auto" and (spacing > 1 or len(whole) < 0.75 * len(every)))
-    return every if reflect else whole
+    return [place for place in (every if reflect else whole) if sure(Y, place, spacing, o)]
+
+
+def sure(Y, place, spacing, o):
+    """Whether not too many neighbours of a place are unknown; what lies beyond the picture is not."""
+    (n, i, j), offsets, unknown = place, plain.offsets(o.order), 0
+    for a, b in offsets:
+        k, m = i + a * spacing, j + b * spacing
+        unknown += 0 <= k < Y.gaps[n].shape[0] and 0 <= m < Y.gaps[n].shape[1] and bool(Y.gaps[n][k, m])
+    return unknown <= o.unsure * len(offsets)
 
 
 def similar(level):
@@ -303,7 +326,7 @@ def similar(level):
 def approximately_similar(level):
     """The same of many candidates: who is like p lies to it as who is like one of p's kin lies to that."""
     everyone, k = range(len(level.places)), level.o.similar
-    at = [i * level.pitch + j for i, j in level.places]  # pixels of the sample with its margin
+    at = [i * level.Y.pitch + j for i, j in level.at]  # pixels of the sample with its margin
     number_at = {pixel: p for p, pixel in enumerate(at)}
 
     def moves(table, at):
@@ -314,17 +337,16 @@ def approximately_similar(level):
         kin, moved, rounds = list(everyone), moves(drawn, at), 6
     else:
         above = level.above
-        lines = [sorted({place[axis] for place in above.places}) for axis in (0, 1)]
         before = [
-            tuple(max([line for line in lines[axis] if line <= place[axis]] or lines[axis][:1]) for axis in (0, 1))
-            for place in level.places
+            tuple(max([x for x in above.lines[axis] if x <= at[axis]] or above.lines[axis][:1]) for axis in (0, 1))
+            for at in level.at
         ]
-        kin = [above.number_of[place] for place in before]
-        moved, rounds = moves(similar(above), [i * level.pitch + j for i, j in above.places]), 2
+        kin = [above.at.index(at) if at in above.at else 0 for at in before]
+        moved, rounds = moves(similar(above), [i * level.Y.pitch + j for i, j in above.at]), 2
     for _ in range(rounds):
         found = []
         for p in everyone:
-            around = [at[p] + (a * level.pitch + b) * level.step for a in (-1, 0, 1) for b in (-1, 0, 1)]
+            around = [at[p] + (a * level.Y.pitch + b) * level.step for a in (-1, 0, 1) for b in (-1, 0, 1)]
             those = [kin[number_at[pixel]] for pixel in around if pixel in number_at]
             there = {at[p] + move for row in those for move in moved[row]}
             found.append(most_similar(level, p, sorted(number_at[pixel] for pixel in there & number_at.keys())))
@@ -334,9 +356,9 @@ def approximately_similar(level):
 
 def most_similar(level, p, numbers):
     """The K of these most similar to p, but for those next to it; the lowest number where several are as near."""
-    (i, j), near = level.places[p], level.step
-    others = [q for q in numbers if max(abs(level.places[q][0] - i), abs(level.places[q][1] - j)) > near]
-    here = [([y[p] for y in planes], 0, None) for planes in level.around]
+    (i, j), near = level.at[p], level.step
+    others = [q for q in numbers if max(abs(level.at[q][0] - i), abs(level.at[q][1] - j)) > near]
+    here = [([y[p] for y in planes], [1] * len(planes)) for planes in level.around[:-1]]
     d = distances(level, here, others, LANES)
     nearest = [q for _, q in sorted(zip(d, others, strict=True))][: level.o.similar]
     return nearest + [p] * (level.o.similar - len(nearest))
@@ -348,18 +370,42 @@ def prices(level, X):
     u is the use of the square around it over its fair share: the square is as wide as the neighbourhood, as far as it
     lies among the candidates, and only pixels with t < 1 use their source.
     """
-    used = np.zeros(len(level.places), int)
+    used, due = (np.zeros([len(lines) for lines in level.lines], int) for _ in range(2))
+    crossing = [tuple(level.lines[axis].index(at[axis]) for axis in (0, 1)) for at in level.at]
+    fair = shares(level)
+    for at, place in zip(crossing, level.places, strict=True):
+        due[at] = fair[place[0]]
     for s in level.sites:
-        p = level.number_of.get(tuple(X.source[level.pixel(s)]))
+        p = level.number_of.get(tuple(X.source[level.pixel(s)].tolist()))
         if X.t[level.pixel(s)] < 1024 and p is not None:
-            used[p] += 1
-    total, used = int(used.sum()), used.reshape(level.lattice)
-    price = np.zeros(level.lattice, float32)
-    for a, b in np.ndindex(*level.lattice) if total else []:
-        square = used[max(0, a - level.blur) : a + level.blur + 1, max(0, b - level.blur) : b + level.blur + 1]
-        u = int(square.sum()) * used.size / (square.size * total)
-        price[a, b] = float32(level.rate * min(4, max(0, u - 1)))
-    return price.ravel()
+            used[crossing[p]] += 1
+    total, price = int(used.sum()), np.zeros(len(crossing), float32)
+    for p, (a, b) in enumerate(crossing) if total else []:
+        square = (slice(max(0, a - level.blur), a + level.blur + 1), slice(max(0, b - level.blur), b + level.blur + 1))
+        u = int(used[square].sum()) * int(due.sum()) / (int(due[square].sum()) * total)
+        price[p] = float32(level.rate * min(4, max(0, u - 1)))
+    return price + of_kinds(level, [int(used[at]) for at in crossing]) if level.o.proportions and total else price
+
+
+def shares(level):
+    """How much of each candidate of a picture is fair, in whole numbers."""
+    wanted, pictures = level.o.shares, [n for n, _, _ in level.places]
+    if not wanted or level.Y.clean:
+        return [1] * len(level.Y.pictures)
+    numbers = [pictures.count(n) for n in range(len(wanted))]
+    each = [share / sum(wanted) * len(pictures) / max(1, n) for share, n in zip(wanted, numbers, strict=True)]
+    return [round(2**16 * one) for one in each]
+
+
+def of_kinds(level, used):
+    """What it costs a candidate to be of a category that is used more often than it is to be."""
+    kinds = [level.Y.pictures[n][i, j, 0].item() for n, i, j in level.places]
+    costs = {}
+    for kind, share in zip(level.Y.categories[0], level.o.proportions, strict=True):
+        due = share / sum(level.o.proportions) * sum(used)
+        times = sum(n for n, k in zip(used, kinds, strict=True) if k == kind)
+        costs[kind] = float32(level.strict * min(1.0, max(0.0, times / due - 1) if due else 1.0))
+    return np.array([costs[kind] for kind in kinds], float32)
 
 
 # -- 6.2.2.1: what a site weighs ------------------------------------------------------------------------------
@@ -372,18 +418,18 @@ def candidates_of(level, X, s, near, turn):
     o = level.o
     suggested, charged = [], []
     for (di, dj), r in list(zip(level.offsets, near, strict=True))[: None if level.all else o.suggesting]:
-        if r is None or r[1] == 1024:  # as nothing has touched it yet
+        if r is None or r[2] == 1024 or r[3] == NOWHERE:  # as nothing has touched it yet
             continue
-        i, j = r[2]
-        suggested.append(level.number_of.get((i - di * level.spacing, j - dj * level.spacing)))
-        charged += [(suggested[-1], 1), (level.number_of.get((i, j)), 4)]
+        n, i, j = r[3]
+        suggested.append(level.number_of.get((n, i - di * level.spacing, j - dj * level.spacing)))
+        charged += [(suggested[-1], 1), (level.number_of.get((n, i, j)), 4)]
     if level.all:
         numbers = list(range(len(level.places)))
         return numbers, [p in suggested for p in numbers], [(p, n) for p, n in charged if p is not None]
 
     found = list(dict.fromkeys(p for p in suggested if p is not None))
     favoured = len(found)
-    found.append(level.number_of.get(tuple(X.source[level.pixel(s)])))
+    found.append(level.number_of.get(tuple(X.source[level.pixel(s)].tolist())))
     found = list(dict.fromkeys(p for p in found if p is not None))
     if level.similar:
         found += [like for p in found for like in level.similar[p]]
@@ -400,15 +446,15 @@ def distances(level, near, numbers, lanes):
     In lanes there is a sum for each column, modulo 16, of the square around the neighbourhood, which is gone through
     row by row; a tree adds them up.
     """
-    d = np.zeros((lanes, len(numbers)), float32)
+    d, offsets = np.zeros((lanes, len(numbers)), float32), [*level.offsets, (0, 0)]
     inside = [k for k, r in enumerate(near) if r is not None]
     if lanes > 1:
-        inside.sort(key=lambda k: level.offsets[k])
+        inside.sort(key=lambda k: offsets[k])
     for k in inside:
-        x, t, _ = near[k]
-        lane = (level.offsets[k][1] + isqrt(level.o.order)) % lanes
-        for x_r, y_r in zip(x, level.around[k], strict=True):
-            e = (x_r - y_r[numbers]) * ((1024 - t) / 1024)
+        x, certain = near[k][:2]
+        lane = (offsets[k][1] + isqrt(level.o.order)) % lanes
+        for x_r, u, y_r in zip(x, certain, level.around[k], strict=True):
+            e = (x_r - y_r[numbers]) * float(u)
             d[lane] = (e * e + d[lane].astype(float)).astype(float32)  # the double is exact
     while len(d) > 1:
         d = d[: len(d) // 2] + d[len(d) // 2 :]
@@ -483,83 +529,75 @@ def mode_of_vectors(level, d, numbers):
     return level.own[:, p], p
 
 
-def picture(pixels, y, unit, X):
-    """Each pixel that of its source, moved by what the grey level differs."""
-    image = np.zeros((*X.t.shape, pixels.shape[-1]), pixels.dtype)
+# -- 7.: what is shown ----------------------------------------------------------------------------------------
+
+
+def picture(Y, X):
+    """Each pixel that of its source, moved by what the grey level differs; what is from nowhere is shown elsewhere."""
+    image = np.zeros((*X.t.shape, len(Y.variables)), Y.pictures[0].dtype)
     for i, j, c in np.ndindex(image.shape):
-        place = tuple(X.source[i, j])
-        image[i, j, c] = moved(pixels, (*place, c), int(X.x[c][i, j] - y[c][place]), unit)
+        n, k, m = X.source[i, j].tolist()
+        if n >= 0:
+            step = int(X.x[c][i, j] - Y.planes[n][c][k, m]) if Y.direct else 0
+            image[i, j, c] = moved(Y, (n, k, m, c), step, Y.unit[c])
     return image
 
 
-def finished(pixels, y, unit, X, o):
+def finished(Y, X, o):
     """Each pixel the weighted mean of what its neighbours' sources say of it: Y[p_r + s - r], r up to 2.5 sd from s.
 
-    Weights are whole 1/1024. The mean is rounded, halves up, to a grey level of 8 bits and to 1/8 of one of others.
+    Weights are whole 1/1024. The mean is rounded, halves up, to a grey level of 8 bits and to 1/8 of one of others. A
+    neighbour that is given, and whose source says nothing, says by how much the site's own source misses it.
     """
-    (rows, cols), (height, width), radius = X.t.shape, y[0].shape, ceil(2.5 * o.finish)
-    image = np.zeros((rows, cols, pixels.shape[-1]), pixels.dtype)
-    fine = 1 if pixels.dtype == np.uint8 else 8
+    (rows, cols), radius = X.t.shape, ceil(2.5 * o.finish)
+    image = np.zeros((rows, cols, len(Y.variables)), Y.pictures[0].dtype)
+    fine = 1 if Y.top == 255 else 8
     for i, j in np.ndindex(rows, cols):
-        own, total, sums = tuple(X.source[i, j].tolist()), 0, [0] * pixels.shape[-1]
+        own, total, sums = tuple(X.source[i, j].tolist()), 0, [0] * len(Y.variables)
+        if own == NOWHERE:
+            continue
         for a, b in product(range(-radius, radius + 1), repeat=2):
             r = ((i + a) % rows, (j + b) % cols) if o.boundary == "torus" else (i + a, j + b)
             far, outside = a * a + b * b > (2.5 * o.finish) ** 2, not (0 <= r[0] < rows and 0 <= r[1] < cols)
             if far or outside or (r == (i, j) and (a, b) != (0, 0)):
                 continue
-            k, m = X.source[r].tolist()
-            if 0 <= k - a < height and 0 <= m - b < width:
-                weight = round(1024 * exp(-(a * a + b * b) / (2 * o.finish**2)))
-                total += weight
-                for c in range(pixels.shape[-1]):  # not the structure channel
-                    sums[c] += weight * int(y[c][k - a, m - b] - y[c][own])
-        for c in range(pixels.shape[-1]):
-            step = (2 * fine * sums[c] + total) // (2 * total)
-            image[i, j, c] = moved(pixels, (*own, c), step, unit / fine)
+            weight = round(1024 * exp(-(a * a + b * b) / (2 * o.finish**2)))
+            said, missed = usable(Y, X.source[r], (-a, -b)), usable(Y, own, (a, b)) if r in Y.given else None
+            for c in range(len(Y.variables)) if said or missed else []:  # not the structure channel
+                if said:
+                    sums[c] += weight * (level_at(Y, c, said) - level_at(Y, c, own))
+                else:
+                    sums[c] += weight * (int(X.x[c][r]) - level_at(Y, c, missed))
+            total += weight if said or missed else 0
+        for c in range(len(Y.variables)):
+            step = (2 * fine * sums[c] + total) // max(1, 2 * total)
+            image[i, j, c] = moved(Y, (*own, c), step, Y.unit[c] / fine)
     return image
 
 
-def moved(pixels, at, step, unit):
+def usable(Y, place, by):
+    """The place that is so much further on, if it may be used; there is none beside what is nowhere."""
+    n, i, j = (int(x) for x in place)
+    i, j = i + by[0], j + by[1]
+    inside = n >= 0 and 0 <= i < Y.usable[n].shape[0] and 0 <= j < Y.usable[n].shape[1]
+    return (n, i, j) if inside and Y.usable[n][i, j] else None
+
+
+def level_at(Y, c, place):
+    """The grey level of a place."""
+    return int(Y.planes[place[0]][c][place[1:]])
+
+
+def moved(Y, at, step, unit):
     """A value of the sample moved by so many steps, within the legal range."""
-    low, high = (0, 255) if pixels.dtype == np.uint8 else (pixels.min().item(), pixels.max().item())
-    own = pixels[at].item()
-    value = own + step * unit if pixels.dtype.kind == "f" else round(own + step * unit)
-    return min(max(value, low), high) if step else own
-
-
-# -- numbers --------------------------------------------------------------------------------------------------
-
-
-def cumulative(terms):
-    """Sums of the first terms over the sum of all, in 2^-32."""
-    sums = list(accumulate(terms))
-    return [*(min(2**32 - 1, round(s / sums[-1] * 2**32)) for s in sums[:-1]), 2**32 - 1]
-
-
-def nearest(exact):
-    """The float32 nearest to a fraction, ties to the even one."""
-    close = float32(float(exact))
-    around = [close, np.nextafter(close, float32(-np.inf)), np.nextafter(close, float32(np.inf))]
-    return min(around, key=lambda x: abs(Fraction(float(x)) - exact))  # the first of equals: a tie is exact above
-
-
-def fma(a, b, c):
-    """A * b + c, rounded once to float32."""
-    a, b, c = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, float)) for x in (a, b, c)))
-    double = a * b + c
-    low, high = (np.nextafter(double, end).astype(float32) for end in (-np.inf, np.inf))
-    for k in np.flatnonzero(low != high):  # too close to the middle for the double to tell
-        high[k] = nearest(Fraction(a[k]) * Fraction(b[k]) + Fraction(c[k]))
-    return high
-
-
-def exponential(x):
-    """exp(x) of float32, as the polynomial that the devices' exponential is; x from -28 to 0."""
-    x = np.atleast_1d(x)
-    k = np.rint(x * float32(1.44269502))
-    r = fma(k, float32(-0.693145752), x)
-    r = fma(k, float32(-1.42860677e-6), r)
-    p = float32(1.38888892e-3)
-    for coefficient in (8.33333377e-3, 4.16666679e-2, 1.66666672e-1, 0.5, 1.0, 1.0):
-        p = fma(p, r, float32(coefficient))
-    return np.ldexp(p.astype(float), k.astype(int))
+    pixels, whole = Y.pictures, Y.pictures[0].dtype.kind != "f"
+    low, high = min(y.min() for y in pixels).item(), max(y.max() for y in pixels).item()
+    if pixels[0].dtype == np.uint8:
+        low, high = 0, 255
+    own = pixels[at[0]][at[1:]].item()
+    if not step:
+        return own
+    value = own + step * unit
+    if pixels[0].dtype == np.bool_:
+        return value > 0.5
+    return min(max(round(value) if whole else value, low), high)

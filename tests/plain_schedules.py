@@ -67,7 +67,7 @@ def in_groups(level, active, group, shuffled):
             key = {g: words(level.seed, level.number, turn, g, random.SCHEDULE)[0] for g in groups}
             order = sorted(groups, key=key.get)
         steps = [[s for s in level.sites if group[s] == g and s in wanted] for g in order]
-        steps = [step for step in steps if step]
+        steps = [step for step in steps if step] or [[]]  # an empty sweep is one step of nobody
         for step in steps:
             yield step, turn, step is steps[-1]
 

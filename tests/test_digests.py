@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import test_algorithm_given
 from skimage import data
 from test_bits import RUNS, expected
 
@@ -59,6 +60,12 @@ LARGE = {
 }
 
 
+GIVEN = (
+    *("known-three-levels-few", "placed-some-exact", "partly-few", "labels-silent-exact", "grey-guide-silent-few"),
+    *("masked-exact", "mixed-few", "everything-exact", "everything-few"),
+)
+"""Runs of test_algorithm_given: with known values, guides, several samples, masks, gaps, and kinds of variables."""
+
 QUICK = ("brick", "coffee", "grass-16-bit", "grass-coarsest", "multires-coffee", "pyramid-coffee")
 """Those whose kernels other tests compile too."""
 
@@ -99,6 +106,11 @@ def small(name):
     return digest([*arrays, counts(levels)])
 
 
+def with_given(name):
+    """The digest of a run of test_algorithm_given on the reference."""
+    return digest(test_algorithm_given.run(test_algorithm_given.CASES[name]))
+
+
 def large(name, device):
     """The digest of a larger run on a device."""
     kind, shape, options = LARGE[name]
@@ -116,12 +128,18 @@ def pinned():
 
 
 def test_every_run_is_pinned():
-    assert set(pinned()) == {f"small {name}" for name in RUNS} | {f"large {name}" for name in LARGE}
+    names = {f"small {name}" for name in RUNS} | {f"given {name}" for name in GIVEN}
+    assert set(pinned()) == names | {f"large {name}" for name in LARGE}
 
 
 @pytest.mark.parametrize("name", RUNS)
 def test_the_references_bytes_are_those_pinned(name):
     assert small(name) == pinned()[f"small {name}"]
+
+
+@pytest.mark.parametrize("name", GIVEN)
+def test_the_bytes_of_a_run_with_what_is_given_are_those_pinned(name):
+    assert with_given(name) == pinned()[f"given {name}"]
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK)) for name in LARGE])
@@ -133,6 +151,7 @@ def test_the_devices_bytes_are_those_pinned(any_device, name):
 
 if __name__ == "__main__":
     found = {f"small {name}": small(name) for name in RUNS}
+    found |= {f"given {name}": with_given(name) for name in GIVEN}
     found |= {f"large {name}": large(name, None) for name in LARGE}
     json.dump(found, sys.stdout, indent=0, sort_keys=True)
     print()

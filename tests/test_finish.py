@@ -14,6 +14,7 @@ from simdtex.model.lattice import Grid
 from simdtex.model.sample import Sample
 from simdtex.model.source_map import apply_source_map
 from simdtex.ops.finish import around, finish
+from simdtex.ops.neighbourhood import Field
 
 
 def plainly(p, sd):
@@ -47,9 +48,49 @@ def plainly(p, sd):
     return found
 
 
+@pytest.mark.parametrize("how", [{"nowhere": 0.4}, {"masked": 0.4}, {"nowhere": 0.2, "masked": 0.6}], ids=str)
+@pytest.mark.parametrize("torus", [True, False])
+def test_who_has_something_to_say(machine, how, torus):
+    """Neighbours whose sources may be used there; and given ones, by how much the site's own source misses them."""
+    p = problem(6, shape=(9, 11), sample_shape=(10, 12), channels=2, edges="reflect", torus=torus, **how)
+    usable, source, shown = p.sample.inside, p.source(), p.sample.working.reshape(-1, p.sample.rows, p.sample.cols)
+    expected, values, spoken = np.zeros((2, 9, 11), np.int16), p.field.values.astype(int), set()
+    for i, j in np.ndindex(9, 11):
+        total, said = 0, np.zeros(2, int)
+        if p.field.source[i, j] < 0:
+            continue
+        for a in range(-2, 3):
+            for b in range(-2, 3):
+                r, beyond = ((i + a) % 9, (j + b) % 11), not (0 <= i + a < 9 and 0 <= j + b < 11)
+                if a * a + b * b > 6.25 or (beyond and not torus) or (r == (i, j) and (a, b) != (0, 0)):
+                    continue
+                there, missed = (tuple(int(x) for x in at) for at in (source[r] - (a, b), source[i, j] + (a, b)))
+                told = p.field.source[r] >= 0 and all(0 <= x < n for x, n in zip(there, usable.shape, strict=True))
+                weight = round(1024 * exp(-(a * a + b * b) / 2))
+                if told and usable[there]:
+                    by = shown[(slice(None), *there)].astype(int) - shown[(slice(None), *source[i, j])]
+                elif (
+                    p.field.source[r] < 0
+                    and all(0 <= x < n for x, n in zip(missed, usable.shape, strict=True))
+                    and usable[missed]
+                ):
+                    by = values[:, *r] - shown[(slice(None), *missed)]
+                else:
+                    continue
+                spoken.add(p.field.source[r] < 0)
+                total, said = total + weight, said + weight * by
+        expected[:, i, j] = [floor(one / total + 0.5) for one in said.tolist()] if total else 0
+    assert spoken == {False, "nowhere" in how}
+    for m in (REFERENCE, machine):
+        assert_same_bits(finished(m, p, 1.0).reshape(expected.shape), expected)
+
+
 def finished(m, p, sd, first=0, count=None):
+    """What is from nowhere is given."""
     _, field, _ = p.on(m)
-    return finish(m, field.source, p.grid, p.sample.planes(m), p.sample, *around(sd), first, count or p.grid.plane)
+    given = m.put((p.field.source < 0).astype(np.uint8))
+    where = (p.grid, p.sample.planes(m), p.sample)
+    return finish(m, field, given, *where, *around(sd), first, count or p.grid.plane)
 
 
 @pytest.mark.parametrize("sd", [0.5, 1.5, 2.0])
@@ -76,7 +117,9 @@ def test_where_the_arrangement_is_coherent_nothing_changes(machine, dtype):
     row, col = np.indices((9, 10)) + sample.margin + 4
     source = (row * sample.cols + col).astype(np.int32)
     for m in (REFERENCE, machine):
-        by = finish(m, m.put(source), grid, sample.planes(m), sample, *around(1.5), 0, 90)
+        values, t = sample.working[:, source], np.zeros((9, 10), np.uint16)
+        field, given = Field(*(m.put(plane) for plane in (values, source, t))), m.put(np.zeros((9, 10), np.uint8))
+        by = finish(m, field, given, grid, sample.planes(m), sample, *around(1.5), 0, 90)
         assert not by.any()
         assert_same_bits(sample.moved(source, by.reshape(2, 9, 10)), pixels[4:13, 4:14])
 

@@ -71,6 +71,19 @@ def test_distances_at_large_orders_have_the_references_bits(machine, channels, d
     assert_same_bits(distances(machine, p), distances(REFERENCE, p))
 
 
+@pytest.mark.parametrize("how", [{"guides": 2}, {"nowhere": 0.3, "weight": 1.0}], ids=str)
+def test_distances_and_the_least_of_what_is_given_have_the_references_bits(machine, how):
+    p = problem(5, order=8, channels=2, sample_shape=(16, 15), shape=(13, 12), count=70, **how)
+    assert_same_bits(distances(machine, p), distances(REFERENCE, p))
+    window, _ = p.window()
+    taken = {m.name: host(m, lcpdf.least(m, *p.distances(m), window)) for m in (REFERENCE, machine)}
+    first, second = taken.values()
+    assert_same_bits(first, second)
+    assert len(first[1]) == p.sample.channels, "a guide is never made"
+    nearest = p.distances(REFERENCE)[0].distance.argmin(0)
+    assert_same_bits(first[0], p.candidates(REFERENCE).positions[nearest])
+
+
 @pytest.mark.parametrize("options", VARIANTS, **ids)
 def test_the_shape_of_a_launch_changes_no_bit_of_a_distance(cl_device, options):
     p = problem(3, order=8, sample_shape=(16, 15), count=37)

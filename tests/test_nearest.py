@@ -46,6 +46,21 @@ def test_a_device_has_the_references_bits(machine, p, strength, dear):
     assert_same_bits(run(machine, p, strength, dear), run(REFERENCE, p, strength, dear))
 
 
+@pytest.mark.parametrize("masked", [0.3, 0.9])
+def test_places_that_may_not_be_taken_cost_infinity(machine, masked):
+    """The list is of all places, then."""
+    p = problem(3, order=8, channels=2, sample_shape=(26, 31), shape=(11, 9), edges="reflect", masked=masked)
+    found = {}
+    for m in (REFERENCE, machine):
+        sites, field, offsets = p.on(m)
+        terms = (np.float32(0.5), m.put(p.price(0.1, every=True)))
+        outcome = nearest(m, sites, field, offsets, p.grid, p.candidates(m, every=True), p.strip(m), *terms)
+        found[m.name] = host(m, outcome)
+    first, second = found.values()
+    assert_same_bits(first, second)
+    assert p.sample.inside.ravel()[first[0]].all()
+
+
 @pytest.mark.parametrize("options", FORMS, ids=lambda options: "-".join(f"{k}-{v}" for k, v in options.items()))
 def test_the_form_of_a_launch_changes_no_bit(cl_device, options):
     for seed, temperatures in enumerate(("mixed", "zero", "one")):

@@ -21,9 +21,9 @@ PLAIN = {"suggesting": 12, "similar": 0, "chance": 4}
 
 def proposal(machine, p, exhaustive=False, **options):
     """The coherent search's proposer; `exhaustive`: the exact one's."""
-    candidates = p.candidates(machine)
     if exhaustive:
-        return Everything(candidates, p.strip(machine))
+        return Everything(p.candidates(machine, every=True), p.strip(machine))
+    candidates = p.candidates(machine)
     few = PLAIN | options
     likes = min(few["similar"], candidates.size - 1)
     square, similar = p.square(machine), machine.put(np.zeros((1, 1), np.int32))
@@ -35,9 +35,10 @@ def proposal(machine, p, exhaustive=False, **options):
 def relaxation(machine, p, gibbs=False, noisy=False, coherence=1.0, level=0, dear=0.0, novelty=0.0, **options):
     window, _ = p.window(0.5)
     favour, choice = np.float32(1 / (1 + coherence)), Choice(gibbs, noisy, window)
-    terms = (favour, np.float32(novelty * p.sample.variance), machine.put(p.price(dear)))
+    price = machine.put(p.price(dear, options.get("exhaustive", False)))
+    terms = (favour, np.float32(novelty * p.sample.variance), price)
     proposed = proposal(machine, p, **options)
-    return Relaxation(p.grid, machine.put(p.offsets), proposed, *terms, choice, -1024, 2**33 + 5, level)
+    return Relaxation(p.grid, machine.put(p.offsets), proposed, *terms, choice, -1024, 2**33 + 5, level, p.beside)
 
 
 def counter(machine, p):
@@ -108,6 +109,36 @@ def test_a_device_has_the_references_bits(machine, p, form):
     if not form["exhaustive"] or (form["noisy"] and not form["gibbs"]):  # where nothing is charged for continuing
         form["novelty"] = 0.0
     assert_same_bits(apart(machine, p, **form), apart(REFERENCE, p, **form))
+
+
+HOWS = [{"similar": 2}, {"gibbs": True}, {"exhaustive": True, "novelty": 2.0}, {"exhaustive": True, "gibbs": True}]
+GIVEN = [
+    {"nowhere": 0.3, "weight": 1.0},
+    {"guides": 2, "channels": 2, "spacing": 2, "torus": False},
+    {"guides": 1, "nowhere": 0.2, "weight": 1.0, "masked": 0.3},
+]
+"""Hard data, guides, and a sample that may be used in part."""
+
+
+@pytest.mark.parametrize("form", HOWS, ids=str)
+@pytest.mark.parametrize("how", GIVEN, ids=str)
+def test_a_device_has_the_references_bits_of_what_is_given(machine, monkeypatch, how, form):
+    """In one kernel, and of all candidates in several."""
+    p = problem(9, order=8, sample_shape=(11, 12), shape=(13, 17), edges="reflect", count=90, **how)
+    expected = apart(REFERENCE, p, dear=0.3, **form)
+    assert_same_bits(apart(machine, p, dear=0.3, **form), expected)
+    if form.get("exhaustive"):
+        monkeypatch.setattr("simdtex.ops.relax.KEPT", 10)
+        form = form | {"novelty": 0.0}
+        assert not relaxation(machine, p, **form).fused
+        assert_same_bits(apart(machine, p, dear=0.3, **form), apart(REFERENCE, p, dear=0.3, **form))
+
+
+@pytest.mark.parametrize("form", HOWS, ids=str)
+def test_nothing_is_taken_that_may_not_be(form):
+    p = problem(3, order=2, channels=2, edges="reflect", masked=0.5, shape=(12, 13))
+    choice, *_ = apart(REFERENCE, p, dear=0.3, **form)
+    assert p.sample.inside.ravel()[choice].all()
 
 
 @pytest.mark.parametrize("options", [{"vector": 1}, {"vector": 1, "work_group": 64}, {"work_group": 3}], ids=str)

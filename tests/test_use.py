@@ -38,6 +38,27 @@ def test_many_sites_of_one_source_are_all_counted(machine):
     assert found.sum() == 7200
 
 
+@pytest.mark.parametrize("every", [False, True])
+@pytest.mark.parametrize(
+    "how", [{"nowhere": 0.5}, {"masked": 0.5}, {"nowhere": 0.3, "masked": 0.4, "spacing": 2}], ids=str
+)
+def test_what_is_from_nowhere_uses_nothing(machine, how, every):
+    """And a number is that of a candidate, or of its place among all."""
+    p = problem(2, shape=(30, 28), edges="reflect", **how)
+    candidates = p.candidates(REFERENCE, every)
+    expected = dict.fromkeys(candidates.positions[: candidates.size].tolist(), 0)
+    view = p.grid.view
+    for source, t in zip(
+        view(p.field.source).ravel().tolist(), view(p.field.temperature).ravel().tolist(), strict=True
+    ):
+        if t < 1024 and source >= 0 and p.sample.inside.ravel()[source]:
+            expected[source] += 1
+    assert sum(expected.values())
+    for m in (REFERENCE, machine):
+        _, field, _ = p.on(m)
+        assert use(m, field, p.grid, p.candidates(m, every)).tolist() == list(expected.values())
+
+
 def plainly(counts, radius, rate):
     """The price in Python numbers."""
     rows, cols = counts.shape
@@ -65,6 +86,49 @@ def test_the_price_is_the_excess_over_the_fair_share(radius):
     if radius == 1:
         assert found.max() == 50, "no more than four times the rate"
         assert found.min() == 0, "what is used less than its share costs nothing"
+
+
+FAIR = np.int64([[2, 0, 2, 1], [0, 0, 1, 1], [4, 4, 0, 1]])
+
+
+def test_what_is_fair_may_differ_and_nobody_is_where_nothing_is_fair():
+    """Use in proportion to what is fair costs nothing; a number runs over places, or over candidates alone."""
+    there = FAIR.ravel() > 0
+    for listed in (False, True):
+        market = Market((3, 4), 0, FAIR.ravel(), listed)
+        where = slice(None) if not listed else there
+        used = 3 * FAIR.ravel()
+        assert not price(used[where], market, 7.0)[there[where]].any()
+        used[0] += 8  # 14 of a total of 56, where 12 of 48 are due ... 2 of 16
+        found = price(used[where], market, 7.0)
+        assert found[0] == np.float32(7.0 * (14 * 16 / (2 * 56) - 1))
+        assert np.isinf(found).tolist() == (~there[where]).tolist()
+        again = price(used[where], market, 7.0, found)
+        assert np.array_equal(again, found), "an infinite price stays so"
+
+
+def test_what_is_fair_counts_in_the_square_around():
+    market = Market((3, 4), 1, FAIR.ravel())
+    used = np.zeros(12, int)
+    used[0], used[8] = 6, 4
+    found = price(used, market, 1.0).reshape(3, 4)
+    due, whole = {(0, 0): 2, (2, 1): 9}, 16
+    assert found[0, 0] == np.float32(min(4, 6 * whole / (due[0, 0] * 10) - 1))
+    assert found[2, 1] == 0.0 == np.float32(max(0, 4 * whole / (due[2, 1] * 10) - 1))
+
+
+def test_a_kind_that_is_used_too_often_costs():
+    kinds = np.array([0, 0, 1, 1, 2, 2])
+    market = Market((2, 3), 0, kinds=kinds, wanted=(1.0, 2.0, 1.0), strict=10.0)
+    used = np.array([2, 0, 3, 3, 0, 0])  # of 8: 2, 4 and 2 are due
+    assert price(used, market, 0.0).tolist() == [0, 0, 5, 5, 0, 0]
+    assert price(used * 2, market, 0.0).tolist() == [0, 0, 5, 5, 0, 0], "in proportion"
+    assert price(np.array([0, 0, 0, 0, 9, 0]), market, 0.0).tolist() == [0, 0, 0, 0, 10, 10], "no more than that"
+    none = Market((2, 3), 0, kinds=kinds, wanted=(1.0, 0.0, 1.0), strict=10.0)
+    assert price(used, none, 0.0)[2] == 10, "what is not wanted at all"
+    both = price(used, market, 1.0)
+    assert np.allclose(both, price(used, Market((2, 3), 0), 1.0) + np.float32([0, 0, 5, 5, 0, 0]))
+    assert not price(used * 0, market, 1.0).any()
 
 
 def test_fair_use_costs_nothing():

@@ -89,6 +89,8 @@ class Guide:
 
     def _channel(self, channel: int, silent: NDArray[np.bool_], spread: float, top: int) -> Planes:
         samples = [sample[..., channel] for sample in self.samples]
+        if self.output.dtype.kind == "f" or any(sample.dtype.kind == "f" for sample in samples):
+            samples = [sample.astype(np.float64) for sample in samples]  # `stretch` takes the ends as the pixels' type
         output = np.where(silent, samples[0].flat[0], self.output[..., channel])
         every = np.concatenate([sample.ravel() for sample in samples])
         if self.labels:

@@ -51,6 +51,7 @@ class Pictures:
             return
         if any(gap.all() for gap in gaps):
             raise ValueError("a sample has no known pixel; leave it out")
+        object.__setattr__(self, "unknown", tuple(gaps))  # completed pixels no longer tell, and `replace` asks again
         object.__setattr__(self, "known", tuple(~gap for gap in gaps))
         object.__setattr__(self, "pixels", tuple(completed(*pair) for pair in zip(self.pixels, gaps, strict=True)))
 

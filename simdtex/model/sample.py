@@ -75,6 +75,9 @@ class Sample:
         Guides: their channels come last.
     unsure : float
         Share of a candidate's neighbours that may be unknown.
+    apart : int
+        Pixels between two pictures at least, where more than their margins: what looks so far from a pixel of one sees
+        no other.
 
     Attributes
     ----------
@@ -103,6 +106,7 @@ class Sample:
         step: int = 1,
         beside: Sequence[Beside] = (),
         unsure: float = 0.25,
+        apart: int = 0,
     ) -> None:
         self.pictures = pixels if isinstance(pixels, Pictures) else Pictures((pixels,))
         self.scale, self.unsure = Scale(self.pictures, values), unsure
@@ -117,7 +121,7 @@ class Sample:
         for guide in guides:
             levels = [np.concatenate(pair) for pair in zip(levels, guide.samples, strict=True)]
         self.guides = np.concatenate([guide.output for guide in guides]) if guides else np.zeros((0, 1, 1), np.uint16)
-        self._lay(levels, margin, step)
+        self._lay(levels, margin, step, apart)
         self.channels = channels
         self.pixels = self._stacked(list(self.pictures.pixels), self.pictures.pixels[0].flat[0])
 
@@ -131,14 +135,14 @@ class Sample:
         sample._lay([levels[None].astype(np.uint16)], 0)
         return sample
 
-    def _lay(self, levels: Sequence[NDArray[np.uint16]], margin: int, step: int = 1) -> None:
+    def _lay(self, levels: Sequence[NDArray[np.uint16]], margin: int, step: int = 1, apart: int = 0) -> None:
         self.margin, self.channels, self.boxes = margin, len(levels[0]), []
         self._allowed: dict[tuple[Any, ...], NDArray[np.bool_] | None] = {}
         self.__dict__.pop("variance", None)
         top = 0
         for one in levels:
             self.boxes.append((top, *one.shape[1:]))
-            top += -(-(one.shape[1] + 2 * margin) // step) * step
+            top += -(-(one.shape[1] + max(2 * margin, apart)) // step) * step
         self.height, self.width = sum(self.boxes[-1][:2]), max(cols for *_, cols in self.boxes)
         self.rows, self.cols = self.height + 2 * margin, self.width + 2 * margin
         canvas = np.zeros((len(levels[0]), self.rows, self.cols), np.uint16)
@@ -367,6 +371,7 @@ class Sample:
         (rows, cols, C) array
             The source's pixel, plus what the working level differs from the source's own.
         """
+        source = np.maximum(source, self.margin * (self.cols + 1))  # what is from nowhere differs from the first pixel
         own, usual = self._own(source), self.working[: self.shown, source]
         if not self.direct or (values[: self.shown] == usual).all():
             return np.ascontiguousarray(own)
@@ -394,10 +399,11 @@ class Sample:
             In the sample's own type.
         """
         own, change = self._own(source), np.moveaxis(by, 0, -1)
-        if self.pixels.dtype == np.uint8:
+        if self.pixels.dtype == np.uint8 and self.direct:
             exact: NDArray[Any] = np.clip(own.astype(np.int32) + change, 0, 255).astype(np.uint8)
             return exact
-        return moved(own, change * (self.unit / self.fine), self.pixels)
+        units = self.scale.units if not self.direct else self.unit
+        return moved(own, change * (units / self.fine), self.pixels)
 
     @property
     def fine(self) -> int:

@@ -62,6 +62,13 @@ class Scale:
             self.unit = self._common.unit
 
     @property
+    def units(self) -> NDArray[np.float64]:
+        """What 1 of each channel of working levels is in the pixels' own unit, (channels,); 0 of a category."""
+        if self.direct:
+            return np.full(self._channels, self.unit)
+        return np.array([unit for one in self._variables for unit in (one.step,) * one.channels])
+
+    @property
     def owners(self) -> list[int]:
         """The variable that each channel of working levels is of."""
         if self.direct:
@@ -100,6 +107,11 @@ class _Stretched:
         """How high its highest level is, over its spread."""
         return self.top / self.spread if self.spread else 0.0
 
+    @property
+    def step(self) -> float:
+        """What 1 of its levels is in the pixels' own unit."""
+        return self.unit * self.spread / self.scale if self.scale else 0.0
+
     def stretched(self, pixels: NDArray[Any]) -> NDArray[np.int64]:
         """Whole numbers 0..top for pixels of any shape."""
         return stretch(np.clip(pixels, *self.ends), self.top, self.ends)[0]
@@ -115,7 +127,7 @@ class _Stretched:
 class _Categories:
     """A variable that names categories; one of two is a channel that has 0 or the highest level."""
 
-    scale = 0.0
+    scale = step = 0.0
 
     def __init__(self, values: NDArray[Any]) -> None:
         self.categories, counts = np.unique(values, return_counts=True)

@@ -74,7 +74,7 @@ class Meter:
         report = self.reports[-1]
         report["weighed"] = float(report["candidates"])
         if weighed is not None:
-            report["weighed"] = weighed[0] / report["relaxations"]
+            report["weighed"] = weighed[0] / max(1, report["relaxations"])  # of none, where all of a level is known
             report["fma"] += weighed[0] * weighed[1]
         self.reports[-1]["skipped"] = skipped
         self.reports[-1]["seconds"] = time.perf_counter() - self._level_began

@@ -196,7 +196,8 @@ def laid_out(
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in beside)
     heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or beside else 1.0  # in sums of squares
     values, margin = round(heavy * (channels * len(offsets) + len(beside))), int(offsets.max()) * step
-    sample = Sample(pictures, values, margin, options.structure, step, beside, options.unsure)
+    far = int(around(options.finish)[0].max()) if options.finish else 0
+    sample = Sample(pictures, values, margin, options.structure, step, beside, options.unsure, far)
     schedule = schedules.get(options.schedule)
     _check_memory(machine, sample, shape, options.similar, copies=2 if schedule.tile else 1)
     emulated = bool(options.array) and options.emulate

@@ -1,0 +1,319 @@
+"""A sample, its guides and what is given of an output as whole grey levels, in plain loops: see `plain_mrf`.
+
+A place is (number of the picture, row, column), and nowhere is (-1, -1, -1). Planes are grey levels of a channel,
+[row, column], one for each picture of the sample.
+"""
+
+from fractions import Fraction
+from itertools import product
+from math import isqrt, log2, sqrt
+from types import SimpleNamespace
+
+import numpy as np
+import plain
+from scipy import ndimage
+
+NOWHERE = (-1, -1, -1)
+UNKNOWN = -1
+COLOCATED = 16  # channels that a variable known where others are not may have, for all that room is made
+
+
+def material(pictures, o, mask=None, known=None, known_source=None, guide=None):
+    """Y: the pictures, whole where they have gaps, and everything that is matched, as grey levels."""
+    gaps = [np.isnan(y).any(-1) if y.dtype.kind == "f" else np.zeros(y.shape[:2], bool) for y in pictures]
+    Y = SimpleNamespace(gaps=gaps, pictures=[completed(*pair) for pair in zip(pictures, gaps, strict=True)])
+    Y.usable = [~gap & (True if mask is None else mask[n]) for n, gap in enumerate(gaps)]
+    Y.clean = len(pictures) == 1 and mask is None and not gaps[0].any()
+    Y.eight = pictures[0].dtype in (np.bool_, np.uint8)
+    Y.variables = [
+        np.concatenate([y[~gap][:, v] for y, gap in zip(Y.pictures, gaps, strict=True)]).tolist()
+        for v in range(pictures[0].shape[-1])
+    ]
+    Y.categories = [sorted(set(v)) if named(o, k) else None for k, v in enumerate(Y.variables)]
+
+    Y.whole = None if known is None else ~np.ma.getmaskarray(known).any(-1)
+    partly = None if known is None else ~np.ma.getmaskarray(known) & ~Y.whole[..., None]
+    colocated = known is not None and bool(partly.any())
+    beside = ([] if guide is None else [labelled(guide, o)]) + [None] * colocated
+    N, channels = len(plain.offsets(o.order)), sum(1 if c is None else one_hot(c) for c in Y.categories)
+    channels += bool(o.structure) + sum(COLOCATED * len(Y.variables) if g is None else channels_of(g) for g in beside)
+    heavy = max(1, o.data_weight, N / 4) if known is not None or beside else 1
+    values = round(heavy * (channels * N + len(beside)))
+    Y.height = 2 ** min(12, int((33 - log2(values)) / 2)) - 1  # so that every distance is exact in float64
+
+    Y.direct = not o.weights and not any(Y.categories)  # the channels of grey levels are those of the pixels
+    owner, Y.levels_of, Y.top, Y.unit = scale(Y, o)
+    planes = [Y.levels_of(y) for y in Y.pictures]
+    Y.shown, spread = len(planes[0]), variance(planes) * len(planes[0])
+    if o.structure:
+        more = structure(planes, o.structure, max(Y.top, 1023))
+        planes = [[*y, plane] for y, plane in zip(planes, more, strict=True)]
+    Y.matched, Y.variance = len(planes[0]), variance(planes)
+    Y.guides = []  # what the output is told, with UNKNOWN
+    if guide is not None:
+        more, told = guide_planes(labelled(guide, o), o, spread, Y.height)
+        Y.guides += told
+        planes = [[*y, *these] for y, these in zip(planes, more, strict=True)]
+    if colocated:
+        those = [c for c, v in enumerate(owner) if partly[..., v].any()]
+        levels = Y.levels_of(np.ma.getdata(known).astype(pictures[0].dtype))
+        Y.guides += [np.where(partly[..., owner[c]], levels[c], UNKNOWN) for c in those]
+        planes = [[*y, *(y[c] for c in those)] for y in planes]
+    Y.planes = planes
+
+    Y.given = {}  # of sites that are known: grey levels of the matched channels, and where they are from
+    for s in [] if known is None else map(tuple, np.argwhere(Y.whole)):
+        place = NOWHERE if known_source is None else place_of(known_source[s])
+        told = Y.levels_of(np.ma.getdata(known)[s][None, None].astype(pictures[0].dtype))
+        told = [int(plane[0, 0]) for plane in told] + [UNKNOWN] * (Y.matched - Y.shown)
+        if place != NOWHERE:
+            told = [int(plane[place[1:]]) for plane in planes[place[0]][: Y.matched]]
+        Y.given[s] = (told, place)
+    Y.own = bool(Y.guides) or any(place == NOWHERE for _, place in Y.given.values())
+    Y.centre, Y.hard = max(1, round(sqrt(N) / 2)), round(8 * sqrt(o.data_weight)) / 8
+    return Y
+
+
+def lay(Y, levels, o):
+    """Where the pictures lie below one another, with margins, in one canvas: their first rows, its size and width."""
+    step = 2 ** (levels - 1)
+    margin, top, Y.tops = isqrt(o.order) * step, 0, []
+    apart = max(2 * margin, int(2.5 * o.finish))  # no picture is within reach of another
+    for y in Y.pictures:
+        Y.tops.append(top)
+        top += -(-(len(y) + apart) // step) * step
+    Y.canvas = (Y.tops[-1] + len(Y.pictures[-1]), max(y.shape[1] for y in Y.pictures))
+    Y.pitch = Y.canvas[1] + 2 * margin
+
+
+def completed(picture, gap):
+    """Unknown pixels replaced by the nearest known one; of several equally near, whichever scipy takes."""
+    if not gap.any():
+        return picture
+    row, col = ndimage.distance_transform_edt(gap, return_distances=False, return_indices=True)
+    return picture[row, col]
+
+
+def place_of(entry):
+    """A place from a row of a source map: (row, column) or (row, column, picture)."""
+    row, col, *number = (int(n) for n in entry)
+    return NOWHERE if row < 0 else (*(number or [0]), row, col)
+
+
+def named(o, variable):
+    """Whether a variable's numbers name categories."""
+    return o.categorical if isinstance(o.categorical, bool) else variable in o.categorical
+
+
+def one_hot(names):
+    """Channels for so many names: of two, one says which."""
+    return 1 if len(names) < 3 else len(names)
+
+
+# -- pixels to grey levels ------------------------------------------------------------------------------------
+
+
+def scale(Y, o):
+    """The variable of each channel; what makes pixels planes of grey levels; the highest level; 1 of each in pixels."""
+    ends = [(min(values), max(values)) for values in Y.variables]
+    if Y.direct:
+        variables = list(range(len(ends)))
+        if Y.eight:
+            return variables, lambda y: [plane.astype(int) for plane in np.moveaxis(y, -1, 0)], 255, [1.0] * len(ends)
+        common = min(low for low, _ in ends), max(high for _, high in ends)
+        unit = float(Fraction(common[1]) - Fraction(common[0])) / Y.height or 1.0
+        alike = [unit] * len(ends)
+        return (
+            variables,
+            lambda y: [stretched(plane, common, Y.height) for plane in np.moveaxis(y, -1, 0)],
+            Y.height,
+            alike,
+        )
+
+    spreads, steep, owner = [], [], []  # steep: how high a channel would be of which pixels vary by 1
+    for v, (values, categories) in enumerate(zip(Y.variables, Y.categories, strict=True)):
+        spreads.append(deviation(stretched(np.array(values), ends[v], Y.height).tolist()))
+        differing = 1 - sum(values.count(c) ** 2 for c in categories or []) / len(values) ** 2
+        if categories is None:
+            steep.append(Y.height / spreads[v] if spreads[v] else 0.0)
+        else:  # in two channels, or one, where two pixels differ
+            steep.append(sqrt(2 / ((1 if len(categories) == 2 else 2) * differing)) if differing else 0.0)
+        owner += [v] * (1 if categories is None else one_hot(categories))
+    weights = o.weights or [1.0] * len(steep)
+    most = max(w * s for w, s in zip(weights, steep, strict=True))
+    by = [w / most * Y.height if most else 0.0 for w in weights]
+
+    def levels(y):
+        planes = []
+        for v, plane in enumerate(np.moveaxis(y, -1, 0)):
+            if Y.categories[v] is None:
+                whole, factor = stretched(plane, ends[v], Y.height), by[v] / spreads[v] if spreads[v] else 0.0
+                planes.append(np.array([[round(t * factor) for t in row] for row in whole.tolist()]))
+            else:
+                planes += [(plane == c) * round(by[v] * steep[v]) for c in names(Y.categories[v])]
+                planes += [] if len(Y.categories[v]) > 1 else [np.zeros(plane.shape, int)]
+        return planes
+
+    units = []  # of variables, which are the channels wherever a finish asks
+    for (low, high), spread, factor in zip(ends, spreads, by, strict=True):
+        units.append(float(high - low) / Y.height * spread / factor if factor else 0.0)
+    return owner, levels, Y.height, units
+
+
+def names(categories):
+    """Those that have a channel: of two, the second."""
+    return categories[1:] if len(categories) < 3 else categories
+
+
+def stretched(plane, ends, top):
+    """Numbers as whole ones from 0 to top, those beyond the ends as the ends."""
+    least, most = (Fraction(end) for end in ends)
+    if least == most:
+        return np.zeros(plane.shape, int)
+    whole = [round((min(max(Fraction(v), least), most) - least) * top / (most - least)) for v in plane.ravel().tolist()]
+    return np.array(whole).reshape(plane.shape)
+
+
+def deviation(values):
+    """Standard deviation of whole numbers."""
+    return sqrt((len(values) * sum(v * v for v in values) - sum(values) ** 2) / len(values) ** 2)
+
+
+def variance(planes):
+    """sigma^2 of equation (8): the mean over channels, of all pictures together."""
+    greys, total = [[v for y in planes for v in y[c].ravel().tolist()] for c in range(len(planes[0]))], 0.0
+    for g in greys:  # Python's own sum of doubles rounds in another way
+        total += (len(g) * sum(v * v for v in g) - sum(g) ** 2) / len(g) ** 2
+    return total / len(greys)
+
+
+def structure(pictures, weight, most):
+    """The signed distance to the edges of the sample, from 0 up, with this weight where that leaves 0..most alone."""
+    slopes = [slope_of(y) for y in pictures]
+    every = sorted(v for slope in slopes for v in slope.ravel().tolist())
+    signed = []
+    for slope in slopes:
+        edge = slope > every[int(0.85 * (len(every) - 1))]
+        signed.append(np.zeros(slope.shape, int))  # in 1/256 of a pixel
+        for i, j in np.ndindex(*slope.shape):
+            others = np.argwhere(edge != edge[i, j])
+            nearest = min([256, *((others - (i, j)) ** 2).sum(1).tolist()])  # 16 pixels at most
+            signed[-1][i, j] = round(sqrt(nearest) * 256) * (-1 if edge[i, j] else 1)
+    least = min(int(one.min()) for one in signed)
+    signed = [one - least for one in signed]
+    spread = sqrt(variance([[one] for one in signed]))
+    if not spread:
+        return signed
+    by = min(weight * sqrt(variance(pictures)) / spread, most / max(int(one.max()) for one in signed))
+    return [np.array([[round(v * by) for v in row] for row in one.tolist()]) for one in signed]
+
+
+def slope_of(y):
+    """The squared gradient of a picture that is smoothed before, summed over channels."""
+    rows, cols = y[0].shape
+    slope = np.zeros((rows, cols), int)
+    for plane in y:
+        smooth = np.zeros((rows, cols), int)
+        for i, j, a, b in product(range(rows), range(cols), range(-2, 3), range(-2, 3)):
+            weights = (1, 4, 6, 4, 1)[a + 2] * (1, 4, 6, 4, 1)[b + 2]
+            smooth[i, j] += weights * plane[clamped(i + a, rows), clamped(j + b, cols)]
+        for i, j in product(range(rows), range(cols)):
+            down = smooth[clamped(i + 1, rows), j] - smooth[clamped(i - 1, rows), j]
+            right = smooth[i, clamped(j + 1, cols)] - smooth[i, clamped(j - 1, cols)]
+            slope[i, j] += down**2 + right**2
+    return slope
+
+
+def clamped(i, n):
+    """Index i brought to 0 .. n-1: the outermost stands for all beyond."""
+    return min(max(i, 0), n - 1)
+
+
+# -- guides ---------------------------------------------------------------------------------------------------
+
+
+def labelled(guide, o):
+    """The guide's pictures (rows, columns, channels), that of the output, and whether their numbers are labels."""
+    of_pictures, output = guide
+    labels = o.labels
+    if labels is None:
+        whole = all(one.dtype.kind in "biu" for one in (*of_pictures, output))
+        labels = whole and all(len(set(one.ravel().tolist())) <= 16 for one in of_pictures)
+    return of_pictures, output, labels
+
+
+def channels_of(guide):
+    """Channels of grey levels: one for each of three labels or more."""
+    of_pictures, output, labels = guide
+    if not labels:
+        return output.shape[-1]
+    return sum(one_hot(labels_of(of_pictures, k)) for k in range(output.shape[-1]))
+
+
+def labels_of(of_pictures, k):
+    """All labels of a channel, in ascending order."""
+    return sorted({v for one in of_pictures for v in one[..., k].ravel().tolist()})
+
+
+def guide_planes(guide, o, spread, top):
+    """Planes of the guide for each picture, and for the output; spread is what the pixels' channels vary in all."""
+    of_pictures, output, labels = guide
+    silent = np.isnan(output).any(-1) if output.dtype.kind == "f" else np.zeros(output.shape[:2], bool)
+    planes, told = [[] for _ in of_pictures], []
+    for k in range(output.shape[-1]):
+        here, asked = [one[..., k] for one in of_pictures], output[..., k]
+        if labels:
+            found = labels_of(of_pictures, k)
+            one = [[(y == name).astype(int) for name in names(found)] for y in here]
+            wanted, most = [(asked == name).astype(int) for name in names(found)], 1
+            if len(found) == 1:
+                one, wanted = [[np.zeros(y.shape, int)] for y in here], [np.zeros(asked.shape, int)]
+        else:
+            every = [v for y in (*here, asked[~silent]) for v in y.ravel().tolist()]
+            ends, most = (min(every), max(every)), top
+            one = [[stretched(y, ends, top)] for y in here]
+            wanted = [stretched(np.where(silent, ends[0], asked), ends, top)]
+        varies = sum(variance([[y[c]] for y in one]) for c in range(len(wanted)))
+        height = float(top) if o.guide_weight else 0.0
+        if varies:
+            height = min(sqrt(o.guide_weight * spread / output.shape[-1] / varies) * most, top)
+
+        def raised(plane, height=height, most=most):
+            return np.array([[round(v * (height / most)) for v in row] for row in plane.tolist()])
+
+        for mine, y in zip(planes, one, strict=True):
+            mine += [raised(plane) for plane in y]
+        told += [np.where(silent, UNKNOWN, raised(plane)) for plane in wanted]
+    return planes, told
+
+
+# -- what is given, at coarse levels --------------------------------------------------------------------------
+
+
+def stand_ins(known, spacing, torus):
+    """{site: datum}: pixels of a level's lattice that stand for known ones between them.
+
+    A datum goes to the nearest row and column of the lattice, halves down the picture and to the right, unless one of
+    the up to four sites around it is known itself; of several the nearest, and of those the first, row by row.
+    """
+    shape, found = known.shape, {}
+
+    def around(i, axis):
+        """The one or two lattice lines around a line, and the one it goes to with the distance to it."""
+        lines = len(range(0, shape[axis], spacing))
+        below, beyond = divmod(i, spacing)
+        to = below + (2 * beyond >= spacing)
+        if torus:
+            apart = abs(min(to * spacing, shape[axis]) - i)  # a torus ends where it begins again
+            return {below % lines, (below + (beyond > 0)) % lines}, to % lines, apart
+        to = min(to, lines - 1)
+        return {min(below, lines - 1), min(below + (beyond > 0), lines - 1)}, to, abs(to * spacing - i)
+
+    for i, j in map(tuple, np.argwhere(known).tolist()):
+        if i % spacing == j % spacing == 0:
+            continue
+        (rows, row, down), (cols, col, right) = around(i, 0), around(j, 1)
+        if not any(known[a * spacing, b * spacing] for a in rows for b in cols):
+            site = (row * spacing, col * spacing)
+            found[site] = min(found.get(site, (np.inf,)), (down**2 + right**2, i, j))
+    return {site: (i, j) for site, (_, i, j) in found.items()}

@@ -1,0 +1,361 @@
+"""Values of the output that are given stay; samples, masks, gaps, guides and kinds of variables do what they say."""
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, texture
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from plain_sample import stand_ins as plainly
+
+import simdtex
+from simdtex.model.given import Given, planes, stand_ins
+from simdtex.model.lattice import Grid
+from simdtex.model.pictures import Pictures
+from simdtex.model.sample import Sample
+from simdtex.schedules import SCHEDULES
+
+DTYPES = (np.bool_, np.uint8, np.uint16, np.int32, np.float32, np.float64)
+
+
+def run(sample, shape, **options):
+    """Image and output on the reference."""
+    return simdtex.synthesize(sample, shape, rng=3, device=REFERENCE, full_output=True, **options)
+
+
+def anything(shape, dtype, seed):
+    """Any values of a type, also such as no sample has."""
+    rng = np.random.default_rng(seed)
+    if dtype == np.bool_:
+        return rng.random(shape) < 0.5
+    if np.issubdtype(dtype, np.integer):
+        return rng.integers(np.iinfo(dtype).min, np.iinfo(dtype).max, shape, dtype, endpoint=True)
+    return (rng.normal(size=shape) * 1e3).astype(dtype)
+
+
+def keeps(sample, known, **options):
+    """Run; what is known comes out to the bit, from nowhere, and cold."""
+    axis = -1 if sample.ndim == 3 else None
+    image, output = run(sample, known.shape[:2], known=known, channel_axis=axis, **options)
+    there = ~np.ma.getmaskarray(known)
+    assert_same_bits(image[there], known.data[there])
+    whole = there.all(-1) if axis else there
+    assert (output.source[whole] == -1).all()
+    assert (output.source[~whole] >= 0).all()
+    assert not output.temperature.any()
+    return image
+
+
+# -- what is given stays --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("search", ["exact", "coherent"])
+@pytest.mark.parametrize("schedule", SCHEDULES)
+def test_known_values_stay_under_every_schedule(schedule, search):
+    number = [*SCHEDULES].index(schedule)
+    known = np.ma.masked_array(anything((8, 9), np.uint8, number), np.random.default_rng(number).random((8, 9)) > 0.3)
+    options = {"schedule": schedule, "search": search, "order": 2, "levels": 2, "exhaustive": 0, "free_sweeps": 3}
+    torus = {"boundary": ("torus", "open")[number % 2], "finish": 1.5}
+    keeps(texture((9, 8)), known, **options, **torus)
+
+
+@pytest.mark.parametrize("search", ["exact", "coherent"])
+@pytest.mark.parametrize("channels", [None, 2])
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_known_values_of_every_type_stay(dtype, channels, search):
+    shape = (9, 10, channels) if channels else (9, 10)
+    for seed, boundary in enumerate(("torus", "open")):
+        values = anything(shape, dtype, seed)
+        known = np.ma.masked_array(values, np.random.default_rng(seed).random(shape) < 0.6)  # of two, some alone
+        options = {"search": search, "exhaustive": 0, "boundary": boundary, "finish": 1.0, "balance": 2.0}
+        keeps(texture((10, 9), channels, dtype), known, order=2, levels=2, **options)
+
+
+def test_a_draw_or_a_density_leaves_known_values_alone():
+    known = np.ma.masked_array(anything((8, 7), np.uint8, 3), np.random.default_rng(4).random((8, 7)) < 0.6)
+    keeps(texture((9, 9)), known, order=1, levels=2, relaxation="gibbs")
+    keeps(texture((9, 9)), known, order=1, levels=2, relaxation="gibbs", pixel="density")
+    keeps(texture((9, 9)), known, order=1, levels=2, pixel="density", xi=-4.0)
+
+
+@pytest.mark.parametrize("search", ["exact", "coherent"])
+@pytest.mark.parametrize("schedule", SCHEDULES)
+@pytest.mark.parametrize("site", [(0, 0), (5, 6)])
+def test_all_is_known_but_one_site(schedule, search, site):
+    """At a coarse level nothing is left to relax, then, or that one alone."""
+    sample = texture((9, 10))
+    known = np.ma.masked_array(texture((9, 10), seed=1), np.zeros((9, 10), bool))
+    known[site] = np.ma.masked
+    for sweeps in (0, 2):
+        options = {"schedule": schedule, "search": search, "exhaustive": 0, "finish": 0.0, "free_sweeps": sweeps}
+        assert keeps(sample, known, order=2, levels=3, **options)[site] in sample
+
+
+@pytest.mark.parametrize("search", ["exact", "coherent"])
+@pytest.mark.parametrize("site", [(0, 0), (5, 6), (8, 9)])
+def test_nothing_is_known_but_one_site(site, search):
+    known = np.ma.masked_all((9, 10), np.uint8)
+    known[site] = 201
+    for schedule in ("coloring", "luby", "block:3x4"):
+        keeps(texture((9, 10)), known, order=2, levels=3, schedule=schedule, search=search, exhaustive=0)
+
+
+def test_floats_with_nan_are_a_masked_array():
+    sample, there = texture((10, 9), dtype=np.float32), np.random.default_rng(1).random((8, 9)) < 0.3
+    values = anything((8, 9), np.float32, 2)
+    masked, _ = run(sample, (8, 9), known=np.ma.masked_array(values, ~there), order=2)
+    nan, _ = run(sample, (8, 9), known=np.where(there, values, np.nan), order=2)
+    assert_same_bits(masked, nan)
+
+
+# -- data between the sites of a level ------------------------------------------------------------------------
+
+
+@given(
+    *(st.integers(1, 20), st.integers(1, 20), st.sampled_from([1, 2, 4, 8]), st.booleans()),
+    *(st.sampled_from([0.02, 0.1, 0.4, 0.9]), st.integers(0, 2**16)),
+)
+@settings(max_examples=60)
+def test_stand_ins_are_those_of_plain_loops(rows, cols, spacing, torus, share, seed):
+    known = np.random.default_rng(seed).random((rows, cols)) < share
+    site, datum = stand_ins(known, Grid(rows, cols, spacing, torus))
+    expected = sorted((a * cols + b, i * cols + j) for (a, b), (i, j) in plainly(known, spacing, torus).items())
+    assert list(zip(site.tolist(), datum.tolist(), strict=True)) == expected
+
+
+def standing(torus, spacing, *data, shape=(9, 10)):
+    known = np.zeros(shape, bool)
+    for at in data:
+        known[at] = True
+    site, datum = stand_ins(known, Grid(*shape, spacing, torus))
+    return {divmod(int(s), shape[1]): divmod(int(d), shape[1]) for s, d in zip(site, datum, strict=True)}
+
+
+def test_known_answers_of_stand_ins():
+    assert standing(True, 1, (3, 3)) == {}
+    assert standing(True, 4, (3, 3)) == {(4, 4): (3, 3)}
+    assert standing(True, 4, (4, 4)) == {}, "on the lattice already"
+    assert standing(True, 4, (3, 3), (0, 4)) == {}, "a site around it is known"
+    assert standing(True, 4, (3, 3), (0, 0)) == {}, "whichever of the four"
+    assert standing(True, 4, (3, 3), (8, 8)) == {(4, 4): (3, 3)}, "and no other"
+    assert standing(True, 4, (3, 3), (5, 4)) == {(4, 4): (5, 4)}, "the nearest"
+    assert standing(True, 4, (5, 4), (3, 4), (4, 5)) == {(4, 4): (3, 4)}, "of several the first, row by row"
+    assert standing(True, 4, (2, 2)) == {(4, 4): (2, 2)}, "halves go down and to the right"
+    assert standing(False, 4, (2, 9), shape=(9, 10)) == {(4, 8): (2, 9)}
+    assert standing(True, 4, (4, 11), shape=(8, 12)) == {(4, 0): (4, 11)}, "around the seam"
+    assert standing(False, 4, (4, 11), shape=(8, 12)) == {(4, 8): (4, 11)}, "but of no open lattice"
+
+
+def test_a_datum_between_sites_is_felt_at_a_coarse_level_and_no_longer_after_it():
+    """A checkerboard of two greys: around a single datum off the lattice is its own."""
+    sample = np.repeat(np.repeat(np.uint8([[0, 255], [255, 0]]), 12, 0), 12, 1)
+    known = np.ma.masked_all((16, 16), np.uint8)
+    share = {}
+    for colour in (0, 255):
+        known[9, 9] = colour
+        means = []
+        for rng in range(3):
+            image = simdtex.synthesize(sample, (16, 16), known=known, rng=rng, device=REFERENCE, order=4, levels=3)
+            means.append(image[7:12, 7:12].mean() / 255)
+        share[colour] = np.mean(means)
+    assert share[255] > 0.8
+    assert share[0] < 0.2
+
+
+# -- where data are from ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("search", ["exact", "coherent"])
+def test_sources_of_known_sites_suggest_how_to_go_on(search):
+    """The left of a picture that the sample holds, with its places: the rest is copied from there."""
+    sample = np.random.default_rng(1).integers(0, 256, (20, 24)).astype(np.uint8)
+    row, col = np.indices((12, 16)) + np.array([3, 4]).reshape(2, 1, 1)
+    original, left = sample[3:15, 4:20], np.arange(16) < 8
+    known = np.ma.masked_array(original, np.broadcast_to(~left, (12, 16)))
+    options = {"known": known, "levels": 1, "order": 8, "search": search, "boundary": "open", "novelty": 0.0}
+    options |= {"balance": 0.0, "coarsest": "same", "schedule": "raster", "exhaustive": 0, "finish": 0.0}
+    image, output = run(sample, (12, 16), known_source=np.dstack([row, col]), **options)
+    assert_same_bits(image, original)
+    assert_same_bits(output.source, np.dstack([row, col]).astype(np.int32))
+    image, output = run(sample, (12, 16), **options)
+    assert (output.source[:, :8] == -1).all(), "without, they are from nowhere"
+
+
+def test_the_planes_of_what_is_given():
+    """Of a site from the sample all channels are known, of one from nowhere those that its values tell."""
+    pixels = texture((9, 8))[..., None]
+    sample = Sample(pixels, 16, 2, weight=2.0)
+    values, known = np.full((2, 3, 1), 7, np.uint8), np.zeros((2, 3, 1), bool)
+    place = np.full((2, 3, 2), -1, np.int32)
+    known[0, 1] = known[1, 2] = True
+    place[1, 2], values[1, 2] = (4, 5), pixels[4, 5]
+    place[0, 0] = (1, 1)  # of a site that is not known
+    laid = planes(Given(values, known, place), sample)
+    assert laid.known.tolist() == known[..., 0].tolist()
+    assert laid.values[:, 0, 1].tolist() == [7, 65535]
+    assert laid.values[:, 1, 2].tolist() == sample.levels[:, 4, 5].tolist()
+    assert laid.source.tolist() == [[-1, -1, -1], [-1, -1, (4 + 2) * (8 + 4) + 5 + 2]]
+
+
+# -- guides -----------------------------------------------------------------------------------------------------
+
+
+def patchwork(labels=2, size=16):
+    """A sample in stripes of one texture each, a bit alike, and their labels."""
+    label = np.repeat(np.arange(labels), size)[:, None] * np.ones(2 * size, int)
+    rng = np.random.default_rng(2)
+    return (rng.integers(0, 160, label.shape) + 40 * label).astype(np.uint8), label
+
+
+@pytest.mark.parametrize("search", ["exact", "coherent"])
+@pytest.mark.parametrize("labels", [2, 3])
+def test_a_map_of_labels_is_obeyed(labels, search):
+    sample, label = patchwork(labels)
+    row, col = np.indices((24, 20))
+    wanted = ((row // 8 + col // 10) % labels).astype(int)
+    share = {}
+    for weight in (1.0, 0.0):
+        guide = {"guide": (label, wanted), "guide_weight": weight}
+        _, output = run(sample, wanted.shape, order=4, search=search, **guide)
+        share[weight] = (label[tuple(np.moveaxis(output.source, -1, 0))] == wanted).mean()
+    assert share[1.0] > 0.93
+    assert share[0.0] < 0.8, "else the guide tells nothing"
+
+
+def test_where_a_guide_says_nothing_others_tell():
+    """Half a map: the known half is obeyed, the rest is as without a guide."""
+    sample, label = patchwork()
+    wanted = np.ones((20, 24))
+    wanted[:, 12:] = np.nan
+    _, output = run(sample, (20, 24), order=4, guide=(label, wanted), labels=True)
+    found = label[tuple(np.moveaxis(output.source, -1, 0))]
+    assert found[:, :12].mean() > 0.95
+    assert found[:, 15:21].mean() < 0.9
+
+
+def test_a_grey_guide_is_followed():
+    """Brightness comes where the guide is high."""
+    row, _ = np.indices((30, 30))
+    sample = (row * 6 + np.random.default_rng(1).integers(0, 60, row.shape)).astype(np.uint8)
+    wanted = np.abs(np.linspace(-29, 29, 24))[None] * np.ones((24, 1))
+    image, _ = run(sample, (24, 24), order=4, guide=(row.astype(float), wanted))
+    alone, _ = run(sample, (24, 24), order=4)
+    assert np.corrcoef(image.ravel(), wanted.ravel())[0, 1] > 0.9
+    assert np.corrcoef(alone.ravel(), wanted.ravel())[0, 1] < 0.5
+
+
+# -- several samples, masks and gaps ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("search", ["exact", "coherent"])
+@pytest.mark.parametrize("phases", ["decimated", "all"])
+def test_nothing_is_taken_from_where_the_mask_is_false(search, phases):
+    mask = np.random.default_rng(5).random((14, 13)) < 0.4
+    sample = texture((14, 13))
+    _, output = run(sample, (12, 11), mask=mask, search=search, order=2, phases=phases, edges="reflect", similar=1)
+    assert mask[tuple(np.moveaxis(output.source, -1, 0))].all()
+
+
+@pytest.mark.parametrize("search", ["exact", "coherent"])
+def test_a_source_names_its_sample(search):
+    samples = [texture((9, 12), seed=1), texture((12, 9), seed=2), texture((8, 8), seed=3)]
+    image, output = run(samples, (14, 13), search=search, order=2, finish=0.0)
+    assert output.source.shape == (14, 13, 3)
+    for (i, j, n), value in zip(output.source.reshape(-1, 3), image.ravel(), strict=True):
+        assert samples[n][i, j] == value
+    assert set(output.source[..., 2].ravel().tolist()) == {0, 1, 2}
+
+
+@pytest.mark.parametrize("search", ["exact", "coherent"])
+def test_shares_are_about_kept(search):
+    samples = [texture((16, 16), seed=1), texture((16, 16), seed=2)]
+    found = {}
+    for first in (1.0, 2.5, 4.0):
+        _, output = run(samples, (24, 24), search=search, order=4, shares=(first, 5.0 - first))
+        found[first] = (output.source[..., 2] == 0).mean()
+    assert abs(found[1.0] - 0.2) < 0.15
+    assert abs(found[2.5] - 0.5) < 0.15
+    assert abs(found[4.0] - 0.8) < 0.15
+
+
+@pytest.mark.parametrize("search", ["exact", "coherent"])
+@pytest.mark.parametrize("edges", ["auto", "whole", "reflect"])
+def test_no_gap_of_a_sample_comes_out(search, edges):
+    sample = texture((16, 15), dtype=np.float32)
+    sample[4:8, 3:9] = np.nan
+    sample[13, 2] = np.nan
+    image, output = run(sample, (13, 12), search=search, order=2, edges=edges, unsure=0.5, finish=1.5)
+    assert np.isfinite(image).all()
+    assert np.isfinite(sample[tuple(np.moveaxis(output.source, -1, 0))]).all()
+
+
+def test_what_is_looked_at_from_one_sample_is_no_other():
+    """A wide finish at the edge of a picture."""
+    samples = [np.full((9, 9), value, np.uint8) + texture((9, 9), dtype=np.bool_, seed=value) for value in (3, 250)]
+    image, output = run([*samples], (10, 10), order=1, levels=1, finish=4.0, shares=(1.0, 0.0))
+    assert (output.source[..., 2] == 0).any()
+    alone = np.isin(output.source[..., 2], 0)
+    if alone.all():
+        assert image.max() <= 4
+
+
+# -- kinds of variables -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("search", ["exact", "coherent"])
+@pytest.mark.parametrize("kinds", [2, 3, 5])
+def test_categories_are_names(kinds, search):
+    """Others in the same order make the same picture; and nothing comes between them."""
+    cells = np.random.default_rng(kinds).integers(0, kinds, (12, 11))
+    cells = np.maximum(cells, np.roll(cells, 1, 0))
+    renamed = np.array([5, 7, 31, 100, 200])[:kinds]
+    options = {"categorical": True, "search": search, "order": 2, "levels": 2, "exhaustive": 0}
+    image, output = run(cells.astype(np.uint8), (10, 12), **options)
+    again, elsewhere = run(renamed[cells].astype(np.uint8), (10, 12), **options)
+    assert_same_bits(renamed[image].astype(np.uint8), again)
+    assert_same_bits(output.source, elsewhere.source)
+    assert set(np.unique(again)) <= set(renamed.tolist())
+    floats, _ = run(renamed[cells].astype(np.float32), (10, 12), **options)
+    assert_same_bits(floats.astype(np.uint8), again)
+
+
+@pytest.mark.parametrize("search", ["exact", "coherent"])
+def test_a_unit_changes_nothing_where_variables_are_weighted(search):
+    """Metres or millimetres."""
+    sample = texture((12, 11), 2, np.float32)
+    other = sample * np.float32([1, 1024])
+    options = {"weights": (1.0, 0.7), "search": search, "order": 2, "levels": 2, "channel_axis": -1}
+    image, output = run(sample, (10, 12), **options)
+    scaled, elsewhere = run(other, (10, 12), **options)
+    assert_same_bits(image * np.float32([1, 1024]), scaled)
+    assert_same_bits(output.source, elsewhere.source)
+
+
+def test_proportions_are_about_kept():
+    cells = (texture((24, 24), seed=4) > 150).astype(np.uint8)
+    found = {}
+    for share in (0.25, 0.75):
+        image, _ = run(cells, (32, 32), categorical=True, proportions=(1 - share, share), order=4)
+        found[share] = image.mean()
+    assert abs(found[0.25] - 0.25) < 0.12
+    assert abs(found[0.75] - 0.75) < 0.12
+
+
+def test_a_stage_shows_what_stands_for_data():
+    """At a coarse level a datum shows at the site that stands for it, up to what levels round away."""
+    known = np.ma.masked_all((16, 16), np.float32)
+    known[5, 5] = 2.0
+    sample = texture((16, 16), dtype=np.float32)
+    _, output = run(sample, (16, 16), known=known, order=1, levels=3)
+    coarse = np.asarray(output.stages[0].image)
+    assert coarse.shape == (4, 4)
+    assert coarse[1, 1] == pytest.approx(min(2.0, sample.max()), abs=1e-2)
+
+
+def test_pictures_keep_their_gaps_when_their_kinds_are_told():
+    from simdtex.methods.mrf.options import make_options
+
+    sample = texture((8, 9), 2, np.float32)
+    sample[2, 3] = np.nan
+    pictures = make_options(weights=(1.0, 2.0)).of(Pictures((sample,)))
+    assert pictures.weights == (1.0, 2.0)
+    assert np.argwhere(~pictures.known[0]).tolist() == [[2, 3]]
