@@ -94,7 +94,7 @@ def begin(run: Run) -> State:
     Those whose values are given have these, at temperature 0.
     """
     everywhere = run.machine.put(run.sample.positions(np.zeros((1, 2), np.int32), 1))
-    field = run.hold(start(run.machine, run.planes, everywhere, Grid(*run.shape), run.seed))
+    field = run.holding.begun(start(run.machine, run.planes, everywhere, Grid(*run.shape), run.seed))
     return State(*field, price=None, schedule=None, level=run.levels - 1)
 
 
@@ -103,7 +103,7 @@ def enter(level: Level, state: State) -> State:
 
     Data between the sites stand for the nearest ones from now on, and no longer for those of the level above.
     """
-    field = level.moved(state.field)
+    field = level.holding.entered(level.number, state.field)
     warm, heat = active.survey(level.machine, level.grid, field.temperature)
     price = priced(level, field, None)
     return State(*field, price, level.schedule.init(level.setting), level.number, warm=warm, heat=heat)

@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from math import log2, prod, sqrt
+from math import log2, prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,14 +13,14 @@ from numpy.typing import NDArray
 
 from simdtex import schedules
 from simdtex.machine.interface import Array, Machine
+from simdtex.methods.mrf.holding import Holding
 from simdtex.methods.mrf.options import Options
-from simdtex.model.given import NOBODY, Given, Planes, Stand, stand_ins
-from simdtex.model.guide import UNKNOWN
+from simdtex.model.given import Given
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates, Sample
 from simdtex.ops import active, lcpdf
 from simdtex.ops.nearest import strip_of
-from simdtex.ops.neighbourhood import UNTOUCHED, Beside, Field
+from simdtex.ops.neighbourhood import Beside, Field
 from simdtex.ops.relax import KEPT, Choice, Everything, Listed
 from simdtex.ops.similar import Table, lattice_of, most_similar
 from simdtex.ops.square import Square, square_of
@@ -94,38 +93,6 @@ class State(NamedTuple):
         return self._replace(values=values, source=source, temperature=temperature)
 
 
-class Moves(NamedTuple):
-    """What changes of what is given where a level begins.
-
-    ``released`` (n,) the sites that stood for data at the level above; ``stand`` those that do now; ``laid`` what is
-    given; ``guides`` (G, H, W) working levels; where these have gaps, ``told`` has the sites of each that are told by
-    others.
-    """
-
-    released: NDArray[np.int64]
-    stand: Stand
-    laid: Planes | None
-    guides: NDArray[np.uint16]
-    told: list[Stand]
-
-    def on(self, machine: Machine, field: Field) -> Field:
-        """The field with these changes."""
-        if not (self.released.size or self.stand.site.size or self.told):
-            return field
-        values, source, temperature = (np.array(machine.get(plane)) for plane in field)
-        matched = len(values) - len(self.guides)
-        flat = values.reshape(len(values), -1)
-        temperature.flat[self.released] = UNTOUCHED
-        if self.laid is not None:
-            given = self.laid.values.reshape(matched, -1)
-            flat[:matched, self.stand.site] = given[:, self.stand.datum]
-            source.flat[self.stand.site], temperature.flat[self.stand.site] = -1, 0
-        for plane, guide, (site, datum) in zip(values[matched:], self.guides, self.told or [], strict=bool(self.told)):
-            plane[:] = guide
-            plane.flat[site] = guide.flat[datum]
-        return Field(*(machine.put(plane) for plane in (values, source, temperature)))
-
-
 class Lists:
     """A schedule's lists of sites as a machine holds them: each is put there once."""
 
@@ -157,8 +124,8 @@ class Run:
     levels: int
     emulated: bool
     weighed: Array
+    holding: Holding = field(repr=False)
     given: Given | None = None
-    laid: Planes | None = field(default=None, repr=False)
     tables: dict[int, Table] = field(default_factory=dict, repr=False)
 
     def grid(self, number: int) -> Grid:
@@ -217,36 +184,14 @@ class Run:
             novelty=np.float32(novelty * sample.channels * variance),
             rate=options.balance * whole,
             market=market,
-            beside=self.beside,
+            beside=self.holding.beside(len(offsets), options.data_weight),
             xi=min(-1, round(options.xi * 1024)),
             in_place=independent and not self.schedule.tile and not self.emulated,
             weighed=machine.put(np.zeros((grid.height, grid.width), np.int32)) if window else self.weighed,
             lists=Lists(machine),
-            movable=self._movable(number),
-            moves=self._moves(number),
+            holding=self.holding,
+            movable=self.holding.movable(number, grid),
         )
-
-    @cached_property
-    def beside(self) -> Beside:
-        """Which channels are guides, and whether each value may be unknown."""
-        guides, hard = (
-            len(self.sample.guides),
-            self.laid is not None and bool((self.laid.source < 0)[self.laid.known].any()),
-        )
-        centre = np.float32(max(1, round(sqrt(len(self.offsets)) / 2)))
-        return Beside(guides, guides > 0 or hard, centre, np.float32(round(8 * sqrt(self.options.data_weight)) / 8))
-
-    def hold(self, field: Field) -> Field:
-        """The field before the first level with what is given."""
-        matched, laid = self.sample.channels, self.laid
-        if laid is None and not len(self.sample.guides):
-            return field
-        values, source, temperature = (np.array(self.machine.get(plane)) for plane in field)
-        values[matched:] = self.sample.guides
-        if laid:
-            values[:matched, laid.known] = laid.values[:, laid.known]
-            source[laid.known], temperature[laid.known] = laid.source[laid.known], 0
-        return Field(*(self.machine.put(plane) for plane in (values, source, temperature)))
 
     def _kinds(self, number: int) -> tuple[NDArray[np.intp] | None, tuple[float, ...]]:
         """The category of each place where candidates may lie, and the shares that are asked for."""
@@ -255,25 +200,6 @@ class Run:
             return None, ()
         row, col = self.sample.lines(*self.where(number))
         return np.searchsorted(categories, self.sample.pixels[np.ix_(row, col)][..., 0].ravel()), wanted
-
-    def _stand_ins(self, number: int) -> Stand:
-        """Who stands for whom at a level: nobody above the coarsest."""
-        if self.laid is None or number == self.levels:
-            return NOBODY
-        return stand_ins(self.laid.known, self.grid(number))
-
-    def _movable(self, number: int) -> Array | None:
-        if self.laid is None:
-            return None
-        movable = (~self.laid.known).astype(np.uint16)
-        movable.flat[self._stand_ins(number).site] = 0
-        return self.machine.put(movable)
-
-    def _moves(self, number: int) -> Moves:
-        guides = self.sample.guides
-        sparse = bool((guides == UNKNOWN).any())
-        told = [stand_ins(plane != UNKNOWN, self.grid(number)) for plane in guides] if sparse else []
-        return Moves(self._stand_ins(number + 1).site, self._stand_ins(number), self.laid, guides, told)
 
     def where(self, number: int) -> tuple[NDArray[np.int32], int, str, str]:
         """What says where the candidates of a level lie: see `simdtex.model.sample.Sample.positions`."""
@@ -335,8 +261,8 @@ class Level:
         Counts the candidates that each site has weighed.
     lists : Lists
         The schedule's lists of sites as the machine holds them.
-    moves : Moves
-        Which data stand for sites beside them.
+    holding : Holding
+        What is given.
     movable : (H, W) uint16 array of the machine, optional
         0 at sites whose values are given: free sweeps leave them alone, as all sweeps do that find their temperature 0.
         None: every site may relax.
@@ -358,12 +284,8 @@ class Level:
     in_place: bool
     weighed: Array
     lists: Lists = field(repr=False)
-    moves: Moves = field(repr=False)
+    holding: Holding = field(repr=False)
     movable: Array | None = None
-
-    def moved(self, field: Field) -> Field:
-        """The field at the level's beginning: data between the sites have moved to those that they stand for."""
-        return self.moves.on(self.machine, field)
 
     @property
     def machine(self) -> Machine:

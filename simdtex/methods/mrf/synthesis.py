@@ -12,6 +12,7 @@ from simdtex import schedules
 from simdtex.machine.interface import Machine
 from simdtex.maspar.array import parse_array
 from simdtex.methods.mrf.algorithm import anneal
+from simdtex.methods.mrf.holding import Holding
 from simdtex.methods.mrf.level import Run, number_of_levels
 from simdtex.methods.mrf.observers import Observer
 from simdtex.methods.mrf.options import CATEGORIES as MOST
@@ -203,6 +204,7 @@ def laid_out(
     emulated = bool(options.array) and options.emulate
     if options.array and emulated:
         machine = machine.emulate(parse_array(options.array, options.mapping))
+    laid = planes(given, sample) if given and given.whole.any() else None
     return Run(
         machine=machine,
         sample=sample,
@@ -215,8 +217,8 @@ def laid_out(
         levels=levels,
         emulated=emulated,
         weighed=machine.put(np.zeros(shape, np.int32)),
+        holding=Holding(machine, Grid(*shape, 1, options.boundary == "torus"), levels, sample.guides, laid),
         given=given,
-        laid=planes(given, sample) if given and given.whole.any() else None,
     )
 
 
@@ -234,7 +236,7 @@ def finished(run: Run, field: Field, seen: NDArray[np.int32]) -> NDArray[Any]:
     sample, grid, ring = run.sample, run.grid(0), around(run.options.finish or 0)
     picture = np.empty((*run.shape, sample.shown), sample.pixels.dtype)
     rows = max(1, AT_ONCE // grid.cols)
-    known = np.zeros(run.shape, bool) if run.laid is None else run.laid.known
+    known = np.zeros(run.shape, bool) if run.holding.laid is None else run.holding.laid.known
     given = run.machine.put(known.view(np.uint8))
     for top in range(0, grid.rows, rows):
         here = seen[top : top + rows]

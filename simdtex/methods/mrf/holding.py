@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a run is given, as its field has it: sites that keep their values, data that move, guides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.machine.interface import Array, Machine
+from simdtex.model.given import NOBODY, Planes, Stand, stand_ins
+from simdtex.model.guide import UNKNOWN
+from simdtex.model.lattice import Grid
+from simdtex.ops.neighbourhood import UNTOUCHED, Beside, Field
+
+
+@dataclass(frozen=True, eq=False)
+class Holding:
+    """What is given of an output.
+
+    Parameters
+    ----------
+    machine : Machine
+    grid : Grid
+        The lattice of the finest level.
+    levels : int
+    guides : (G, H, W) uint16 array
+        Working levels of the output's guides.
+    laid : Planes, optional
+        Given values, sources and sites. None: there are none.
+    """
+
+    machine: Machine
+    grid: Grid
+    levels: int
+    guides: NDArray[np.uint16]
+    laid: Planes | None = None
+
+    def beside(self, neighbours: int, data_weight: float) -> Beside:
+        """Which channels are guides, whether each value has a confidence of its own, and what counts how much."""
+        laid, guides = self.laid, len(self.guides)
+        from_nowhere = laid is not None and bool((laid.source < 0)[laid.known].any())
+        hard = round(8 * sqrt(data_weight)) / 8  # in eighths, so that sums stay exact
+        return Beside(
+            guides, guides > 0 or from_nowhere, np.float32(max(1, round(sqrt(neighbours) / 2))), np.float32(hard)
+        )
+
+    def begun(self, field: Field) -> Field:
+        """The field before the first level with what is given: at temperature 0."""
+        if self.laid is None and not len(self.guides):
+            return field
+        values, source, temperature = (np.array(self.machine.get(plane)) for plane in field)
+        matched = len(values) - len(self.guides)
+        values[matched:] = self.guides
+        if self.laid:
+            known = self.laid.known
+            values[:matched, known] = self.laid.values[:, known]
+            source[known], temperature[known] = self.laid.source[known], 0
+        return Field(*(self.machine.put(plane) for plane in (values, source, temperature)))
+
+    def entered(self, number: int, field: Field) -> Field:
+        """The field where a level begins: data between its sites have moved to those that they stand for.
+
+        The sites that stood for data at the level above are unknown again, at temperature 1.
+        """
+        released, (site, datum) = self._stand_ins(number + 1).site, self._stand_ins(number)
+        gaps = bool((self.guides == UNKNOWN).any())
+        if not (released.size or site.size or gaps):
+            return field
+        values, source, temperature = (np.array(self.machine.get(plane)) for plane in field)
+        matched = len(values) - len(self.guides)
+        temperature.flat[released] = UNTOUCHED
+        if self.laid is not None:
+            flat, given = values.reshape(len(values), -1), self.laid.values.reshape(matched, -1)
+            flat[:matched, site] = given[:, datum]
+            source.flat[site], temperature.flat[site] = -1, 0
+        for plane, guide in zip(values[matched:], self.guides, strict=True):
+            told = stand_ins(guide != UNKNOWN, self._lattice(number)) if gaps else NOBODY
+            plane[:] = guide
+            plane.flat[told.site] = guide.flat[told.datum]
+        return Field(*(self.machine.put(plane) for plane in (values, source, temperature)))
+
+    def movable(self, number: int, grid: Grid) -> Array | None:
+        """0 at the sites of a level's grid, or of a window of it, that nothing may relax; None where all may."""
+        if self.laid is None:
+            return None
+        movable = (~self.laid.known).astype(np.uint16)
+        movable.flat[self._stand_ins(number).site] = 0
+        if grid.part is not None:
+            row = (grid.part.top + np.arange(grid.rows)) % grid.part.rows * grid.step
+            col = (grid.part.left + np.arange(grid.cols)) % grid.part.cols * grid.step
+            movable = movable[np.ix_(row, col)]
+        return self.machine.put(movable)
+
+    def _lattice(self, number: int) -> Grid:
+        return Grid(self.grid.height, self.grid.width, 2**number, self.grid.torus)
+
+    def _stand_ins(self, number: int) -> Stand:
+        """Who stands for whom at a level: nobody above the coarsest."""
+        if self.laid is None or number == self.levels:
+            return NOBODY
+        return stand_ins(self.laid.known, self._lattice(number))
+
+
+__all__ = ["Holding"]
