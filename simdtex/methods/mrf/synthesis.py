@@ -193,6 +193,8 @@ def laid_out(
     step = 2 ** (levels - 1)
     beside: list[Beside] = [check_guide(guide, options)] if guide else []
     if given and given.partly:
+        if options.pixel == "density":
+            raise ValueError('sites that are known in part choose among pixels of the sample; give pixel="source"')
         beside.append(given.colocated(pictures.pixels))
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in beside)
     heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or beside else 1.0  # in sums of squares
