@@ -69,7 +69,11 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
     wanted = levels or 1 + max(0, ceil(log2(max(1, int(deepest.max())) / radius)))
     around = radius * 2 ** (wanted - 1) + 1
     near = ndimage.binary_dilation(hole, np.ones((3, 3), bool), iterations=around)
-    found = ndimage.find_objects(ndimage.label(near, np.ones((3, 3)))[0])
+    found: list[tuple[slice, slice]] = []
+    while len(boxes := ndimage.find_objects(ndimage.label(near, np.ones((3, 3)))[0])) != len(found):
+        found = boxes
+        for box in found:
+            near[box] = True  # what lies in the bend of a hole may be another's
     area = sum((r.stop - r.start) * (c.stop - c.start) for r, c in found)
     if len(found) > FEW or area > near.size // 2:
         rows, cols = (np.flatnonzero(near.any(axis)) for axis in (1, 0))
