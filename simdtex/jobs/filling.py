@@ -263,7 +263,9 @@ def extend(
     given = Given(canvas, np.repeat(~hole[..., None], canvas.shape[2], -1), place, suggests=bool(tile))
 
     def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
-        return mrf.synthesize(machine, Pictures((pixels,)), hole.shape, chosen, seed, seen, given)
+        made, output = mrf.synthesize(machine, Pictures((pixels,)), hole.shape, chosen, seed, seen, given)
+        assert output.source is not None
+        return made, replace(output, source=np.where(hole[..., None], output.source, place))
 
     return executed(device, channel_axis, callback, full_output, run)
 
