@@ -213,13 +213,14 @@ def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) ->
     from simdtex import __version__
 
     told: dict[str, Any] = {"seed": seed, "version": __version__, "device": device, "options": vars(options)}
-    told["training_image"] = _digest(*inputs.pictures.pixels)
+    pictures = inputs.pictures  # whose pixels are completed where they are unknown
+    told["training_image"] = _digest(*pictures.pixels, *(pictures.known or ()))
     if inputs.given:
         told["hard_data"] = _digest(np.where(inputs.given.known, inputs.given.values, 0), inputs.given.known)
     if inputs.guide:
         told["guide"] = _digest(*inputs.guide[0], inputs.guide[1])
-    if inputs.pictures.usable:
-        told["mask"] = _digest(*inputs.pictures.usable)
+    if pictures.usable:
+        told["mask"] = _digest(*pictures.usable)
     return told
 
 
