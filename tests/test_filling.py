@@ -404,9 +404,14 @@ def test_on_a_torus_a_hole_at_an_edge_sees_the_other_side():
 def test_the_same_bytes_on_every_device(machine):
     colour = texture(SHAPE, 3)
     sides = {"tile": True, "band": 3, "channel_axis": -1}
-    for make in (lambda m: fill(colour, MIDDLE, channel_axis=-1, device=m), lambda m: extend(colour, device=m, **sides)):
+    for make in (
+        lambda m: fill(colour, MIDDLE, channel_axis=-1, device=m),
+        lambda m: extend(colour, device=m, **sides),
+    ):
         assert_same_bits(make(machine), make(REFERENCE))
-    one, two = (fill(texture(SHAPE, dtype=np.float64), MIDDLE, device=m, full_output=True) for m in (machine, REFERENCE))
+    one, two = (
+        fill(texture(SHAPE, dtype=np.float64), MIDDLE, device=m, full_output=True) for m in (machine, REFERENCE)
+    )
     assert_same_bits(one[0], two[0])
     assert_same_bits(one[1].source, two[1].source)
 

@@ -155,7 +155,9 @@ def test_a_table_of_several_variables(tmp_path, axis):
         assert_same_bits(one[~placed.mask], placed.data[~placed.mask])
     same = simulate(training, n=2, hard=np.ma.MaskedArray(np.moveaxis(placed, -1, axis)), channel_axis=axis)
     assert_same_bits(found.values, same.values)
-    assert simulate(training, n=1, hard=np.moveaxis(placed, -1, axis), channel_axis=axis, shape=None).shape[1:3] == SHAPE
+    assert (
+        simulate(training, n=1, hard=np.moveaxis(placed, -1, axis), channel_axis=axis, shape=None).shape[1:3] == SHAPE
+    )
 
 
 # -- the array ------------------------------------------------------------------------------------------------
