@@ -255,6 +255,8 @@ def extend(
             f"band={width} leaves nothing of a picture of {rows}x{cols} (rows x columns); give a narrower one"
         )
     hole[top + along : top + rows - along, left + across : left + cols - across] = False
+    if "boundary" in options:
+        raise ValueError("the boundary of what is extended follows from tile; leave boundary out")
     chosen = mrf.make_options(**{"boundary": "torus" if tile else "open"} | OF_EDGES | options)
     seed = as_seed(rng)
     place = np.full((*hole.shape, 2), -1, np.int32)

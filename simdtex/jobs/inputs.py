@@ -71,9 +71,17 @@ def is_several(sample: Any, channel_axis: int | None) -> bool:
     return all(isinstance(one, np.ndarray) and one.ndim == axes for one in sample)
 
 
+def check_array(name: str, values: Any) -> NDArray[Any]:
+    """An array, or one clear sentence."""
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{name} is ragged; give rows of equal length") from None
+
+
 def check_mask(name: str, mask: Any, shape: tuple[int, int]) -> Mask:
     """A bool array of a shape, or one clear sentence."""
-    found = _array(name, mask)
+    found = check_array(name, mask)
     if found.dtype != np.bool_:
         raise TypeError(f"{name} holds {found.dtype} values; give True and False")
     if found.shape != shape:
@@ -87,7 +95,7 @@ def check_known(
     known: Any, shape: tuple[int, int], channel_axis: int | None, pictures: Pictures, source: Any = None
 ) -> Given:
     """What is given of an output: a masked array, or an array of floats with NaN for unknown."""
-    array = known if isinstance(known, np.ma.MaskedArray) else np.ma.asarray(_array("known", known))
+    array = known if isinstance(known, np.ma.MaskedArray) else np.ma.asarray(check_array("known", known))
     axes = 2 if channel_axis is None else 3
     if array.dtype.kind not in "buif":
         raise TypeError(f"known holds {array.dtype} values; give integers or real floats")
@@ -119,7 +127,7 @@ def check_known(
 
 def check_place(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.int32]:
     """Where in the sample known pixels are from, (rows, cols, 2 or 3)."""
-    place = _array("known_source", source)
+    place = check_array("known_source", source)
     columns = 2 if len(pictures.pixels) == 1 else 3
     if place.dtype.kind not in "iu" or place.shape != (*there.shape[:2], columns):
         raise ValueError(
@@ -148,7 +156,8 @@ def check_guide(
     several = len(pictures.pixels) > 1
     if several and not (isinstance(first, (list, tuple)) and len(first) == len(pictures.pixels)):
         raise ValueError(f"there are {len(pictures.pixels)} samples; give a list of a guide for each")
-    samples = [_guide("the guide of the sample", one) for one in (first if several else [first])]
+    listed = several or (isinstance(first, (list, tuple)) and len(first) == 1 and isinstance(first[0], np.ndarray))
+    samples = [_guide("the guide of the sample", one) for one in (first if listed else [first])]
     output = _guide("the guide of the output", second)
     for number, (one, picture) in enumerate(zip(samples, pictures.pixels, strict=True)):
         if one.shape[:2] != picture.shape[:2]:
@@ -172,7 +181,7 @@ def check_guide(
 
 
 def _guide(name: str, array: Any) -> NDArray[Any]:
-    found = _array(name, array)
+    found = check_array(name, array)
     if found.dtype.kind not in "buif":
         raise TypeError(f"{name} holds {found.dtype} values; give integers or real floats")
     if found.ndim not in (2, 3) or not found.size:
@@ -181,13 +190,6 @@ def _guide(name: str, array: Any) -> NDArray[Any]:
         raise ValueError(f"{name} has infinite values; give numbers")
     found = found.astype(np.uint8) if found.dtype == np.bool_ else found
     return found[..., None] if found.ndim == 2 else found
-
-
-def _array(name: str, values: Any) -> NDArray[Any]:
-    try:
-        return np.asarray(values)
-    except ValueError:
-        raise ValueError(f"{name} is ragged; give rows of equal length") from None
 
 
 def _cast(name: str, values: NDArray[Any], there: Mask, dtype: np.dtype[Any]) -> NDArray[Any]:
