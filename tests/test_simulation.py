@@ -339,6 +339,7 @@ BAD = {
     "data of another size": ({"hard": holed(shape=(12, 13))}, ValueError, "known is 12x13 .* the output 12x14"),
     "data of no value": ({"hard": NOTHING}, ValueError, "known has no value"),
     "data everywhere": ({"hard": TRAINING[:12, :14]}, ValueError, "known leaves nothing to do"),
+    "ragged data": ({"hard": [[1, 2], [3]]}, ValueError, "hard is ragged; give rows of equal length"),
     "data in words": ({"hard": np.full(SHAPE, "x")}, TypeError, "known holds .* give integers or real floats"),
     "data with an axis too many": ({"hard": NOTHING[..., None]}, ValueError, "known is 3-dimensional"),
     "data that the type does not hold": ({"hard": with_value(NOTHING, 1.5)}, ValueError, "known holds 1.5, which"),
