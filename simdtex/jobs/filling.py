@@ -69,7 +69,11 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
     wanted = levels or 1 + max(0, ceil(log2(max(1, int(deepest.max())) / radius)))
     around = radius * 2 ** (wanted - 1) + 1
     near = ndimage.binary_dilation(hole, np.ones((3, 3), bool), iterations=around)
-    found = ndimage.find_objects(ndimage.label(near, np.ones((3, 3)))[0])
+    found: list[tuple[slice, slice]] = []
+    while len(boxes := ndimage.find_objects(ndimage.label(near, np.ones((3, 3)))[0])) != len(found):
+        found = boxes
+        for box in found:
+            near[box] = True  # what lies in the bend of a hole may be another's
     area = sum((r.stop - r.start) * (c.stop - c.start) for r, c in found)
     if len(found) > FEW or area > near.size // 2:
         rows, cols = (np.flatnonzero(near.any(axis)) for axis in (1, 0))
@@ -251,6 +255,8 @@ def extend(
             f"band={width} leaves nothing of a picture of {rows}x{cols} (rows x columns); give a narrower one"
         )
     hole[top + along : top + rows - along, left + across : left + cols - across] = False
+    if "boundary" in options:
+        raise ValueError("the boundary of what is extended follows from tile; leave boundary out")
     chosen = mrf.make_options(**{"boundary": "torus" if tile else "open"} | OF_EDGES | options)
     seed = as_seed(rng)
     place = np.full((*hole.shape, 2), -1, np.int32)
@@ -259,7 +265,9 @@ def extend(
     given = Given(canvas, np.repeat(~hole[..., None], canvas.shape[2], -1), place, suggests=bool(tile))
 
     def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
-        return mrf.synthesize(machine, Pictures((pixels,)), hole.shape, chosen, seed, seen, given)
+        made, output = mrf.synthesize(machine, Pictures((pixels,)), hole.shape, chosen, seed, seen, given)
+        assert output.source is not None
+        return made, replace(output, source=np.where(hole[..., None], output.source, place))
 
     return executed(device, channel_axis, callback, full_output, run)
 

@@ -54,7 +54,7 @@ def check_samples(sample: ArrayLike | Sequence[ArrayLike], channel_axis: int | N
             )
     if mask is None:
         return Pictures(tuple(pixels))
-    masks = list(mask) if several else [mask]
+    masks = list(mask) if several and np.iterable(mask) else [mask]
     if len(masks) != len(pixels):
         raise ValueError(f"there are {len(pixels)} samples and {len(masks)} masks; give one mask for each")
     usable = [check_mask("mask", one, picture.shape[:2]) for one, picture in zip(masks, pixels, strict=True)]
@@ -71,9 +71,17 @@ def is_several(sample: Any, channel_axis: int | None) -> bool:
     return all(isinstance(one, np.ndarray) and one.ndim == axes for one in sample)
 
 
+def check_array(name: str, values: Any) -> NDArray[Any]:
+    """An array, or one clear sentence."""
+    try:
+        return np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{name} is ragged; give rows of equal length") from None
+
+
 def check_mask(name: str, mask: Any, shape: tuple[int, int]) -> Mask:
     """A bool array of a shape, or one clear sentence."""
-    found = np.asarray(mask)
+    found = check_array(name, mask)
     if found.dtype != np.bool_:
         raise TypeError(f"{name} holds {found.dtype} values; give True and False")
     if found.shape != shape:
@@ -87,7 +95,7 @@ def check_known(
     known: Any, shape: tuple[int, int], channel_axis: int | None, pictures: Pictures, source: Any = None
 ) -> Given:
     """What is given of an output: a masked array, or an array of floats with NaN for unknown."""
-    array = np.ma.asarray(known)
+    array = known if isinstance(known, np.ma.MaskedArray) else np.ma.asarray(check_array("known", known))
     axes = 2 if channel_axis is None else 3
     if array.dtype.kind not in "buif":
         raise TypeError(f"known holds {array.dtype} values; give integers or real floats")
@@ -119,19 +127,22 @@ def check_known(
 
 def check_place(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.int32]:
     """Where in the sample known pixels are from, (rows, cols, 2 or 3)."""
-    place = np.asarray(source)
+    place = check_array("known_source", source)
     columns = 2 if len(pictures.pixels) == 1 else 3
     if place.dtype.kind not in "iu" or place.shape != (*there.shape[:2], columns):
         raise ValueError(
             f"known_source is no array of integers ({there.shape[0]}, {there.shape[1]}, {columns}); give a source map"
         )
-    found = place.astype(np.int32)
-    number = found[..., 2] if columns == 3 else np.zeros(found.shape[:2], np.int32)
-    used = (found[..., 0] >= 0) & there.all(-1)
-    for k, picture in enumerate(pictures.pixels):
-        here = found[used & (number == k)]
-        if here.size and ((here[:, :2] < 0).any() or (here[:, :2] >= picture.shape[:2]).any()):
-            raise ValueError("known_source points outside the sample; give -1 where a pixel is not from there")
+    used = (place[..., 0] >= 0) & there.all(-1)
+    row, col, *rest = np.moveaxis(place[used], -1, 0)
+    number = rest[0] if rest else np.zeros(row.shape, np.int32)
+    inside = (number >= 0) & (number < len(pictures.pixels))
+    sizes = np.array([picture.shape[:2] for picture in pictures.pixels])
+    rows, cols = sizes[np.where(inside, number, 0).astype(np.intp)].T
+    if not (inside & (row < rows) & (col >= 0) & (col < cols)).all():  # as they are given: a cast would wrap
+        raise ValueError("known_source points outside the sample; give -1 where a pixel is not from there")
+    found = np.full(place.shape, -1, np.int32)
+    found[used] = place[used]
     return found
 
 
@@ -145,7 +156,8 @@ def check_guide(
     several = len(pictures.pixels) > 1
     if several and not (isinstance(first, (list, tuple)) and len(first) == len(pictures.pixels)):
         raise ValueError(f"there are {len(pictures.pixels)} samples; give a list of a guide for each")
-    samples = [_guide("the guide of the sample", one) for one in (first if several else [first])]
+    listed = several or (isinstance(first, (list, tuple)) and len(first) == 1 and isinstance(first[0], np.ndarray))
+    samples = [_guide("the guide of the sample", one) for one in (first if listed else [first])]
     output = _guide("the guide of the output", second)
     for number, (one, picture) in enumerate(zip(samples, pictures.pixels, strict=True)):
         if one.shape[:2] != picture.shape[:2]:
@@ -169,7 +181,7 @@ def check_guide(
 
 
 def _guide(name: str, array: Any) -> NDArray[Any]:
-    found = np.asarray(array)
+    found = check_array(name, array)
     if found.dtype.kind not in "buif":
         raise TypeError(f"{name} holds {found.dtype} values; give integers or real floats")
     if found.ndim not in (2, 3) or not found.size:

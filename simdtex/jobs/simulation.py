@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.envelope import check_shape, restored
 from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
-from simdtex.jobs.inputs import Inputs, check_inputs, check_samples
+from simdtex.jobs.inputs import Inputs, check_array, check_inputs, check_samples
 from simdtex.machine import Machine, open_machine
 from simdtex.methods import mrf
 from simdtex.options import whole
@@ -203,7 +203,7 @@ def _hard(
         if placed is not None and channel_axis is not None:
             placed = np.moveaxis(placed[..., None] if placed.ndim == 2 else placed, -1, channel_axis)
         return placed, size
-    array = np.ma.asarray(hard)
+    array = hard if isinstance(hard, np.ma.MaskedArray) else check_array("hard", hard)
     if shape is None and array.ndim == (2 if channel_axis is None else 3):
         shape = array.shape if channel_axis is None else np.moveaxis(array, channel_axis, -1).shape[:2]
     return array, check_shape(training.shape[:2] if shape is None else shape)
@@ -213,13 +213,14 @@ def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) ->
     from simdtex import __version__
 
     told: dict[str, Any] = {"seed": seed, "version": __version__, "device": device, "options": vars(options)}
-    told["training_image"] = _digest(*inputs.pictures.pixels)
+    pictures = inputs.pictures  # whose pixels are completed where they are unknown
+    told["training_image"] = _digest(*pictures.pixels, *(pictures.known or ()))
     if inputs.given:
         told["hard_data"] = _digest(np.where(inputs.given.known, inputs.given.values, 0), inputs.given.known)
     if inputs.guide:
         told["guide"] = _digest(*inputs.guide[0], inputs.guide[1])
-    if inputs.pictures.usable:
-        told["mask"] = _digest(*inputs.pictures.usable)
+    if pictures.usable:
+        told["mask"] = _digest(*pictures.usable)
     return told
 
 

@@ -1,0 +1,268 @@
+"""``simdtex simulate``, end to end."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import simdtex
+from simdtex.cli import main
+from simdtex.io import image
+from simdtex.io.hard_data import read_hard_data
+from simdtex.io.realisations import read_realisations
+
+pytest.importorskip("zarr")
+pytest.importorskip("h5netcdf")
+
+OPTIONS = {"order": 2, "rng": 5, "device": "reference"}
+ENDS = (".png", ".tif", ".npz", ".nc", ".zarr", ".csv", ".xyz")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Training images of three kinds, tables and pictures of hard data, guides and a mask."""
+    rng = np.random.default_rng(2)
+    row, col = np.indices((16, 20))
+    grey = np.rint(120 + 80 * np.sin(row * 0.9 + col * 0.5) + rng.uniform(-20, 20, (16, 20))).astype(np.uint8)
+    known, there = grey[:12, :14], rng.random((12, 14)) < 0.1
+    there[3, 4] = True
+    facies = (grey > 120).astype(np.uint8) * np.uint8(3)
+    holed = grey.astype(np.float32)
+    holed[4:6, 7:9] = np.nan
+    pictures = {
+        "grey.png": grey,
+        "second.png": grey[::-1, :15],
+        "facies.png": facies,
+        "colour.png": rng.integers(0, 256, (16, 20, 3), dtype=np.uint8),
+        "holed.tif": holed,
+        "float.tif": grey.astype(np.float32),
+        "known.png": np.dstack([known, there * np.uint8(255)]),
+        "known.tif": np.where(there, known, np.nan).astype(np.float32),
+        "full.tif": known.astype(np.float32),
+        "mask.png": (col < 14) * np.uint8(255),
+        "black.png": np.zeros((16, 20), np.uint8),
+        "guide.png": (row * 12).astype(np.uint8),
+        "wanted.png": (row[:12, :14] * 12).astype(np.uint8),
+    }
+    for name, pixels in pictures.items():
+        image.write(tmp_path / name, pixels)
+    tables = {
+        "wells.csv": "x,y,value\n3,4,200\n10.4,7,17\n",
+        "facies.csv": "x,y,facies\n3,4,3\n10,7,0\n5,5,3\n",
+        "outside.csv": "x,y,value\n3,4,200\n40,7,17\n",
+        "disagree.csv": "x,y,value\n3,4,200\n3.2,4.1,17\n",
+        "beyond.csv": "x,y,value\n3,4,300\n",
+        "two.csv": "x,y,a,b\n3,4,200,1\n",
+        "strange.csv": "x,y,facies\n3,4,1\n",
+        "words.csv": "x,y,facies\n3,4,sand\n",
+    }
+    for name, text in tables.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def simulate(folder, *args):
+    """Run the command; what ends like a file, or is a report, is one of the folder."""
+
+    def placed(text):
+        if not text.endswith((*ENDS, "report")) or text.startswith("-"):
+            return text
+        return "=".join(f"{folder}/{part}" for part in text.split("="))
+
+    words = [placed(str(arg)) for arg in args]
+    return CliRunner().invoke(main, ["simulate", *words, "--order", "2", "--seed", "5", "--device", "reference"])
+
+
+def made(folder, *args, out="out.npz"):
+    result = simulate(folder, *args, "-o", out)
+    assert result.exit_code == 0, result.output
+    return read_realisations(folder / out)
+
+
+def pixels(folder, name):
+    return image.read(folder / name, unknown=True).pixels
+
+
+def contents(folder):
+    """Every file and folder by name, a file with its bytes."""
+    return {str(path.relative_to(folder)): path.is_file() and path.read_bytes() for path in folder.rglob("*")}
+
+
+def assert_same(ours, theirs):
+    """Two arrays of realisations agree in all but the type of what files hold as lists."""
+    assert (ours.dtype, ours.dims) == (theirs.dtype, theirs.dims)
+    assert ours.values.tobytes() == theirs.values.tobytes()
+    for name in theirs.coords:
+        assert np.array_equal(ours[name], theirs[name])
+    assert json.dumps(ours.attrs, sort_keys=True) == json.dumps(theirs.attrs, sort_keys=True)
+
+
+# ---------------------------------------------------------------- what is written
+
+
+@pytest.mark.parametrize("suffix", ["npz", "nc", "zarr"])
+def test_the_bytes_of_the_function_in_every_format(folder, suffix):
+    found = made(folder, "grey.png", "-n", 3, "--first", 2, "--size", "14x12", out=f"out.{suffix}")
+    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 3, first=2, shape=(12, 14), **OPTIONS))
+
+
+def test_what_is_told(folder):
+    args = ("grey.png", "-n", 2, "--size", "14x12", "-o", "out.npz", "--jobs", 2)
+    result = simulate(folder, *args)
+    assert result.exit_code == 0
+    assert "2 realisations of 14x12 in" in result.output and "on reference" in result.output
+    assert "seed 5" in result.output
+    assert simulate(folder, *args, "-q").output == ""
+    assert "1 realisation of 20x16" in simulate(folder, "grey.png", "-o", "out.npz").output
+
+
+def test_options_are_handed_on(folder):
+    args = ("--size", "14x12", "--novelty", 1, "--boundary", "torus", "--free-sweeps", 1)
+    found = made(folder, "grey.png", *args)
+    options = {"novelty": 1.0, "boundary": "torus", "free_sweeps": 1} | OPTIONS
+    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 1, shape=(12, 14), **options))
+
+
+def test_colour_has_variables(folder):
+    found = made(folder, "colour.png", "--size", "14x12")
+    assert found.dims == ("realisation", "y", "x", "variable") and found.shape == (1, 12, 14, 3)
+    assert_same(found, simdtex.simulate(pixels(folder, "colour.png"), 1, shape=(12, 14), channel_axis=-1, **OPTIONS))
+
+
+def test_several_training_images(folder):
+    args = ("grey.png", "second.png", "--size", "14x12", "--shares", "1,2")
+    found = made(folder, *args)
+    training = [pixels(folder, "grey.png"), pixels(folder, "second.png")]
+    assert_same(found, simdtex.simulate(training, 1, shape=(12, 14), shares=(1.0, 2.0), **OPTIONS))
+
+
+def test_masks_and_guides(folder):
+    args = ("--sample-mask", "mask.png", "--guide", "guide.png=wanted.png", "--size", "14x12")
+    found = made(folder, "grey.png", *args)
+    guide = pixels(folder, "guide.png"), pixels(folder, "wanted.png")
+    mask = pixels(folder, "mask.png") > 0
+    wanted = simdtex.simulate(pixels(folder, "grey.png"), 1, shape=(12, 14), mask=mask, guide=guide, **OPTIONS)
+    assert_same(found, wanted)
+
+
+def test_a_training_image_may_be_unknown_in_parts(folder):
+    found = made(folder, "holed.tif", "--size", "14x12")
+    assert_same(found, simdtex.simulate(pixels(folder, "holed.tif"), 1, shape=(12, 14), **OPTIONS))
+    assert not np.isnan(found.values).any()
+
+
+# ---------------------------------------------------------------- hard data
+
+
+def test_a_table_of_hard_data(folder):
+    found = made(folder, "grey.png", "-n", 2, "--hard", "wells.csv", "--size", "14x12")
+    assert (found.values[:, 4, 3] == 200).all() and (found.values[:, 7, 10] == 17).all()
+    table = read_hard_data(folder / "wells.csv")
+    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 2, shape=(12, 14), hard=table, **OPTIONS))
+
+
+def test_a_table_leaves_the_size_to_the_training_image(folder):
+    assert made(folder, "grey.png", "--hard", "wells.csv").shape == (1, 16, 20)
+
+
+@pytest.mark.parametrize("name", ["known.png", "known.tif"])
+def test_a_picture_of_hard_data(folder, name):
+    found = made(folder, "grey.png", "-n", 2, "--hard", name)
+    known = pixels(folder, "known.tif")
+    there = ~np.isnan(known)
+    assert found.shape == (2, 12, 14)
+    for one in found.values:
+        assert np.array_equal(one[there], known[there])
+    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 2, hard=known, **OPTIONS))
+
+
+def test_categories(folder):
+    found = made(folder, "facies.png", "-n", 2, "--hard", "facies.csv", "--size", "14x12", "--categorical")
+    assert set(np.unique(found)) == {0, 3}
+    assert (found.values[:, 4, 3] == 3).all() and (found.values[:, 7, 10] == 0).all()
+
+
+def test_an_existing_file_is_replaced(folder):
+    made(folder, "grey.png", "-n", 2, "--size", "14x12")
+    assert made(folder, "grey.png", "--size", "9x8").shape == (1, 8, 9)
+
+
+# ---------------------------------------------------------------- a report
+
+
+def test_a_report_is_a_page_and_numbers(folder):
+    pytest.importorskip("gstools")
+    args = ("--hard", "facies.csv", "--size", "14x12", "--categorical", "--report", "report")
+    made(folder, "facies.png", "-n", 2, *args)
+    page = (folder / "report" / "index.html").read_text(encoding="utf-8")
+    assert "simdtex simulate" in page and "facies.csv" in page
+    results = json.loads((folder / "report" / "results.json").read_text(encoding="utf-8"))
+    assert results["files"] == sorted(path.name for path in (folder / "report").iterdir())
+
+
+# ---------------------------------------------------------------- what is refused
+
+GREY = ["grey.png", "-o", "out.npz", "--size", "14x12"]
+FACIES = ["facies.png", "-o", "out.npz", "--size", "14x12", "--categorical"]
+BAD = {
+    "data outside": ([*GREY, "--hard", "outside.csv"], "line 3 of the hard data is at x 40"),
+    "data that disagree": ([*GREY, "--hard", "disagree.csv"], "keep one of them"),
+    "data beyond the type": ([*GREY, "--hard", "beyond.csv"], "uint8 cannot hold"),
+    "data of two variables": ([*GREY, "--hard", "two.csv"], "has 2 values to a datum"),
+    "data in words": ([*GREY, "--hard", "words.csv"], "'sand' in column 3"),
+    "no such data": ([*GREY, "--hard", "none.csv"], "does not exist"),
+    "data everywhere": (["float.tif", "-o", "out.npz", "--hard", "full.tif"], "known everywhere"),
+    "data of another size": (["grey.png", "-o", "out.npz", "--hard", "known.tif", "--size", "9x9"], "14x12"),
+    "a colour picture of data": ([*GREY, "--hard", "colour.png"], "convert them to one type"),
+    "an unknown category": ([*FACIES, "--hard", "strange.csv"], "the category 1 and the sample has 0, 3"),
+    "an unknown suffix": (["grey.png", "-o", "out.xyz"], "names no format of realisations"),
+    "a picture as output": (["grey.png", "-o", "out.png"], "names no format of realisations"),
+    "the training image overwritten": (["grey.png", "-o", "grey.png"], "grey.png"),
+    "no realisation": ([*GREY, "-n", 0], "n is 0; give 1 or more"),
+    "first": ([*GREY, "--first", -1], "first is -1"),
+    "jobs": ([*GREY, "--jobs", 0], "jobs is 0"),
+    "no such picture": (["none.png", "-o", "out.npz"], "does not exist"),
+    "two types": (["grey.png", "colour.png", "-o", "out.npz"], "convert them to one type"),
+    "a size in words": (["grey.png", "-o", "out.npz", "--size", "large"], "large"),
+    "a size of nothing": (["grey.png", "-o", "out.npz", "--size", "0x5"], "0"),
+    "a mask of nothing": ([*GREY, "--sample-mask", "black.png"], "nothing of"),
+    "two masks": ([*GREY, "--sample-mask", "mask.png", "--sample-mask", "mask.png"], "once for each sample"),
+    "half a guide": ([*GREY, "--guide", "guide.png"], "SAMPLE-GUIDE=OUTPUT-GUIDE"),
+    "a guide of another size": ([*GREY, "--guide", "guide.png=guide.png"], "guide of the output is 16x20"),
+    "an order": ([*GREY, "--xi", 2], "xi is 2"),
+    "a report of several": (["grey.png", "second.png", "-o", "out.npz", "--report", "report"], "leave it out"),
+    "a report of colour": (["colour.png", "-o", "out.npz", "--report", "report"], "one variable"),
+    "a report of gaps": (["holed.tif", "-o", "out.npz", "--report", "report"], "known everywhere"),
+}
+
+
+def refused(folder, args, words):
+    before = contents(folder)
+    result = simulate(folder, *args)
+    assert result.exit_code == 2, result.output
+    assert words in result.output
+    assert len(result.output.strip().splitlines()) == 1
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_gets_one_sentence_and_writes_nothing(folder, case):
+    refused(folder, *BAD[case])
+
+
+def test_an_output_that_is_an_input_is_refused(folder):
+    image.write(folder / "grey.npy", pixels(folder, "grey.png"))
+    (folder / "linked.npz").symlink_to(folder / "grey.npy")
+    refused(folder, [str(folder / "grey.npy"), "-o", "linked.npz"], "is an input and would be overwritten")
+
+
+def test_one_place_for_two_outputs_is_refused(folder):
+    refused(folder, ["grey.png", "-o", "report.zarr", "--report", "report.zarr"], "would be written twice")
+
+
+def test_a_folder_of_other_files_is_no_place_for_a_report(folder):
+    pytest.importorskip("gstools")
+    (folder / "report").mkdir()
+    (folder / "report" / "letter.txt").write_text("dear")
+    refused(folder, [*GREY, "--report", "report"], "report")

@@ -1,0 +1,595 @@
+"""`simdtex.fill` and `simdtex.extend`: what they keep, where the rest is from, and what they refuse."""
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, texture
+from hypothesis import given
+from hypothesis import strategies as st
+
+import simdtex
+from simdtex.jobs.filling import FEW, windows
+from simdtex.model.source_map import apply_source_map
+
+TYPES = [np.bool_, np.uint8, np.uint16, np.int32, np.float32, np.float64]
+SHAPE = (16, 20)
+QUICK = {"order": 2, "rng": 1, "device": REFERENCE}
+
+
+def hole_at(*parts, shape=SHAPE):
+    """A mask that is True in each part, (rows, columns) as slices."""
+    mask = np.zeros(shape, bool)
+    for part in parts:
+        mask[part] = True
+    return mask
+
+
+MIDDLE = hole_at(np.s_[5:9, 6:11])
+
+
+def fill(image, mask=None, **options):
+    return simdtex.fill(image, mask, **(QUICK | options))
+
+
+def extend(image, **options):
+    return simdtex.extend(image, **(QUICK | options))
+
+
+def planes(axis, image):
+    """The picture with its channels last, (rows, cols, C)."""
+    return image[..., None] if axis is None else np.moveaxis(image, axis, -1)
+
+
+def with_axis(axis, dtype=np.uint8, shape=SHAPE, seed=0):
+    """A texture that is grey, or has three channels on an axis."""
+    if axis is None:
+        return texture(shape, dtype=dtype, seed=seed)
+    return np.ascontiguousarray(np.moveaxis(texture(shape, 3, dtype, seed), -1, axis))
+
+
+# -- fill: what is kept ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("axis", [None, 0, -1])
+@pytest.mark.parametrize("dtype", TYPES)
+def test_outside_the_hole_is_the_image_to_the_bit(dtype, axis):
+    image = with_axis(axis, dtype)
+    before = image.copy()
+    found = fill(image, MIDDLE, channel_axis=axis, levels=1)
+    assert_same_bits(image, before)
+    assert (found.dtype, found.shape) == (image.dtype, image.shape)
+    ours, theirs = planes(axis, found), planes(axis, image)
+    assert_same_bits(ours[~MIDDLE], theirs[~MIDDLE])
+    assert (ours[MIDDLE] != theirs[MIDDLE]).any()
+
+
+@pytest.mark.parametrize(("axis", "dtype"), [(None, np.float64), (0, np.float32), (-1, np.float64)])
+def test_nan_is_a_hole(dtype, axis):
+    image = with_axis(axis, dtype)
+    holed = image.copy()
+    planes(axis, holed)[MIDDLE] = np.nan
+    found = fill(holed, channel_axis=axis)
+    assert np.isfinite(found).all()
+    assert_same_bits(found, fill(image, MIDDLE, channel_axis=axis))
+    assert_same_bits(found, fill(holed, MIDDLE, channel_axis=axis))
+
+
+def test_nan_beside_a_mask_is_made_too():
+    image = texture(SHAPE, dtype=np.float32)
+    image[1, 2] = np.nan
+    found = fill(image, MIDDLE)
+    kept = ~MIDDLE & ~np.isnan(image)
+    assert np.isfinite(found).all()
+    assert_same_bits(found[kept], image[kept])
+
+
+def test_nan_in_one_channel_is_a_hole_in_all():
+    image = texture(SHAPE, 3, np.float32)
+    image[5:9, 6:11, 1] = np.nan
+    found, output = fill(image, channel_axis=-1, finish=0.0, full_output=True)
+    assert_same_bits(found, image[output.source[..., 0], output.source[..., 1]])
+    assert_same_bits(found[~MIDDLE], image[~MIDDLE])
+
+
+def test_what_a_hole_holds_makes_no_difference():
+    image, other = texture(SHAPE), texture(SHAPE)
+    other[MIDDLE] = 255 - other[MIDDLE]
+    assert_same_bits(fill(image, MIDDLE), fill(other, MIDDLE))
+
+
+EDGES = {
+    "top": np.s_[:3, 7:12],
+    "bottom": np.s_[-3:, 7:12],
+    "left": np.s_[5:9, :3],
+    "right": np.s_[5:9, -3:],
+    "top left": np.s_[:4, :3],
+    "top right": np.s_[:4, -3:],
+    "bottom left": np.s_[-4:, :3],
+    "bottom right": np.s_[-4:, -3:],
+    "a pixel": np.s_[8:9, 8:9],
+    "a corner": np.s_[-1:, -1:],
+    "rows across": np.s_[6:8, :],
+    "columns down": np.s_[:, 9:11],
+}
+
+
+@pytest.mark.parametrize("boundary", ["open", "torus"])
+@pytest.mark.parametrize("where", EDGES)
+def test_a_hole_may_be_anywhere(where, boundary):
+    image, mask = texture(SHAPE), hole_at(EDGES[where])
+    found, output = fill(image, mask, boundary=boundary, finish=0.0, full_output=True)
+    assert_same_bits(found[~mask], image[~mask])
+    assert not mask[output.source[..., 0], output.source[..., 1]].any()
+    assert not output.temperature.any()
+
+
+def test_one_known_part_fills_all_the_rest():
+    image = texture(SHAPE)
+    mask = ~hole_at(np.s_[2:14, 3:17])
+    found = fill(image, mask, finish=0.0)
+    assert_same_bits(found[~mask], image[~mask])
+    assert np.isin(found, image[~mask]).all()
+
+
+# -- fill: windows --------------------------------------------------------------------------------------------
+
+FAR = hole_at(np.s_[3:6, 3:7], np.s_[20:24, 50:54], np.s_[2:5, 54:58], shape=(30, 60))
+NEAR = hole_at(np.s_[3:6, 3:7], np.s_[3:6, 9:12], shape=(30, 60))
+
+
+@pytest.mark.parametrize(("mask", "count"), [(FAR, 3), (NEAR, 1)], ids=["far", "near"])
+def test_holes_far_apart_have_windows_of_their_own(mask, count):
+    image = texture(mask.shape)
+    found, output = fill(image, mask, full_output=True)
+    told = output.statistics["windows"]
+    assert len(told) == count
+    assert_same_bits(found[~mask], image[~mask])
+    covered = np.zeros(mask.shape, int)
+    for top, bottom, left, right in (one["window"] for one in told):
+        covered[top:bottom, left:right] += 1
+    assert (covered[mask] == 1).all() and covered.max() == 1
+
+
+def test_a_hole_does_not_depend_on_what_is_beyond_its_reach():
+    image, mask = texture((20, 80)), hole_at(np.s_[8:11, 8:12], shape=(20, 80))
+    (window,) = windows(mask, 1, None)
+    beyond = window.cols.stop + 6
+    assert beyond < 40
+    other = image.copy()
+    other[:, beyond:] = 255 - other[:, beyond:]
+    one, two = (fill(picture, mask, reach=6) for picture in (image, other))
+    assert_same_bits(one[mask], two[mask])
+    near = image.copy()
+    near[:, beyond - 6 : beyond] = 255 - near[:, beyond - 6 : beyond]
+    assert (fill(near, mask, reach=6)[mask] != one[mask]).any()
+
+
+def test_a_hole_does_not_depend_on_another_that_is_far():
+    image = texture((30, 60))
+    alone = hole_at(np.s_[20:24, 50:54], shape=(30, 60))
+    both, one = fill(image, FAR, reach=4), fill(image, alone, reach=4)
+    assert (FAR & ~alone).any()
+    assert_same_bits(both[18:26, 46:58], one[18:26, 46:58])
+
+
+@pytest.mark.parametrize("reach", [1, 3, None])
+def test_nothing_is_from_beyond_the_reach(reach):
+    image, mask = texture((20, 40)), hole_at(np.s_[8:11, 4:8], shape=(20, 40))
+    _, output = fill(image, mask, reach=reach, full_output=True)
+    top, bottom, left, right = output.statistics["windows"][0]["window"]
+    reach = 128 if reach is None else reach
+    row, col = output.source[mask].T
+    assert top - reach <= row.min() and row.max() < bottom + reach
+    assert left - reach <= col.min() and col.max() < right + reach
+
+
+def test_levels_are_those_that_are_asked_for():
+    image = texture(SHAPE)
+    for levels in (1, 2):
+        _, output = fill(image, MIDDLE, levels=levels, full_output=True)
+        assert len(output.statistics["levels"]) == levels
+    with pytest.raises(ValueError, match="levels=9 is too many"):
+        fill(image, MIDDLE, levels=9)
+
+
+def test_the_window_of_a_pixel():
+    mask = hole_at(np.s_[10:11, 20:21], shape=(40, 50))
+    assert windows(mask, 1, None) == [(slice(8, 13), slice(18, 23), 1)]
+    assert windows(mask, 3, None) == [(slice(6, 15), slice(16, 25), 1)]
+    assert windows(mask, 1, 2) == [(slice(7, 14), slice(17, 24), 2)]
+
+
+@pytest.mark.parametrize(("side", "radius", "levels"), [(1, 1, 1), (2, 1, 1), (3, 1, 2), (4, 1, 2), (5, 1, 3),
+                                                        (9, 1, 4), (9, 2, 3), (9, 4, 2), (9, 5, 1)])  # fmt: skip
+def test_the_middle_of_a_hole_sees_its_rim_at_the_coarsest_level(side, radius, levels):
+    mask = hole_at(np.s_[60 : 60 + side, 50 : 50 + side], shape=(200, 200))
+    ((rows, cols, found),) = windows(mask, radius, None)
+    around = radius * 2 ** (levels - 1) + 1
+    assert found == levels
+    assert (rows, cols) == (slice(60 - around, 60 + side + around), slice(50 - around, 50 + side + around))
+
+
+def test_a_window_ends_with_the_picture():
+    mask = hole_at(np.s_[0:1, 49:50], shape=(40, 50))
+    assert windows(mask, 1, None) == [(slice(0, 3), slice(47, 50), 1)]
+
+
+def test_windows_come_from_top_to_bottom():
+    mask = hole_at(np.s_[30:31, 4:5], np.s_[10:11, 20:21], shape=(40, 50))
+    assert [window.rows.start for window in windows(mask, 1, None)] == [8, 28]
+
+
+def test_windows_that_overlap_are_one():
+    mask = hole_at(np.s_[10:11, 10:11], np.s_[10:11, 15:16], np.s_[30:31, 40:41], shape=(40, 60))
+    assert windows(mask, 1, None) == [(slice(8, 13), slice(8, 18), 1), (slice(28, 33), slice(38, 43), 1)]
+
+
+def test_a_hole_within_the_bend_of_another_is_in_its_window():
+    mask = hole_at(np.s_[10:60, 10:11], np.s_[59:60, 10:60], np.s_[20:21, 50:51], shape=(200, 200))
+    assert windows(mask, 1, None) == [(slice(8, 62), slice(8, 62), 1)]
+
+
+def test_many_holes_are_in_one_window():
+    mask = np.zeros((100, 100), bool)
+    mask.flat[[k * 2000 + 10 + 20 * j for k in range(4) for j in range(4)]] = True
+    assert mask.sum() == FEW
+    assert len(windows(mask, 1, None)) == FEW
+    mask[90, 90] = True
+    assert windows(mask, 1, None) == [(slice(0, 93), slice(8, 93), 1)]
+
+
+def test_windows_of_more_than_half_the_picture_are_one():
+    mask = hole_at(np.s_[4:5, 4:5], np.s_[4:5, 11:12], shape=(9, 16))
+    assert windows(mask, 1, None) == [(slice(2, 7), slice(2, 7), 1), (slice(2, 7), slice(9, 14), 1)]
+    assert windows(mask, 2, None) == [(slice(1, 8), slice(1, 15), 1)]
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(0, 59), st.integers(0, 59), st.integers(1, 12), st.integers(1, 12)),
+        min_size=1,
+        max_size=8,
+    ),
+    st.integers(1, 3),
+    st.sampled_from([None, 1, 2]),
+)
+def test_every_hole_is_in_one_window_with_what_its_sites_look_at(parts, radius, levels):
+    mask = hole_at(*(np.s_[i : i + h, j : j + w] for i, j, h, w in parts), shape=(60, 60))
+    found = windows(mask, radius, levels)
+    covered = np.zeros(mask.shape, int)
+    for rows, cols, _ in found:
+        covered[rows, cols] += 1
+    assert covered.max() == 1
+    around = radius * 2 ** (found[0].levels - 1)
+    for row, col in np.argwhere(mask):
+        (one,) = (w for w in found if w.rows.start <= row < w.rows.stop and w.cols.start <= col < w.cols.stop)
+        assert one.rows.start <= max(0, row - around) and min(60, row + around + 1) <= one.rows.stop
+        assert one.cols.start <= max(0, col - around) and min(60, col + around + 1) <= one.cols.stop
+    assert {one.levels for one in found} == {found[0].levels}
+    assert len(found) <= FEW
+
+
+# -- fill: where pixels are from ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("mask", "reach"), [(FAR, None), (FAR, 3), (NEAR, None)], ids=["far", "far, 3", "near"])
+def test_known_pixels_are_from_themselves_and_others_from_what_is_known(mask, reach):
+    image = texture(mask.shape)
+    found, output = fill(image, mask, reach=reach, finish=0.0, full_output=True)
+    source = output.source
+    assert (source.shape, source.dtype) == ((*mask.shape, 2), np.int32)
+    own = np.moveaxis(np.indices(mask.shape), 0, -1)
+    assert np.array_equal(source[~mask], own[~mask])
+    assert (source >= 0).all() and (source < mask.shape).all()
+    assert not mask[source[..., 0], source[..., 1]].any()
+    assert_same_bits(found, apply_source_map(source, image, mask.shape))
+
+
+@pytest.mark.parametrize("axis", [0, -1])
+def test_a_source_map_carries_other_maps(axis):
+    image = with_axis(axis)
+    found, output = fill(image, MIDDLE, channel_axis=axis, finish=0.0, full_output=True)
+    assert_same_bits(np.ascontiguousarray(planes(axis, found)), apply_source_map(output.source, planes(axis, image)))
+    height = texture(SHAPE, dtype=np.uint16, seed=3)
+    carried = apply_source_map(output.source, height, SHAPE)
+    assert_same_bits(carried[~MIDDLE], height[~MIDDLE])
+    assert np.isin(carried[MIDDLE], height[~MIDDLE]).all()
+
+
+@pytest.mark.parametrize("axis", [None, 0])
+def test_a_sample_is_all_that_a_hole_is_filled_from(axis):
+    image = with_axis(axis) // 2
+    sample = with_axis(axis, shape=(12, 14), seed=4) // 2 + 128  # no pixel of the picture is one of the sample
+    found, output = fill(image, MIDDLE, sample=sample, channel_axis=axis, finish=0.0, full_output=True)
+    ours = planes(axis, found)
+    assert_same_bits(ours[~MIDDLE], planes(axis, image)[~MIDDLE])
+    assert (output.source[~MIDDLE] == -1).all()
+    row, col = output.source[MIDDLE].T
+    assert_same_bits(ours[MIDDLE], planes(axis, sample)[row, col])
+    kept = apply_source_map(output.source, planes(axis, sample), (12, 14), fill=planes(axis, image))
+    assert np.array_equal(kept, ours)
+
+
+def test_several_samples_are_told_apart():
+    image, samples = texture(SHAPE), [texture((10, 12), seed=5), texture((14, 9), seed=6)]
+    found, output = fill(image, MIDDLE, sample=samples, finish=0.0, shares=[1, 1], full_output=True)
+    assert output.source.shape == (*SHAPE, 3)
+    assert (output.source[~MIDDLE] == -1).all()
+    row, col, number = output.source[MIDDLE].T
+    assert set(number.tolist()) == {0, 1}
+    values = [int(samples[n][i, j]) for i, j, n in zip(row, col, number, strict=True)]
+    assert found[MIDDLE].tolist() == values
+
+
+def test_reach_makes_no_difference_to_a_sample():
+    sample = texture((12, 14), seed=4)
+    assert_same_bits(*(fill(texture(SHAPE), MIDDLE, sample=sample, reach=reach) for reach in (None, 1)))
+
+
+def test_categories_are_filled_with_categories():
+    image = (texture(SHAPE) > 90).astype(np.uint8) * 3 + (texture(SHAPE) > 170) * np.uint8(4)
+    found = fill(image, MIDDLE, categorical=True)
+    assert set(np.unique(found[MIDDLE])) <= set(np.unique(image[~MIDDLE]))
+
+
+# -- fill: what is told ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("axis", [None, 0])
+def test_a_callback_sees_the_whole_picture_and_a_fraction_that_never_falls(axis):
+    image = with_axis(axis, shape=FAR.shape)
+    seen = []
+
+    def look(progress):
+        seen.append((progress.fraction, progress.image()))
+
+    found = fill(image, FAR, channel_axis=axis, callback=look)
+    fractions = [fraction for fraction, _ in seen]
+    assert fractions == sorted(fractions)
+    assert 0 < fractions[0] < 0.34 and 0.95 < fractions[-1] <= 1
+    assert all((one.shape, one.dtype) == (image.shape, image.dtype) for _, one in seen)
+    untouched = np.ones(FAR.shape, bool)
+    for rows, cols, _ in windows(FAR, 1, None):
+        untouched[rows, cols] = False
+    for _, one in seen:
+        assert_same_bits(planes(axis, one)[untouched], planes(axis, image)[untouched])
+    last, known = planes(axis, seen[-1][1]), ~FAR
+    assert_same_bits(last[known], planes(axis, image)[known])
+    first = hole_at(np.s_[2:6, 3:7], shape=FAR.shape)  # windows that are finished are in the picture
+    assert_same_bits(last[first], planes(axis, found)[first])
+    assert_same_bits(fill(image, FAR, channel_axis=axis), found)
+
+
+def test_an_error_of_a_callback_comes_out():
+    def stop(progress):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fill(texture(SHAPE), MIDDLE, callback=stop)
+
+
+def test_statistics_are_of_every_window():
+    _, output = fill(texture(FAR.shape), FAR, full_output=True, rng=7)
+    told = output.statistics
+    assert (told["device"], told["seed"]) == (REFERENCE.name, 7)
+    options = {name: told["options"][name] for name in ("boundary", "balance", "novelty", "chance", "data_weight")}
+    assert options == {"boundary": "open", "balance": 0, "novelty": 0, "chance": 16, "data_weight": 4}
+    assert told["device_seconds"] is None
+    assert len(told["windows"]) == 3 and told["levels"] == told["windows"][0]["levels"]
+    for one in told["windows"]:
+        top, bottom, left, right = one["window"]
+        assert FAR[top:bottom, left:right].any()
+        assert (one["levels"][-1]["rows"], one["levels"][-1]["cols"]) == (bottom - top, right - left)
+    assert told["seconds"] >= sum(one["seconds"] for one in told["windows"])
+    assert output.temperature.shape == FAR.shape and not output.temperature.any()
+
+
+def test_an_option_of_ones_own_goes_before_that_of_holes():
+    _, output = fill(texture(SHAPE), MIDDLE, chance=3, boundary="torus", full_output=True)
+    assert (output.statistics["options"]["chance"], output.statistics["options"]["boundary"]) == (3, "torus")
+
+
+def test_on_a_torus_a_hole_at_an_edge_sees_the_other_side():
+    image, mask = texture(SHAPE), hole_at(EDGES["left"])
+    other = image.copy()
+    other[:, -1] = 255 - other[:, -1]
+    results = {
+        boundary: [fill(one, mask, boundary=boundary, reach=2)[mask] for one in (image, other)]
+        for boundary in ("open", "torus")
+    }
+    assert (results["torus"][0] != results["torus"][1]).any()
+    assert_same_bits(*results["open"])
+
+
+def test_the_same_bytes_on_every_device(machine):
+    colour = texture(SHAPE, 3)
+    sides = {"tile": True, "band": 3, "channel_axis": -1}
+    for make in (
+        lambda m: fill(colour, MIDDLE, channel_axis=-1, device=m),
+        lambda m: extend(colour, device=m, **sides),
+    ):
+        assert_same_bits(make(machine), make(REFERENCE))
+    one, two = (
+        fill(texture(SHAPE, dtype=np.float64), MIDDLE, device=m, full_output=True) for m in (machine, REFERENCE)
+    )
+    assert_same_bits(one[0], two[0])
+    assert_same_bits(one[1].source, two[1].source)
+
+
+def test_seeds_count():
+    image = texture(SHAPE)
+    assert_same_bits(fill(image, MIDDLE, rng=3), fill(image, MIDDLE, rng=3))
+    assert (fill(image, MIDDLE, rng=3) != fill(image, MIDDLE, rng=4)).any()
+    assert_same_bits(extend(image, right=4, rng=3), extend(image, right=4, rng=3))
+    assert (extend(image, right=4, rng=3) != extend(image, right=4, rng=4)).any()
+
+
+# -- extend ---------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("axis", [None, 0, -1])
+@pytest.mark.parametrize("dtype", [np.bool_, np.uint8, np.int32, np.float32])
+def test_the_picture_is_in_its_place_to_the_bit(dtype, axis):
+    image = with_axis(axis, dtype)
+    found = extend(image, top=2, bottom=1, left=3, right=4, channel_axis=axis)
+    assert found.dtype == image.dtype
+    ours, theirs = planes(axis, found), planes(axis, image)
+    assert ours.shape == (19, 27, theirs.shape[-1])
+    assert_same_bits(ours[2:18, 3:23].copy(), theirs.copy())
+
+
+@pytest.mark.parametrize("side", ["top", "bottom", "left", "right"])
+def test_each_side_alone(side):
+    image = texture(SHAPE)
+    found, output = extend(image, **{side: 3}, finish=0.0, full_output=True)
+    rows = slice(3 * (side == "top"), 3 * (side == "top") + 16)
+    cols = slice(3 * (side == "left"), 3 * (side == "left") + 20)
+    assert found.shape == (16 + 3 * (side in ("top", "bottom")), 20 + 3 * (side in ("left", "right")))
+    assert_same_bits(found[rows, cols].copy(), image)
+    assert np.array_equal(output.source[rows, cols], np.moveaxis(np.indices(SHAPE), 0, -1))
+    assert_same_bits(found, apply_source_map(output.source, image, SHAPE))
+    assert output.statistics["options"]["boundary"] == "open"
+
+
+@pytest.mark.parametrize(("tile", "inner"), [(True, np.s_[3:-3, 3:-3]), ("x", np.s_[:, 3:-3]), ("y", np.s_[3:-3, :])])
+@pytest.mark.parametrize("axis", [None, 0])
+def test_a_tile_keeps_all_but_its_bands(tile, inner, axis):
+    image = with_axis(axis)
+    found, output = extend(image, tile=tile, band=3, channel_axis=axis, finish=0.0, full_output=True)
+    ours, theirs = planes(axis, found), planes(axis, image)
+    assert ours.shape == theirs.shape
+    assert_same_bits(ours[inner].copy(), theirs[inner].copy())
+    assert (ours != theirs).any()
+    assert np.array_equal(ours, apply_source_map(output.source, theirs, SHAPE))
+    if tile != "y":
+        assert (ours[:, :3] != theirs[:, :3]).any() and (ours[:, -3:] != theirs[:, -3:]).any()
+    if tile != "x":
+        assert (ours[:3] != theirs[:3]).any() and (ours[-3:] != theirs[-3:]).any()
+
+
+def test_a_tile_that_grows_in_one_direction_has_a_band_in_the_other_alone():
+    image = texture(SHAPE)
+    found = extend(image, tile=True, right=5, band=3)
+    assert found.shape == (16, 25)
+    assert_same_bits(found[3:-3, :20].copy(), image[3:-3])
+    assert (found[:3, :20] != image[:3]).any()
+
+
+def test_the_default_band_is_an_eighth_of_the_shorter_side_and_8_at_least():
+    for shape, width in (((24, 30), 8), ((72, 80), 9)):
+        image = texture(shape)
+        found = extend(image, tile="x", finish=0.0)
+        assert_same_bits(found[:, width:-width].copy(), image[:, width:-width].copy())
+        assert (found[:, :width] != image[:, :width]).mean() > 0.5
+
+
+def step(image, axis):
+    """The mean absolute step across the seam of a tile."""
+    found = image.astype(float)
+    return np.abs(np.take(found, 0, axis) - np.take(found, -1, axis)).mean()
+
+
+@pytest.mark.parametrize(("finish", "most"), [(0.0, 0.8), (None, 0.55)])
+def test_a_tile_wraps(finish, most):
+    """Of stripes that do not fit their picture the step across the seam is 93; a tile has 58, and finished 34."""
+    for axis in (0, 1):
+        images = [texture((32, 40), seed=seed) for seed in range(2)]
+        tiles = [extend(image, tile=True, band=5, finish=finish, rng=seed) for seed, image in enumerate(images)]
+        assert np.mean([step(tile, axis) for tile in tiles]) < most * np.mean([step(image, axis) for image in images])
+
+
+def test_a_tile_along_x_wraps_along_x_alone():
+    image = texture((32, 40))
+    found = extend(image, tile="x", band=5)
+    assert step(found, 1) < 0.55 * step(image, 1)
+    assert np.array_equal(found[[0, -1], 5:-5], image[[0, -1], 5:-5])
+
+
+# -- what is refused ------------------------------------------------------------------------------------------
+
+IMAGE = texture(SHAPE)
+FLOAT = texture(SHAPE, dtype=np.float32)
+
+
+def holding(value):
+    found = FLOAT.copy()
+    found[3, 4] = value
+    return found
+
+
+BAD_FILL = {
+    "nothing to fill": ({"mask": np.zeros(SHAPE, bool)}, ValueError, "leaves nothing to fill; set it True"),
+    "no NaN": ({"mask": None}, ValueError, "leaves nothing to fill"),
+    "nothing known": ({"mask": np.ones(SHAPE, bool)}, ValueError, "leaves nothing known; set it False"),
+    "NaN everywhere": ({"image": np.full(SHAPE, np.nan), "mask": None}, ValueError, "leaves nothing known"),
+    "a mask of numbers": ({"mask": MIDDLE.astype(np.uint8)}, TypeError, "mask holds uint8 values; give True and False"),
+    "another size": ({"mask": MIDDLE[:-1]}, ValueError, "mask is 15x20 and the picture 16x20 .*; give one size"),
+    "a mask with channels": ({"mask": MIDDLE[..., None]}, ValueError, "give one size"),
+    "no reach": ({"reach": 0}, ValueError, "reach is 0; give 1 or more"),
+    "half a reach": ({"reach": 1.5}, TypeError, "reach must be an integer"),
+    "a sample of another type": (
+        {"sample": FLOAT}, ValueError, "sample has 1 channels of float32 and the picture 1 of uint8; give both one"),
+    "samples of two types": ({"sample": [IMAGE, FLOAT]}, ValueError, "sample 1 has .*; give samples of one type"),
+    "a sample with colour": ({"sample": texture(SHAPE, 3)}, ValueError, "the sample is 3-dimensional"),
+    "more channels": (
+        {"image": texture(SHAPE, 3), "sample": texture(SHAPE, 2), "channel_axis": -1}, ValueError,
+        "2 channels of uint8 and the picture 3 of uint8"),
+    "a sample of nothing": (
+        {"image": FLOAT, "sample": np.full(SHAPE, np.nan, np.float32)}, ValueError, "no known pixel"),
+    "infinite": ({"image": holding(np.inf)}, ValueError, "1 value that is infinite, the first at row 3, column 4"),
+    "text": ({"image": IMAGE.astype(str)}, TypeError, "convert it"),
+    "ragged": ({"image": [[1, 2], [3]]}, ValueError, "ragged"),
+    "empty": ({"image": np.zeros((0, 4))}, ValueError, "empty"),
+    "one axis": ({"image": IMAGE[0]}, ValueError, "1-dimensional"),
+    "a channel axis of a grey one": ({"channel_axis": -1}, ValueError, "give three axes"),
+    "a channel axis that is not there": ({"image": texture(SHAPE, 3), "channel_axis": 3}, ValueError, "-3 to 2"),
+    "a channel axis in words": ({"image": texture(SHAPE, 3), "channel_axis": "c"}, TypeError, "None or an integer"),
+    "an unknown option": ({"method": "mrf"}, TypeError, "unknown option 'method'"),
+    "an order": ({"order": 0}, ValueError, "order 0 has no neighbours"),
+    "a boundary": ({"boundary": "mirror"}, ValueError, "choose one of: torus, open"),
+    "a seed": ({"rng": -1}, ValueError, "integer from 0"),
+    "a device": ({"device": "abacus"}, simdtex.DeviceError, "choose one of"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD_FILL)
+def test_bad_input_to_fill_is_refused_with_a_remedy(case):
+    change, error, words = BAD_FILL[case]
+    arguments = {"image": IMAGE, "mask": MIDDLE} | change
+    with pytest.raises(error, match=words) as caught:
+        fill(**arguments)
+    assert "\n" not in str(caught.value)
+
+
+BAD_EXTEND = {
+    "nothing to add": ({}, ValueError, "nothing to add; give top, bottom, left or right, or tile=True"),
+    **{side: ({side: -3}, ValueError, f"{side} is -3; give 0 or more") for side in ("top", "bottom", "left", "right")},
+    "half a pixel": ({"left": 0.5}, TypeError, "left must be an integer"),
+    "a tile in z": ({"tile": "z"}, ValueError, "tile is 'z'; give True, False"),
+    "no tile": ({"tile": None}, ValueError, "tile is None; give True, False"),
+    "no band": ({"tile": True, "band": 0}, ValueError, "band is 0; give 1 or more"),
+    "half a band": ({"tile": True, "band": 2.5}, TypeError, "band must be an integer"),
+    "all a band": ({"tile": True, "band": 8}, ValueError, "band=8 leaves nothing of a picture of 16x20 .* narrower"),
+    "all a band by default": ({"tile": "y"}, ValueError, "band=8 leaves nothing"),
+    "NaN": ({"image": holding(np.nan), "left": 2}, ValueError, "NaN or infinite, the first at row 3.*: fill them"),
+    "infinite": ({"image": holding(np.inf), "left": 2}, ValueError, "fill them first"),
+    "text": ({"image": IMAGE.astype(str), "left": 2}, TypeError, "convert it"),
+    "colour": ({"image": texture(SHAPE, 3), "left": 2}, ValueError, "or channel_axis=-1"),
+    "a boundary": ({"tile": True, "band": 3, "boundary": "open"}, ValueError, "follows from tile; leave boundary out"),
+    "an unknown option": ({"left": 2, "reach": 3}, TypeError, "unknown option 'reach'"),
+    "an order": ({"left": 2, "order": 200}, ValueError, "largest order that fits"),
+    "a seed": ({"left": 2, "rng": "x"}, TypeError, "an integer or a numpy.random.Generator"),
+    "a device": ({"left": 2, "device": "abacus"}, simdtex.DeviceError, "choose one of"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_EXTEND)
+def test_bad_input_to_extend_is_refused_with_a_remedy(case):
+    change, error, words = BAD_EXTEND[case]
+    with pytest.raises(error, match=words) as caught:
+        extend(**({"image": IMAGE} | change))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_band_as_wide_as_fits_is_taken():
+    found = extend(IMAGE, tile=True, band=7)
+    assert_same_bits(found[7:9, 7:13].copy(), IMAGE[7:9, 7:13].copy())

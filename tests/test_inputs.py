@@ -1,0 +1,297 @@
+"""What users give beside a sample: the forms that are taken, and a sentence for each that is not."""
+
+import numpy as np
+import pytest
+from cases import assert_same_bits, texture
+
+from simdtex.jobs.inputs import check_inputs, check_samples, is_several
+
+SHAPE = (6, 7)
+GREY, COLOUR = texture((9, 10)), texture((9, 10), 3)
+FLOAT = texture((9, 10), dtype=np.float64)
+MASK = np.arange(10) < np.full((9, 1), 6)
+SOME = np.full(SHAPE, np.nan)
+SOME[1, 2], SOME[5, 6] = 7, 200
+THERE = ~np.isnan(SOME)
+NOWHERE = np.full((*SHAPE, 2), -1)
+
+
+def at(array, place, value):
+    found = np.array(array)
+    found[place] = value
+    return found
+
+
+def check(sample=GREY, shape=SHAPE, **rest):
+    return check_inputs(sample, shape, **rest)
+
+
+# -- what is taken --------------------------------------------------------------------------------------------
+
+
+def test_a_sample_alone_is_plain():
+    found = check()
+    assert found.plain and found.given is None and found.guide is None
+    assert_same_bits(found.pictures.pixels[0], GREY[..., None])
+    assert found.pictures.known is None and found.pictures.usable is None
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"mask": MASK},
+        {"known": SOME},
+        {"guide": (GREY, GREY[:6, :7])},
+        {"sample": [GREY, GREY]},
+        {"sample": at(FLOAT, (2, 3), np.nan)},
+    ],
+    ids=["mask", "known", "guide", "several", "NaN"],
+)
+def test_with_more_it_is_not_plain(more):
+    assert not check(**more).plain
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2, -1, -2, -3])
+def test_channels_come_last(axis):
+    given = np.moveaxis(COLOUR, -1, axis)
+    known = np.moveaxis(np.repeat(SOME[..., None], 3, -1), -1, axis)
+    found = check(given, channel_axis=axis, known=known)
+    assert_same_bits(found.pictures.pixels[0], COLOUR)
+    assert found.given.values.shape == (*SHAPE, 3)
+    assert np.array_equal(found.given.known, np.repeat(THERE[..., None], 3, -1))
+
+
+ARRAYS = {
+    "a list of samples": ([GREY, GREY[:5]], None, True),
+    "a tuple of samples": ((GREY, GREY[:, :4]), None, True),
+    "a list of one": ([GREY], None, True),
+    "samples in colour": ([COLOUR, COLOUR[:4]], -1, True),
+    "an array": (GREY, None, False),
+    "a stack of them": (np.stack([GREY, GREY]), None, False),
+    "lists of numbers": (GREY.tolist(), None, False),
+    "a list of rows": (list(GREY), None, False),
+    "a list of planes": (list(np.moveaxis(COLOUR, -1, 0)), 0, False),
+    "nothing": ([], None, False),
+    "None": (None, None, False),
+    "arrays and lists": ([GREY, GREY.tolist()], None, False),
+}
+
+
+@pytest.mark.parametrize("case", ARRAYS)
+def test_a_list_of_samples_is_told_from_a_sample_written_as_lists(case):
+    sample, axis, several = ARRAYS[case]
+    assert is_several(sample, axis) is several
+
+
+def test_nested_lists_are_one_sample():
+    (one,) = check_samples(GREY.tolist(), None).pixels
+    assert one.shape == (9, 10, 1) and np.array_equal(one[..., 0], GREY)
+    (one,) = check_samples(list(np.moveaxis(COLOUR, -1, 0)), 0).pixels
+    assert np.array_equal(one, COLOUR)
+
+
+def test_samples_of_several_sizes():
+    found = check([GREY, GREY[:5, :4]], mask=[MASK, MASK[:5, :4]])
+    assert [one.shape for one in found.pictures.pixels] == [(9, 10, 1), (5, 4, 1)]
+    assert [one.sum() for one in found.pictures.usable] == [54, 20]
+    assert check([GREY, GREY], mask=[MASK, ~MASK & False]).pictures.usable[1].sum() == 0
+
+
+def test_unknown_pixels_are_completed_and_said_to_be_unknown():
+    found = check(at(FLOAT, np.s_[2:4, 3], np.nan)).pictures
+    (pixels,), (known,) = found.pixels, found.known
+    assert np.isfinite(pixels).all() and known.sum() == 88 and not known[2:4, 3].any()
+    assert np.isin(pixels[2:4, 3], FLOAT).all()
+
+
+KNOWN = {
+    "NaN": SOME,
+    "lists": [[None if np.isnan(v) else v for v in row] for row in SOME.tolist()],
+    "masked": np.ma.MaskedArray(np.where(THERE, SOME, 9).astype(np.uint8), ~THERE),
+    "masked floats": np.ma.masked_invalid(SOME),
+    "masked and NaN": np.ma.MaskedArray(SOME, np.zeros(SHAPE, bool)),
+    "masked infinite": np.ma.MaskedArray(np.where(THERE, SOME, np.inf), ~THERE),
+    "64 bits": np.ma.MaskedArray(np.where(THERE, SOME, -1).astype(np.int64), ~THERE),
+    "half": SOME.astype(np.float16),
+    "another byte order": SOME.astype(">f4"),
+}
+
+
+@pytest.mark.parametrize("case", KNOWN)
+def test_forms_of_what_is_known(case):
+    known = np.array(KNOWN[case], float) if case == "lists" else KNOWN[case]
+    found = check(known=known).given
+    assert found.values.dtype == np.uint8 and found.place is None
+    assert np.array_equal(found.known[..., 0], THERE)
+    assert_same_bits(found.values[..., 0], np.where(THERE, SOME, 0).astype(np.uint8))
+
+
+@pytest.mark.parametrize("dtype", [np.bool_, np.int8, np.uint16, np.int64, np.float32, np.float64])
+def test_what_is_known_takes_the_samples_type(dtype):
+    known = at(np.full(SHAPE, np.nan), (2, 3), 1)
+    found = check(texture((9, 10), dtype=dtype), known=known).given
+    assert found.values.dtype == dtype and found.values[2, 3, 0] == 1
+
+
+def test_numbers_of_64_bits_are_kept_exactly():
+    sample = np.arange(90, dtype=np.int64).reshape(9, 10) + 2**60
+    known = np.ma.masked_all(SHAPE, np.int64)
+    known[1, 2] = 2**60 + 3
+    assert check(sample, known=known).given.values[1, 2, 0] == 2**60 + 3
+
+
+def test_some_variables_of_a_site_may_be_known():
+    known = np.full((*SHAPE, 3), np.nan)
+    known[2, 3, 1] = 8
+    found = check(COLOUR, channel_axis=-1, known=known).given
+    assert found.known.sum() == 1 and found.known[2, 3].tolist() == [False, True, False]
+    assert found.partly
+
+
+@pytest.mark.parametrize("dtype", [np.int8, np.int32, np.uint64, np.int64])
+def test_a_source_map_is_of_whole_numbers(dtype):
+    place = np.zeros((*SHAPE, 2), dtype)
+    place[1, 2] = 8, 9
+    found = check(known=SOME, known_source=place).given.place
+    assert found.dtype == np.int32
+    assert found[1, 2].tolist() == [8, 9] and found[5, 6].tolist() == [0, 0]
+    assert (found[~THERE] == -1).all()
+
+
+def test_where_nothing_is_known_a_source_map_may_say_anything():
+    found = check(known=SOME, known_source=at(NOWHERE, (0, 0), 99)).given.place
+    assert (found == -1).all()
+
+
+def test_a_source_map_of_several_samples():
+    place = np.full((*SHAPE, 3), -1)
+    place[1, 2] = 4, 3, 1
+    found = check([GREY, GREY[:5, :4]], known=SOME, known_source=place).given.place
+    assert found[1, 2].tolist() == [4, 3, 1] and found[5, 6].tolist() == [-1, -1, -1]
+
+
+def test_a_source_map_without_known_values_says_nothing():
+    assert check(known_source=NOWHERE).given is None
+
+
+def test_forms_of_guides():
+    (one,), output = check(guide=(GREY, GREY[:6, :7])).guide
+    assert one.shape == (9, 10, 1) and output.shape == (6, 7, 1)
+    (one,), output = check(guide=[COLOUR, COLOUR[:6, :7]]).guide
+    assert one.shape == (9, 10, 3) and output.shape == (6, 7, 3)
+    (one,), output = check(guide=(MASK, MASK[:6, :7])).guide
+    assert one.dtype == output.dtype == np.uint8
+    (one,), output = check(guide=(GREY.tolist(), SOME)).guide
+    assert np.isnan(output).any()
+    many, output = check([GREY, GREY[:5]], guide=([GREY, GREY[:5]], GREY[:6, :7])).guide
+    assert [each.shape for each in many] == [(9, 10, 1), (5, 10, 1)]
+    (one,), output = check([GREY], guide=([GREY], GREY[:6, :7])).guide
+    assert one.shape == (9, 10, 1)
+    (one,), output = check(GREY, guide=(COLOUR, COLOUR[:6, :7])).guide  # not of the sample's channels
+    assert one.shape[-1] == 3
+
+
+# -- what is refused ------------------------------------------------------------------------------------------
+
+INF = at(SOME, (2, 2), np.inf)
+TWO = {"sample": [GREY, GREY[:5, :4]]}
+THREE = np.full((*SHAPE, 3), -1)
+
+BAD = {
+    # samples
+    "ragged": ({"sample": [[1, 2], [3]]}, ValueError, "the sample is ragged: give rows of equal length"),
+    "text": ({"sample": GREY.astype(str)}, TypeError, "the sample holds <U.* values: convert it"),
+    "complex": ({"sample": GREY.astype(complex)}, TypeError, "convert it to integers or real floats"),
+    "one axis": ({"sample": GREY[0]}, ValueError, r"1-dimensional: give \(rows, cols\)"),
+    "no samples": ({"sample": []}, ValueError, "1-dimensional"),
+    "colour": ({"sample": COLOUR}, ValueError, "3-dimensional: give .* or channel_axis=-1"),
+    "samples as lists": ({"sample": [GREY.tolist()] * 2}, ValueError, "3-dimensional"),
+    "grey with an axis": ({"channel_axis": 0}, ValueError, "2-dimensional: give three axes"),
+    "axis 3": ({"sample": COLOUR, "channel_axis": 3}, ValueError, "channel_axis is 3: give one of -3 to 2"),
+    "axis -4": ({"sample": COLOUR, "channel_axis": -4}, ValueError, "channel_axis is -4"),
+    "axis True": ({"sample": COLOUR, "channel_axis": True}, TypeError, "channel_axis is True: give None or an"),
+    "empty": ({"sample": GREY[:0]}, ValueError, "the sample is empty"),
+    "infinite": ({"sample": at(FLOAT, (2, 3), -np.inf)}, ValueError, "infinite, the first at row 2, column 3"),
+    "NaN": ({"sample": FLOAT * np.nan}, ValueError, "a sample has no known pixel; leave it out"),
+    "the second NaN": ({"sample": [FLOAT, FLOAT * np.nan]}, ValueError, "no known pixel"),
+    "two types": ({"sample": [GREY, FLOAT]}, ValueError,
+                  "sample 1 has 1 channels of float64 and sample 0 1 channels of uint8; give samples of one type"),
+    "channels": ({"sample": [COLOUR, COLOUR, COLOUR[..., :2]], "channel_axis": -1}, ValueError,
+                 "sample 2 has 2 channels of uint8 and sample 0 3 channels"),
+    # masks
+    "a mask of numbers": ({"mask": MASK.astype(int)}, TypeError, "mask holds int64 values; give True and False"),
+    "a number": ({"mask": 1}, TypeError, "mask holds int64 values"),
+    "a mask of another size": ({"mask": MASK.T}, ValueError, "mask is 10x9 and the picture 9x10 .*; give one size"),
+    "a mask in colour": ({"mask": np.repeat(MASK[..., None], 3, -1)}, ValueError, "give one size"),
+    "a ragged mask": ({"mask": [[True], [True, False]]}, ValueError, "mask is ragged; give rows of equal length"),
+    "a mask of nothing": ({"mask": MASK & False}, ValueError, "the mask leaves nothing of the sample"),
+    "masks of nothing": (TWO | {"mask": [MASK & False, MASK[:5, :4] & False]}, ValueError, "leaves nothing"),
+    "a mask for two": (TWO | {"mask": [MASK]}, ValueError, "2 samples and 1 masks; give one mask for each"),
+    "True for two": (TWO | {"mask": True}, ValueError, "2 samples and 1 masks; give one mask for each"),
+    "three for two": (TWO | {"mask": [MASK] * 3}, ValueError, "2 samples and 3 masks"),
+    "masks turned round": (TWO | {"mask": [MASK[:5, :4], MASK]}, ValueError, "mask is 5x4 and the picture 9x10"),
+    # known values
+    "known words": ({"known": SOME.astype(str)}, TypeError, "known holds <U.* give integers or real floats"),
+    "known None": ({"known": [[None] * 7] * 6}, TypeError, "known holds object values"),
+    "known ragged": ({"known": [[1, 2], [3]]}, ValueError, "known is ragged; give rows of equal length"),
+    "known number": ({"known": 5}, ValueError, r"known is 0-dimensional; give \(rows, cols\)"),
+    "known in colour": ({"known": np.dstack([SOME] * 3)}, ValueError, r"known is 3-dimensional; give \(rows, cols\)"),
+    "known grey": ({"sample": COLOUR, "channel_axis": -1, "known": SOME}, ValueError,
+                   "known is 2-dimensional; give the channel axis too"),
+    "known of another size": ({"known": SOME.T}, ValueError, "known is 7x6 with 1 channels and the output 6x7"),
+    "known of other channels": ({"sample": COLOUR, "channel_axis": -1, "known": np.dstack([SOME] * 2)}, ValueError,
+                                "known is 6x7 with 2 channels and the output 6x7 .* with 3; give one size"),
+    "known infinite": ({"known": INF}, ValueError, "known has infinite values; give numbers, or NaN"),
+    "nothing known": ({"known": SOME * np.nan}, ValueError, "known has no value; leave it out"),
+    "all masked": ({"known": np.ma.masked_all(SHAPE)}, ValueError, "known has no value"),
+    "all known": ({"known": np.ones(SHAPE)}, ValueError, "known leaves nothing to do; give NaN or a masked array"),
+    "no fraction": ({"known": at(SOME, (0, 0), 2.5)}, ValueError, "known holds 2.5, which the sample's type uint8"),
+    "too much": ({"known": at(SOME, (0, 0), 256)}, ValueError, "known holds 256.0, which .* give values of that type"),
+    "too little": ({"known": at(SOME, (0, 0), -1)}, ValueError, "known holds -1.0"),
+    "neither 0 nor 1": ({"sample": GREY > 90, "known": SOME}, ValueError, "known holds 7.0, which .* bool"),
+    "beyond 32 bits": ({"sample": FLOAT.astype(np.float32), "known": at(SOME, (0, 0), 1e300)}, ValueError,
+                       "known holds 1e[+]300, which the sample's type float32"),
+    # where known values are from
+    "a source of floats": ({"known": SOME, "known_source": NOWHERE * 1.0}, ValueError,
+                           r"known_source is no array of integers \(6, 7, 2\); give a source map"),
+    "a source of another size": ({"known": SOME, "known_source": NOWHERE[:5]}, ValueError, "is no array of integers"),
+    "a source of one of two": (TWO | {"known": SOME, "known_source": NOWHERE}, ValueError, r"integers \(6, 7, 3\)"),
+    "a source of two of one": ({"known": SOME, "known_source": THREE}, ValueError, r"integers \(6, 7, 2\)"),
+    "a ragged source": ({"known": SOME, "known_source": [[1], [1, 2]]}, ValueError, "known_source is ragged"),
+    "a row too far": ({"known": SOME, "known_source": at(NOWHERE, (1, 2), (9, 0))}, ValueError,
+                      "known_source points outside the sample; give -1 where a pixel is not from there"),
+    "a column too far": ({"known": SOME, "known_source": at(NOWHERE, (1, 2), (0, 10))}, ValueError, "points outside"),
+    "no column": ({"known": SOME, "known_source": at(NOWHERE, (1, 2), (0, -1))}, ValueError, "points outside"),
+    "more than 32 bits": ({"known": SOME, "known_source": at(NOWHERE, (1, 2), (2**32, 0))}, ValueError, "points out"),
+    "a third of two": (TWO | {"known": SOME, "known_source": at(THREE, (1, 2), (0, 0, 2))}, ValueError, "points out"),
+    "none of two": (TWO | {"known": SOME, "known_source": at(THREE, (1, 2), (0, 0, -1))}, ValueError, "points out"),
+    "beyond the second": (TWO | {"known": SOME, "known_source": at(THREE, (1, 2), (8, 9, 1))}, ValueError, "points"),
+    # guides
+    "no pair": ({"guide": GREY}, TypeError, "guide is no pair; give .guide of the sample, guide of the output"),
+    "a triple": ({"guide": (GREY, GREY, GREY)}, TypeError, "guide is no pair"),
+    "a word": ({"guide": "no"}, TypeError, "guide is no pair"),
+    "guides in words": ({"guide": (GREY.astype(str), GREY)}, TypeError, "the guide of the sample holds"),
+    "an output in words": ({"guide": (GREY, GREY[:6, :7].astype(str))}, TypeError, "the guide of the output holds"),
+    "guide numbers": ({"guide": (5, 6)}, ValueError, "the guide of the sample is 0-dimensional; give"),
+    "ragged guides": ({"guide": ([[1, 2], [3]], GREY)}, ValueError, "the guide of the sample is ragged"),
+    "an empty guide": ({"guide": (GREY, GREY[:0])}, ValueError, "the guide of the output is 2-dimensional"),
+    "an infinite guide": ({"guide": (FLOAT + np.inf, SOME)}, ValueError, "guide of the sample has infinite values"),
+    "an infinite output": ({"guide": (FLOAT, INF)}, ValueError, "guide of the output has infinite values; give"),
+    "a guide with NaN": ({"guide": (at(FLOAT, (1, 1), np.nan), SOME)}, ValueError, "guide of the sample has NaN; give"),
+    "a small guide": ({"guide": (GREY[:5], GREY[:6, :7])}, ValueError,
+                      "guide of the sample is 5x10 and the sample 9x10; give one size"),
+    "a large output": ({"guide": (GREY, GREY)}, ValueError, "guide of the output is 9x10 and the output 6x7"),
+    "guide channels": ({"guide": (COLOUR, GREY[:6, :7])}, ValueError, "has 3 channels and that of the output 1; give"),
+    "a guide for two": (TWO | {"guide": (GREY, GREY[:6, :7])}, ValueError, "2 samples; give a list of a guide"),
+    "one guide of two": (TWO | {"guide": ([GREY], GREY[:6, :7])}, ValueError, "give a list of a guide for each"),
+    "the second guide": (TWO | {"guide": ([GREY, GREY], GREY[:6, :7])}, ValueError,
+                         "guide of sample 1 is 9x10 and sample 1 5x4; give one size"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_refused_with_a_remedy(case):
+    change, error, words = BAD[case]
+    with pytest.raises(error, match=words) as caught:
+        check(**change)
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 300

@@ -1,0 +1,382 @@
+"""`simdtex.simulate`: every realisation is its own seed's, honours the data, and the array tells what it is of."""
+
+import sys
+import threading
+
+import numpy as np
+import pytest
+from cases import assert_same_bits, texture
+
+import simdtex
+from simdtex.io.hard_data import place_hard_data, read_hard_data
+from simdtex.jobs import simulation
+from simdtex.jobs.simulation import DEFAULTS, realisation_seed
+
+pytest.importorskip("xarray")
+
+SHAPE = (12, 14)
+QUICK = {"order": 2, "device": "reference", "rng": 5, "jobs": 1}
+TRAINING = texture((16, 20))
+CATEGORIES = (TRAINING > 90).astype(np.uint8) * 3 + (TRAINING > 170) * np.uint8(4)
+
+
+def simulate(training=TRAINING, n=2, **options):
+    return simdtex.simulate(training, n, **({"shape": SHAPE} | QUICK | options))
+
+
+def holed(dtype=np.float32, shape=SHAPE, channels=None):
+    """Values of the training image here and there, NaN elsewhere."""
+    rng = np.random.default_rng(3)
+    source = texture((16, 20), channels, dtype)[: shape[0], : shape[1]]
+    found = source.astype(np.float64 if dtype != np.float32 else dtype)
+    found[rng.random(shape) < 0.9] = np.nan
+    return found
+
+
+# -- realisations ---------------------------------------------------------------------------------------------
+
+
+def test_a_realisation_depends_on_its_number_alone():
+    four = simulate(n=4)
+    assert len({one.tobytes() for one in four.values}) == 4
+    for k in range(4):
+        assert_same_bits(simulate(n=1, first=k).values[0], four.values[k])
+    assert_same_bits(simulate(n=2, first=2).values, four.values[2:])
+
+
+@pytest.mark.parametrize("jobs", [2, 3, 9, None])
+def test_how_many_at_a_time_makes_no_difference(jobs):
+    one, many = simulate(n=3), simulate(n=3, jobs=jobs)
+    assert_same_bits(one.values, many.values)
+    assert one.attrs == many.attrs
+    assert np.array_equal(one.seed, many.seed)
+
+
+def test_a_realisation_is_what_synthesize_gives_with_its_seed():
+    assert DEFAULTS == {"boundary": "open", "novelty": 0.25}
+    data = holed()
+    options = {"order": 2, "device": "reference"}
+    found = simulate(texture((16, 20), dtype=np.float32), hard=data)
+    for seed, values in zip(found.seed.values, found.values, strict=True):
+        own = simdtex.synthesize(
+            texture((16, 20), dtype=np.float32), SHAPE, rng=int(seed), known=data, **DEFAULTS, **options
+        )
+        assert_same_bits(values, own)
+
+
+def test_guides_and_masks_are_those_of_synthesize():
+    guide = texture((16, 20), seed=7), texture(SHAPE, seed=8)
+    mask = np.zeros((16, 20), bool)
+    mask[:, :12] = True
+    found = simulate(n=1, guide=guide, mask=mask, finish=0.0)
+    own = simdtex.synthesize(
+        TRAINING, SHAPE, rng=int(found.seed[0]), guide=guide, mask=mask, finish=0.0, order=2, device="reference",
+        **DEFAULTS,
+    )  # fmt: skip
+    assert_same_bits(found.values[0], own)
+    assert np.isin(found.values, TRAINING[:, :12]).all()
+
+
+def test_seeds_are_apart_and_stay_what_they_are():
+    seeds = [realisation_seed(seed, number) for seed in (0, 1, 2**64 - 1) for number in range(50)]
+    assert len(set(seeds)) == 150
+    assert all(0 <= seed < 2**64 for seed in seeds)
+    # written down once: files of realisations name these seeds
+    assert [realisation_seed(1, number) for number in (0, 1)] == [8431846347943309920, 4042681867674859579]
+    assert simulate(first=3).seed.values.tolist() == [realisation_seed(5, 3), realisation_seed(5, 4)]
+
+
+def test_an_option_of_ones_own_goes_before_the_defaults():
+    found = simulate(n=1, boundary="torus", novelty=1.0)
+    assert (found.attrs["options"]["boundary"], found.attrs["options"]["novelty"]) == ("torus", 1.0)
+    assert (found.values != simulate(n=1).values).any()
+
+
+def test_several_training_images():
+    samples = [texture((12, 12)) // 2, texture((10, 14), seed=1) // 2 + 128]
+    found = simulate(samples, n=1, finish=0.0)
+    assert np.isin(found.values, np.concatenate([one.ravel() for one in samples])).all()
+    assert simulate(samples, n=1, shape=None).shape == (1, 12, 12)
+
+
+# -- hard data ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_data_are_kept_to_the_bit_in_every_realisation(dtype):
+    data = holed(dtype)
+    known = ~np.isnan(data)
+    found = simulate(texture((16, 20), dtype=dtype), n=3, hard=data)
+    assert found.dtype == dtype
+    for one in found.values:
+        assert_same_bits(one[known], data[known].astype(dtype))
+
+
+def test_all_forms_of_data_give_the_same(tmp_path):
+    data = holed()
+    known = ~np.isnan(data)
+    row, col = np.nonzero(known)
+    lines = [f"{j},{i},{data[i, j]!r}" for i, j in zip(row, col, strict=True)]
+    lines = [line.replace("np.float32(", "").replace(")", "") for line in lines]
+    path = tmp_path / "wells.csv"
+    path.write_text("x,y,value\n" + "\n".join(lines) + "\n")
+    training = texture((16, 20), dtype=np.float32)
+    expected = simulate(training, hard=data)
+    masked = np.ma.MaskedArray(np.nan_to_num(data, nan=7.0), ~known)
+    for hard in (masked, read_hard_data(path), path, str(path), np.ma.MaskedArray(data, np.zeros(SHAPE, bool))):
+        found = simulate(training, hard=hard)
+        assert_same_bits(found.values, expected.values)
+        assert found.attrs == expected.attrs
+
+
+def test_a_masked_array_of_whole_numbers():
+    known = np.random.default_rng(4).random(SHAPE) < 0.1
+    data = np.ma.MaskedArray(CATEGORIES[: SHAPE[0], : SHAPE[1]], ~known)
+    found = simulate(CATEGORIES, hard=data, categorical=True)
+    for one in found.values:
+        assert_same_bits(one[known], data.data[known])
+
+
+def test_the_size_is_that_of_the_data_or_of_the_training_image():
+    training = texture((16, 20), dtype=np.float32)
+    assert simulate(training, n=1, shape=None, hard=holed()).shape == (1, *SHAPE)
+    assert simulate(training, n=1, shape=None).shape == (1, 16, 20)
+    assert simulate(n=1, shape=(np.int64(7), 9)).shape == (1, 7, 9)
+
+
+@pytest.mark.parametrize("axis", [0, -1])
+def test_a_table_of_several_variables(tmp_path, axis):
+    path = tmp_path / "wells.csv"
+    path.write_text("x,y,a,b\n3,4,0.5,0.25\n7,2,,0.75\n")
+    training = np.moveaxis(texture((16, 20), 2, np.float32), -1, axis)
+    found = simulate(training, n=2, hard=path, channel_axis=axis)
+    placed = place_hard_data(read_hard_data(path), SHAPE, np.float32)
+    for one in found.values:
+        assert_same_bits(one[~placed.mask], placed.data[~placed.mask])
+    same = simulate(training, n=2, hard=np.ma.MaskedArray(np.moveaxis(placed, -1, axis)), channel_axis=axis)
+    assert_same_bits(found.values, same.values)
+    assert (
+        simulate(training, n=1, hard=np.moveaxis(placed, -1, axis), channel_axis=axis, shape=None).shape[1:3] == SHAPE
+    )
+
+
+# -- the array ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dtype", [np.bool_, np.uint8, np.int32, np.float32, np.float64])
+def test_dimensions_coordinates_and_type(dtype):
+    found = simulate(texture((16, 20), dtype=dtype), n=2, first=4)
+    assert found.dtype == dtype and found.name == "simulation"
+    assert dict(found.sizes) == {"realisation": 2, "y": 12, "x": 14}
+    assert found.dims == ("realisation", "y", "x")
+    assert found.realisation.values.tolist() == [4, 5]
+    assert np.array_equal(found.y, np.arange(12)) and np.array_equal(found.x, np.arange(14))
+    assert found.seed.dims == ("realisation",) and found.seed.dtype == np.uint64
+
+
+@pytest.mark.parametrize("axis", [0, -1])
+def test_several_variables_are_the_last_dimension(axis):
+    training = np.moveaxis(texture((16, 20), 3), -1, axis)
+    found = simulate(training, n=2, channel_axis=axis)
+    assert found.dims == ("realisation", "y", "x", "variable") and found.shape == (2, *SHAPE, 3)
+    own = simdtex.synthesize(
+        training, SHAPE, channel_axis=axis, rng=int(found.seed[1]), order=2, device="reference", **DEFAULTS
+    )
+    assert np.array_equal(found.values[1], np.moveaxis(own, axis, -1))
+
+
+def test_attributes_tell_how():
+    found = simulate(n=1, levels=1)
+    assert set(found.attrs) == {"seed", "version", "device", "options", "training_image"}
+    assert (found.attrs["seed"], found.attrs["version"]) == (5, simdtex.__version__)
+    assert found.attrs["device"].startswith("reference")
+    options = found.attrs["options"]
+    assert (options["order"], options["levels"], options["novelty"]) == (2, 1, 0.25)
+    assert len(found.attrs["training_image"]) == 64
+
+
+def test_a_generator_is_asked_for_a_seed_that_gives_the_same_again():
+    found = simulate(n=1, rng=np.random.default_rng(3))
+    again = simulate(n=1, rng=found.attrs["seed"])
+    assert_same_bits(found.values, again.values)
+    assert np.array_equal(found.values, simulate(n=1, rng=np.random.default_rng(3)).values)
+
+
+DIGESTS = ("training_image", "hard_data", "guide", "mask")
+FLOATS = texture((16, 20), dtype=np.float32)
+
+
+def digests(**change):
+    arguments = {
+        "training": FLOATS,
+        "hard": holed(),
+        "guide": (texture((16, 20), seed=7), texture(SHAPE, seed=8)),
+        "mask": np.arange(20) < np.full((16, 1), 14),
+    } | change
+    attrs = simulate(n=1, levels=1, free_sweeps=0, **arguments).attrs
+    return {name: attrs.get(name) for name in DIGESTS}
+
+
+def with_value(array, value, at=(2, 3)):
+    found = array.copy()
+    found[at] = value
+    return found
+
+
+CHANGES = {
+    "training_image": [
+        {"training": with_value(FLOATS, FLOATS[0, 0])},
+        {"training": with_value(FLOATS, np.nan)},
+        {"training": FLOATS.astype(np.float64)},
+    ],
+    "hard_data": [{"hard": with_value(holed(), 0.5)}, {"hard": None}],
+    "guide": [{"guide": (texture((16, 20), seed=7), texture(SHAPE, seed=9))}, {"guide": None}],
+    "mask": [{"mask": np.arange(20) < np.full((16, 1), 15)}, {"mask": None}],
+}
+
+
+@pytest.mark.parametrize(("name", "number"), [(name, k) for name in CHANGES for k in range(len(CHANGES[name]))])
+def test_a_digest_changes_with_its_array_and_with_nothing_else(name, number):
+    before, after = digests(), digests(**CHANGES[name][number])
+    assert all(before.values()) and after[name] != before[name]
+    # hard data are of the training image's type
+    kept = [other for other in DIGESTS if other != name and not (number == 2 and other == "hard_data")]
+    assert [after[other] for other in kept] == [before[other] for other in kept]
+
+
+def test_a_digest_is_of_the_values_and_not_of_how_they_lie():
+    one = digests()
+    assert digests(training=np.asfortranarray(FLOATS)) == one
+    assert digests(training=FLOATS.astype(">f4")) == one
+    assert digests(training=FLOATS.tolist())["training_image"] != one["training_image"]  # these are of 64 bits
+
+
+def test_an_unknown_pixel_is_not_what_it_is_completed_with():
+    holey = with_value(FLOATS, np.nan)
+    near = [with_value(FLOATS, FLOATS[i, j]) for i, j in ((1, 3), (3, 3), (2, 2), (2, 4))]
+    found = digests(training=holey)["training_image"]
+    assert found not in [digests(training=one)["training_image"] for one in near]
+
+
+def test_categories_are_those_of_the_training_image():
+    found = simulate(CATEGORIES, n=3, categorical=True)
+    assert set(np.unique(found)) == {0, 3, 7}
+    assert found.attrs["options"]["categorical"] is True
+
+
+def test_what_is_unknown_of_the_training_image_is_never_shown():
+    training = with_value(FLOATS, np.nan, np.s_[4:7, 5:9])
+    found = simulate(training, n=2, finish=0.0)
+    assert np.isin(found.values, training[~np.isnan(training)]).all()
+
+
+# -- what is told, and errors ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("axis", [None, 0])
+def test_a_callback_is_told_of_every_realisation(jobs, axis):
+    seen = []
+
+    def look(progress):
+        seen.append((progress, progress.image()))
+
+    training = TRAINING if axis is None else np.moveaxis(texture((16, 20), 2), -1, 0)
+    found = simulate(training, n=3, first=2, jobs=jobs, channel_axis=axis, callback=look)
+    assert [one.finished for one, _ in seen] == [1, 2, 3]
+    assert [one.fraction for one, _ in seen] == [1 / 3, 2 / 3, 1.0]
+    assert sorted(one.realisation for one, _ in seen) == [2, 3, 4]
+    assert {one.realisations for one, _ in seen} == {3}
+    assert len({one.stage for one, _ in seen}) == 3
+    for one, picture in seen:
+        assert np.array_equal(picture, found.sel(realisation=one.realisation).values)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
+def test_an_error_in_one_realisation_ends_all(jobs, error):
+    before, calls = set(threading.enumerate()), []
+
+    def stop(progress):
+        calls.append(progress.finished)
+        raise error("enough")
+
+    with pytest.raises(error, match="enough"):
+        simulate(n=40, jobs=jobs, callback=stop)
+    assert len(calls) <= 3 * jobs
+    assert set(threading.enumerate()) <= before
+
+
+def test_an_error_of_the_method_comes_out_and_leaves_no_thread(monkeypatch):
+    def fail(*args):
+        raise MemoryError("too large")
+
+    before = set(threading.enumerate())
+    monkeypatch.setattr(simulation.mrf, "synthesize", fail)
+    with pytest.raises(MemoryError, match="too large"):
+        simulate(n=5, jobs=3)
+    assert set(threading.enumerate()) <= before
+
+
+def test_without_xarray_a_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(ValueError, match=r"xarray is not installed; pip install 'simdtex\[simulate\]'"):
+        simulate()
+
+
+NOTHING = np.full(SHAPE, np.nan)
+BAD = {
+    "none": ({"n": 0}, ValueError, "n is 0; give 1 or more"),
+    "half a one": ({"n": 1.5}, TypeError, "n must be an integer"),
+    "first": ({"first": -1}, ValueError, "first is -1; give 0 or more"),
+    "jobs": ({"jobs": 0}, ValueError, "jobs is 0; give 1 or more"),
+    "many jobs": ({"jobs": "all"}, TypeError, "jobs must be an integer"),
+    "no size": ({"shape": (0, 5)}, ValueError, "rows of the output is 0; give 1 or more"),
+    "one number": ({"shape": 5}, ValueError, "shape must be two integers"),
+    "colour": ({"training": texture((9, 9), 3)}, ValueError, "or channel_axis=-1"),
+    "infinite": ({"training": np.full((9, 9), np.inf)}, ValueError, "infinite"),
+    "nothing known": ({"training": np.full((9, 9), np.nan)}, ValueError, "no known pixel"),
+    "data of another size": ({"hard": holed(shape=(12, 13))}, ValueError, "known is 12x13 .* the output 12x14"),
+    "data of no value": ({"hard": NOTHING}, ValueError, "known has no value"),
+    "data everywhere": ({"hard": TRAINING[:12, :14]}, ValueError, "known leaves nothing to do"),
+    "ragged data": ({"hard": [[1, 2], [3]]}, ValueError, "hard is ragged; give rows of equal length"),
+    "data in words": ({"hard": np.full(SHAPE, "x")}, TypeError, "known holds .* give integers or real floats"),
+    "data with an axis too many": ({"hard": NOTHING[..., None]}, ValueError, "known is 3-dimensional"),
+    "data that the type does not hold": ({"hard": with_value(NOTHING, 1.5)}, ValueError, "known holds 1.5, which"),
+    "an unknown category": (
+        {"training": CATEGORIES, "categorical": True, "hard": with_value(NOTHING, 1.0)}, ValueError, "1"),
+    "no such table": ({"hard": "nowhere.csv"}, ValueError, "nowhere.csv does not exist"),
+    "a mask of nothing": ({"mask": np.zeros((16, 20), bool)}, ValueError, "the mask leaves nothing of the sample"),
+    "no pair of guides": ({"guide": TRAINING}, TypeError, "guide is no pair"),
+    "an unknown option": ({"preset": "default", "reach": 3}, TypeError, "unknown option 'reach'"),
+    "an order": ({"order": 0}, ValueError, "order 0 has no neighbours"),
+    "a seed": ({"rng": -1}, ValueError, "integer from 0"),
+    "a device": ({"device": "abacus"}, simdtex.DeviceError, "choose one of"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_refused_with_a_remedy(case):
+    change, error, words = BAD[case]
+    with pytest.raises(error, match=words) as caught:
+        simulate(**change)
+    assert "\n" not in str(caught.value)
+
+
+TABLES = {
+    "outside": ("x,y,value\n3,4,20\n14,2,9\n", "line 3 .* outside of a picture of 14 x 12"),
+    "disagree": ("x,y,value\n3,4,20\n3.2,4.1,9\n", "line 3 and line 2 .* keep one|line 2 and line 3 .* keep one"),
+    "beyond the type": ("x,y,value\n3,4,300\n", "which uint8 cannot hold"),
+    "of two variables": ("x,y,a,b\n3,4,1,2\n", "known is 3-dimensional"),
+    "empty": ("", "the table is empty"),
+    "words": ("x,y,value\n3,4,high\n", "'high' in column 3"),
+}
+
+
+@pytest.mark.parametrize("case", TABLES)
+def test_bad_tables_are_refused_with_their_line(tmp_path, case):
+    text, words = TABLES[case]
+    path = tmp_path / "wells.csv"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=words):
+        simulate(hard=path)
