@@ -57,7 +57,7 @@ def synthesize(
     ----------
     sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array; or a list of such
         The texture; any real type, any size that holds a neighbourhood. With ``mrf`` a float sample may have NaN where
-        it is unknown, and there may be several samples of one type, of any sizes.
+        it is unknown, or any be a masked array, and there may be several samples of one type, of any sizes.
     shape : (int, int)
         Rows and columns of the output, each 1 or more; smaller or larger than the sample.
     method : {"mrf", "multires", "pyramid"}

@@ -593,3 +593,16 @@ def test_bad_input_to_extend_is_refused_with_a_remedy(case):
 def test_a_band_as_wide_as_fits_is_taken():
     found = extend(IMAGE, tile=True, band=7)
     assert_same_bits(found[7:9, 7:13].copy(), IMAGE[7:9, 7:13].copy())
+
+
+def test_of_a_picture_that_is_mostly_unknown_fewer_levels_are_made():
+    picture, hole = texture(SHAPE), ~hole_at(np.s_[5:11, 6:13])
+    filled = fill(picture, hole)
+    assert (filled[~hole] == picture[~hole]).all()
+    with pytest.raises(ValueError, match="fewer levels"):
+        fill(picture, hole, levels=3)
+
+
+def test_a_masked_picture_is_filled_where_it_is_masked():
+    masked = np.ma.array(texture(SHAPE), mask=MIDDLE)
+    assert_same_bits(fill(masked), fill(texture(SHAPE), MIDDLE))

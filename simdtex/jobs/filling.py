@@ -14,13 +14,14 @@ from scipy import ndimage
 
 from simdtex.envelope import executed
 from simdtex.io.image import check_sample
-from simdtex.jobs.inputs import check_mask, check_samples
+from simdtex.jobs.inputs import check_mask, check_samples, masked_in
 from simdtex.machine import Machine
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures, unknown_in
+from simdtex.model.sample import NothingUsable
 from simdtex.options import whole
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
@@ -114,7 +115,7 @@ def fill(
     image : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
         The picture; any real type.
     mask : (rows, cols) bool array, optional
-        True where the picture is to be made. None: where `image` is NaN.
+        True where the picture is to be made. None: where `image` is NaN or, in a masked array, masked.
     sample : array of the image's type, optional
         The texture to fill with, or a list of several. None: the rest of the picture.
     reach : int, optional
@@ -163,7 +164,8 @@ def fill(
     True
     """
     pixels = check_sample(image, channel_axis, unknown=True)
-    hole = unknown_in(pixels) if mask is None else check_mask("mask", mask, pixels.shape[:2]) | unknown_in(pixels)
+    hole = unknown_in(pixels) | masked_in(image, channel_axis)
+    hole = hole if mask is None else hole | check_mask("mask", mask, pixels.shape[:2])
     if not hole.any():
         raise ValueError("the mask leaves nothing to fill; set it True where the picture is to be made")
     if hole.all():
@@ -321,13 +323,22 @@ def _window(
         pictures, corner = Pictures((job.pixels[around],), unknown=(job.hole[around],)), (top, left)
         inside = np.indices(hole.shape) + np.array([window.rows.start - top, window.cols.start - left])[:, None, None]
         place = np.moveaxis(inside, 0, -1).astype(np.int32)
-    if options.levels is None and window.levels:
+    asked = options.levels is not None
+    if not asked and window.levels:
         sizes = [picture.shape[:2] for picture in pictures.pixels]
         offsets = neighbourhood_offsets(options.order)
         most = mrf.number_of_levels(sizes, offsets, hole.shape, replace(options, overview=LEAST))
         options = replace(options, levels=min(window.levels, most))
     given = Given(np.where(known, job.pixels[at], 0).astype(job.pixels.dtype), known, place, suggests=False)
-    made, output = mrf.synthesize(machine, pictures, hole.shape, options, seed, callback, given)
+    for levels in range(options.levels or 0, -1, -1):
+        try:
+            made, output = mrf.synthesize(machine, pictures, hole.shape, options, seed, callback, given)
+        except NothingUsable:  # found before anything is made
+            if asked or levels < 2:
+                raise
+            options = replace(options, levels=levels - 1)
+            continue
+        break
     return corner, made, output
 
 

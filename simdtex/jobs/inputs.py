@@ -52,15 +52,23 @@ def check_samples(sample: ArrayLike | Sequence[ArrayLike], channel_axis: int | N
             raise ValueError(
                 f"sample {number} has {_kind(picture)} and sample 0 {_kind(pixels[0])}; give samples of one type"
             )
+    gaps = tuple(masked_in(array, channel_axis) for array in arrays)
+    unknown = gaps if any(gap.any() for gap in gaps) else None
     if mask is None:
-        return Pictures(tuple(pixels))
+        return Pictures(tuple(pixels), unknown)
     masks = list(mask) if several and np.iterable(mask) else [mask]
     if len(masks) != len(pixels):
         raise ValueError(f"there are {len(pixels)} samples and {len(masks)} masks; give one mask for each")
     usable = [check_mask("mask", one, picture.shape[:2]) for one, picture in zip(masks, pixels, strict=True)]
     if not any(one.any() for one in usable):
         raise ValueError("the mask leaves nothing of the sample to be used; set it True where pixels may be taken from")
-    return Pictures(tuple(pixels), usable=tuple(usable))
+    return Pictures(tuple(pixels), unknown, tuple(usable))
+
+
+def masked_in(array: Any, channel_axis: int | None) -> Mask:
+    """Where a masked array (rows, cols) is masked in any channel; nowhere where it is no masked array."""
+    mask = np.ma.getmaskarray(array) if np.ma.isMaskedArray(array) else np.zeros(np.shape(array), bool)
+    return mask if channel_axis is None else np.asarray(mask.any(channel_axis))
 
 
 def is_several(sample: Any, channel_axis: int | None) -> bool:

@@ -200,6 +200,11 @@ def _hard(
     if hard is None or isinstance(hard, HardData):
         size = check_shape(training.shape[:2] if shape is None else shape)
         placed = None if hard is None else place_hard_data(hard, size, training.dtype)
+        variables = 1 if channel_axis is None else training.shape[2]
+        if hard is not None and len(hard.names) != variables:
+            raise ValueError(
+                f"a datum has {len(hard.names)} values and a pixel of the training image {variables}; give as many"
+            )
         if placed is not None and channel_axis is not None:
             placed = np.moveaxis(placed[..., None] if placed.ndim == 2 else placed, -1, channel_axis)
         return placed, size

@@ -28,6 +28,10 @@ ENOUGH_WHOLE = 0.75
 """Share of positions that must have a whole neighbourhood for ``edges="auto"`` not to reflect."""
 
 
+class NothingUsable(ValueError):
+    """No pixel of a sample is a candidate of some level."""
+
+
 class Candidates(NamedTuple):
     """The sample positions p that a site may be taken from, at one level.
 
@@ -240,7 +244,7 @@ class Sample:
             row, col = self.lines(offsets, spacing, phases, edges)
             found = self._permitted(offsets, spacing, edges, row, col)
             if not found.any():
-                raise ValueError("nothing of the sample may be used at some level; give more of it, or fewer levels")
+                raise NothingUsable("nothing of the sample may be used at some level; give more of it, or fewer levels")
             self._allowed[key] = found.ravel()
         return self._allowed[key]
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from simdtex.model.given import Given, planes
 from simdtex.model.guide import Beside, Guide
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Pictures
-from simdtex.model.sample import Sample
+from simdtex.model.sample import NothingUsable, Sample
 from simdtex.model.use import effective_use
 from simdtex.ops.finish import around, finish
 from simdtex.ops.neighbourhood import Field
@@ -190,7 +191,6 @@ def laid_out(
     options = options.resolved(pictures)
     offsets = neighbourhood_offsets(options.order)
     levels = number_of_levels([picture.shape[:2] for picture in pictures.pixels], offsets, shape, options)  # 1
-    step = 2 ** (levels - 1)
     beside: list[Beside] = [check_guide(guide, options)] if guide else []
     if given and given.partly:
         if options.pixel == "density":
@@ -198,9 +198,8 @@ def laid_out(
         beside.append(given.colocated(pictures.pixels))
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in beside)
     heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or beside else 1.0  # in sums of squares
-    values, margin = round(heavy * (channels * len(offsets) + len(beside))), int(offsets.max()) * step
-    far = int(around(options.finish)[0].max()) if options.finish else 0
-    sample = Sample(pictures, values, margin, options.structure, step, beside, options.unsure, far)
+    values = round(heavy * (channels * len(offsets) + len(beside)))
+    levels, sample = sampled(pictures, levels, offsets, values, options, beside)
     schedule = schedules.get(options.schedule)
     _check_memory(machine, sample, shape, options.similar, copies=2 if schedule.tile else 1)
     emulated = bool(options.array) and options.emulate
@@ -222,6 +221,31 @@ def laid_out(
         holding=Holding(machine, Grid(*shape, 1, options.boundary == "torus"), levels, sample.guides, laid),
         given=given,
     )
+
+
+def sampled(
+    pictures: Pictures,
+    levels: int,
+    offsets: NDArray[np.int32],
+    values: int,
+    options: Options,
+    beside: Sequence[Beside],
+) -> tuple[int, Sample]:
+    """How many levels there are, and the sample; fewer, where some level has no candidate and nobody asked for it."""
+    far = int(around(options.finish)[0].max()) if options.finish else 0
+    for fewer in range(levels, 0, -1):
+        step = 2 ** (fewer - 1)
+        margin = int(offsets.max()) * step
+        sample = Sample(pictures, values, margin, options.structure, step, beside, options.unsure, far)
+        try:
+            for number in range(fewer):
+                sample.allowed(offsets, 2**number, options.phases, options.edges)
+        except NothingUsable:
+            if fewer == 1 or options.levels is not None:
+                raise
+            continue
+        break
+    return fewer, sample
 
 
 def finished(run: Run, field: Field, seen: NDArray[np.int32]) -> NDArray[Any]:
