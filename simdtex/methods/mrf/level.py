@@ -166,9 +166,7 @@ class Run:
         novelty = options.novelty * min(1.0, WHOLE / count) if anew else 0.0
         around = int(offsets.max()) * (grid.step if options.phases == "all" else 1)
         fair = sample.fair(*self.where(number))
-        whole = (
-            len(offsets) * sample.channels * variance
-        )  # what two neighbourhoods differ by that have nothing in common
+        whole = len(offsets) * sample.channels * variance  # half of what any two neighbourhoods differ by, on average
         kinds = (*self._kinds(number), STRICT * whole)
         market = Market((rows.size, cols.size), around, fair, isinstance(proposal, Listed), *kinds)
         independent = self.schedule.independent(grid, offsets)
