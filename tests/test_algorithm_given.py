@@ -206,8 +206,17 @@ CASES = {
 }
 
 ON_A_DEVICE = (
-    *("known-three-levels-exact", "known-three-levels-few", "labels-silent-exact", "labels-silent-few"),
-    *("partly-few", "masked-exact", "everything-exact", "everything-few", "many-known", "many-similar"),
+    *("known-three-levels-few", "labels-silent-exact", "partly-few", "masked-exact", "many-known"),
+    *(
+        pytest.param(name, marks=pytest.mark.slow)  # a runtime that has not seen their kernels compiles for minutes
+        for name in (
+            "known-three-levels-exact",
+            "labels-silent-few",
+            "everything-exact",
+            "everything-few",
+            "many-similar",
+        )
+    ),
 )
 
 
