@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from simdtex.cli.common import check_distinct, command_line, given, plainly, watching
-from simdtex.cli.inputs import channels, check_source_map, read_also, read_material
+from simdtex.cli.inputs import channels, check_source_map, read_also, read_material, write_arranged
 from simdtex.cli.options import DEVICE, QUIET, SEED, extend_options, stages_option
 
 SIDES = ("top", "bottom", "left", "right")
@@ -85,7 +85,6 @@ def extend(
     """
     from simdtex import extend as make
     from simdtex.io import image
-    from simdtex.model.source_map import save_source_map
 
     whole = read_material([picture])
     pixels = whole.pixels[0]
@@ -124,12 +123,7 @@ def extend(
             **given(options),
         )
     made, run = extended
-    carried = [(one.carried(run.source), one.out) for one in others]
-    image.write(output, made)
-    for array, path in carried:
-        image.write(path, array)
-    if source_map:
-        save_source_map(source_map, run.source)
+    write_arranged(output, made, others, source_map, run.source)
     if report:
         from simdtex.report.synthesis import write_synthesis
 

@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.common import check_distinct, given, plainly, watching
-from simdtex.cli.inputs import Material, channels, check_alike, check_source_map, read_also, read_material
+from simdtex.cli.inputs import (
+    Material,
+    channels,
+    check_alike,
+    check_source_map,
+    read_also,
+    read_material,
+    write_arranged,
+)
 from simdtex.cli.options import DEVICE, QUIET, SEED, fill_options
 
 
@@ -68,7 +76,6 @@ def fill(
     """
     from simdtex import fill as make
     from simdtex.io import image
-    from simdtex.model.source_map import save_source_map
 
     whole = read_material([picture], unknown=True)
     pixels, hole = _hole(picture, whole.pixels[0], mask)
@@ -99,12 +106,7 @@ def fill(
             **given(options),
         )
     made, run = filled
-    carried = [(one.carried(run.source), one.out) for one in others]
-    image.write(output, made)
-    for array, path in carried:
-        image.write(path, array)
-    if source_map:
-        save_source_map(source_map, run.source)
+    write_arranged(output, made, others, source_map, run.source)
     if not quiet:
         click.echo(
             f"{output}: {np.count_nonzero(hole)} of {hole.size} pixels filled in {time.perf_counter() - began:.1f} s "

@@ -148,6 +148,21 @@ def _other_map(text: str, samples: Material) -> Also:
     return Also(maps, Path(out))
 
 
+def write_arranged(
+    output: Path, made: NDArray[Any], others: Sequence[Also], source_map: Path | None, source: Any
+) -> None:
+    """Write a picture, the other maps in its arrangement and, where it is asked for, the source map."""
+    from simdtex.io import image
+    from simdtex.model.source_map import save_source_map
+
+    carried = [(one.carried(source), one.out) for one in others]
+    image.write(output, made)
+    for array, path in carried:
+        image.write(path, array)
+    if source_map:
+        save_source_map(source_map, source)
+
+
 def check_source_map(path: Path | None, samples: Material, *, everywhere: bool = True) -> None:
     """Raise where a source map cannot be written there; ``everywhere`` says that all pixels are from a sample."""
     from simdtex.io import image

@@ -31,6 +31,7 @@ from simdtex.cli.inputs import (
     read_known,
     read_masks,
     read_material,
+    write_arranged,
 )
 from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, method_options, option, stages_option
 
@@ -177,15 +178,7 @@ def synth(
             full_output=True,
             **given(options | {"start": begin}),
         )
-    source: Any = run.source
-    carried = [(one.carried(source), one.out) for one in others]
-    image.write(output, made)
-    for array, path in carried:
-        image.write(path, array)
-    if source_map:
-        from simdtex.model.source_map import save_source_map
-
-        save_source_map(source_map, source)
+    write_arranged(output, made, others, source_map, run.source)
     if report:
         from simdtex.report.synthesis import write_synthesis
 

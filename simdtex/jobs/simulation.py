@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 from queue import SimpleQueue
 from threading import Lock
@@ -215,9 +216,7 @@ def _hard(
 
 
 def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) -> dict[str, Any]:
-    from simdtex import __version__
-
-    told: dict[str, Any] = {"seed": seed, "version": __version__, "device": device, "options": vars(options)}
+    told: dict[str, Any] = {"seed": seed, "version": version("simdtex"), "device": device, "options": vars(options)}
     pictures = inputs.pictures  # whose pixels are completed where they are unknown
     told["training_image"] = _digest(*pictures.pixels, *(pictures.known or ()))
     if inputs.given:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import sqrt
 
 import numpy as np
@@ -37,6 +37,7 @@ class Holding:
     levels: int
     guides: NDArray[np.uint16]
     laid: Planes | None = None
+    _found: dict[int, Stand] = field(default_factory=dict, init=False, repr=False)
 
     def beside(self, neighbours: int, data_weight: float) -> Beside:
         """Which channels are guides, whether each value has a confidence of its own, and what counts how much."""
@@ -101,7 +102,9 @@ class Holding:
         """Who stands for whom at a level: nobody above the coarsest."""
         if self.laid is None or number == self.levels:
             return NOBODY
-        return stand_ins(self.laid.known, self._lattice(number))
+        if number not in self._found:
+            self._found[number] = stand_ins(self.laid.known, self._lattice(number))
+        return self._found[number]
 
 
 __all__ = ["Holding"]
