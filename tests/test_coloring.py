@@ -7,12 +7,14 @@ neighbours has, so there are at most max(colours of the best pattern, neighbours
 import numpy as np
 import plain
 import pytest
-from cases import REFERENCE, assert_same_bits
+from cases import assert_same_bits
 from hypothesis import given
 from hypothesis import strategies as st
 
-from simdtex.model.lattice import Grid, coloring_sublattice, neighbourhood_offsets
-from simdtex.ops.coloring import UNCOLORED, coloring, greedy_coloring, lattice_coloring
+from simdtex import random
+from simdtex.model.lattice import Grid, coloring_sublattice
+from simdtex.ops import coloring as module
+from simdtex.ops.coloring import coloring, colors_of
 
 TINY = [(1, 1), (1, 2), (1, 5), (5, 1), (2, 2), (2, 3), (3, 3), (4, 2)]
 SMALL = [(6, 6), (7, 7), (8, 13), (13, 8), (12, 10), (9, 15)]
@@ -20,8 +22,8 @@ LARGER = [(17, 19), (24, 24), (31, 11)]
 ORDERS = range(1, 33)
 
 
-def colour(order, rows, cols, torus, machine=REFERENCE, seed=0):
-    colors = coloring(machine, Grid(rows, cols, 1, torus), neighbourhood_offsets(order), order, seed)
+def colour(order, rows, cols, torus, seed=0):
+    colors = coloring(Grid(rows, cols, 1, torus), order, seed)
     assert colors.shape == (rows, cols)
     assert colors.dtype == np.int32
     return colors
@@ -128,48 +130,71 @@ def test_the_seed_moves_only_the_seam():
     assert np.array_equal(first, colour(2, 7, 9, True, seed=1))
 
 
-@pytest.mark.parametrize("torus", [True, False], ids=["torus", "open"])
-@pytest.mark.parametrize("order", [1, 2, 4, 5, 8, 13, 18, 25, 32])
-def test_a_device_has_the_references_bits(machine, order, torus):
+def plain_colors(order, rows, cols, seed):
+    """The colours of a torus with plain loops, site by site in falling priority, which is what the rounds amount to."""
+    best, n = coloring_sublattice(order), rows * cols
+    coset = [(i - j // best.c * best.b) % best.a * best.c + j % best.c for i in range(rows) for j in range(cols)]
+    beside = [
+        [k * cols + m for k, m in filter(None, plain.neighbours(*divmod(s, cols), order, rows, cols, True))]
+        for s in range(n)
+    ]
+    bare = [s for s in range(n) if any(r < s and coset[r] == coset[s] for r in beside[s])]
+    colors = [None if s in bare else color for s, color in enumerate(coset)]
+    priority = random.draw4(seed, 0, 0, np.arange(n), random.COLOR)[0].tolist()
+    for s in sorted(bare, key=lambda s: (priority[s], s), reverse=True):
+        taken = {colors[r] for r in beside[s]}
+        colors[s] = next(color for color in range(n) if color not in taken)
+    if len(set(colors)) > best.index:
+        other = coloring_sublattice(order, rows, cols, limit=len(set(colors)))
+        if other:
+            colors = [
+                (i - j // other.c * other.b) % other.a * other.c + j % other.c for i in range(rows) for j in range(cols)
+            ]
+    names = sorted(set(colors))
+    return np.array([names.index(color) for color in colors], np.int32).reshape(rows, cols)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4, 5, 8, 13, 18, 25])
+def test_the_seam_is_coloured_as_by_plain_loops(order):
     for rows, cols in [*TINY, *SMALL, (29, 37)]:
-        theirs = colour(order, rows, cols, torus, seed=order)
-        assert_same_bits(colour(order, rows, cols, torus, machine, order), theirs)
+        assert_same_bits(
+            colour(order, rows, cols, True, seed=2**40 + order), plain_colors(order, rows, cols, 2**40 + order)
+        )
 
 
 @pytest.mark.parametrize("spacing", [1, 2, 4])
-def test_a_coarser_level_is_coloured_as_a_lattice_of_its_own(machine, spacing):
-    offsets = neighbourhood_offsets(5)
+def test_a_coarser_level_is_coloured_as_a_lattice_of_its_own(spacing):
     grid = Grid(23, 30, spacing)
-    ours = coloring(machine, grid, offsets, 5, 3)
-    assert_same_bits(ours, colour(5, grid.rows, grid.cols, True, seed=3))
+    assert_same_bits(coloring(grid, 5, 3), colour(5, grid.rows, grid.cols, True, seed=3))
 
 
-def test_each_kernel_has_its_twins_bits(machine):
-    """One round of each, so that no later round can hide a difference."""
-    offsets, seed = neighbourhood_offsets(8), 2**40 + 5
-    for rows, cols in [(7, 9), (10, 11), (1, 5), (16, 14)]:
-        for torus in (True, False):
-            grid, pattern = Grid(rows, cols, 1, torus), coloring_sublattice(8)
-            on_device = machine.put(offsets)
-            colors = lattice_coloring(REFERENCE, grid, offsets, pattern)
-            assert_same_bits(machine.get(lattice_coloring(machine, grid, on_device, pattern)), colors)
-            bare = np.full((rows, cols), UNCOLORED, np.int32)
-            for start in (colors, bare):
-                left = np.flatnonzero(start == UNCOLORED).astype(np.int32)
-                once = greedy_coloring(REFERENCE, grid, offsets, left, start, seed)
-                assert (once == UNCOLORED).sum() < max(1, (start == UNCOLORED).sum())
-                again = greedy_coloring(machine, grid, on_device, machine.put(left), machine.put(start), seed)
-                assert_same_bits(machine.get(again), once)
+@given(
+    st.sampled_from([1, 2, 5, 8, 18]),
+    st.tuples(*[st.integers(1, 45)] * 2),
+    st.booleans(),
+    st.tuples(*[st.integers(0, 44)] * 2),
+    st.tuples(*[st.integers(1, 45)] * 2),
+)
+def test_a_window_has_the_colours_of_the_whole(order, shape, torus, corner, size):
+    grid = Grid(*shape, 1, torus)
+    rows, cols = (min(a, b) for a, b in zip(size, shape, strict=True))
+    top, left = corner if torus else (min(at, n - k) for at, n, k in zip(corner, shape, (rows, cols), strict=True))
+    window = grid.window(top, left, rows, cols)
+    assert_same_bits(coloring(window, order, 7), window.cut(coloring(grid, order, 7)))
+    assert colors_of(window, order, 7).count == coloring(grid, order, 7).max() + 1
 
 
-def test_more_than_32_colours_are_told_apart(machine):
-    """All sites of a small torus are neighbours, so every one needs its own."""
-    offsets = neighbourhood_offsets(32)
-    colors = np.full((7, 7), UNCOLORED, np.int32)
-    theirs = colors
-    ours, every = machine.put(colors), np.arange(49, dtype=np.int32)
-    for _ in range(49):
-        theirs = greedy_coloring(REFERENCE, Grid(7, 7), offsets, every, theirs, 1)
-        ours = greedy_coloring(machine, Grid(7, 7), machine.put(offsets), machine.put(every), ours, 1)
-    assert sorted(theirs.ravel().tolist()) == list(range(49))
-    assert_same_bits(machine.get(ours), theirs)
+def test_sites_are_looked_at_piece_by_piece(monkeypatch):
+    whole = [colour(order, 30, 37, True) for order in (8, 18)]
+    monkeypatch.setattr(module, "TOGETHER", 500)
+    module._plan.cache_clear()
+    assert_same_bits([colour(order, 30, 37, True) for order in (8, 18)], whole)
+
+
+def test_the_colours_of_a_vast_torus_are_known_by_its_seam():
+    """No work goes with the area: 10^10 sites."""
+    grid = Grid(99_991, 100_003)
+    window = grid.window(99_980, 99_990, 30, 40)
+    colors = coloring(window, 2, 1)
+    assert not conflicts(colors, 2, False)
+    assert colors.max() < colors_of(grid, 2, 1).count <= 9

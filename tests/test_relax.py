@@ -203,7 +203,7 @@ def test_steps_in_place_are_step_after_step(machine, monkeypatch, longest, how):
     """In pieces, too, where a step has more sites than a launch may."""
     monkeypatch.setattr("simdtex.machine.opencl.LONGEST", longest)
     p = problem(11, order=4, shape=(20, 24), edges="reflect")
-    colors = coloring(REFERENCE, p.grid, p.offsets, p.order).ravel()
+    colors = coloring(p.grid, p.order).ravel()
     sites = np.argsort(colors, kind="stable").astype(np.int32)
     bounds = np.concatenate([[0], np.cumsum(np.bincount(colors))])
     steps = np.stack([bounds[:-1], bounds[1:]], 1)[::-1]

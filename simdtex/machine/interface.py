@@ -221,7 +221,3 @@ class Launcher(Machine, Protocol):
     def launch_groups(self, kernel: Any, groups: NDArray[np.int64], *args: Any) -> None:
         """Enqueue a kernel over one group of work-items after another; (groups, 2), each its begin and end."""
         ...
-
-    def launch_rounds(self, kernel: Any, size: int, rounds: int, *args: Any) -> None:
-        """Enqueue a kernel several times, its last two arguments changing places."""
-        ...

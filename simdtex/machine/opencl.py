@@ -40,7 +40,7 @@ OUT_OF_MEMORY = (
 SMALL_GROUP = 4
 """Work-items to a work-group of a CPU where each has much to do: a small group of sites still feeds all cores."""
 
-TOGETHER = ("active", "coloring", "start")
+TOGETHER = ("active", "start")
 """Files whose kernels need no -D constant and serve every run of ``mrf``: one program, since each costs some 50 ms to
 load on PoCL."""
 
@@ -341,21 +341,6 @@ class OpenCL:
                 size = -(-min(end - first, LONGEST) // group) * group
                 event = cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (group,), (first,))
                 self.log.add(size, event, kernel)
-
-    def launch_rounds(self, kernel: Any, size: int, rounds: int, *args: Any) -> None:
-        """Enqueue a kernel several times, its last two arguments changing places; the others are set once."""
-        if self.array:
-            for number in range(rounds):
-                self.launch(kernel, (size,), *args[:-2], *(args[-2:] if number % 2 == 0 else args[:-3:-1]))
-            return
-        data = [a.data if type(a) is DeviceArray else a for a in args]
-        kernel.set_args(*data)
-        whole = -(-size // self.group) * self.group
-        for number in range(rounds):
-            kernel.set_arg(len(data) - 2, data[-2 + number % 2])
-            kernel.set_arg(len(data) - 1, data[-1 - number % 2])
-            event = cl.enqueue_nd_range_kernel(self.queue, kernel, (whole,), (self.group,))
-            self.log.add(whole, event, kernel)
 
     def _enqueue(
         self,

@@ -1,91 +1,45 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Colouring of a lattice so that no two neighbours share a colour: sets of i.i.d. sites, equation (14)."""
+"""Colouring of a lattice so that no two neighbours share a colour: sets of i.i.d. sites, equation (14).
+
+A colour is a formula of a site's row and column, but for the sites along the seam of a torus that cuts through the
+pattern; those alone are kept in a list. So any window of a lattice is coloured without looking at the rest of it.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from functools import lru_cache
+from math import inf
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.machine.interface import Array, Launcher, Operation
-from simdtex.model.lattice import Grid, Sublattice, coloring_sublattice
+from simdtex.model.lattice import Grid, Sublattice, coloring_sublattice, neighbourhood_offsets
 
 UNCOLORED = -1
 
-ROUNDS = 8
-"""Greedy rounds between two looks at the colours; one too many changes nothing."""
+TOGETHER = 2**20
+"""Neighbours that are looked at together."""
 
 
-def _lattice_reference(grid: Grid, offsets: NDArray[np.int32], pattern: Sublattice) -> NDArray[np.int32]:
-    site = np.arange(grid.rows * grid.cols, dtype=np.int32)
-    row, col = np.divmod(site, grid.cols)
-    own = (row - col // pattern.c * pattern.b) % pattern.a * pattern.c + col % pattern.c
-    r = grid.flat.neighbours(site, offsets)
-    clash = ((r >= 0) & (r < site) & (own[r] == own)).any(0)
-    colors: NDArray[np.int32] = np.where(clash, UNCOLORED, own).astype(np.int32)
-    return colors.reshape(grid.rows, grid.cols)
+class Plan(NamedTuple):
+    """How a lattice is coloured.
+
+    ``pattern`` whose cosets are the colours; ``seam`` (n,) int64, ascending, the numbers row cols + column of the sites
+    that have colours of their own, ``own`` (n,) int32 these; ``compact`` (colours before,) int32 the number of each
+    colour among those that are used, ``count``.
+    """
+
+    pattern: Sublattice
+    seam: NDArray[np.int64]
+    own: NDArray[np.int32]
+    compact: NDArray[np.int32]
+    count: int
 
 
-def _lattice_launch(machine: Launcher, grid: Grid, offsets: Array, pattern: Sublattice) -> Array:
-    colors = machine.empty((grid.rows, grid.cols), np.int32)
-    basis = (np.int32(pattern.a), np.int32(pattern.b), np.int32(pattern.c))
-    machine.launch(
-        machine.kernel("coloring", "coloring_lattice"),
-        (colors.size,),
-        *(grid.flat.struct, offsets, np.int32(offsets.shape[0]), *basis, colors),
-    )
-    return colors
-
-
-lattice_coloring = Operation("lattice_coloring", _lattice_reference, _lattice_launch)
-
-
-def _greedy_reference(
-    grid: Grid,
-    offsets: NDArray[np.int32],
-    bare: NDArray[np.int32],
-    colors: NDArray[np.int32],
-    seed: int,
-    rounds: int = 1,
-) -> NDArray[np.int32]:
-    for _ in range(rounds):
-        colors = _greedy_round(grid, offsets, colors, seed)
-    return colors
-
-
-def _greedy_round(grid: Grid, offsets: NDArray[np.int32], colors: NDArray[np.int32], seed: int) -> NDArray[np.int32]:
-    flat = colors.ravel()
-    bare = np.flatnonzero(flat == UNCOLORED).astype(np.int32)
-    r = grid.flat.neighbours(bare, offsets)
-    priority = random.draw4(seed, 0, 0, np.arange(flat.size), random.COLOR)[0].astype(np.int64)
-    own, other = priority[bare], priority[r]
-    rival = (r >= 0) & (flat[r] == UNCOLORED) & ((other > own) | ((other == own) & (r > bare)))
-    new = flat.copy()
-    for s in np.flatnonzero(~rival.any(0)):
-        taken = set(flat[r[:, s][r[:, s] >= 0]].tolist())
-        new[bare[s]] = next(color for color in range(len(taken) + 1) if color not in taken)
-    return new.reshape(colors.shape)
-
-
-def _greedy_launch(
-    machine: Launcher, grid: Grid, offsets: Array, bare: Array, colors: Array, seed: int, rounds: int = 1
-) -> Array:
-    one, other = (machine.part(colors.reshape(-1), 0, colors.size).reshape(colors.shape) for _ in range(2))
-    kernel = machine.kernel("coloring", "coloring_greedy")
-    arguments = (grid.flat.struct, bare, np.int32(bare.size), offsets, np.int32(offsets.shape[0]), np.uint64(seed))
-    machine.launch_rounds(kernel, bare.size, rounds, *arguments, one, other)
-    return other if rounds % 2 else one
-
-
-greedy_coloring = Operation("greedy_coloring", _greedy_reference, _greedy_launch)
-"""``greedy_coloring(machine, grid, offsets, bare, colors, seed, rounds)``: ``bare`` (S,) int32 lists the sites of
-``colors`` (rows, cols) that have none."""
-
-
-def coloring(machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int = 0) -> Any:
-    """Colour a level's lattice.
+def coloring(grid: Grid, order: int, seed: int = 0) -> NDArray[np.int32]:
+    """Colour a level's lattice, or a window of one.
 
     The best lattice colouring of the plane where the size of the lattice takes it without a seam. Else either a
     lattice colouring with more colours that fits, or the best one with its clashes along the seam coloured
@@ -93,32 +47,148 @@ def coloring(machine: Any, grid: Grid, offsets: NDArray[np.int32], order: int, s
 
     Parameters
     ----------
-    machine : Machine
     grid : Grid
-    offsets : (N, 2) int32 array
-        The neighbourhood.
+        A window's sites have the colours that they have in the whole.
     order : int
-        Its order.
+        Of the neighbourhood.
     seed : int
         Of the priorities of the greedy rounds.
 
     Returns
     -------
     (rows, cols) int32 array
-        0 .. colours - 1. Cost: O(rows cols N) per round; a few tens of rounds at a seam.
+        0 .. colours - 1. Cost: O(rows cols), and once for a whole lattice a few tens of rounds along its seam.
     """
-    device_offsets = machine.put(offsets)
+    whole, plan = grid.within, colors_of(grid, order, seed)
+    row = (whole.top + np.arange(grid.rows)) % whole.rows
+    col = (whole.left + np.arange(grid.cols)) % whole.cols
+    colors = _cosets(plan.pattern, row[:, None], col[None, :])
+    here, there = (np.full(n, -1) for n in (whole.rows, whole.cols))
+    here[row], there[col] = np.arange(row.size), np.arange(col.size)
+    i, j = (line[at] for line, at in zip((here, there), np.divmod(plan.seam, whole.cols), strict=True))
+    seen = (i >= 0) & (j >= 0)
+    colors[i[seen], j[seen]] = plan.own[seen]
+    return plan.compact[colors]
+
+
+def colors_of(grid: Grid, order: int, seed: int) -> Plan:
+    """How the whole lattice of a grid is coloured."""
+    return _plan(grid.within.rows, grid.within.cols, grid.torus, order, seed)
+
+
+@lru_cache(maxsize=32)
+def _plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Plan:
     best = coloring_sublattice(order)
     assert best is not None  # a square pattern always exists in the plane
-    colors = lattice_coloring(machine, grid, device_offsets, best)
-    result = machine.get(colors)
-    while (bare := np.flatnonzero(result.ravel() == UNCOLORED).astype(np.int32)).size:
-        colors = greedy_coloring(machine, grid, device_offsets, machine.put(bare), colors, seed, ROUNDS)
-        result = machine.get(colors)
-    used = np.bincount(result.ravel()) > 0
-    if grid.torus and used.sum() > best.index:
-        seamless = coloring_sublattice(order, grid.rows, grid.cols, limit=int(used.sum()))
-        if seamless:
-            result = machine.get(lattice_coloring(machine, grid, device_offsets, seamless))
-            used = np.bincount(result.ravel()) > 0
-    return (np.cumsum(used) - 1).astype(np.int32)[result]
+    neighbours = len(neighbourhood_offsets(order))
+    seamless = coloring_sublattice(order, rows, cols, limit=max(best.index, neighbours + 1)) if torus else best
+    nobody, own = np.zeros(0, np.int64), None
+    if seamless != best:
+        seam = _clashing(rows, cols, order, best)
+        own = _greedy(rows, cols, order, best, seam, seed, max(best.index, seamless.index - 1) if seamless else inf)
+    if own is None:
+        assert seamless is not None  # else greedy colours have no limit
+        best, seam, own = seamless, nobody, nobody.astype(np.int32)
+    used = _used(rows, cols, order, best, seam, own)
+    return Plan(best, seam, own, (np.cumsum(used) - 1).astype(np.int32), int(used.sum()))
+
+
+def _cosets(pattern: Sublattice, row: NDArray[np.int64], col: NDArray[np.int64]) -> NDArray[np.int32]:
+    """The colour of a site is its coset of the sublattice spanned by (a, 0) and (b, c) (row, column).
+
+    Two sites of one coset differ by a sublattice vector, none of which is as short as a neighbour's offset.
+    """
+    a, b, c = pattern.a, pattern.b, pattern.c
+    turned = (row % a).astype(np.int32) + (-(col // c) * b % a).astype(np.int32)
+    found: NDArray[np.int32] = np.where(turned < a, turned, turned - a) * np.int32(c) + (col % c).astype(np.int32)
+    return found
+
+
+def _along(rows: int, cols: int, radius: int) -> NDArray[np.int64]:
+    """The sites that may see another across the seam and come after it, in ascending order."""
+    row, col = np.arange(rows), np.arange(cols)
+    low = row >= rows - radius
+    side = (col < radius) | (col >= cols - radius)
+    return np.sort(
+        np.concatenate(
+            [
+                (row[low][:, None] * cols + col[None, :]).ravel(),
+                (row[~low][:, None] * cols + col[side][None, :]).ravel(),
+            ]
+        )
+    )
+
+
+def _clashing(rows: int, cols: int, order: int, pattern: Sublattice) -> NDArray[np.int64]:
+    """The later of any two sites that are neighbours across the seam and of one coset."""
+    offsets = neighbourhood_offsets(order).astype(np.int64)
+    site = _along(rows, cols, int(offsets.max()))
+    clash = [np.zeros(0, bool)]
+    for here in _pieces(site, len(offsets)):
+        row, col = np.divmod(here, cols)
+        k, m = row + offsets[:, :1], col + offsets[:, 1:]
+        across = np.nonzero((k < 0) | (k >= rows) | (m < 0) | (m >= cols))
+        k, m, own = k[across] % rows, m[across] % cols, _cosets(pattern, row, col)[across[1]]
+        met = (k * cols + m < here[across[1]]) & (_cosets(pattern, k, m) == own)
+        clash.append(np.bincount(across[1][met], minlength=here.size) > 0)
+    return site[np.concatenate(clash)]
+
+
+def _pieces(sites: NDArray[np.int64], neighbours: int) -> list[NDArray[np.int64]]:
+    """Sites in pieces of which all neighbours are looked at together."""
+    return np.array_split(sites, 1 + sites.size * neighbours // TOGETHER)
+
+
+def _greedy(
+    rows: int, cols: int, order: int, pattern: Sublattice, bare: NDArray[np.int64], seed: int, most: float
+) -> NDArray[np.int32] | None:
+    """Parallel greedy colouring (Jones and Plassmann) of the sites of a torus that have no colour.
+
+    In each round every site whose priority is above those of all its uncoloured neighbours takes the lowest colour
+    that no neighbour has. None where some site needs the colour ``most`` or a higher one.
+    """
+    offsets, n = neighbourhood_offsets(order).astype(np.int64), bare.size
+    taken = np.zeros((n, max(pattern.index, len(offsets) + 1) + 1), bool)
+    beside = np.empty((len(offsets), n), np.int64)
+    first = 0
+    for here in _pieces(bare, len(offsets)):
+        row, col = np.divmod(here, cols)
+        k, m = (row + offsets[:, :1]) % rows, (col + offsets[:, 1:]) % cols
+        r = k * cols + m
+        at = np.minimum(np.searchsorted(bare, r), n - 1)
+        other = bare[at] == r
+        beside[:, first : first + here.size] = np.where(other & (r != here), at, -1)
+        fixed = np.nonzero(~other)
+        taken[first + fixed[1], _cosets(pattern, k[fixed], m[fixed])] = True
+        first += here.size
+    priority = random.draw4(seed, 0, 0, bare, random.COLOR)[0].astype(np.int64)
+    rank = np.empty(n, np.int64)
+    rank[np.lexsort((bare, priority))] = np.arange(n)
+    rank = np.append(rank, -1)  # of nobody, whom -1 stands for
+    colors, left = np.full(n, UNCOLORED, np.int32), np.arange(n)
+    while left.size:
+        now = left[(rank[beside[:, left]] < rank[left]).all(0)]
+        colors[now] = taken[now].argmin(1)
+        if (colors[now] >= most).any():
+            return None
+        near = beside[:, now]
+        taken[near[near >= 0], np.broadcast_to(colors[now], near.shape)[near >= 0]] = True
+        rank[now] = -1
+        left = left[colors[left] == UNCOLORED]
+    return colors
+
+
+def _used(
+    rows: int, cols: int, order: int, pattern: Sublattice, seam: NDArray[np.int64], own: NDArray[np.int32]
+) -> NDArray[np.bool_]:
+    """Which colours there are."""
+    used = np.zeros(1 + max(pattern.index - 1, int(own.max(initial=0))), bool)
+    used[own] = True
+    radius = int(neighbourhood_offsets(order).max())
+    if rows - radius >= pattern.a and cols - 2 * radius >= pattern.c:
+        used[: pattern.index] = True  # away from the seam lies one site of each coset
+        return used
+    site = np.arange(rows * cols)
+    site = site[~np.isin(site, seam)]
+    used[_cosets(pattern, *np.divmod(site, cols))] = True
+    return used

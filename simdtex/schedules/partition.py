@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from simdtex import random
 from simdtex.machine.interface import Machine
 from simdtex.model.lattice import Grid
-from simdtex.ops.coloring import coloring
+from simdtex.ops.coloring import coloring, colors_of
 from simdtex.options import whole
 from simdtex.schedules.schedule import Active, Info, Setting
 
@@ -39,17 +39,24 @@ class Partition:
     windows = False
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """(rows, cols) integers from 0: the group of each site of a whole lattice."""
+        """(rows, cols) integers from 0: the group of each site of a lattice; of a window too, where `windows` says so."""
+        raise NotImplementedError
+
+    def count(self, grid: Grid, order: int, seed: int) -> int:
+        """How many groups the whole lattice has, where `windows` is true."""
         raise NotImplementedError
 
     def init(self, setting: Setting) -> State:
-        """Lay out the groups, once a level; those of a window are cut out of the whole lattice's."""
+        """Lay out the groups, once a level; those of a window are those of its sites in the whole lattice."""
         machine, grid, offsets, order, seed, _ = setting
-        group = self.groups(machine, grid.whole, offsets, order, seed)
-        if group.min() < 0 or group.max() >= group.size:  # numbers with wide gaps
-            group = np.unique(group, return_inverse=True)[1].reshape(group.shape)
-        count = int(group.max()) + 1
-        group = np.ravel(grid.cut(group) if grid.part else group)
+        group = self.groups(machine, grid if self.windows else grid.whole, offsets, order, seed)
+        if self.windows:
+            count = self.count(grid, order, seed)
+        else:
+            if group.min() < 0 or group.max() >= group.size:  # numbers with wide gaps
+                group = np.unique(group, return_inverse=True)[1].reshape(group.shape)
+            count, group = int(group.max()) + 1, grid.cut(group) if grid.part else group
+        group = np.ravel(group)
         few = group.astype(np.uint16) if count <= 2**16 else group  # sorts in linear time
         place = np.argsort(few, kind="stable")
         starts = np.concatenate([[0], np.cumsum(np.bincount(group, minlength=count))])
@@ -96,9 +103,12 @@ class Coloring(Partition):
         return True
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Colours; O(sites x (neighbours + colours))."""
-        colors: NDArray[Any] = coloring(machine, grid, offsets, order, seed)
-        return colors
+        """Colours; O(sites)."""
+        return coloring(grid, order, seed)
+
+    def count(self, grid: Grid, order: int, seed: int) -> int:
+        """Colours of the whole lattice."""
+        return colors_of(grid, order, seed).count
 
 
 class FixedColoring(Coloring):
@@ -130,8 +140,14 @@ class Checkerboard(Partition):
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """Row plus column, odd or even."""
-        colors: NDArray[Any] = np.indices((grid.rows, grid.cols)).sum(0) % 2
+        whole = grid.within
+        row, col = (whole.top + np.arange(grid.rows)) % whole.rows, (whole.left + np.arange(grid.cols)) % whole.cols
+        colors: NDArray[Any] = (row[:, None] + col[None, :]) % 2
         return colors
+
+    def count(self, grid: Grid, order: int, seed: int) -> int:
+        """Two, or one of a single site."""
+        return min(2, grid.within.rows * grid.within.cols)
 
 
 class Synchronous(Partition):
@@ -151,6 +167,10 @@ class Synchronous(Partition):
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """One for all."""
         return np.zeros((grid.rows, grid.cols), np.int64)
+
+    def count(self, grid: Grid, order: int, seed: int) -> int:
+        """One."""
+        return 1
 
 
 class Raster(Partition):
