@@ -181,7 +181,7 @@ def test_a_window_has_the_colours_of_the_whole(order, shape, torus, corner, size
     top, left = corner if torus else (min(at, n - k) for at, n, k in zip(corner, shape, (rows, cols), strict=True))
     window = grid.window(top, left, rows, cols)
     assert_same_bits(coloring(window, order, 7), window.cut(coloring(grid, order, 7)))
-    assert colors_of(window, order, 7).count == coloring(grid, order, 7).max() + 1
+    assert colors_of(window, order, 7).colors == coloring(grid, order, 7).max() + 1
 
 
 def test_sites_are_looked_at_piece_by_piece(monkeypatch):
@@ -197,4 +197,4 @@ def test_the_colours_of_a_vast_torus_are_known_by_its_seam():
     window = grid.window(99_980, 99_990, 30, 40)
     colors = coloring(window, 2, 1)
     assert not conflicts(colors, 2, False)
-    assert colors.max() < colors_of(grid, 2, 1).count <= 9
+    assert colors.max() < colors_of(grid, 2, 1).colors <= 9

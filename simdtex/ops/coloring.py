@@ -28,14 +28,14 @@ class Plan(NamedTuple):
 
     ``pattern`` whose cosets are the colours; ``seam`` (n,) int64, ascending, the numbers row cols + column of the sites
     that have colours of their own, ``own`` (n,) int32 these; ``compact`` (colours before,) int32 the number of each
-    colour among those that are used, ``count``.
+    colour among those that are used, ``colors``.
     """
 
     pattern: Sublattice
     seam: NDArray[np.int64]
     own: NDArray[np.int32]
     compact: NDArray[np.int32]
-    count: int
+    colors: int
 
 
 def coloring(grid: Grid, order: int, seed: int = 0) -> NDArray[np.int32]:
@@ -131,7 +131,8 @@ def _clashing(rows: int, cols: int, order: int, pattern: Sublattice) -> NDArray[
         k, m, own = k[across] % rows, m[across] % cols, _cosets(pattern, row, col)[across[1]]
         met = (k * cols + m < here[across[1]]) & (_cosets(pattern, k, m) == own)
         clash.append(np.bincount(across[1][met], minlength=here.size) > 0)
-    return site[np.concatenate(clash)]
+    found: NDArray[np.int64] = site[np.concatenate(clash)]
+    return found
 
 
 def _pieces(sites: NDArray[np.int64], neighbours: int) -> list[NDArray[np.int64]]:

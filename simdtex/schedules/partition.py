@@ -39,7 +39,7 @@ class Partition:
     windows = False
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """(rows, cols) integers from 0: the group of each site of a lattice; of a window too, where `windows` says so."""
+        """(rows, cols) integers from 0: the group of each site of a lattice, or of a window where `windows` is true."""
         raise NotImplementedError
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
@@ -108,7 +108,7 @@ class Coloring(Partition):
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
         """Colours of the whole lattice."""
-        return colors_of(grid, order, seed).count
+        return colors_of(grid, order, seed).colors
 
 
 class FixedColoring(Coloring):
