@@ -91,6 +91,8 @@ class Sample:
         Channels that are matched: those, and the structure channel.
     guides : (G, H, W) uint16 array
         Working levels of the output's guides.
+    guided : list of (G, rows, cols) uint16 arrays
+        Those of each picture's; empty where there is no guide.
     boxes : list of (int, int, int)
         Of each picture its first row, its rows and its columns.
 
@@ -122,6 +124,7 @@ class Sample:
             more = structure(levels, weight, spread, max(self.top, STEPS))
             levels = [np.concatenate([here, one[None]]) for here, one in zip(levels, more, strict=True)]
         channels = len(levels[0])
+        self.guided = [np.concatenate(those) for those in zip(*(guide.samples for guide in guides), strict=True)]
         for guide in guides:
             levels = [np.concatenate(pair) for pair in zip(levels, guide.samples, strict=True)]
         self.guides = np.concatenate([guide.output for guide in guides]) if guides else np.zeros((0, 1, 1), np.uint16)

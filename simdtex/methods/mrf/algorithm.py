@@ -103,7 +103,12 @@ def enter(level: Level, state: State) -> State:
 
     Data between the sites stand for the nearest ones from now on, and no longer for those of the level above.
     """
-    field = level.holding.entered(level.number, state.field)
+    field = level.holding.entered(level.number, level.setting.grid, state.field)
+    return opened(level, field)
+
+
+def opened(level: Level, field: Field) -> State:
+    """The state of a level whose sites are as they are before its first sweep."""
     warm, heat = active.survey(level.machine, level.grid, field.temperature)
     price = priced(level, field, None)
     return State(*field, price, level.schedule.init(level.setting), level.number, warm=warm, heat=heat)
@@ -147,10 +152,16 @@ def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None
 
 def priced(level: Level, field: Field, before: NDArray[np.float32] | None) -> NDArray[np.float32]:
     """What each candidate costs during the next sweep, from how often it is used now: the same for all sites of it."""
+    return price(counted(level, field, level.grid), level.market, level.rate, before)
+
+
+def counted(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
+    """How often each candidate is used, (n,), where that says what it costs; 0 otherwise."""
     candidates = level.proposal.candidates
-    asked = level.rate or level.market.kinds is not None
-    counts = use(level.machine, field, level.grid, candidates) if asked else np.zeros(candidates.size, np.int32)
-    return price(counts, level.market, level.rate, before)
+    if not (level.rate or level.market.kinds is not None):
+        return np.zeros(candidates.size, np.int32)
+    found: NDArray[np.int32] = use(level.machine, field, grid, candidates)
+    return found
 
 
 def rule(level: Level, price: NDArray[np.float32] | None) -> Relaxation:
@@ -217,4 +228,4 @@ def warmth(run: Run, grid: Grid, field: Field) -> NDArray[np.float64]:
     return found
 
 
-__all__ = ["Info", "Part", "Watch", "anneal", "begin", "enter", "picture", "sweep", "warmth"]
+__all__ = ["Info", "Part", "Watch", "anneal", "begin", "counted", "enter", "opened", "picture", "sweep", "warmth"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import sqrt
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,41 @@ from simdtex.model.given import NOBODY, Planes, Stand, stand_ins
 from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import Grid
 from simdtex.ops.neighbourhood import UNTOUCHED, Beside, Field
+
+FREE, KNOWN, STANDING = 0, 1, 2
+"""What a site of a level is: nobody's, given, or one that stands for a datum between the sites."""
+
+
+class Held(NamedTuple):
+    """What is given of a level's lattice, on the host.
+
+    ``values`` (C, rows, cols) uint16, of free sites those of guides alone; ``source`` (rows, cols) int32; ``kind``
+    (rows, cols) uint8: `FREE`, `KNOWN` or `STANDING`.
+    """
+
+    values: NDArray[np.uint16]
+    source: NDArray[np.int32]
+    kind: NDArray[np.uint8]
+
+
+class Holder(Protocol):
+    """Who knows what is given of an output: `Holding` of a whole one, or what cuts its windows out of a store."""
+
+    def beside(self, neighbours: int, data_weight: float) -> Beside:
+        """Which channels are guides, whether each value has a confidence of its own, and what counts how much."""
+        ...
+
+    def begun(self, field: Field) -> Field:
+        """The field before the first level."""
+        ...
+
+    def entered(self, number: int, grid: Grid, field: Field) -> Field:
+        """The field where a level begins on a grid."""
+        ...
+
+    def movable(self, number: int, grid: Grid) -> Array | None:
+        """0 at the sites of a grid that nothing may relax; None where all may."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +97,7 @@ class Holding:
             source[known], temperature[known] = self.laid.source[known], 0
         return Field(*(self.machine.put(plane) for plane in (values, source, temperature)))
 
-    def entered(self, number: int, field: Field) -> Field:
+    def entered(self, number: int, grid: Grid, field: Field) -> Field:
         """The field where a level begins: data between its sites have moved to those that they stand for.
 
         The sites that stood for data at the level above are unknown again, at temperature 1.
@@ -95,6 +131,26 @@ class Holding:
             movable = movable[np.ix_(row, col)]
         return self.machine.put(movable)
 
+    def held(self, number: int) -> Held | None:
+        """What is given of a level, `begun` and `entered` in one; None where nothing is."""
+        if self.laid is None and not len(self.guides):
+            return None
+        grid, (site, datum) = self._lattice(number), self._stand_ins(number)
+        matched, shape = 0 if self.laid is None else len(self.laid.values), (grid.height, grid.width)
+        values = np.zeros((matched + len(self.guides), *shape), np.uint16)
+        source, kind = np.full(shape, -1, np.int32), np.full(shape, FREE, np.uint8)
+        if self.laid is not None:
+            values[:matched] = np.where(self.laid.known, self.laid.values, 0)
+            source[:], kind[:] = self.laid.source, self.laid.known * np.uint8(KNOWN)
+            values.reshape(len(values), -1)[:matched, site] = self.laid.values.reshape(matched, -1)[:, datum]
+            source.flat[site], kind.flat[site] = -1, STANDING
+        gaps = bool((self.guides == UNKNOWN).any())
+        for plane, guide in zip(values[matched:], self.guides, strict=True):
+            told = stand_ins(guide != UNKNOWN, grid) if gaps else NOBODY
+            plane[:] = guide
+            plane.flat[told.site] = guide.flat[told.datum]
+        return Held(*(np.ascontiguousarray(grid.view(plane)) for plane in (values, source, kind)))
+
     def _lattice(self, number: int) -> Grid:
         return Grid(self.grid.height, self.grid.width, 2**number, self.grid.torus)
 
@@ -107,4 +163,4 @@ class Holding:
         return self._found[number]
 
 
-__all__ = ["Holding"]
+__all__ = ["FREE", "KNOWN", "STANDING", "Held", "Holder", "Holding"]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from simdtex import schedules
 from simdtex.machine.interface import Array, Machine
-from simdtex.methods.mrf.holding import Holding
+from simdtex.methods.mrf.holding import Holder
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given
 from simdtex.model.lattice import Grid
@@ -124,9 +124,10 @@ class Run:
     levels: int
     emulated: bool
     weighed: Array
-    holding: Holding = field(repr=False)
+    holding: Holder = field(repr=False)
     given: Given | None = None
     tables: dict[int, Table] = field(default_factory=dict, repr=False)
+    last: dict[int, Level] = field(default_factory=dict, repr=False)
 
     def grid(self, number: int) -> Grid:
         """The lattice of a level, equation (10)."""
@@ -143,11 +144,29 @@ class Run:
             Row and column of the first site, rows and columns of a window of the lattice; the state's arrays then hold
             that alone, site by site. None: the whole lattice, in pictures of the output's size.
         """
+        if number not in self.last:
+            self.last.clear()  # the arrays of one level are enough to keep
+            self.last[number] = self._level(number)
+        level, machine = self.last[number], self.machine
+        if window is None:
+            return level
+        grid = self.grid(number).window(*window)
+        return replace(
+            level,
+            setting=level.setting._replace(grid=grid),
+            grid=replace(grid, tile=self.schedule.tile),
+            in_place=self._in_place(grid),
+            weighed=machine.put(np.zeros((grid.height, grid.width), np.int32)),
+            lists=Lists(machine),
+            movable=self.holding.movable(number, grid),
+        )
+
+    def _level(self, number: int) -> Level:
         options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
-        grid = self.grid(number).window(*window) if window else self.grid(number)
+        grid = self.grid(number)
         coarsest, count = number == self.levels - 1, sample.positions(*self.where(number)).size
         proposal: Everything | Listed
-        if options.search == "exact" or coarsest or count <= options.exhaustive:
+        if self.exhaustive(number):
             every = sample.candidates(machine, *self.where(number), self.planes, every=True)
             proposal = Everything(every, strip_of(machine, sample, *self.where(number)))
         else:
@@ -157,19 +176,12 @@ class Run:
             similar = self.similar(number, candidates, square).numbers if likes else machine.put(nobody)
             few = (min(options.suggesting, len(offsets)), options.chance)
             proposal = Listed(candidates, square, similar, likes, *few)
-        rows, cols = sample.lines(*self.where(number))
         dimensions = sample.channels * (len(offsets) + 1)
         variance = sample.variance
         h = options.bandwidth * lcpdf.optimal_bandwidth(variance, count, dimensions)  # (8)
         draws = options.relaxation == "gibbs" or (coarsest and options.coarsest == "gibbs")
         anew = coarsest and proposal.slots <= KEPT and (draws or options.pixel == "source")
         novelty = options.novelty * min(1.0, WHOLE / count) if anew else 0.0
-        around = int(offsets.max()) * (grid.step if options.phases == "all" else 1)
-        fair = sample.fair(*self.where(number))
-        whole = len(offsets) * sample.channels * variance  # half of what any two neighbourhoods differ by, on average
-        kinds = (*self._kinds(number), STRICT * whole)
-        market = Market((rows.size, cols.size), around, fair, isinstance(proposal, Listed), *kinds)
-        independent = self.schedule.independent(grid, offsets)
         return Level(
             number=number,
             setting=Setting(machine, grid, offsets, options.order, self.seed, number),
@@ -180,16 +192,40 @@ class Run:
             choice=Choice(draws, options.pixel == "density", lcpdf.window(h, sample.top)),
             favour=np.float32(1 / (1 + options.coherence)),
             novelty=np.float32(novelty * sample.channels * variance),
-            rate=options.balance * whole,
-            market=market,
+            rate=options.balance * self.usual,
+            market=self.market(number),
             beside=self.holding.beside(len(offsets), options.data_weight),
             xi=min(-1, round(options.xi * 1024)),
-            in_place=independent and not self.schedule.tile and not self.emulated,
-            weighed=machine.put(np.zeros((grid.height, grid.width), np.int32)) if window else self.weighed,
+            in_place=self._in_place(grid),
+            weighed=self.weighed,
             lists=Lists(machine),
             holding=self.holding,
             movable=self.holding.movable(number, grid),
         )
+
+    def _in_place(self, grid: Grid) -> bool:
+        independent = self.schedule.independent(grid, self.offsets)
+        return independent and not self.schedule.tile and not self.emulated
+
+    @property
+    def usual(self) -> float:
+        """N C sigma^2: half of what any two neighbourhoods differ by, on average."""
+        return len(self.offsets) * self.sample.channels * self.sample.variance
+
+    def exhaustive(self, number: int) -> bool:
+        """Whether a site of a level weighs all its candidates."""
+        options, coarsest = self.options, number == self.levels - 1
+        if options.search == "exact" or coarsest:
+            return True
+        return bool(self.sample.positions(*self.where(number)).size <= options.exhaustive)
+
+    def market(self, number: int) -> Market:
+        """Who competes for the sites of a level."""
+        step = 2**number if self.options.phases == "all" else 1
+        rows, cols = self.sample.lines(*self.where(number))
+        fair, kinds = self.sample.fair(*self.where(number)), (*self._kinds(number), STRICT * self.usual)
+        around = int(self.offsets.max()) * step
+        return Market((rows.size, cols.size), around, fair, not self.exhaustive(number), *kinds)
 
     def _kinds(self, number: int) -> tuple[NDArray[np.intp] | None, tuple[float, ...]]:
         """The category of each place where candidates may lie, and the shares that are asked for."""
@@ -259,7 +295,7 @@ class Level:
         Counts the candidates that each site has weighed.
     lists : Lists
         The schedule's lists of sites as the machine holds them.
-    holding : Holding
+    holding : Holder
         What is given.
     movable : (H, W) uint16 array of the machine, optional
         0 at sites whose values are given: free sweeps leave them alone, as all sweeps do that find their temperature 0.
@@ -282,7 +318,7 @@ class Level:
     in_place: bool
     weighed: Array
     lists: Lists = field(repr=False)
-    holding: Holding = field(repr=False)
+    holding: Holder = field(repr=False)
     movable: Array | None = None
 
     @property

@@ -3,26 +3,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex import schedules
 from simdtex.machine.interface import Machine
 from simdtex.maspar.array import parse_array
 from simdtex.methods.mrf.algorithm import anneal
-from simdtex.methods.mrf.holding import Holding
-from simdtex.methods.mrf.level import Run, number_of_levels
+from simdtex.methods.mrf.level import Run
 from simdtex.methods.mrf.observers import Observer
-from simdtex.methods.mrf.options import CATEGORIES as MOST
 from simdtex.methods.mrf.options import Options
-from simdtex.model.given import Given, planes
-from simdtex.model.guide import Beside, Guide
-from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.methods.mrf.outline import outlined
+from simdtex.model.given import Given
+from simdtex.model.lattice import Grid
 from simdtex.model.pictures import Pictures
-from simdtex.model.sample import NothingUsable, Sample
+from simdtex.model.sample import Sample
 from simdtex.model.use import effective_use
 from simdtex.ops.finish import around, finish
 from simdtex.ops.neighbourhood import Field
@@ -31,9 +28,6 @@ from simdtex.run import Callback, Output, device_seconds
 
 AT_ONCE = 2**20
 """Sites that are finished together."""
-
-LABELS = 64
-"""Labels of a guide, at most: each is a channel."""
 
 
 def synthesize(
@@ -90,7 +84,8 @@ def synthesize(
     grid = Grid(*shape)
     source, temperatures = (grid.view(machine.get(plane)) for plane in (state.source, state.temperature))
     if run.options.finish:
-        image = finished(run, state.field, source)
+        known = given.whole if given and given.whole.any() else None
+        image = finished(run, run.grid(0), state.field, known, source)
     else:
         image = run.sample.picture(grid.view(machine.get(state.values)), source)
     if given:
@@ -110,65 +105,6 @@ def synthesize(
     return image, Output(place, temperatures / 1024, observer.stages, statistics)
 
 
-def check_categories(pictures: Pictures, given: Given | None, options: Options) -> None:
-    """Raise where a category is given that the sample does not have, or a share of one."""
-    for variable in range(pictures.pixels[0].shape[-1]):
-        categories = pictures.categories(variable)
-        if categories is None:
-            continue
-        if given:
-            told = np.unique(given.values[given.known[..., variable], variable])
-            strange = told[~np.isin(told, categories)]
-            if strange.size:
-                raise ValueError(
-                    f"known has the category {strange[0]} and the sample has {_listed(categories)}; give one of these"
-                )
-        if len(categories) > MOST:
-            raise ValueError(
-                f"a variable has {len(categories)} categories; give {MOST} or fewer, or leave categorical out"
-            )
-    if options.proportions:
-        found = pictures.categories(0)
-        if found is None or pictures.pixels[0].shape[-1] > 1:
-            raise ValueError("proportions are of one variable of categories; give categorical=True, or leave them out")
-        if len(found) != len(options.proportions):
-            raise ValueError(
-                f"there are {len(options.proportions)} proportions and {len(found)} categories, {_listed(found)}; "
-                "give one for each"
-            )
-
-
-def check_guide(guide: tuple[tuple[NDArray[Any], ...], NDArray[Any]], options: Options) -> Guide:
-    """The guide with its kind and weight; raises where it names a label that the sample lacks."""
-    if options.pixel == "density":
-        raise ValueError('a guide chooses among pixels of the sample; give pixel="source"')
-    samples, output = guide
-    labels = options.labels
-    if labels is None:
-        integers = all(one.dtype.kind in "iu" for one in (*samples, output))
-        labels = integers and all(np.unique(one).size <= MOST for one in samples)
-    if labels:
-        for channel in range(output.shape[-1]):
-            there = np.unique(np.concatenate([np.unique(one[..., channel]) for one in samples]))
-            told = np.unique(output[..., channel])
-            told = told[~np.isnan(told)] if told.dtype.kind == "f" else told
-            strange = told[~np.isin(told, there)]
-            if strange.size:
-                raise ValueError(
-                    f"the guide of the output asks for the label {strange[0]} and that of the sample has "
-                    f"{_listed(there)}; give labels that the sample has"
-                )
-            if there.size > LABELS:
-                raise ValueError(f"the guide has {there.size} labels; give {LABELS} or fewer, or labels=False")
-    return Guide(samples, output, labels, options.guide_weight)
-
-
-def _listed(values: NDArray[Any]) -> str:
-    """Up to ten values in words."""
-    words = [str(value) for value in values[:10]]
-    return ", ".join(words) + (", ..." if len(values) > 10 else "")
-
-
 def used(place: NDArray[np.int32], pictures: Pictures) -> dict[str, Any] | None:
     """How evenly the sample is used, where it is one picture and something is from there."""
     if place.shape[-1] > 2 or (place[..., 0] < 0).all():
@@ -186,87 +122,43 @@ def laid_out(
     guide: tuple[tuple[NDArray[Any], ...], NDArray[Any]] | None = None,
 ) -> Run:
     """Lay out a run on a machine; the arguments are those of `synthesize`."""
-    pictures = options.of(pixels if isinstance(pixels, Pictures) else Pictures((pixels,)))
-    check_categories(pictures, given, options)
-    options = options.resolved(pictures)
-    offsets = neighbourhood_offsets(options.order)
-    levels = number_of_levels([picture.shape[:2] for picture in pictures.pixels], offsets, shape, options)  # 1
-    beside: list[Beside] = [check_guide(guide, options)] if guide else []
-    if given and given.partly:
-        if options.pixel == "density":
-            raise ValueError('sites that are known in part choose among pixels of the sample; give pixel="source"')
-        beside.append(given.colocated(pictures.pixels))
-    channels = pictures.channels + bool(options.structure) + sum(one.channels for one in beside)
-    heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or beside else 1.0  # in sums of squares
-    values = round(heavy * (channels * len(offsets) + len(beside)))
-    levels, sample = sampled(pictures, levels, offsets, values, options, beside)
-    schedule = schedules.get(options.schedule)
-    _check_memory(machine, sample, shape, options.similar, copies=2 if schedule.tile else 1)
+    outline = outlined(pixels, shape, options, seed, given, guide)
+    schedule, options = outline.schedule, outline.options
+    _check_memory(machine, outline.sample, shape, options.similar, copies=2 if schedule.tile else 1)
     emulated = bool(options.array) and options.emulate
     if options.array and emulated:
         machine = machine.emulate(parse_array(options.array, options.mapping))
-    laid = planes(given, sample) if given and given.whole.any() else None
-    return Run(
-        machine=machine,
-        sample=sample,
-        planes=sample.planes(machine),
-        shape=shape,
-        offsets=offsets,
-        options=options,
-        schedule=schedules.Checked(schedule) if options.check_schedule else schedule,
-        seed=seed,
-        levels=levels,
-        emulated=emulated,
-        weighed=machine.put(np.zeros(shape, np.int32)),
-        holding=Holding(machine, Grid(*shape, 1, options.boundary == "torus"), levels, sample.guides, laid),
-        given=given,
-    )
+    run = outline.run(machine, outline.holding(machine), machine.put(np.zeros(shape, np.int32)))
+    return replace(run, emulated=emulated, given=given)
 
 
-def sampled(
-    pictures: Pictures,
-    levels: int,
-    offsets: NDArray[np.int32],
-    values: int,
-    options: Options,
-    beside: Sequence[Beside],
-) -> tuple[int, Sample]:
-    """How many levels there are, and the sample; fewer, where some level has no candidate and nobody asked for it."""
-    far = int(around(options.finish)[0].max()) if options.finish else 0
-    for fewer in range(levels, 0, -1):
-        step = 2 ** (fewer - 1)
-        margin = int(offsets.max()) * step
-        sample = Sample(pictures, values, margin, options.structure, step, beside, options.unsure, far)
-        try:
-            for number in range(fewer):
-                sample.allowed(offsets, 2**number, options.phases, options.edges)
-        except NothingUsable:
-            if fewer == 1 or options.levels is not None:
-                raise
-            continue
-        break
-    return fewer, sample
-
-
-def finished(run: Run, field: Field, seen: NDArray[np.int32]) -> NDArray[Any]:
+def finished(
+    run: Run, grid: Grid, field: Field, known: NDArray[np.bool_] | None, seen: NDArray[np.int32], first: int = 0
+) -> NDArray[Any]:
     """The picture with the finish (`simdtex.ops.finish`), in the sample's type.
 
     Parameters
     ----------
     run : Run
+    grid : Grid
+        The finest level, or a window of it.
     field : Field
-        Of the finest level.
+        Of that.
+    known : (H, W) bool array, optional
+        Which sites of that are given.
     seen : (rows, cols) int32 array
-        Its sources on the host.
+        Sources on the host: of all rows, or of some.
+    first : int
+        The first of these rows.
     """
-    sample, grid, ring = run.sample, run.grid(0), around(run.options.finish or 0)
-    picture = np.empty((*run.shape, sample.shown), sample.pixels.dtype)
+    sample, ring = run.sample, around(run.options.finish or 0)
+    picture = np.empty((*seen.shape, sample.shown), sample.pixels.dtype)
     rows = max(1, AT_ONCE // grid.cols)
-    known = np.zeros(run.shape, bool) if run.holding.laid is None else run.holding.laid.known
+    known = np.zeros((grid.height, grid.width), bool) if known is None else known
     given = run.machine.put(known.view(np.uint8))
-    for top in range(0, grid.rows, rows):
+    for top in range(0, len(seen), rows):
         here = seen[top : top + rows]
-        by = finish(run.machine, field, given, grid, run.planes, sample, *ring, top * grid.cols, here.size)
+        by = finish(run.machine, field, given, grid, run.planes, sample, *ring, (first + top) * grid.cols, here.size)
         picture[top : top + rows] = sample.moved(here, by.reshape(-1, *here.shape))
     return picture
 
