@@ -132,6 +132,18 @@ def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None
     state : State
     info : Info
     """
+    field, memory, chosen = swept(level, state, free=free, watch=watch)
+    hot, heat = active.survey(level.machine, level.grid, field.temperature)
+    cooling, freed = state.cooling + (not free), state.free + free
+    info = Info(level.number, cooling + freed, "free" if free else "relax", chosen, False)
+    price = priced(level, field, state.price)
+    return State(*field, price, memory, level.number, cooling, freed, hot, heat), info
+
+
+def swept(
+    level: Level, state: State, *, free: bool = False, watch: Watch | None = None
+) -> tuple[Field, Any, list[schedules.Info]]:
+    """The steps of a sweep: the sites after it, the schedule's state, and what the schedule chose."""
     field, memory = exchanged(level, state.field), state.schedule
     relaxation = rule(level, state.price)
     chosen: list[schedules.Info] = []
@@ -143,11 +155,7 @@ def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None
             if watch:
                 watch(level, state, free, part)
         chosen.append(now)
-    hot, heat = active.survey(level.machine, level.grid, field.temperature)
-    cooling, freed = state.cooling + (not free), state.free + free
-    info = Info(level.number, cooling + freed, "free" if free else "relax", chosen, False)
-    price = priced(level, field, state.price)
-    return State(*field, price, memory, level.number, cooling, freed, hot, heat), info
+    return field, memory, chosen
 
 
 def priced(level: Level, field: Field, before: NDArray[np.float32] | None) -> NDArray[np.float32]:
@@ -228,4 +236,7 @@ def warmth(run: Run, grid: Grid, field: Field) -> NDArray[np.float64]:
     return found
 
 
-__all__ = ["Info", "Part", "Watch", "anneal", "begin", "counted", "enter", "opened", "picture", "sweep", "warmth"]
+__all__ = [
+    *("Info", "Part", "Watch", "anneal", "begin", "counted", "enter", "opened", "picture", "priced", "sweep", "swept"),
+    "warmth",
+]

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A tile of a level: relaxed in a window that is as much larger as a sweep reaches, it has the bits of the whole.
+
+All that goes in and comes out are arrays of NumPy over the sites of a lattice, so tiles may be anybody's to compute.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.machine.interface import Machine
+from simdtex.methods.mrf.algorithm import Info, counted, opened, sweep, swept
+from simdtex.methods.mrf.level import Level, Run, State
+from simdtex.model.lattice import Grid
+from simdtex.ops import active
+from simdtex.ops.neighbourhood import Field
+from simdtex.ops.start import start
+from simdtex.schedules.trimmed import Trimmed
+
+
+class Tile(NamedTuple):
+    """The first row and column of a tile in its lattice, its rows and its columns; or a window's."""
+
+    top: int
+    left: int
+    rows: int
+    cols: int
+
+
+class Framed(NamedTuple):
+    """A tile in a window of its lattice: the window, and where in it the tile lies."""
+
+    window: Tile
+    rows: slice
+    cols: slice
+
+    def cut(self, array: NDArray[np.generic]) -> NDArray[np.generic]:
+        """The tile's part of an array (..., rows, cols) over the window."""
+        return np.ascontiguousarray(array[..., self.rows, self.cols])
+
+
+class Tally(NamedTuple):
+    """What is known of a tile's sites: numbers that add up over tiles.
+
+    ``counts`` (n,) how often each candidate is used; ``warm`` sites warmer than 0; ``heat`` the sum of temperatures in
+    1/1024.
+    """
+
+    counts: NDArray[np.int32]
+    warm: int
+    heat: int
+
+
+def framed(lattice: Grid, tile: Tile, halo: int) -> Framed:
+    """A tile in the window that holds it and all sites within a halo, as far as the lattice has them."""
+    sides = []
+    for first, size, whole in ((tile.top, tile.rows, lattice.rows), (tile.left, tile.cols, lattice.cols)):
+        if size + 2 * halo >= whole:
+            begin, end = 0, whole
+        elif lattice.torus:
+            begin, end = first - halo, first + size + halo
+        else:
+            begin, end = max(0, first - halo), min(whole, first + size + halo)
+        sides.append((begin % whole, end - begin, slice(first - begin, first - begin + size)))
+    (top, rows, down), (left, cols, right) = sides
+    return Framed(Tile(top, left, rows, cols), down, right)
+
+
+def begun(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Field, Tally]:
+    """A tile where its level begins: steps 2 and 5 of Algorithm 1, and what is kept from the level above.
+
+    Parameters
+    ----------
+    run : Run
+    number : int
+        Of the level.
+    tile : Tile
+    above : Field, optional
+        The sites of the level above that lie in the tile; None at the coarsest level.
+    """
+    level, field = _begun(run, number, tile, above)
+    return _off(run.machine, field), _tally(level, field, level.grid)
+
+
+def whole(run: Run, number: int, above: Field | None) -> Iterator[tuple[Field, Info]]:
+    """All sweeps of a level that is a single tile: after each, its sites on the machine, and what the sweep did."""
+    grid = run.grid(number)
+    level, field = _begun(run, number, Tile(0, 0, grid.rows, grid.cols), above)
+    state, free_sweeps = opened(level, field), run.options.free_sweeps
+    while state.warm:
+        state, info = sweep(level, state)
+        yield state.field, info
+    while state.free < free_sweeps:
+        state, info = sweep(level, state, free=True)
+        yield state.field, info
+    if not (state.cooling or state.free):
+        yield state.field, Info(number, 0, "relax", [], True)
+
+
+def relaxed(
+    run: Run, number: int, tile: Tile, frame: Framed, field: Field, price: NDArray[np.float32], done: int, free: bool
+) -> tuple[Field, Tally]:
+    """A tile after a sweep.
+
+    Parameters
+    ----------
+    run : Run
+    number : int
+        Of the level.
+    tile : Tile
+    frame : Framed
+        Its window, with a halo as deep as the sweep reaches.
+    field : Field
+        The sites of the window before the sweep.
+    price : (n,) float32 array
+        Of the candidates, during the sweep.
+    done : int
+        Sweeps of the level before it.
+    free : bool
+        Whether it is a free one.
+    """
+    machine, level = run.machine, run.level(number, frame.window)
+    if frame.window.rows < run.grid(number).rows:  # else rows wrap around, and none is far away
+        level = replace(level, schedule=Trimmed(level.schedule, frame.rows.start, frame.rows.stop))
+    memory = level.schedule.init(level.setting)._replace(sweep=done)  # all that its state carries over
+    state = State(*Field(*map(machine.put, field)), price, memory, number)
+    found, *_ = swept(level, state, free=free)
+    inside = Field(*map(frame.cut, _off(machine, found)))
+    inner = run.grid(number).window(*tile)
+    return inside, _tally(level, Field(*map(machine.put, inside)), inner)
+
+
+def _begun(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Level, Field]:
+    machine, level = run.machine, run.level(number, tile)
+    grid = level.setting.grid
+    everywhere = machine.put(run.sample.positions(np.zeros((1, 2), np.int32), 1))
+    field = start(machine, run.planes, everywhere, grid, run.seed)
+    if above is not None:
+        planes = _off(machine, field)
+        for plane, kept in zip(planes, above, strict=True):
+            plane[..., tile.top % 2 :: 2, tile.left % 2 :: 2] = kept
+        field = Field(*map(machine.put, planes))
+    return level, run.holding.entered(number, grid, field)
+
+
+def _tally(level: Level, field: Field, grid: Grid) -> Tally:
+    return Tally(counted(level, field, grid), *active.survey(level.machine, grid, field.temperature))
+
+
+def _off(machine: Machine, field: Field) -> Field:
+    return Field(*(np.array(machine.get(plane)) for plane in field))
+
+
+__all__ = ["Framed", "Tally", "Tile", "begun", "framed", "relaxed", "whole"]
