@@ -196,6 +196,35 @@ class Simulating(Progress):
         return f"realisation {self.realisation}"
 
 
+@dataclass(frozen=True, kw_only=True)
+class Tiling(Progress):
+    """The progress of `simdtex.distributed.synthesize`, told after every tile.
+
+    The image is every n-th site of the level as it was before the turn, about 1000 to the side: reading it takes long.
+
+    Attributes
+    ----------
+    phase : str
+        What is being done to every tile: ``"begin"`` a level; ``"whole"``, all of a level that is one tile;
+        ``"sweep"``; or ``"show"``, write the picture.
+    sweep : int
+        The present sweep of the level, from 1.
+    tile, tiles : int
+        How many are done, and how many there are.
+    """
+
+    phase: str
+    sweep: int
+    tile: int
+    tiles: int
+
+    @property
+    def doing(self) -> str:  # noqa: D102
+        sweep = f", sweep {self.sweep}" if self.phase == "sweep" else ""
+        what = "writing the picture" if self.phase == "show" else f"level {self.level}{sweep}"
+        return f"{what}, tile {self.tile} of {self.tiles}"
+
+
 Callback = Callable[[Any], Any]
 
 

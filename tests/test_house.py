@@ -75,6 +75,7 @@ ROOMS = [
         "__init__",
         "quality",
         "experiments",
+        "distributed",
         "synthesis",
         "jobs",
         "methods",

@@ -158,6 +158,15 @@ class Schedule(Protocol):
         ...
 
 
+@runtime_checkable
+class Windowed(Schedule, Protocol):
+    """A schedule whose `windows` is true, and which knows how far a sweep reaches."""
+
+    def count(self, grid: Grid, order: int, seed: int) -> int:
+        """How many steps a sweep of the whole lattice has at most."""
+        ...
+
+
 def neighbours_in(grid: Grid, offsets: NDArray[np.int32], sites: NDArray[np.int32]) -> tuple[int, int] | None:
     """Two sites that are neighbours, which equation (14) forbids, or None."""
     chosen = np.zeros(grid.plane, bool)

@@ -6,15 +6,14 @@ All that goes in and comes out are arrays of NumPy over the sites of a lattice, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Machine
-from simdtex.methods.mrf.algorithm import Info, counted, opened, sweep, swept
+from simdtex.methods.mrf.algorithm import counted, opened, sweep, swept
 from simdtex.methods.mrf.level import Level, Run, State
 from simdtex.model.lattice import Grid
 from simdtex.ops import active
@@ -39,7 +38,7 @@ class Framed(NamedTuple):
     rows: slice
     cols: slice
 
-    def cut(self, array: NDArray[np.generic]) -> NDArray[np.generic]:
+    def cut(self, array: NDArray[Any]) -> NDArray[Any]:
         """The tile's part of an array (..., rows, cols) over the window."""
         return np.ascontiguousarray(array[..., self.rows, self.cols])
 
@@ -87,19 +86,16 @@ def begun(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Field
     return _off(run.machine, field), _tally(level, field, level.grid)
 
 
-def whole(run: Run, number: int, above: Field | None) -> Iterator[tuple[Field, Info]]:
-    """All sweeps of a level that is a single tile: after each, its sites on the machine, and what the sweep did."""
+def whole(run: Run, number: int, above: Field | None) -> Field:
+    """A level that is a single tile, after all its sweeps."""
     grid = run.grid(number)
     level, field = _begun(run, number, Tile(0, 0, grid.rows, grid.cols), above)
-    state, free_sweeps = opened(level, field), run.options.free_sweeps
+    state = opened(level, field)
     while state.warm:
-        state, info = sweep(level, state)
-        yield state.field, info
-    while state.free < free_sweeps:
-        state, info = sweep(level, state, free=True)
-        yield state.field, info
-    if not (state.cooling or state.free):
-        yield state.field, Info(number, 0, "relax", [], True)
+        state, _ = sweep(level, state)
+    while state.free < run.options.free_sweeps:
+        state, _ = sweep(level, state, free=True)
+    return _off(run.machine, state.field)
 
 
 def relaxed(

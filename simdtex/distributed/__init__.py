@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Outputs larger than one machine: in tiles, by any number of workers, with the bytes of one.
+
+The extra ``distributed`` brings the libraries: ``pip install 'simdtex[distributed]'``.
+"""
+
+from simdtex.distributed.plan import Plan
+from simdtex.distributed.synthesis import plan, resume, synthesize
+
+__all__ = ["Plan", "plan", "resume", "synthesize"]

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Who does the tiles: this process, or the workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+from simdtex.distributed.drive import Execute
+from simdtex.distributed.store import Turn
+from simdtex.distributed.tasks import do
+from simdtex.machine import Machine
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+AHEAD = 3
+"""Tiles to a worker that the scheduler knows of: the next one is there when one is done, and no more."""
+
+
+def here(where: str, device: str | Machine | None) -> Execute:
+    """Tiles are done by this process, one after another."""
+
+    def execute(turn: Turn, tiles: Sequence[int]) -> Iterator[int]:
+        for number in tiles:
+            yield do(where, device, turn, number)
+
+    return execute
+
+
+def across(client: Client, where: str, device: str | None) -> Execute:
+    """Tiles are done by the workers of a cluster; one that is lost with its worker is done by another."""
+    distributed: Any = import_module("distributed")
+
+    def execute(turn: Turn, tiles: Sequence[int]) -> Iterator[int]:
+        token, todo = os.urandom(8).hex(), iter(tiles)
+
+        def begun(count: int) -> list[Any]:
+            return [
+                client.submit(do, where, device, turn, number, key=f"tile-{token}-{turn.number}-{number}", pure=False)
+                for number in islice(todo, count)
+            ]
+
+        running = distributed.as_completed(begun(AHEAD * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))))
+        try:
+            for future in running:
+                for another in begun(1):
+                    running.add(another)
+                try:
+                    yield future.result()
+                except distributed.KilledWorker:
+                    raise MemoryError(
+                        "the workers that took a tile ended one after another; give smaller tiles, or workers more "
+                        "memory, and go on with simdtex resume"
+                    ) from None
+        finally:
+            cancel: Any = client.cancel
+            cancel(list(running.futures))
+
+    return execute
+
+
+@contextmanager
+def connected(workers: int | None, scheduler: str | None) -> Iterator[Client | None]:
+    """A client of the cluster that is asked for: of one's own on this machine, of a scheduler's, or none."""
+    if workers is None and scheduler is None:
+        yield None
+        return
+    Client, LocalCluster = _libraries()
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=10)
+        except (OSError, ValueError) as error:
+            raise ValueError(f"no scheduler answers at {scheduler}; start one with: dask scheduler") from error
+        with client:
+            yield client
+        return
+    from simdtex.distributed.cores import Cores
+
+    assert workers is not None
+    each = max(1, (os.cpu_count() or 1) // workers)
+    limits = {name: str(each) for name in ("POCL_MAX_PTHREAD_COUNT", "POCL_CPU_MAX_CU_COUNT")}
+    with (
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            dashboard_address=None,
+            memory_limit=0,  # the plan says what a worker needs; a tile that is stopped at a limit is only begun again
+            env={**limits, "OMP_NUM_THREADS": str(each)},
+            plugins=(Cores(each),),
+            silence_logs=50,
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        yield client
+
+
+def _libraries() -> Any:
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError:
+        raise ValueError("distributed is not installed; pip install 'simdtex[distributed]'") from None
+    return Client, LocalCluster
+
+
+__all__ = ["across", "connected", "here"]

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Workers of one machine that share its cores out among themselves."""
+
+from __future__ import annotations
+
+import os
+
+from distributed import Worker, WorkerPlugin
+
+
+class Cores(WorkerPlugin):
+    """Gives each worker of a local cluster cores of its own, before it opens a device.
+
+    Parameters
+    ----------
+    each : int
+        Cores to a worker.
+    """
+
+    name = "simdtex-cores"
+
+    def __init__(self, each: int) -> None:
+        self.each = each
+
+    def setup(self, worker: Worker) -> None:
+        """Called by the worker: its threads, and those of its device, inherit what is set here."""
+        if not hasattr(os, "sched_setaffinity"):
+            return  # no such thing on this system: workers compete for cores
+        free = sorted(os.sched_getaffinity(0))
+        first = int(worker.name) * self.each % len(free)
+        os.sched_setaffinity(0, {free[(first + k) % len(free)] for k in range(min(self.each, len(free)))})

@@ -1,0 +1,342 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The Zarr store of an output in tiles: what is made, how far it is, and what a worker needs to go on with it.
+
+    image, source    the output, written tile by tile at the end
+    work/            removed at the end
+        input/       the outline's arrays (`simdtex.distributed.description`)
+        given/       values and which are known, of the output; held0, held1, ... what is given of each level
+        level0/a, b  values, source, temperature: before a sweep and after it, turn about
+        price7       of each candidate during turn 7
+        tally7       a row for each tile that has had its turn 7: 1, warm, heat, and the use of each candidate
+
+A turn is one thing done to every tile: a level begun, a sweep, the picture. Whatever is written in a turn goes where
+nobody reads, so a turn that was broken off is done again, or only its tiles that are missing. The attribute ``turn`` of
+``work`` is changed when a turn is complete, in one piece.
+"""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from importlib import import_module
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.distributed.description import described, restored
+from simdtex.distributed.plan import LevelPlan, Plan, laid
+from simdtex.machine.interface import Array, Machine
+from simdtex.machine.reference import Reference
+from simdtex.methods.mrf.holding import FREE, STANDING, Held
+from simdtex.methods.mrf.outline import Outline
+from simdtex.methods.mrf.tiles import Tally, Tile
+from simdtex.model.given import Given
+from simdtex.model.lattice import Grid
+from simdtex.ops.neighbourhood import UNTOUCHED, Beside, Field
+
+FORMAT = 1
+"""Of the store; another one is not gone on with."""
+
+KIND = "simdtex tiles"
+
+PLANES = ("values", "source", "temperature")
+
+
+class Turn(NamedTuple):
+    """What is to be done to every tile.
+
+    ``number`` from 1; ``phase`` ``"begin"``, ``"whole"`` (a level of one tile), ``"sweep"``, ``"show"`` or ``"done"``;
+    ``level``; ``read``, ``write`` 0 or 1, the state before and the one after; ``cooling``, ``free`` sweeps of the level
+    done; ``warm``, ``heat`` of all its sites now.
+    """
+
+    number: int
+    phase: str
+    level: int
+    read: int = 0
+    write: int = 0
+    cooling: int = 0
+    free: int = 0
+    warm: int = 0
+    heat: int = 0
+
+
+@dataclass(frozen=True)
+class Work:
+    """What a store is about.
+
+    Attributes
+    ----------
+    outline : Outline
+        Without what is given of the output.
+    plan : Plan
+    beside : Beside
+    held : bool
+        Whether something is given of the output.
+    """
+
+    outline: Outline
+    plan: Plan
+    beside: Beside
+    held: bool
+
+
+class Store:
+    """A store, opened by its path or address.
+
+    Parameters
+    ----------
+    where : str
+        As Zarr takes it: a folder, or an address of a file system that all workers reach.
+    """
+
+    def __init__(self, where: str) -> None:
+        self.where = where
+        self.root: Any = _zarr().open_group(where, mode="r+")
+
+    @staticmethod
+    def create(
+        where: str, outline: Outline, plan: Plan, given: Given | None, channels: bool, source: bool, version: str
+    ) -> Store:
+        """A new store, ready for its first turn; whether its image has a channel axis, and whether it has a source."""
+        root = _zarr().open_group(where, mode="w")
+        work = root.create_group("work")
+        text, arrays = described(outline)
+        for name, array in arrays.items():
+            work.create_array(f"input/{name}", data=np.ascontiguousarray(array))
+        holding = outline.holding(Reference())
+        beside = holding.beside(len(outline.offsets), outline.options.data_weight)
+        store, held = Store(where), False
+        for level in plan.levels:
+            if (here := holding.held(level.number)) is not None:
+                held = True
+                for name, plane in here._asdict().items():
+                    store._planes(f"given/held{level.number}/{name}", level, plane.shape[:-2], plane.dtype)[:] = plane
+        sample, finest = outline.sample, plan.levels[0]
+        if given is not None:
+            for name, array in (("values", given.values), ("known", given.known)):
+                store._pixels(f"work/given/{name}", finest, array.shape[2:], array.dtype)[:] = array
+        store._pixels("image", finest, (sample.shown,) if channels else (), sample.pixels.dtype)
+        if source:
+            store._pixels("source", finest, (2 + (len(sample.boxes) > 1),), np.dtype(np.int32))
+        work.attrs["kind"] = KIND
+        work.attrs["about"] = {
+            **{"format": FORMAT, "version": version, "name": secrets.token_hex(8), "run": text},
+            **{"sides": [one.side for one in plan.levels], "workers": plan.workers},
+            **{"beside": [float(one) for one in beside], "held": held, "given": given is not None},
+        }
+        store.save(first_turn(plan))
+        root.attrs["simdtex"] = {"version": version, "seed": outline.seed, "options": asdict(outline.options)}
+        return store
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What is kept in JSON."""
+        return cast(dict[str, Any], self.root["work"].attrs["about"])
+
+    def work(self) -> Work:
+        """What it is about."""
+        about = self.about
+        inputs = self.root["work/input"]
+        arrays = {name: inputs[name][...] for name in inputs.array_keys()}
+        outline = restored(about["run"], arrays)
+        guides, own, centre, hard = about["beside"]
+        beside = Beside(int(guides), bool(own), np.float32(centre), np.float32(hard))
+        return Work(outline, laid(outline, about["sides"], about["workers"]), beside, about["held"])
+
+    # -- turns ----------------------------------------------------------------------------------------------------
+
+    @property
+    def turn(self) -> Turn:
+        """What is to be done now, as the store has it."""
+        work = _zarr().open_group(self.where, path="work", mode="r") if "work" in self.root else None
+        return Turn(*work.attrs["turn"]) if work is not None else Turn(0, "done", 0)
+
+    def save(self, turn: Turn, price: NDArray[np.float32] | None = None) -> None:
+        """Go on to a turn: from now on this is what is to be done."""
+        work = self.root["work"]
+        if price is not None:
+            work.create_array(f"price{turn.number}", data=price, overwrite=True)
+        work.attrs["turn"] = list(turn)
+        for name in (f"price{turn.number - 1}", f"tally{turn.number - 1}"):
+            if name in work:
+                del work[name]
+
+    def prepare(self, turn: Turn, level: LevelPlan, channels: int, candidates: int) -> bool:
+        """Make the arrays that a turn writes to, where they are not there; true where the turn is new."""
+        work = self.root["work"]
+        if turn.phase != "show" and f"level{level.number}/{turn.write}/temperature" not in work:
+            for name, kind in zip(PLANES, ("uint16", "int32", "uint16"), strict=True):
+                before = (channels,) if name == "values" else ()
+                self._planes(f"level{level.number}/{turn.write}/{name}", level, before, np.dtype(kind))
+        if f"tally{turn.number}" in work:
+            return False
+        shape = (level.count, 3 + candidates)
+        work.create_array(f"tally{turn.number}", shape=shape, chunks=(1, shape[1]), dtype=np.int64, fill_value=0)
+        return True
+
+    def forget(self, level: int) -> None:
+        """Remove the state of a level."""
+        work = self.root["work"]
+        if f"level{level}" in work:
+            del work[f"level{level}"]
+
+    def finish(self) -> None:
+        """Remove what is of use no more."""
+        if "work" in self.root:
+            del self.root["work"]
+
+    def price(self, turn: Turn) -> NDArray[np.float32]:
+        """What each candidate costs during a turn."""
+        return np.asarray(self.root[f"work/price{turn.number}"][...])
+
+    def told(self, turn: Turn, number: int, tally: Tally) -> None:
+        """Note that a tile has had its turn."""
+        row = np.concatenate([np.array([1, tally.warm, tally.heat], np.int64), tally.counts])
+        self.root[f"work/tally{turn.number}"][number] = row
+
+    def tally(self, turn: Turn, number: int) -> Tally | None:
+        """What was noted of a tile, if it has had its turn."""
+        there, warm, heat, *_ = row = self.root[f"work/tally{turn.number}"][number]
+        return Tally(row[3:], int(warm), int(heat)) if there else None
+
+    # -- arrays over sites ----------------------------------------------------------------------------------------
+
+    def read(self, level: LevelPlan, which: int, window: Tile) -> Field:
+        """The state of a level's sites in a window, which may go on across the seam."""
+        here = f"work/level{level.number}/{which}"
+        return Field(*(cut(self.root[f"{here}/{name}"], level, window) for name in PLANES))
+
+    def write(self, level: LevelPlan, which: int, tile: Tile, field: Field) -> None:
+        """Write the state of a tile's sites."""
+        here = f"work/level{level.number}/{which}"
+        for name, plane in zip(PLANES, field, strict=True):
+            self.root[f"{here}/{name}"][..., *spans(tile)] = plane
+
+    def held(self, level: LevelPlan, window: Tile) -> Held:
+        """What is given of a level's sites in a window."""
+        here = f"work/given/held{level.number}"
+        return Held(*(cut(self.root[f"{here}/{name}"], level, window) for name in Held._fields))
+
+    def given(self, tile: Tile) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+        """Values that are given of the output's pixels in a tile, and which of them are."""
+        values, known = (self.root[f"work/given/{name}"][spans(tile)] for name in ("values", "known"))
+        return values, known
+
+    def show(self, tile: Tile, picture: NDArray[Any], place: NDArray[np.int32]) -> None:
+        """Write a tile of the output."""
+        image = self.root["image"]
+        image[spans(tile)] = picture[..., 0] if image.ndim == 2 else picture
+        if "source" in self.root:
+            self.root["source"][spans(tile)] = place
+
+    def _planes(self, name: str, level: LevelPlan, before: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
+        shape, chunks = (*before, level.rows, level.cols), (*before, level.chunk, level.chunk)
+        return self._array(f"work/{name}", shape, chunks, dtype, (*("channel",) * len(before), "y", "x"))
+
+    def _pixels(self, name: str, level: LevelPlan, after: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
+        shape, chunks = (level.rows, level.cols, *after), (level.chunk, level.chunk, *after)
+        return self._array(name, shape, chunks, dtype, ("y", "x", *("channel",) * len(after)))
+
+    def _array(
+        self, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: np.dtype[Any], axes: tuple[str, ...]
+    ) -> Any:
+        fast = _zarr().codecs.BloscCodec(cname="lz4", clevel=1, shuffle="shuffle")
+        chunks = tuple(max(1, min(pair)) for pair in zip(chunks, shape, strict=True))
+        return self.root.create_array(
+            name, shape=shape, chunks=chunks, dtype=dtype, compressors=fast, dimension_names=axes, overwrite=True
+        )
+
+
+@dataclass(frozen=True)
+class Stored:
+    """What is given of an output, window by window out of a store."""
+
+    store: Store
+    work: Work
+    machine: Machine
+
+    def beside(self, neighbours: int, data_weight: float) -> Beside:
+        """As the whole output has it."""
+        return self.work.beside
+
+    def begun(self, field: Field) -> Field:
+        """As it is: `entered` lays all."""
+        return field
+
+    def entered(self, number: int, grid: Grid, field: Field) -> Field:
+        """The field of a window where a level begins, with what is given of it."""
+        if not self.work.held:
+            return field
+        levels, tile = self.work.plan.levels, Tile(*grid.within[:2], grid.rows, grid.cols)
+        values, source, temperature = (np.array(self.machine.get(plane)) for plane in field)
+        if number + 1 < len(levels):
+            kind = self.store.held(levels[number + 1], above(tile)).kind
+            temperature[tile.top % 2 :: 2, tile.left % 2 :: 2][kind == STANDING] = UNTOUCHED
+        held, guides = self.store.held(levels[number], tile), self.work.beside.guides
+        matched, given = len(values) - guides, held.kind != FREE
+        if guides:
+            values[matched:] = held.values[-guides:]
+        values[:matched, given] = held.values[:matched, given]
+        source[given], temperature[given] = held.source[given], 0
+        return Field(*(self.machine.put(plane) for plane in (values, source, temperature)))
+
+    def movable(self, number: int, grid: Grid) -> Array | None:
+        """0 at the sites of a window that nothing may relax; None where all may."""
+        if not self.work.held or grid.part is None:
+            return None
+        window = Tile(*grid.within[:2], grid.rows, grid.cols)
+        kind = self.store.held(self.work.plan.levels[number], window).kind
+        return self.machine.put((kind == FREE).astype(np.uint16))
+
+
+def _zarr() -> Any:
+    import_module("zarr.codecs")
+    return import_module("zarr")
+
+
+def first_turn(plan: Plan) -> Turn:
+    """The coarsest level begins."""
+    return Turn(1, phase_of(plan.levels[-1]), len(plan.levels) - 1)
+
+
+def phase_of(level: LevelPlan) -> str:
+    """How a level begins: one that is a single tile goes through all its sweeps at once."""
+    return "whole" if level.count == 1 else "begin"
+
+
+def above(tile: Tile) -> Tile:
+    """The sites of the level above that lie in a tile; there may be none."""
+    (top, rows), (left, cols) = (
+        (-(-first // 2), (first + size + 1) // 2 - -(-first // 2))
+        for first, size in ((tile.top, tile.rows), (tile.left, tile.cols))
+    )
+    return Tile(top, left, rows, cols)
+
+
+def spans(tile: Tile) -> tuple[slice, slice]:
+    """Rows and columns of a tile."""
+    return slice(tile.top, tile.top + tile.rows), slice(tile.left, tile.left + tile.cols)
+
+
+def cut(array: Any, level: LevelPlan, window: Tile) -> NDArray[Any]:
+    """A window of a stored array (..., rows, cols), in one piece."""
+
+    def parts(first: int, size: int, whole: int) -> Iterator[tuple[slice, slice]]:
+        at = 0
+        while at < size:
+            begin = (first + at) % whole
+            end = min(whole, begin + size - at)
+            yield slice(begin, end), slice(at, at + end - begin)
+            at += end - begin
+
+    found = np.empty((*array.shape[:-2], window.rows, window.cols), array.dtype)
+    for rows, down in parts(window.top, window.rows, level.rows):
+        for cols, right in parts(window.left, window.cols, level.cols):
+            found[..., down, right] = array[..., rows, cols]
+    return found
+
+
+__all__ = ["FORMAT", "KIND", "Store", "Stored", "Turn", "Work", "above", "first_turn", "phase_of"]

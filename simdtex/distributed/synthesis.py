@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""`synthesize` for outputs of any size, `resume`, and `plan`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from simdtex.distributed.plan import Plan, planned
+from simdtex.envelope import check_shape
+from simdtex.io.image import atomic_folder
+from simdtex.jobs.inputs import Inputs, check_inputs
+from simdtex.machine import Machine
+from simdtex.methods.mrf import make_options
+from simdtex.methods.mrf.outline import Outline, outlined
+from simdtex.options import whole
+from simdtex.random import as_seed
+from simdtex.run import Callback
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from distributed import Client
+
+TILES = 2048
+"""Sites to the side of a tile, where nobody says."""
+
+PathLike = str | os.PathLike[str]
+
+
+def synthesize(
+    sample: ArrayLike,
+    shape: tuple[int, int],
+    store: PathLike,
+    *,
+    tiles: int = TILES,
+    client: Client | None = None,
+    workers: int | None = None,
+    source_map: bool = False,
+    channel_axis: int | None = None,
+    mask: ArrayLike | Sequence[ArrayLike] | None = None,
+    known: ArrayLike | None = None,
+    known_source: ArrayLike | None = None,
+    guide: tuple[Any, Any] | None = None,
+    rng: int | np.random.Generator | None = None,
+    device: str | Machine | None = None,
+    callback: Callback | None = None,
+    **options: Any,
+) -> Any:
+    """Make more of a texture than one machine holds: the bytes of `simdtex.synthesize` with ``method="mrf"``.
+
+    Parameters
+    ----------
+    sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array; or a list of such
+        As in `simdtex.synthesize`, like all that is not said here.
+    shape : (int, int)
+        Rows and columns of the output.
+    store : path
+        Folder of the Zarr store to make, or an address of a file system that every worker reaches. It holds all that is
+        needed to go on where a run ended early: see `resume`.
+    tiles : int
+        Sites to the side of a tile. It decides how much memory a worker needs, never what is made.
+    client : distributed.Client, optional
+        Whose cluster's workers do the tiles; each opens its own device.
+    workers : int, optional
+        Start so many worker processes on this machine, which share its cores out. Without `client` and `workers` this
+        process does one tile after another.
+    source_map : bool
+        Also write ``source``, for every output pixel the (row, column[, picture]) of the sample pixel it is from.
+    mask, known, known_source, guide, rng
+        As in `simdtex.synthesize`. What is given of the output is held by this process once, and copied into the store.
+    device : str, optional
+        As in `simdtex.synthesize`, on every worker.
+    callback : callable, optional
+        Called with a `simdtex.run.Tiling` after every tile.
+    **options
+        Of the method, see `simdtex.methods.mrf.Options`; schedules that relax a window as they do the whole.
+
+    Returns
+    -------
+    dask.array.Array, (rows, cols[, channels])
+        The array ``image`` of the store, read when it is asked for; the channels are where `channel_axis` says.
+
+    Raises
+    ------
+    ValueError, TypeError
+        What is wrong and what would be right, in one sentence.
+    MemoryError
+        Workers end one after another over the same tile.
+
+    Notes
+    -----
+    A tile relaxes in a window that is as much larger as a sweep reaches, so the cost is that of `simdtex.synthesize`
+    and the redundant work that `plan` states. Memory of a worker: what `plan` states, whatever the output's size.
+    """
+    size = check_shape(shape)
+    inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
+    outline = _outline(inputs, size, as_seed(rng), options)
+    count = _workers(client, workers)
+    layout, target = planned(outline, tiles, count), _address(store)
+    with _made(target) as temporary:
+        from simdtex.distributed.store import Store
+
+        Store.create(temporary, outline, layout, inputs.given, channel_axis is not None, source_map, version("simdtex"))
+    return resume(store, client=client, workers=workers, channel_axis=channel_axis, device=device, callback=callback)
+
+
+def resume(
+    store: PathLike,
+    *,
+    client: Client | None = None,
+    workers: int | None = None,
+    channel_axis: int | None = -1,
+    device: str | Machine | None = None,
+    callback: Callback | None = None,
+) -> Any:
+    """Go on with an output that was begun: to the bytes of a run that never ended early.
+
+    Parameters
+    ----------
+    store : path
+        As of `synthesize`.
+    client, workers, device, callback
+        As of `synthesize`; they may be others than before.
+    channel_axis : int, optional
+        Where the channels of the array that is returned are, if it has any.
+
+    Returns
+    -------
+    dask.array.Array, (rows, cols[, channels])
+        As of `synthesize`; also of an output that was finished before.
+
+    Raises
+    ------
+    ValueError
+        There is no such store, or one of another version.
+    """
+    from simdtex.distributed.cluster import across, connected, here
+    from simdtex.distributed.drive import go_on
+
+    where = _address(store)
+    opened = _opened(where)
+    _workers(client, workers)
+    with connected(workers, None) as own:
+        crew = client or own
+        if crew is not None and not (device is None or isinstance(device, (str, int))):
+            raise TypeError("each worker opens its own device; give its name, not an open machine")
+        name = None if device is None else str(device)
+        go_on(opened, here(where, device) if crew is None else across(crew, where, name), callback)
+    return _array(where, channel_axis)
+
+
+def plan(
+    sample: ArrayLike,
+    shape: tuple[int, int],
+    *,
+    tiles: int = TILES,
+    workers: int = 1,
+    channel_axis: int | None = None,
+    **options: Any,
+) -> Plan:
+    """How an output would be cut into tiles, and what that would need.
+
+    Parameters
+    ----------
+    sample, shape, tiles, channel_axis, **options
+        As of `synthesize`; ``mask``, ``known`` and the like may be among the options.
+    workers : int
+        For whom it is laid out.
+
+    Returns
+    -------
+    simdtex.distributed.Plan
+        Tiles, halos and redundant work of each level, and bytes of memory and of disk.
+    """
+    size = check_shape(shape)
+    given = {name: options.pop(name, None) for name in ("mask", "known", "known_source", "guide")}
+    return planned(_outline(check_inputs(sample, size, channel_axis, **given), size, 0, options), tiles, workers)
+
+
+def _outline(inputs: Inputs, size: tuple[int, int], seed: int, options: dict[str, Any]) -> Outline:
+    chosen = make_options(**options)
+    if not isinstance(chosen.schedule, str):
+        raise TypeError("workers know schedules by their names; give schedule the name of one")
+    return outlined(inputs.pictures, size, chosen, seed, inputs.given, inputs.guide)
+
+
+def _workers(client: Client | None, workers: int | None) -> int:
+    """How many there are."""
+    if workers is not None:
+        whole("workers", workers, 1)
+        if client is not None:
+            raise TypeError("a client has its own workers; give client or workers, not both")
+        return workers
+    return 1 if client is None else max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+
+
+def _address(store: PathLike) -> str:
+    where = os.fspath(store)
+    if not isinstance(where, str):
+        raise TypeError(f"store must be a path or an address, not {store!r}")
+    return where if "://" in where else os.path.abspath(where)
+
+
+@contextmanager
+def _made(where: str) -> Iterator[str]:
+    """Where to make a store, so that it is there whole or not at all."""
+    _libraries()
+    if "://" in where:
+        yield where
+        return
+    path = Path(where)
+    if path.exists():
+        raise ValueError(f"{path} is there already; remove it, give another name, or go on with: simdtex resume {path}")
+    if not path.parent.is_dir():
+        raise ValueError(f"the folder {path.parent} does not exist; make it first")
+    with atomic_folder(path) as temporary:
+        yield str(temporary)
+
+
+def _opened(where: str) -> Any:
+    """A store, or one clear sentence."""
+    _libraries()
+    from simdtex.distributed.store import FORMAT, KIND, Store
+
+    try:
+        store = Store(where)
+    except (FileNotFoundError, ValueError, KeyError):
+        raise ValueError(f"{where} is no Zarr store; give one that simdtex has begun") from None
+    if "simdtex" not in store.root.attrs and "work" not in store.root:
+        raise ValueError(f"{where} is no output in tiles; give one that simdtex has begun")
+    if "work" in store.root:
+        attributes = store.root["work"].attrs
+        about, own = attributes.get("about", {}), version("simdtex")
+        if attributes.get("kind") != KIND or about.get("format") != FORMAT or about.get("version") != own:
+            raise ValueError(
+                f"{where} was begun by simdtex {about.get('version', 'of another kind')} and this is {own}; "
+                "go on with that version, or begin anew"
+            )
+    return store
+
+
+def _libraries() -> None:
+    try:
+        for name in ("zarr", "dask.array"):
+            import_module(name)
+    except ImportError as error:
+        raise ValueError(f"{error.name} is not installed; pip install 'simdtex[distributed]'") from None
+
+
+def _array(where: str, channel_axis: int | None) -> Any:
+    dask: Any = import_module("dask.array")
+    image = dask.from_zarr(where, component="image")
+    return image if channel_axis is None or image.ndim == 2 else dask.moveaxis(image, -1, channel_axis)

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a worker does: one tile's turn. It finds all that it needs in the store, and notes there what it has done."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from simdtex.distributed.store import Store, Stored, Turn, Work, above
+from simdtex.machine import Machine, open_machine
+from simdtex.methods.mrf import tiles
+from simdtex.methods.mrf.level import Run
+from simdtex.methods.mrf.synthesis import finished
+from simdtex.methods.mrf.tiles import Tally, Tile, framed
+from simdtex.ops.finish import around
+from simdtex.ops.neighbourhood import Field
+
+
+@dataclass(frozen=True)
+class Context:
+    """What a process keeps between two tiles."""
+
+    name: str
+    store: Store
+    work: Work
+    run: Run
+
+
+_contexts: dict[tuple[str, Any], Context] = {}
+_one = Lock()
+"""A process has one device, and two tiles at once would share it."""
+
+
+def context(where: str, device: str | Machine | None) -> Context:
+    """The context of a store, laid out on a device once."""
+    key, store = (where, device), Store(where)
+    name = store.about["name"]
+    if key not in _contexts or _contexts[key].name != name:
+        _contexts.clear()  # one at a time, so that memory has its bound
+        work, machine = store.work(), open_machine(device)
+        run = work.outline.run(machine, Stored(store, work, machine), machine.put(np.zeros((1, 1), np.int32)))
+        _contexts[key] = Context(name, store, work, run)
+    return _contexts[key]
+
+
+def forget() -> None:
+    """Let go of what is kept."""
+    _contexts.clear()
+
+
+def do(where: str, device: str | Machine | None, turn: Turn, number: int) -> int:
+    """A tile's turn, unless it has been done; returns the tile's number.
+
+    Parameters
+    ----------
+    where : str
+        The store.
+    device : str or Machine, optional
+        As of `simdtex.open_machine`.
+    turn : Turn
+    number : int
+        Of the tile, row by row.
+    """
+    with _one:
+        here = context(where, device)
+        if here.store.tally(turn, number) is None:
+            here.store.told(
+                turn, number, PHASES[turn.phase](here, turn, here.work.plan.levels[turn.level].tile(number))
+            )
+    return number
+
+
+def _begin(here: Context, turn: Turn, tile: Tile) -> Tally:
+    field, tally = tiles.begun(here.run, turn.level, tile, _above(here, turn, tile))
+    here.store.write(here.work.plan.levels[turn.level], turn.write, tile, field)
+    return tally
+
+
+def _whole(here: Context, turn: Turn, tile: Tile) -> Tally:
+    field = tiles.whole(here.run, turn.level, _above(here, turn, tile))
+    here.store.write(here.work.plan.levels[turn.level], turn.write, tile, field)
+    return Tally(np.zeros(0, np.int32), 0, 0)
+
+
+def _sweep(here: Context, turn: Turn, tile: Tile) -> Tally:
+    level = here.work.plan.levels[turn.level]
+    frame = framed(level.lattice, tile, level.halo)
+    before, price = here.store.read(level, turn.read, frame.window), here.store.price(turn)
+    done, free = turn.cooling + turn.free, not turn.warm
+    field, tally = tiles.relaxed(here.run, turn.level, tile, frame, before, price, done, free)
+    here.store.write(level, turn.write, tile, field)
+    return tally
+
+
+def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
+    run, work, level = here.run, here.work, here.work.plan.levels[0]
+    sd = run.options.finish or 0
+    frame = framed(level.lattice, tile, int(around(sd)[0].max()) if sd else 0)
+    state = here.store.read(level, turn.read, frame.window)
+    source = frame.cut(state.source)
+    if sd:
+        known = here.store.held(level, frame.window).kind > 0 if work.held else None
+        field, grid = Field(*map(run.machine.put, state)), run.grid(0).window(*frame.window)
+        shown = finished(run, grid, field, known, state.source[frame.rows], frame.rows.start)[:, frame.cols]
+    else:
+        shown = run.sample.picture(frame.cut(state.values), source)
+    if here.store.about["given"]:
+        values, told = here.store.given(tile)
+        shown = np.where(told, values, shown)
+    here.store.show(tile, shown, run.sample.place(source))
+    return Tally(np.zeros(0, np.int32), 0, 0)
+
+
+def _above(here: Context, turn: Turn, tile: Tile) -> Field | None:
+    levels = here.work.plan.levels
+    if turn.level + 1 == len(levels):
+        return None
+    return here.store.read(levels[turn.level + 1], turn.read, above(tile))
+
+
+PHASES = {"begin": _begin, "whole": _whole, "sweep": _sweep, "show": _show}
+
+__all__ = ["Context", "context", "do", "forget"]
