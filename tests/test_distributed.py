@@ -1,0 +1,478 @@
+"""An output in tiles has the bytes of one that is made at once, whatever the tiles, the workers and their order."""
+
+import json
+import random
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, opencl, texture
+
+import simdtex
+from simdtex import distributed
+from simdtex.distributed import store as store_module
+from simdtex.distributed.drive import go_on
+from simdtex.distributed.plan import planned
+from simdtex.distributed.store import Store, above, cut
+from simdtex.distributed.tasks import do, forget
+from simdtex.io.image import read
+from simdtex.methods.mrf import make_options
+from simdtex.methods.mrf.outline import outlined
+from simdtex.methods.mrf.tiles import Tile, framed
+from simdtex.model.lattice import Grid
+from simdtex.ops.neighbourhood import Field
+from simdtex.run import Tiling
+
+zarr = pytest.importorskip("zarr")
+
+SAMPLE = texture((22, 25), seed=2)
+COLOUR = np.stack([texture((22, 25), seed=k) for k in (1, 2, 3)], -1)
+
+
+def both(tmp_path, sample, shape, tiles, device=REFERENCE, **options):
+    """The output in tiles and its source map; and those of one that is made at once."""
+    path = tmp_path / "out.zarr"
+    ours = distributed.synthesize(
+        sample, shape, path, tiles=tiles, rng=11, device=device, source_map=True, **options
+    ).compute()
+    theirs, output = simdtex.synthesize(sample, shape, rng=11, device=device, full_output=True, **options)
+    return (ours, zarr.open_group(path)["source"][...]), (theirs, output.source)
+
+
+def assert_same(tmp_path, *given, **options):
+    ours, theirs = both(tmp_path, *given, **options)
+    for mine, whole in zip(ours, theirs, strict=True):
+        assert_same_bits(mine, whole)
+    forget()
+
+
+TILINGS = [7, 12, 16, 30, 36, 1000]  # rows of 37: uneven; one site wide (36 + 1); more than all
+
+
+@pytest.mark.parametrize("boundary", ["torus", "open"])
+@pytest.mark.parametrize("tiles", TILINGS)
+def test_any_tiling(tmp_path, tiles, boundary):
+    assert_same(tmp_path, SAMPLE, (37, 30), tiles, order=1, boundary=boundary)
+
+
+VARIANTS = {
+    "coherent": {"order": 2, "exhaustive": 0, "similar": 1},
+    "exact": {"order": 2, "search": "exact"},
+    "draws": {"order": 2, "search": "exact", "relaxation": "gibbs"},
+    "density": {"order": 2, "search": "exact", "relaxation": "gibbs", "pixel": "density"},
+    "fixed": {"order": 1, "schedule": "coloring-fixed"},
+    "checkerboard": {"order": 2, "schedule": "checkerboard"},
+    "synchronous": {"order": 2, "schedule": "synchronous"},
+    "one level, no price": {"order": 2, "levels": 1, "balance": 0.0},
+    "no free sweep, no finish": {"order": 2, "free_sweeps": 0, "finish": 0.0},
+    "all phases": {"order": 1, "phases": "all", "levels": 2},
+    "wide finish": {"order": 1, "finish": 3.0},
+}
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_any_options(tmp_path, name):
+    assert_same(tmp_path, SAMPLE, (29, 33), 16, **VARIANTS[name])
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "bool", "uint16", "float32"])
+def test_any_type_and_channels(tmp_path, dtype):
+    assert_same(tmp_path, COLOUR.astype(dtype), (26, 25), 13, order=1, channel_axis=-1)
+
+
+def test_channels_stay_where_they_are(tmp_path):
+    assert_same(tmp_path, np.moveaxis(COLOUR, -1, 0), (26, 25), 13, order=1, channel_axis=0)
+    assert_same(tmp_path / "..", COLOUR[..., :1], (20, 20), 13, order=1, channel_axis=-1)
+
+
+def test_on_devices(tmp_path, any_device):
+    assert_same(tmp_path, COLOUR, (61, 70), 33, opencl(any_device), order=2, channel_axis=-1)
+
+
+def known_values(shape, share, seed):
+    rng = np.random.default_rng(seed)
+    return np.ma.masked_array(rng.choice(SAMPLE.ravel(), shape), rng.random(shape) > share)
+
+
+@pytest.mark.parametrize("boundary", ["torus", "open"])
+@pytest.mark.parametrize("share", [0.02, 0.3])
+def test_known_sites(tmp_path, share, boundary):
+    """Also data between the sites of coarse levels, whose stand-ins lie in other tiles."""
+    shape = (39, 34)
+    given = {"known": known_values(shape, share, 5), "boundary": boundary}
+    assert_same(tmp_path, SAMPLE, shape, 10, order=2, levels=3, **given)
+
+
+def test_known_sources_and_a_known_side(tmp_path):
+    shape = (24, 31)
+    known = np.ma.masked_array(np.zeros(shape, np.uint8), True)
+    place = np.full((*shape, 2), -1)
+    known[:, :9], place[:22, :9] = SAMPLE[[*range(22), 0, 1], :9], np.moveaxis(np.mgrid[:22, :9], 0, -1)
+    assert_same(tmp_path, SAMPLE, shape, 11, order=2, known=known, known_source=place)
+
+
+def test_variables_known_in_part(tmp_path):
+    shape, rng = (25, 26), np.random.default_rng(3)
+    two = COLOUR[..., :2]
+    known = np.ma.masked_array(rng.choice(two.ravel(), (*shape, 2)), rng.random((*shape, 2)) > 0.2)
+    assert_same(tmp_path, two, shape, 13, order=1, channel_axis=-1, known=known)
+
+
+@pytest.mark.parametrize("gaps", [False, True])
+def test_guides(tmp_path, gaps):
+    shape, rng = (27, 30), np.random.default_rng(4)
+    guide = rng.random(shape).astype(np.float32)
+    guide[rng.random(shape) < 0.6 * gaps] = np.nan
+    assert_same(tmp_path, SAMPLE, shape, 14, order=1, guide=(SAMPLE.astype(np.float32) / 255, guide))
+
+
+def test_labels_with_known_sites(tmp_path):
+    shape = (27, 30)
+    labels = (SAMPLE > 128).astype(np.uint8), (np.indices(shape).sum(0) // 20 % 2).astype(np.uint8)
+    assert_same(tmp_path, SAMPLE, shape, 14, order=1, guide=labels, known=known_values(shape, 0.05, 6))
+
+
+def test_several_samples_with_masks_and_gaps(tmp_path):
+    first, second = SAMPLE.astype(np.float32), texture((19, 30), seed=8).astype(np.float32)
+    first[3:6, 4:9] = np.nan
+    masks = [np.ones(one.shape, bool) for one in (first, second)]
+    masks[1][:, :7] = False
+    given = {"mask": masks, "shares": (2.0, 1.0)}
+    ours, theirs = both(tmp_path, [first, second], (28, 31), 15, order=1, **given)
+    for mine, whole in zip(ours, theirs, strict=True):
+        assert_same_bits(mine, whole)
+    assert ours[1].shape == (28, 31, 3)
+
+
+def test_categories(tmp_path):
+    kinds = (SAMPLE // 64).astype(np.uint8)
+    options = {"categorical": True, "proportions": (1.0, 2.0, 1.0, 1.0)[: np.unique(kinds).size]}
+    assert_same(tmp_path, kinds, (28, 31), 15, order=1, **options)
+
+
+def test_a_sample_and_options_of_every_kind_come_back_from_a_store(tmp_path):
+    """What a worker lays out is what was laid out: see also that all options survive JSON."""
+    options = make_options(order=2, weights=(1.0, 0.5, 0.1 + 0.2), xi=-1.7)
+    outline = outlined(COLOUR, (30, 31), options, 2**40 + 1)
+    store = Store.create(str(tmp_path / "s.zarr"), outline, planned(outline, 10, 1), None, True, False, "v")
+    again = store.work().outline
+    assert again.options == outline.options
+    assert (again.seed, again.levels, again.shape, again.kit) == (2**40 + 1, outline.levels, (30, 31), outline.kit)
+    assert_same_bits(again.sample.working, outline.sample.working)
+    assert json.dumps(store.about)
+
+
+# -- the order of things, and going on -------------------------------------------------------------------------
+
+
+class Stop(Exception):
+    pass
+
+
+def shuffled(where, device, seed, stop=None):
+    """Tiles in any order; an exception after so many of them, over all turns."""
+    order, done = random.Random(seed), [0]
+
+    def execute(turn, tiles):
+        tiles = list(tiles)
+        order.shuffle(tiles)
+        for number in tiles:
+            if stop is not None and done[0] == stop:
+                raise Stop
+            done[0] += 1
+            yield do(where, device, turn, number)
+
+    return execute
+
+
+def created(tmp_path, name="s.zarr", **options):
+    outline = outlined(SAMPLE[..., None], (26, 31), make_options(order=1, levels=2, **options), 11)
+    where = str(tmp_path / name)
+    return Store.create(where, outline, planned(outline, 12, 1), None, False, False, "v"), where
+
+
+def test_tiles_come_in_any_order(tmp_path):
+    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, device=REFERENCE)
+    for seed in range(2):
+        store, where = created(tmp_path, f"{seed}.zarr")
+        go_on(store, shuffled(where, REFERENCE, seed))
+        assert_same_bits(store.root["image"][...], whole)
+        assert "work" not in Store(where).root
+
+
+def test_a_run_that_is_stopped_after_any_tile_goes_on_to_the_same_bytes(tmp_path):
+    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, device=REFERENCE)
+    store, where = created(tmp_path)
+    stops = 0
+    while True:
+        try:
+            go_on(Store(where), shuffled(where, REFERENCE, stops, stop=5))
+            break
+        except Stop:
+            stops += 1
+    assert stops > 10
+    assert_same_bits(store.root["image"][...], whole)
+
+
+def test_a_tile_that_is_done_twice_changes_nothing(tmp_path):
+    store, where = created(tmp_path)
+
+    def twice(turn, tiles):
+        for number in tiles:
+            do(where, REFERENCE, turn, number)
+            before = store.tally(turn, number)
+            store.root[f"work/tally{turn.number}"][number] = 0
+            do(where, REFERENCE, turn, number)
+            assert_same_bits([np.asarray(one) for one in store.tally(turn, number)], [np.asarray(one) for one in before])
+            yield number
+
+    go_on(store, twice)
+    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, device=REFERENCE)
+    assert_same_bits(store.root["image"][...], whole)
+
+
+@pytest.mark.parametrize("moment", ["price", "attribute", "removal", "tally", "planes"])
+def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeypatch, moment):
+    """Turns are changed in one piece: stopped before or after each of the writes around that, a run goes on."""
+    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, device=REFERENCE)
+    store, where = created(tmp_path)
+    calls = {"left": 0}
+
+    class Group:
+        """A group of Zarr that stops at the n-th of one kind of its writes."""
+
+        def __init__(self, group):
+            self._group = group
+
+        def __getattr__(self, name):
+            return getattr(self._group, name)
+
+        def __getitem__(self, name):
+            found = self._group[name]
+            return Group(found) if name == "work" else found
+
+        def __contains__(self, name):
+            return name in self._group
+
+        def _stop(self, kind):
+            if kind == moment:
+                calls["left"] -= 1
+                if calls["left"] == 0:
+                    raise Stop
+
+        def create_array(self, name, **given):
+            kind = "price" if name.startswith("price") else "tally" if "tally" in name else "planes"
+            self._stop(kind)
+            return self._group.create_array(name, **given)
+
+        def __delitem__(self, name):
+            self._stop("removal")
+            del self._group[name]
+
+        @property
+        def attrs(self):
+            self._stop("attribute")
+            return self._group.attrs
+
+    class Stopping(Store):
+        def __init__(self, where):
+            super().__init__(where)
+            self.root = Group(self.root)
+
+    stops = 0
+    while True:
+        calls["left"] = 2
+        try:
+            go_on(Stopping(where), shuffled(where, REFERENCE, 0))
+            break
+        except Stop:
+            stops += 1
+            assert stops < 200
+    assert stops > 2
+    assert_same_bits(store.root["image"][...], whole)
+
+
+def test_going_on_with_what_is_finished_changes_nothing(tmp_path):
+    path = tmp_path / "out.zarr"
+    first = distributed.synthesize(SAMPLE, (20, 21), path, tiles=9, order=1, rng=1, device=REFERENCE).compute()
+    assert_same_bits(distributed.resume(path).compute(), first)
+
+
+# -- progress --------------------------------------------------------------------------------------------------
+
+
+def test_progress_tells_every_tile(tmp_path):
+    seen = []
+
+    def callback(progress):
+        assert isinstance(progress, Tiling)
+        seen.append((progress.fraction, progress.doing, progress.image()))
+
+    distributed.synthesize(
+        SAMPLE, (30, 31), tmp_path / "o.zarr", tiles=16, order=1, rng=1, device=REFERENCE, callback=callback
+    )
+    fractions = [fraction for fraction, *_ in seen]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+    assert seen[-1][1] == "writing the picture, tile 4 of 4"
+    assert any("sweep 2, tile 3 of 4" in doing for _, doing, _ in seen)
+    assert seen[-1][2].shape[:2] == (30, 31)
+
+
+def test_a_picture_of_a_large_level_is_every_nth_site(tmp_path, monkeypatch):
+    monkeypatch.setattr("simdtex.distributed.drive.SHOWN", 8)
+    shapes = set()
+    distributed.synthesize(
+        SAMPLE, (30, 31), tmp_path / "o.zarr", tiles=16, order=1, rng=1, device=REFERENCE,
+        callback=lambda progress: shapes.add(progress.image().shape[:2]),
+    )  # fmt: skip
+    assert (8, 8) in shapes
+
+
+# -- the plan --------------------------------------------------------------------------------------------------
+
+
+def test_the_plan_says_what_is_needed():
+    plan = distributed.plan(SAMPLE, (4096, 4096), tiles=1024, order=18)
+    finest = plan.levels[0]
+    assert (finest.count, finest.side, finest.rows, finest.chunk) == (16, 1024, 4096, 512)
+    assert finest.halo == 4 * 28  # its colours: docs/concepts/coloring.rst
+    relaxed = sum(finest.relaxed(tile) for tile in finest.tiles())
+    assert finest.redundant == pytest.approx(relaxed / 4096**2 - 1)
+    assert 0.3 < finest.redundant < 0.4
+    assert plan.levels[-1].count == 1
+    lines = plan.lines()
+    assert lines[-2].startswith("level 0: 4096x4096 sites in 16 tiles of 1024x1024, halo 112, 3")
+    assert f"{plan.memory / 2**20:.0f} MiB" in lines[-1]
+
+
+def test_memory_of_a_worker_does_not_grow_with_the_output():
+    plans = [distributed.plan(SAMPLE, (side, side), tiles=512, order=2) for side in (4000, 40_000, 1_000_000)]
+    assert len({plan.memory for plan in plans}) == 1
+    assert plans[-1].disk > 10**13
+
+
+def test_more_workers_cut_coarse_levels_smaller():
+    one, many = (distributed.plan(SAMPLE, (4096, 4096), tiles=2048, workers=n, order=2) for n in (1, 64))
+    assert [level.count for level in one.levels] <= [level.count for level in many.levels]
+    assert many.levels[1].count > one.levels[1].count
+    assert many.levels[0].side == 2048
+
+
+def test_redundant_work_is_what_the_schedule_does(tmp_path):
+    """Counted: the sites of all steps of a free sweep, over those of the lattice."""
+    from simdtex.methods.mrf.algorithm import Warm
+    from simdtex.schedules.trimmed import Trimmed
+
+    outline = outlined(SAMPLE[..., None], (60, 64), make_options(order=2, levels=1), 1)
+    level = planned(outline, 20, 1).levels[0]
+    run = outline.run(REFERENCE, outline.holding(REFERENCE), np.zeros((60, 64), np.int32))
+    sites = 0
+    for tile in level.tiles():
+        frame = framed(level.lattice, tile, level.halo)
+        window = run.level(0, frame.window)
+        schedule = Trimmed(window.schedule, frame.rows.start, frame.rows.stop)
+        warm = Warm(window, np.zeros((1, 1)), True)
+        _, info = schedule.step(window.setting, schedule.init(window.setting), warm)
+        sites += int((info.ranges[:, 1] - info.ranges[:, 0]).sum())
+    assert sites / (60 * 64) - 1 == pytest.approx(level.redundant, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("tile", "halo", "torus", "window", "where"),
+    [
+        (Tile(0, 10, 10, 10), 3, True, (37, 7, 16, 16), (3, 3)),
+        (Tile(0, 10, 10, 10), 3, False, (0, 7, 13, 16), (0, 3)),
+        (Tile(30, 40, 10, 10), 3, False, (27, 37, 13, 13), (3, 3)),
+        (Tile(10, 0, 10, 50), 20, True, (0, 0, 40, 50), (10, 0)),
+        (Tile(10, 0, 10, 50), 20, False, (0, 0, 40, 50), (10, 0)),
+        (Tile(39, 0, 1, 10), 0, True, (39, 0, 1, 10), (0, 0)),
+    ],
+    ids=str,
+)
+def test_a_tile_lies_in_its_window(tile, halo, torus, window, where):
+    frame = framed(Grid(40, 50, 1, torus), tile, halo)
+    assert tuple(frame.window) == window
+    assert (frame.rows.start, frame.cols.start) == where
+    assert frame.cut(np.zeros((2, *window[2:]))).shape == (2, tile.rows, tile.cols)
+
+
+@pytest.mark.parametrize("tile", [Tile(0, 0, 4, 4), Tile(3, 2, 5, 1), Tile(1, 1, 1, 1), Tile(5, 0, 1, 3)], ids=str)
+def test_the_sites_above_lie_in_the_tile(tile):
+    there = above(tile)
+    rows = [2 * row for row in range(there.top, there.top + there.rows)]
+    assert rows == [row for row in range(tile.top, tile.top + tile.rows) if row % 2 == 0]
+
+
+def test_windows_go_on_across_the_seam():
+    level = distributed.plan(SAMPLE, (20, 30), tiles=8, order=1).levels[0]
+    whole = np.arange(2 * 600).reshape(2, 20, 30)
+    for window in (Tile(15, 25, 9, 12), Tile(0, 0, 20, 30), Tile(3, 4, 5, 6)):
+        rows, cols = (np.arange(a, a + n) % m for a, n, m in zip(window[:2], window[2:], (20, 30), strict=True))
+        assert_same_bits(cut(whole, level, window), whole[:, rows[:, None], cols])
+
+
+# -- bad input -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"schedule": "luby"}, "schedule luby needs the whole output at once; give the schedule coloring"),
+        ({"schedule": "block"}, "schedule block needs the whole"),
+        ({"array": "16x16"}, "array 16x16 needs the whole"),
+        ({"tiles": 0}, "tiles is 0; give 1 or more"),
+        ({"workers": 0}, "workers is 0; give 1 or more"),
+        ({"shape": (0, 3)}, "rows of the output is 0"),
+        ({"order": 50}, "does not fit the sample"),
+    ],
+)
+def test_bad_input_is_said_before_anything_is_made(tmp_path, options, words):
+    path = tmp_path / "out.zarr"
+    with pytest.raises(ValueError, match=words):
+        distributed.synthesize(SAMPLE, options.pop("shape", (20, 20)), path, **options)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_there_is_kept(tmp_path):
+    (tmp_path / "out.zarr").mkdir()
+    with pytest.raises(ValueError, match="is there already; remove it"):
+        distributed.synthesize(SAMPLE, (20, 20), tmp_path / "out.zarr")
+    with pytest.raises(ValueError, match=r"the folder .*no does not exist; make it first"):
+        distributed.synthesize(SAMPLE, (20, 20), tmp_path / "no" / "out.zarr")
+
+
+def test_only_stores_of_ones_own_are_gone_on_with(tmp_path, monkeypatch):
+    for make in (lambda path: None, lambda path: path.mkdir(), lambda path: path.write_text("no")):
+        make(tmp_path / "a.zarr")
+        with pytest.raises(ValueError, match="is no Zarr store; give one that simdtex has begun"):
+            distributed.resume(tmp_path / "a.zarr")
+        if (tmp_path / "a.zarr").is_dir():
+            (tmp_path / "a.zarr").rmdir()
+    zarr.open_group(tmp_path / "b.zarr", mode="w")
+    with pytest.raises(ValueError, match="is no output in tiles"):
+        distributed.resume(tmp_path / "b.zarr")
+    store, where = created(tmp_path)
+    with pytest.raises(ValueError, match="was begun by simdtex v and this is .*; go on with that version, or begin anew"):
+        distributed.resume(where)
+    monkeypatch.setattr(store_module, "FORMAT", 2)
+    with pytest.raises(ValueError, match="go on with that version"):
+        distributed.resume(where)
+    assert store.turn.number == 1
+
+
+def test_a_schedule_of_ones_own_is_not_known_to_workers(tmp_path):
+    with pytest.raises(TypeError, match="workers know schedules by their names"):
+        distributed.synthesize(SAMPLE, (20, 20), tmp_path / "o.zarr", schedule=simdtex.schedules.get("coloring"))
+
+
+def test_the_store_is_an_array_that_others_read(tmp_path):
+    path = tmp_path / "out.zarr"
+    picture = distributed.synthesize(COLOUR, (20, 21), path, tiles=9, order=1, rng=1, device=REFERENCE, channel_axis=-1)
+    assert picture.chunksize == (9, 9, 3)
+    image = zarr.open_group(path, mode="r")["image"]
+    assert image.metadata.dimension_names == ("y", "x", "channel")
+    assert zarr.open_group(path).attrs["simdtex"]["seed"] == 1
+    assert sorted(zarr.open_group(path).keys()) == ["image"]
+    with pytest.raises(ValueError, match="."):
+        read(path)
+    assert Field._fields == store_module.PLANES
