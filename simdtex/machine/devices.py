@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simdtex.machine import runtimes
+from simdtex.machine.runtimes import DeviceError
 
 if TYPE_CHECKING:
     import pyopencl as cl
@@ -37,10 +38,6 @@ _SIMULATORS = ("oclgrind", "llvmpipe", "softpipe", "emulat")
 _ONE_THREAD = ("basic", "cpu-minimal")
 _KIND_ORDER = {"gpu": 0, "cpu": 1, "accelerator": 2, "other": 3}
 _NOT_PROBED = "not probed"
-
-
-class DeviceError(ValueError):
-    """No device, or no single device, fits what was asked for."""
 
 
 @dataclass(frozen=True)
@@ -175,6 +172,7 @@ def find(text: str | int | DeviceInfo | None = None) -> DeviceInfo:
     wanted = str(text) if text is not None else os.environ.get(VARIABLE) or None
     if wanted is not None and wanted.strip().lower() == "reference":
         return _reference(0)  # no runtime is asked, so that it works where all are broken
+    runtimes.alive()
     return choose(wanted, devices(probe=False), probe)
 
 

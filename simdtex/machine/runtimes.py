@@ -22,7 +22,7 @@ import numpy as np
 if TYPE_CHECKING:
     import pyopencl as cl
 
-__all__ = ["clean", "failure", "failures", "intel_library", "one_line", "platforms"]
+__all__ = ["DeviceError", "alive", "clean", "failure", "failures", "intel_library", "one_line", "platforms"]
 
 _INTEL = "libintelocl.so"
 _MARK = "simdtex-probe:"
@@ -39,6 +39,33 @@ __kernel void probe(__global const float *a, __global float *b)
 """
 
 
+LOST = (
+    "OpenCL was in use before this process was forked, and its threads are not in the child; start processes with "
+    'multiprocessing.get_context("spawn") or "forkserver", or take device="reference" here'
+)
+_asked, _lost = False, False
+
+
+class DeviceError(ValueError):
+    """No device, or no single device, fits what was asked for; or it cannot do it."""
+
+
+def _forked() -> None:
+    """In a child that shares a runtime's memory but none of its threads: whatever is asked of it waits for ever."""
+    global _lost
+    _lost = _asked
+
+
+if hasattr(os, "register_at_fork"):  # Windows forks nothing
+    os.register_at_fork(after_in_child=_forked)
+
+
+def alive() -> None:
+    """Raise DeviceError where this process was forked from one in which a runtime was in use."""
+    if _lost:
+        raise DeviceError(LOST)
+
+
 def platforms() -> list[cl.Platform]:
     """Return the platforms that the loader knows, each once; the first call decides.
 
@@ -47,6 +74,9 @@ def platforms() -> list[cl.Platform]:
     """
     import pyopencl
 
+    global _asked
+    alive()
+    _asked = True
     try:
         try:
             with _folder():
@@ -130,6 +160,7 @@ def failure(handle: cl.Device) -> str:
     from simdtex.machine.programs import build
 
     try:
+        alive()
         context = pyopencl.Context([handle])
         program = build(context, _SOURCE, ["-cl-std=CL1.2"])
         queue = pyopencl.CommandQueue(context)
@@ -158,6 +189,8 @@ def failures(indices: Sequence[int]) -> list[str]:
     list of str
         For each, why the device is not usable, or nothing.
     """
+    if _lost:
+        return [LOST] * len(indices)
     # The children get this process's own path, so that they find the same package.
     code = (
         "import sys; sys.path[:] = {path!r}\n"
