@@ -168,7 +168,9 @@ def find(text: str | int | DeviceInfo | None = None) -> DeviceInfo:
             return text
         raise DeviceError(f"The device {text} cannot be used: {text.reason}.")
     if isinstance(text, bool) or not isinstance(text, str | int | None):
-        raise TypeError(f"device must be a text, an index, a DeviceInfo or None, but it is a {type(text).__name__}.")
+        raise TypeError(
+            f"device must be a text, an index, a DeviceInfo, an open machine or None, but it is a {type(text).__name__}."
+        )
     wanted = str(text) if text is not None else os.environ.get(VARIABLE) or None
     if wanted is not None and wanted.strip().lower() == "reference":
         return _reference(0)  # no runtime is asked, so that it works where all are broken
@@ -210,7 +212,9 @@ def choose(
         return usable[0]
     choices = ", ".join(f"{info.index} = {info}" for info in listing if info.name)
     if not matches:
-        raise DeviceError(f'No device matches "{text}"; choose one of: {choices}.')
+        trouble = runtimes.cache_trouble()
+        why = f" ({trouble})" if trouble else ""
+        raise DeviceError(f'No device matches "{text}"{why}; choose one of: {choices}.')
     if not usable:
         reasons = "; ".join(f"{info}: {info.reason}" for info in matches)
         raise DeviceError(f'The device "{text}" cannot be used ({reasons}); choose one of: {choices}.')
@@ -357,7 +361,8 @@ def _nothing_usable(found: Sequence[DeviceInfo]) -> str:
         "the driver of your GPU",
     ]
     install = ", ".join(remedy for remedy in remedies if remedy)
-    why = "; ".join(f"{info.name or info.platform}: {info.reason}" for info in found)
+    reasons = [*(f"{info.name or info.platform}: {info.reason}" for info in found), runtimes.cache_trouble()]
+    why = "; ".join(reason for reason in reasons if reason)
     return (
         f"No usable OpenCL device was found{f' ({why})' if why else ''}: install {install}, "
         'or use device="reference", which is slow.'

@@ -298,8 +298,7 @@ class OpenCL:
 
     def _build(self, files: tuple[str, ...], options: str) -> Any:
         source = "\n".join((kernel_folder() / f"{file}.cl").read_text(encoding="utf-8") for file in files)
-        with programs.building():
-            return cl.Program(self.context, source).build([*options.split(), *self.include])
+        return programs.compiled(self.context, source, [*options.split(), *self.include])
 
     def launch_sites(
         self,

@@ -8,6 +8,7 @@ every kernel once more, for work-groups of any size, which pays only for a tiny 
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import warnings
 from collections.abc import Iterator
@@ -39,6 +40,36 @@ def building() -> Iterator[None]:
         yield
 
 
+def compiled(context: cl.Context, source: str, options: list[str]) -> Any:
+    """Compile a program; the compiler's warnings, which Intel's prints by itself, are nobody's business.
+
+    Returns
+    -------
+    pyopencl.Program
+
+    Raises
+    ------
+    pyopencl.Error
+        With the compiler's words.
+    """
+    options = ["-w", *options]
+    with building():
+        try:
+            return cl.Program(context, source).build(options, cache_dir=_binaries())
+        except (OSError, LookupError):  # pyopencl could not use its cache of binaries
+            return cl.Program(context, source).build(options, cache_dir=False)  # type: ignore[arg-type]
+
+
+@functools.cache
+def _binaries() -> str | None:
+    """Where pyopencl is to keep binaries for runtimes that do not: None is its own place."""
+    import platformdirs
+
+    own = Path(platformdirs.user_cache_dir("pyopencl", "pyopencl"))
+    place = None if cache.writable(own) else cache.spare("pyopencl")
+    return place and str(place)
+
+
 def build(context: cl.Context, source: str, options: list[str]) -> Any:
     """Build a program that includes nothing for the one device of a context, from what was kept where there is that.
 
@@ -57,7 +88,7 @@ def build(context: cl.Context, source: str, options: list[str]) -> Any:
         if binary is not None:
             with suppress(cl.Error):  # one of a runtime that is gone is built anew
                 return cl.Program(context, context.devices, [binary]).build(options)
-        program = cl.Program(context, source).build(options)
+        program = compiled(context, source, options)
         if path:
             with suppress(cl.Error):  # a runtime without a compiler for binaries is none the worse for it
                 binary = program.get_info(cl.program_info.BINARIES)[0]
