@@ -94,7 +94,7 @@ def keep(path: Path, data: bytes) -> None:
 
 @functools.cache
 def _tidy(place: Path, ours: bool) -> None:
-    """Remove, once in a process, what killed ones were writing; in a folder of the user's choice by our prefix alone."""
+    """Remove, once in a process, what killed ones were writing; in a folder that the user chose by our prefix alone."""
     for part in (place, place / "programs"):
         try:
             names = [name for name in os.listdir(part) if name.endswith(SUFFIX)]

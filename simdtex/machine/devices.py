@@ -169,7 +169,8 @@ def find(text: str | int | DeviceInfo | None = None) -> DeviceInfo:
         raise DeviceError(f"The device {text} cannot be used: {text.reason}.")
     if isinstance(text, bool) or not isinstance(text, str | int | None):
         raise TypeError(
-            f"device must be a text, an index, a DeviceInfo, an open machine or None, but it is a {type(text).__name__}."
+            "device must be a text, an index, a DeviceInfo, an open machine or None, "
+            f"but it is a {type(text).__name__}."
         )
     wanted = str(text) if text is not None else os.environ.get(VARIABLE) or None
     if wanted is not None and wanted.strip().lower() == "reference":

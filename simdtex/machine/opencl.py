@@ -59,9 +59,8 @@ def kernel_folder() -> Path:
 class OpenCL:
     """One OpenCL device, which threads may share: the bytes of each are those of a run alone.
 
-    Operations of several threads take turns, so that sharing saves memory and compilation, but no time; figures of work,
-    as `launches` and `seconds`, count what all of them asked for. A process that is forked must open its own, and can do
-    so only if OpenCL was not in use before.
+    Operations of several threads take turns, so that sharing saves compilation, but no time; figures of work, as
+    `launches` and `seconds`, count what all of them asked for. In a process that was forked it raises DeviceError.
 
     Parameters
     ----------

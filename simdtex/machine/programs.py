@@ -65,9 +65,10 @@ def _binaries() -> str | None:
     """Where pyopencl is to keep binaries for runtimes that do not: None is its own place."""
     import platformdirs
 
-    own = Path(platformdirs.user_cache_dir("pyopencl", "pyopencl"))
-    place = None if cache.writable(own) else cache.spare("pyopencl")
-    return place and str(place)
+    if cache.writable(Path(platformdirs.user_cache_dir("pyopencl", "pyopencl"))):
+        return None
+    place = cache.spare("pyopencl")
+    return str(place) if place else None
 
 
 def build(context: cl.Context, source: str, options: list[str]) -> Any:

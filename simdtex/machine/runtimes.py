@@ -32,7 +32,7 @@ __all__ = ["DeviceError", "alive", "clean", "failure", "failures", "intel_librar
 _INTEL = "libintelocl.so"
 _MARK = "simdtex-probe:"
 _POCL_CACHE = "POCL_CACHE_DIR"
-_SEARCH = 0.05
+_SEARCH = 0.03
 _SECONDS = 60.0  # a first build takes a second or two; a busy machine, several times that
 _FOLDERS = ("OCL_ICD_VENDORS", "OPENCL_VENDOR_PATH")  # how users name a folder to the loader
 
@@ -104,7 +104,7 @@ def pocl_cache() -> Path:
     if home := os.environ.get("XDG_CACHE_HOME"):
         return Path(home, "pocl", "kcache")
     home = os.environ.get("HOME")
-    return Path(home, ".cache", "pocl", "kcache") if home else Path("/tmp/pocl/kcache")  # noqa: S108: PoCL's choice
+    return Path(home, ".cache", "pocl", "kcache") if home else Path("/tmp/pocl/kcache")
 
 
 def _give_pocl_a_cache() -> None:
