@@ -101,9 +101,11 @@ import os, sys
 import numpy as np
 import simdtex
 
+SAMPLE = np.arange(64).reshape(8, 8)
+
 def told(device):
     try:
-        return simdtex.synthesize(np.arange(64).reshape(8, 8), (5, 6), order=1, rng=1, levels=1, device=device).tobytes()
+        return simdtex.synthesize(SAMPLE, (5, 6), order=1, rng=1, levels=1, device=device).tobytes()
     except simdtex.DeviceError as error:
         return "spawn" in str(error) and "OpenCL was in use before this process was forked" in str(error)
 
