@@ -292,7 +292,9 @@ def _enumerate() -> tuple[DeviceInfo, ...]:
             handles = vendor.get_devices()
             found += [_describe(title, handle) for handle in handles]
             if not handles:
-                found.append(DeviceInfo(0, title, "", "other", reason="the platform reports no device"))
+                trouble = runtimes.cache_trouble() if title == runtimes.POCL else ""
+                reason = trouble or "the platform reports no device"
+                found.append(DeviceInfo(0, title, "", "other", reason=reason))
         except Exception as error:  # a broken platform must never stop the working ones
             found.append(DeviceInfo(0, title, "", "other", reason=runtimes.one_line(error)))
     found.sort(key=lambda info: info.driver, reverse=True)  # of two versions, the newer first
@@ -362,8 +364,7 @@ def _nothing_usable(found: Sequence[DeviceInfo]) -> str:
         "the driver of your GPU",
     ]
     install = ", ".join(remedy for remedy in remedies if remedy)
-    reasons = [*(f"{info.name or info.platform}: {info.reason}" for info in found), runtimes.cache_trouble()]
-    why = "; ".join(reason for reason in reasons if reason)
+    why = "; ".join(f"{info.name or info.platform}: {info.reason}" for info in found)
     return (
         f"No usable OpenCL device was found{f' ({why})' if why else ''}: install {install}, "
         'or use device="reference", which is slow.'

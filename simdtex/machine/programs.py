@@ -20,8 +20,8 @@ from typing import Any
 import pyopencl as cl
 
 from simdtex.machine import cache
+from simdtex.machine.runtimes import POCL
 
-POCL = "Portable Computing Language"
 FOLDER = "programs"
 """Of the cache folder."""
 
