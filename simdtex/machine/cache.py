@@ -15,6 +15,8 @@ from contextlib import suppress
 from pathlib import Path
 
 FOLDER, SWITCH = "SIMDTEX_CACHE", "SIMDTEX_TUNE"
+POCL = "Portable Computing Language"
+"""The platform whose own cache needs care."""
 PREFIX, SUFFIX = "simdtex-", ".tmp"
 """Of the name of a file that is being written."""
 STALE = 24 * 60 * 60

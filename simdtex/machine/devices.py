@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simdtex.machine import runtimes
+from simdtex.machine import cache, runtimes
 from simdtex.machine.runtimes import DeviceError
 
 if TYPE_CHECKING:
@@ -292,7 +292,7 @@ def _enumerate() -> tuple[DeviceInfo, ...]:
             handles = vendor.get_devices()
             found += [_describe(title, handle) for handle in handles]
             if not handles:
-                trouble = runtimes.cache_trouble() if title == runtimes.POCL else ""
+                trouble = runtimes.cache_trouble() if title == cache.POCL else ""
                 reason = trouble or "the platform reports no device"
                 found.append(DeviceInfo(0, title, "", "other", reason=reason))
         except Exception as error:  # a broken platform must never stop the working ones

@@ -20,7 +20,7 @@ from typing import Any
 import pyopencl as cl
 
 from simdtex.machine import cache
-from simdtex.machine.runtimes import POCL
+from simdtex.machine.cache import POCL
 
 FOLDER = "programs"
 """Of the cache folder."""

@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 __all__ = ["DeviceError", "alive", "clean", "failure", "failures", "intel_library", "one_line", "platforms"]
 
 _INTEL = "libintelocl.so"
-POCL = "Portable Computing Language"
-"""The platform's name."""
 _MARK = "simdtex-probe:"
 _POCL_CACHE = "POCL_CACHE_DIR"
 _SEARCH = 0.03
@@ -269,7 +267,7 @@ def failure(handle: cl.Device) -> str:
 
     try:
         alive()
-        if handle.platform.name == POCL and (wrong := broken_file(pocl_cache())):
+        if handle.platform.name == cache.POCL and (wrong := broken_file(pocl_cache())):
             return f"its cache of kernels is corrupt, as {wrong} shows; delete the folder {pocl_cache()}"
         context = pyopencl.Context([handle])
         program = programs.build(context, _SOURCE, ["-cl-std=CL1.2"])
