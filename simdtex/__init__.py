@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """More of a texture from a sample of it, by parallel relaxation on any OpenCL device."""
 
-from typing import TYPE_CHECKING, Any
+from __future__ import annotations
 
+TYPE_CHECKING = False  # as type checkers know it by this name, without what importing typing takes
 if TYPE_CHECKING:
+    from typing import Any
+
     from simdtex import quality
     from simdtex.io.hard_data import place_hard_data, read_hard_data
     from simdtex.jobs.filling import extend, fill

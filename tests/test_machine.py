@@ -2,6 +2,10 @@
 """The machines: bounds on memory, and what is said when a device has too little."""
 
 import dataclasses
+import os
+import subprocess
+import sys
+import uuid
 
 import numpy as np
 import pytest
@@ -48,3 +52,130 @@ def test_memory_that_runs_out_is_said_in_one_sentence(any_device):
 def test_a_device_cannot_be_two_things():
     with pytest.raises(DeviceError):
         simdtex.open_machine("no such device")
+
+
+# Threads and forks: in processes of their own, since a race may end in a crash, and a fork may wait for ever
+
+
+def python(code, *words, **environment):
+    """What a process of its own prints; at most 100 seconds."""
+    result = subprocess.run(
+        [sys.executable, "-c", code, *words],
+        env=os.environ | {"SIMDTEX_TUNE": "0"} | environment,
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+    assert result.returncode == 0, result.stderr[-2000:]
+    return result.stdout.split()
+
+
+THREADS = """
+import sys
+from concurrent.futures import ThreadPoolExecutor
+import numpy as np
+import simdtex
+
+machine = simdtex.open_machine(sys.argv[1], profile=sys.argv[2] == "True")
+sample = np.random.default_rng(0).integers(0, 256, (20, 18), dtype=np.uint8)
+METHODS = [{"order": 2, "levels": 2}, {"method": "multires"}, {"method": "pyramid", "iterations": 1}]
+
+def run(i):
+    return simdtex.synthesize(sample, (16, 17), rng=i, device=machine, **METHODS[i % 3]).tobytes()
+
+alone = [run(i) for i in range(6)]
+sys.setswitchinterval(1e-5)  # threads change places in the middle of everything
+with ThreadPoolExecutor(6) as pool:
+    together = list(pool.map(run, [*range(6)] * 3))
+print([bytes == alone[i % 6] for i, bytes in enumerate(together)].count(False), len(set(alone)))
+"""
+
+
+@pytest.mark.parametrize("profile", [False, True])
+def test_threads_that_share_a_machine_get_the_bytes_of_runs_alone(cl_device, profile):
+    assert python(THREADS, str(cl_device.index), str(profile)) == ["0", "6"]
+
+
+FORK = """
+import os, sys
+import numpy as np
+import simdtex
+
+SAMPLE = np.arange(64).reshape(8, 8)
+
+def told(device):
+    try:
+        return simdtex.synthesize(SAMPLE, (5, 6), order=1, rng=1, levels=1, device=device).tobytes()
+    except simdtex.DeviceError as error:
+        return "spawn" in str(error) and "OpenCL was in use before this process was forked" in str(error)
+
+def child(work):
+    pid = os.fork()
+    if not pid:
+        os._exit(work())
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+device = sys.argv[1]
+early = child(lambda: len(told(device)) == 5 * 6 * 8)  # before OpenCL is in use a child may use it
+machine = simdtex.open_machine(device)
+right = told(machine)
+waiting = machine.put(np.zeros(10))
+lost = [child(lambda: told(which) is True) for which in (machine, device, None)]
+listed = child(lambda: [line.usable for line in simdtex.devices()] == [False] * (len(simdtex.devices()) - 1) + [True])
+print(early, *lost, listed, child(lambda: told("reference") == right), told(machine) == right)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing is forked here")
+def test_a_forked_child_says_at_once_that_opencl_is_lost(cl_device):
+    assert python(FORK, str(cl_device.index)) == [*"111111", "True"]
+
+
+MULTIPROCESSING = """
+import multiprocessing
+import numpy as np
+import simdtex
+
+def work(device):
+    try:
+        return simdtex.synthesize(np.eye(8), (4, 4), order=1, rng=1, levels=1, device=device).shape
+    except simdtex.DeviceError as error:
+        return str(error).count(".") == 1 and "spawn" in str(error)
+
+if __name__ == "__main__":
+    work(None)
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        print(*pool.map(work, [None, "reference"]), sep=";")
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing is forked here")
+def test_a_pool_of_forked_processes_gets_the_error_and_may_use_the_reference(any_device):
+    assert "".join(python(MULTIPROCESSING)) == "True;(4,4)"
+
+
+class Mute:
+    """Neither a name nor a machine."""
+
+
+@pytest.mark.parametrize("wrong", [1.0, b"0", [], (), {}, True, Mute()], ids=repr)
+def test_what_is_no_device_is_a_type_error_of_one_sentence(wrong):
+    sentence = r"^device must be a text, an index, a DeviceInfo, an open machine or None, but it is a \w+\.$"
+    with pytest.raises(TypeError, match=sentence):
+        simdtex.open_machine(wrong)
+    with pytest.raises(TypeError, match=sentence):
+        simdtex.synthesize(np.eye(8), (4, 4), device=wrong)
+
+
+def test_a_line_of_the_listing_opens_its_device(any_device):
+    assert simdtex.open_machine(any_device).info == any_device
+    assert simdtex.open_machine(simdtex.devices(probe=False)[-1]).kind == "reference"
+
+
+def test_the_compilers_warnings_are_not_printed(cl_device, capfd):
+    from simdtex.machine import programs
+
+    machine = OpenCL(cl_device)
+    source = f"__kernel void f(__global int *a) {{ int b; a[0] = b; 7; }} // {uuid.uuid4()}"
+    programs.compiled(machine.context, source, [])
+    assert capfd.readouterr() == ("", "")

@@ -2,8 +2,10 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import click
 import numpy as np
@@ -121,3 +123,61 @@ def test_nothing_is_kept_where_the_folder_is_to_be_left_alone(cl_device, kept, m
     monkeypatch.setenv(cache.SWITCH, "0")
     assert runtimes.failure(cl_device.handle) == ""
     assert not kept.exists()
+
+
+# Ctrl-C while the command line is starting
+
+INTERRUPT = """
+import os, signal, sys
+
+class Finder:
+    # sends the signal of Ctrl-C when a module is asked for first
+    def find_spec(self, name, path=None, target=None):
+        if name == os.environ["INTERRUPT_AT"]:
+            sys.meta_path.remove(self)
+            os.kill(os.getpid(), signal.SIGINT)
+
+sys.meta_path.insert(0, Finder())
+"""
+WAYS = {
+    "module": ["-m", "simdtex"],
+    "script": ["-c", "import sys; from simdtex.__main__ import main; sys.exit(main())"],
+}
+
+
+def interrupted(tmp_path, way, module, size="64", before=None):
+    (tmp_path / "sitecustomize.py").write_text(INTERRUPT)
+    write(tmp_path / "grey.png", np.arange(256, dtype=np.uint8).reshape(16, 16))
+    words = ["synth", str(tmp_path / "grey.png"), "-o", str(tmp_path / "out.png"), "--size", size, "-q"]
+    paths = [str(tmp_path), os.environ.get("PYTHONPATH", "")]
+    return subprocess.run(
+        [sys.executable, *WAYS[way], *words, "--device", "reference"],
+        env=os.environ | {"INTERRUPT_AT": module, "PYTHONPATH": os.pathsep.join(paths)},
+        capture_output=True,
+        text=True,
+        timeout=100,
+        preexec_fn=before,
+    )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
+@pytest.mark.parametrize("module", ["simdtex.cli", "click", "click.core", "simdtex.cli.synth", "numpy", "PIL"])
+@pytest.mark.parametrize("way", WAYS)
+def test_ctrl_c_during_imports_ends_with_one_line(tmp_path, way, module):
+    result = interrupted(tmp_path, way, module)
+    assert result.returncode == 130, result.stderr
+    assert result.stderr.startswith("simdtex: stopped")
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "out.png").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
+def test_a_ctrl_c_that_was_to_be_ignored_is(tmp_path):
+    result = interrupted(tmp_path, "module", "click", "4", lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
+    assert (result.returncode, result.stderr) == (0, "")
+    assert (tmp_path / "out.png").exists()
+
+
+def test_the_script_begins_where_the_module_does():
+    text = (Path(simdtex.__file__).parent.parent / "pyproject.toml").read_text()
+    assert 'simdtex = "simdtex.__main__:main"' in text

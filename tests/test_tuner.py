@@ -56,10 +56,11 @@ def test_another_driver_is_another_device(any_device, folder, measured):
 
 
 BROKEN = ["", "{", "[]", "7", '{"KEY": 3}', '{"KEY": {"vector": 5, "step": 4, "group": 16}}', '{"KEY": {"vector": 4}}',
-          '{"KEY": {"vector": [4], "step": 4, "group": 16}}', "\x00"]  # fmt: skip
+          '{"KEY": {"vector": [4], "step": 4, "group": 16}}', "\x00",
+          "[" * 100_000, '{"KEY": []}']  # fmt: skip
 
 
-@pytest.mark.parametrize("content", BROKEN)
+@pytest.mark.parametrize("content", BROKEN, ids=range(len(BROKEN)))
 def test_a_broken_file_is_written_anew(any_device, folder, measured, content):
     machine = OpenCL(any_device)
     tuner.tune(machine)

@@ -13,7 +13,7 @@ def open_machine(device: str | Machine | None = None, *, profile: bool = False, 
 
     Parameters
     ----------
-    device : str, Machine or None
+    device : str, int, DeviceInfo, Machine or None
         Part of a name or platform, an index of ``simdtex devices``, or ``"reference"``; None takes
         SIMDTEX_DEVICE, else a GPU, else a CPU. A machine is returned as it is.
     profile : bool
@@ -24,13 +24,16 @@ def open_machine(device: str | Machine | None = None, *, profile: bool = False, 
     Raises
     ------
     simdtex.machine.devices.DeviceError
-        No device matches, several do, or none is usable; the sentence names the remedy.
+        No device matches, several do, or none is usable; or OpenCL was in use before this process was forked. The
+        sentence names the remedy.
+    TypeError
+        `device` is none of these.
     """
-    if device is not None and not isinstance(device, (str, int)):
-        return device
+    if callable(getattr(device, "run", None)):
+        return device  # type: ignore[return-value]
     from simdtex.machine.devices import find
 
-    info = find(None if device is None else str(device))
+    info = find(device)  # type: ignore[arg-type]
     if info.kind == "reference":
         from simdtex.machine.reference import Reference
 

@@ -20,7 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from simdtex.machine import runtimes
+from simdtex.machine import cache, runtimes
+from simdtex.machine.runtimes import DeviceError
 
 if TYPE_CHECKING:
     import pyopencl as cl
@@ -37,10 +38,6 @@ _SIMULATORS = ("oclgrind", "llvmpipe", "softpipe", "emulat")
 _ONE_THREAD = ("basic", "cpu-minimal")
 _KIND_ORDER = {"gpu": 0, "cpu": 1, "accelerator": 2, "other": 3}
 _NOT_PROBED = "not probed"
-
-
-class DeviceError(ValueError):
-    """No device, or no single device, fits what was asked for."""
 
 
 @dataclass(frozen=True)
@@ -171,10 +168,14 @@ def find(text: str | int | DeviceInfo | None = None) -> DeviceInfo:
             return text
         raise DeviceError(f"The device {text} cannot be used: {text.reason}.")
     if isinstance(text, bool) or not isinstance(text, str | int | None):
-        raise TypeError(f"device must be a text, an index, a DeviceInfo or None, but it is a {type(text).__name__}.")
+        raise TypeError(
+            "device must be a text, an index, a DeviceInfo, an open machine or None, "
+            f"but it is a {type(text).__name__}."
+        )
     wanted = str(text) if text is not None else os.environ.get(VARIABLE) or None
     if wanted is not None and wanted.strip().lower() == "reference":
         return _reference(0)  # no runtime is asked, so that it works where all are broken
+    runtimes.alive()
     return choose(wanted, devices(probe=False), probe)
 
 
@@ -212,7 +213,9 @@ def choose(
         return usable[0]
     choices = ", ".join(f"{info.index} = {info}" for info in listing if info.name)
     if not matches:
-        raise DeviceError(f'No device matches "{text}"; choose one of: {choices}.')
+        trouble = runtimes.cache_trouble()
+        why = f" ({trouble})" if trouble else ""
+        raise DeviceError(f'No device matches "{text}"{why}; choose one of: {choices}.')
     if not usable:
         reasons = "; ".join(f"{info}: {info.reason}" for info in matches)
         raise DeviceError(f'The device "{text}" cannot be used ({reasons}); choose one of: {choices}.')
@@ -289,7 +292,9 @@ def _enumerate() -> tuple[DeviceInfo, ...]:
             handles = vendor.get_devices()
             found += [_describe(title, handle) for handle in handles]
             if not handles:
-                found.append(DeviceInfo(0, title, "", "other", reason="the platform reports no device"))
+                trouble = runtimes.cache_trouble() if title == cache.POCL else ""
+                reason = trouble or "the platform reports no device"
+                found.append(DeviceInfo(0, title, "", "other", reason=reason))
         except Exception as error:  # a broken platform must never stop the working ones
             found.append(DeviceInfo(0, title, "", "other", reason=runtimes.one_line(error)))
     found.sort(key=lambda info: info.driver, reverse=True)  # of two versions, the newer first

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from copy import copy
 from math import gcd, prod
 from pathlib import Path
+from threading import RLock
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ import pyopencl as cl
 import pyopencl.tools as cl_tools
 from numpy.typing import NDArray
 
-from simdtex.machine import programs
+from simdtex.machine import programs, runtimes
 from simdtex.machine.buffers import DeviceArray
 from simdtex.machine.devices import DeviceError, DeviceInfo
 from simdtex.machine.forms import Form, default
@@ -56,7 +57,10 @@ def kernel_folder() -> Path:
 
 
 class OpenCL:
-    """One OpenCL device.
+    """One OpenCL device, which threads may share: the bytes of each are those of a run alone.
+
+    Operations of several threads take turns, so that sharing saves compilation, but no time; figures of work, as
+    `launches` and `seconds`, count what all of them asked for. In a process that was forked it raises DeviceError.
 
     Parameters
     ----------
@@ -90,7 +94,10 @@ class OpenCL:
         skip: bool = True,
         profile: bool = False,
     ) -> None:
+        runtimes.alive()
         self.info = info
+        # The arguments of a kernel object, the pool and the log are one for all threads; copies of a machine share it.
+        self._turn = RLock()
         self.name = f"{info.name.strip()} ({info.platform})"
         self.context = cl.Context([info.handle])  # type: ignore[list-item]
         timed: dict[str, Any] = {"properties": cl.command_queue_properties.PROFILING_ENABLE} if profile else {}
@@ -127,14 +134,14 @@ class OpenCL:
         self.tile = (self.group, 1) if self.info.kind == "gpu" else (1, 8)
 
     def run(self, operation: Operation[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        """Launch the operation's kernels."""
-        with self._memory_errors():
+        """Launch the operation's kernels, while no other thread launches any."""
+        with self._use(), self._turn:
             return operation.launch(self, *args, **kwargs)
 
     def put(self, array: Any) -> Array:
         """Copy to the device."""
         array = np.array(array, order="C")
-        with self._memory_errors():  # little comes in turn, and is not waited for: its event keeps the copy
+        with self._use():  # little comes in turn, and is not waited for: its event keeps the copy
             later = array.nbytes <= LITTLE
             result = self._pooled(array.shape, array.dtype) if later else self._alone(array.shape, array.dtype)
             if array.size:
@@ -144,7 +151,7 @@ class OpenCL:
 
     def get(self, array: Array) -> Any:
         """Copy from the device."""
-        with self._memory_errors():
+        with self._use():
             return array.get(self.queue)
 
     def empty(self, shape: Any, dtype: Any) -> Array:
@@ -152,7 +159,8 @@ class OpenCL:
         return self._pooled((int(shape),) if isinstance(shape, (int, np.integer)) else tuple(shape), np.dtype(dtype))
 
     def _pooled(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> DeviceArray:
-        return DeviceArray(self._pool.allocate(max(1, prod(shape) * dtype.itemsize)), shape, dtype)
+        with self._turn:
+            return DeviceArray(self._pool.allocate(max(1, prod(shape) * dtype.itemsize)), shape, dtype)
 
     def _alone(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> DeviceArray:
         """The same from no pool: large arrays that come once."""
@@ -171,14 +179,14 @@ class OpenCL:
         self._pending += work
         if work and self._pending < self._burst:
             return
-        with self._memory_errors():
+        with self._use(), self._turn:  # nothing is launched between the end of the queue and the reading of its times
             self.queue.finish()
-        self.log.settle()
-        seconds = time.perf_counter() - self._synced
-        if work:
-            rate = self._pending / max(seconds, 1e-6)
-            self._burst = min(max(rate * 0.1, self._burst / 2), self._burst * 2)
-        self._pending, self._synced = 0, time.perf_counter()
+            self.log.settle()
+            seconds = time.perf_counter() - self._synced
+            if work:
+                rate = self._pending / max(seconds, 1e-6)
+                self._burst = min(max(rate * 0.1, self._burst / 2), self._burst * 2)
+            self._pending, self._synced = 0, time.perf_counter()
 
     @property
     def launches(self) -> int:
@@ -193,13 +201,15 @@ class OpenCL:
 
     def profile(self) -> dict[str, Any] | None:
         """What was launched since this was called last, see `simdtex.machine.log.Log.take`."""
-        self.sync()
-        return self.log.take()
+        with self._turn:
+            self.sync()
+            return self.log.take()
 
     @property
     def spared(self) -> int:
         """Fma of distances that a bound has spared so far."""
-        return self.tally.spared
+        with self._turn:
+            return self.tally.spared
 
     def part(self, array: Array, begin: int, end: int) -> Array:
         """Some elements of an array of one axis, copied on the device."""
@@ -243,8 +253,9 @@ class OpenCL:
             )
 
     @contextmanager
-    def _memory_errors(self) -> Iterator[None]:
-        """Say in one sentence that the device ran out of memory."""
+    def _use(self) -> Iterator[None]:
+        """Say in one sentence that the device ran out of memory, or was lost in a fork."""
+        runtimes.alive()
         try:
             yield
         except cl.Error as error:
@@ -286,8 +297,7 @@ class OpenCL:
 
     def _build(self, files: tuple[str, ...], options: str) -> Any:
         source = "\n".join((kernel_folder() / f"{file}.cl").read_text(encoding="utf-8") for file in files)
-        with programs.building():
-            return cl.Program(self.context, source).build([*options.split(), *self.include])
+        return programs.compiled(self.context, source, [*options.split(), *self.include])
 
     def launch_sites(
         self,

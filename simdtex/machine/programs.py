@@ -8,6 +8,7 @@ every kernel once more, for work-groups of any size, which pays only for a tiny 
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import warnings
 from collections.abc import Iterator
@@ -19,8 +20,8 @@ from typing import Any
 import pyopencl as cl
 
 from simdtex.machine import cache
+from simdtex.machine.cache import POCL
 
-POCL = "Portable Computing Language"
 FOLDER = "programs"
 """Of the cache folder."""
 
@@ -37,6 +38,37 @@ def building() -> Iterator[None]:
     with _ONE, warnings.catch_warnings():
         warnings.simplefilter("ignore", cl.CompilerWarning)
         yield
+
+
+def compiled(context: cl.Context, source: str, options: list[str]) -> Any:
+    """Compile a program; the compiler's warnings, which Intel's prints by itself, are nobody's business.
+
+    Returns
+    -------
+    pyopencl.Program
+
+    Raises
+    ------
+    pyopencl.Error
+        With the compiler's words.
+    """
+    options = ["-w", *options]
+    with building():
+        try:
+            return cl.Program(context, source).build(options, cache_dir=_binaries())
+        except (OSError, LookupError):  # pyopencl could not use its cache of binaries
+            return cl.Program(context, source).build(options, cache_dir=False)  # type: ignore[arg-type]
+
+
+@functools.cache
+def _binaries() -> str | None:
+    """Where pyopencl is to keep binaries for runtimes that do not: None is its own place."""
+    import platformdirs
+
+    if cache.writable(Path(platformdirs.user_cache_dir("pyopencl", "pyopencl"))):
+        return None
+    place = cache.spare("pyopencl")
+    return str(place) if place else None
 
 
 def build(context: cl.Context, source: str, options: list[str]) -> Any:
@@ -57,7 +89,7 @@ def build(context: cl.Context, source: str, options: list[str]) -> Any:
         if binary is not None:
             with suppress(cl.Error):  # one of a runtime that is gone is built anew
                 return cl.Program(context, context.devices, [binary]).build(options)
-        program = cl.Program(context, source).build(options)
+        program = compiled(context, source, options)
         if path:
             with suppress(cl.Error):  # a runtime without a compiler for binaries is none the worse for it
                 binary = program.get_info(cl.program_info.BINARIES)[0]

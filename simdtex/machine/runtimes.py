@@ -8,24 +8,31 @@ import importlib.metadata
 import os
 import signal
 import site
+import struct
 import subprocess
 import sys
 import tempfile
 import textwrap
+import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from simdtex.machine import cache
+
 if TYPE_CHECKING:
     import pyopencl as cl
 
-__all__ = ["clean", "failure", "failures", "intel_library", "one_line", "platforms"]
+__all__ = ["DeviceError", "alive", "clean", "failure", "failures", "intel_library", "one_line", "platforms"]
 
 _INTEL = "libintelocl.so"
 _MARK = "simdtex-probe:"
+_POCL_CACHE = "POCL_CACHE_DIR"
+_SEARCH = 0.03
 _SECONDS = 60.0  # a first build takes a second or two; a busy machine, several times that
 _FOLDERS = ("OCL_ICD_VENDORS", "OPENCL_VENDOR_PATH")  # how users name a folder to the loader
 
@@ -39,6 +46,33 @@ __kernel void probe(__global const float *a, __global float *b)
 """
 
 
+LOST = (
+    "OpenCL was in use before this process was forked, and its threads are not in the child; start processes with "
+    'multiprocessing.get_context("spawn") or "forkserver", or take device="reference" here'
+)
+_asked, _lost = False, False
+
+
+class DeviceError(ValueError):
+    """No device, or no single device, fits what was asked for; or it cannot do it."""
+
+
+def _forked() -> None:
+    """In a child that shares a runtime's memory but none of its threads: whatever is asked of it waits for ever."""
+    global _lost
+    _lost = _asked
+
+
+if hasattr(os, "register_at_fork"):  # Windows forks nothing
+    os.register_at_fork(after_in_child=_forked)
+
+
+def alive() -> None:
+    """Raise DeviceError where this process was forked from one in which a runtime was in use."""
+    if _lost:
+        raise DeviceError(LOST)
+
+
 def platforms() -> list[cl.Platform]:
     """Return the platforms that the loader knows, each once; the first call decides.
 
@@ -47,6 +81,11 @@ def platforms() -> list[cl.Platform]:
     """
     import pyopencl
 
+    global _asked
+    alive()
+    _asked = True
+    _give_pocl_a_cache()
+    _give_pyopencl_a_cache()
     try:
         try:
             with _folder():
@@ -56,6 +95,111 @@ def platforms() -> list[cl.Platform]:
     except pyopencl.Error:  # the loader's way to say that there is none
         return []
     return list(dict.fromkeys(found))
+
+
+def pocl_cache() -> Path:
+    """The folder in which PoCL keeps compiled kernels, by its own rules."""
+    if chosen := os.environ.get(_POCL_CACHE):
+        return Path(chosen)
+    if home := os.environ.get("XDG_CACHE_HOME"):
+        return Path(home, "pocl", "kcache")
+    home = os.environ.get("HOME")
+    return Path(home, ".cache", "pocl", "kcache") if home else Path("/tmp/pocl/kcache")
+
+
+def _give_pocl_a_cache() -> None:
+    """Name a folder to PoCL where nothing can be written in its own: it then would not start, or abort.
+
+    PoCL reads the name when it is asked for its devices first. A folder that the user chose is let be.
+    """
+    if sys.platform == "win32" or os.environ.get(_POCL_CACHE) or cache.writable(pocl_cache()):
+        return
+    if place := cache.spare("pocl"):
+        os.environ[_POCL_CACHE] = str(place)
+
+
+def _give_pyopencl_a_cache() -> None:
+    """Let pyopencl keep its Python code for launches elsewhere where its own file cannot be written, or is corrupt.
+
+    It opens the file when this module of it is imported, and raises whatever goes wrong there.
+    """
+    import platformdirs
+
+    with suppress(Exception):
+        if cache.writable(Path(platformdirs.user_cache_dir("pytools", "pytools"))):
+            import_module("pyopencl.invoker")
+            return
+    place = cache.spare("pyopencl") if sys.platform != "win32" else None
+    if place:
+        with _environment({"XDG_CACHE_HOME": str(place)}), suppress(Exception):  # what is left is said by the probe
+            import_module("pyopencl.invoker")
+
+
+@contextmanager
+def _environment(values: dict[str, str]) -> Iterator[None]:
+    """Variables for as long as the context lasts."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def cache_trouble() -> str:
+    """Why PoCL may not start, where its cache is to blame; else nothing."""
+    place = pocl_cache()
+    if sys.platform == "win32" or cache.writable(place):
+        return ""
+    return f"nothing can be written in {place}, where PoCL keeps kernels; name another folder by {_POCL_CACHE}"
+
+
+def broken_file(place: Path, seconds: float = _SEARCH) -> Path | None:
+    """A file of PoCL's cache that is no kernel or program, or is cut off: PoCL would abort on it.
+
+    Parameters
+    ----------
+    place : Path
+        PoCL's cache.
+    seconds : float
+        After which no more files are looked at; a thousand take some 20 ms.
+
+    Returns
+    -------
+    Path or None
+        None if all are in order, as far as their first bytes and their sizes tell.
+    """
+    end, folders = time.perf_counter() + seconds, [str(place)]
+    while folders and time.perf_counter() < end:
+        try:
+            with os.scandir(folders.pop()) as entries:
+                for entry in entries:
+                    if entry.name.endswith((".so", ".bc")):
+                        if not _whole(entry.path):
+                            return Path(entry.path)
+                    elif entry.is_dir(follow_symlinks=False):
+                        folders.append(entry.path)
+        except OSError:  # somebody else has just removed it
+            continue
+    return None
+
+
+def _whole(path: str) -> bool:
+    """Whether this is bitcode of LLVM, or a library whose last part, the table of its sections, is there."""
+    with open(path, "rb") as file:
+        head, size = file.read(64), os.fstat(file.fileno()).st_size
+    if path.endswith(".bc"):
+        return head[:4] in (b"BC\xc0\xde", b"\xde\xc0\x17\x0b") and size % 4 == 0
+    if head[:4] != b"\x7fELF" or len(head) < 64:
+        return False
+    if head[4:6] != b"\x02\x01":  # not of 64 bits, the lowest first
+        return True
+    (table,), (each, count) = struct.unpack_from("<Q", head, 40), struct.unpack_from("<HH", head, 58)
+    return bool(table + each * count <= size)
 
 
 def intel_library() -> Path | None:
@@ -88,16 +232,8 @@ def _folder() -> Iterator[None]:
     with tempfile.TemporaryDirectory(prefix="simdtex-icd-") as folder:
         _copy(Path(folder))
         Path(folder, "intel.icd").write_text(f"{library}\n")
-        before = {name: os.environ.get(name) for name in _FOLDERS}
-        os.environ[_FOLDERS[0]] = folder
-        try:
+        with _environment({_FOLDERS[0]: folder}):
             yield
-        finally:
-            for name, value in before.items():
-                if value is None:
-                    os.environ.pop(name, None)
-                else:
-                    os.environ[name] = value
 
 
 def _copy(folder: Path) -> None:
@@ -127,11 +263,14 @@ def failure(handle: cl.Device) -> str:
     """Build and run a tiny program, once; return why the device is not usable, or nothing."""
     import pyopencl
 
-    from simdtex.machine.programs import build
+    from simdtex.machine import programs
 
     try:
+        alive()
+        if handle.platform.name == cache.POCL and (wrong := broken_file(pocl_cache())):
+            return f"its cache of kernels is corrupt, as {wrong} shows; delete the folder {pocl_cache()}"
         context = pyopencl.Context([handle])
-        program = build(context, _SOURCE, ["-cl-std=CL1.2"])
+        program = programs.build(context, _SOURCE, ["-cl-std=CL1.2"])
         queue = pyopencl.CommandQueue(context)
         host = np.full(64, 1 + 2.0**-12, np.float32)
         flags = pyopencl.mem_flags
@@ -158,6 +297,8 @@ def failures(indices: Sequence[int]) -> list[str]:
     list of str
         For each, why the device is not usable, or nothing.
     """
+    if _lost:
+        return [LOST] * len(indices)
     # The children get this process's own path, so that they find the same package.
     code = (
         "import sys; sys.path[:] = {path!r}\n"

@@ -20,7 +20,7 @@ import pyopencl as cl
 from simdtex.machine.cache import FOLDER, SWITCH, folder, keep
 from simdtex.machine.forms import Form, default, others
 from simdtex.machine.opencl import OpenCL
-from simdtex.machine.programs import building
+from simdtex.machine.programs import compiled
 
 __all__ = ["FILE", "FOLDER", "SWITCH", "Form", "choose", "default", "others", "probe", "tune"]
 
@@ -63,8 +63,7 @@ def probe(machine: OpenCL, form: Form) -> Callable[[], float]:
     """The loop in this form, compiled: a function that gives its fma per second, the best of three launches."""
     items = form.group * machine.info.compute_units * (16 if machine.info.kind == "gpu" else 4)
     options = ["-D", f"V={form.vector}", "-D", f"STEP={form.step}", *machine.include]
-    with building():
-        kernel = cl.Kernel(cl.Program(machine.context, SOURCE).build(options), "tune")
+    kernel = cl.Kernel(compiled(machine.context, SOURCE, options), "tune")
     x, y = (machine.put(np.linspace(0, 1, n, dtype=np.float32)) for n in (120 * form.vector + 16, 128 + form.step))
     out = machine.empty((items * form.vector,), np.float32)
 
@@ -117,7 +116,7 @@ def tune(machine: OpenCL) -> None:
 def _read(path: Path) -> dict[str, Any]:
     try:
         known = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):  # the last: brackets within brackets without end
         return {}
     return known if isinstance(known, dict) else {}
 
