@@ -14,11 +14,11 @@ from simdtex.distributed.drive import go_on
 from simdtex.distributed.plan import planned
 from simdtex.distributed.store import Store, above, cut
 from simdtex.distributed.tasks import do, forget
-from simdtex.io.image import read
 from simdtex.methods.mrf import make_options
 from simdtex.methods.mrf.outline import outlined
 from simdtex.methods.mrf.tiles import Tile, framed
 from simdtex.model.lattice import Grid
+from simdtex.ops.coloring import colors_of
 from simdtex.ops.neighbourhood import Field
 from simdtex.run import Tiling
 
@@ -31,6 +31,7 @@ COLOUR = np.stack([texture((22, 25), seed=k) for k in (1, 2, 3)], -1)
 def both(tmp_path, sample, shape, tiles, device=REFERENCE, **options):
     """The output in tiles and its source map; and those of one that is made at once."""
     path = tmp_path / "out.zarr"
+    options = {"xi": -8.0} | options  # few sweeps
     ours = distributed.synthesize(
         sample, shape, path, tiles=tiles, rng=11, device=device, source_map=True, **options
     ).compute()
@@ -45,7 +46,7 @@ def assert_same(tmp_path, *given, **options):
     forget()
 
 
-TILINGS = [7, 12, 16, 30, 36, 1000]  # rows of 37: uneven; one site wide (36 + 1); more than all
+TILINGS = [12, 16, 36, 1000]  # rows of 37: uneven; one site wide (36 + 1); more than all
 
 
 @pytest.mark.parametrize("boundary", ["torus", "open"])
@@ -99,7 +100,7 @@ def test_known_sites(tmp_path, share, boundary):
     """Also data between the sites of coarse levels, whose stand-ins lie in other tiles."""
     shape = (39, 34)
     given = {"known": known_values(shape, share, 5), "boundary": boundary}
-    assert_same(tmp_path, SAMPLE, shape, 10, order=2, levels=3, **given)
+    assert_same(tmp_path, SAMPLE, shape, 14, order=1, levels=3, **given)
 
 
 def test_known_sources_and_a_known_side(tmp_path):
@@ -168,7 +169,7 @@ class Stop(Exception):
     pass
 
 
-def shuffled(where, device, seed, stop=None):
+def shuffled(store, seed, stop=None):
     """Tiles in any order; an exception after so many of them, over all turns."""
     order, done = random.Random(seed), [0]
 
@@ -179,33 +180,33 @@ def shuffled(where, device, seed, stop=None):
             if stop is not None and done[0] == stop:
                 raise Stop
             done[0] += 1
-            yield do(where, device, turn, number)
+            yield do(store.where, store.name, REFERENCE, turn, number)
 
     return execute
 
 
 def created(tmp_path, name="s.zarr", **options):
-    outline = outlined(SAMPLE[..., None], (26, 31), make_options(order=1, levels=2, **options), 11)
+    outline = outlined(SAMPLE[..., None], (26, 31), make_options(order=1, levels=2, xi=-8.0, **options), 11)
     where = str(tmp_path / name)
     return Store.create(where, outline, planned(outline, 12, 1), None, False, False, "v"), where
 
 
 def test_tiles_come_in_any_order(tmp_path):
-    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, device=REFERENCE)
+    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, xi=-8.0, device=REFERENCE)
     for seed in range(2):
         store, where = created(tmp_path, f"{seed}.zarr")
-        go_on(store, shuffled(where, REFERENCE, seed))
+        go_on(store, shuffled(store, seed))
         assert_same_bits(store.root["image"][...], whole)
         assert "work" not in Store(where).root
 
 
 def test_a_run_that_is_stopped_after_any_tile_goes_on_to_the_same_bytes(tmp_path):
-    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, device=REFERENCE)
+    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, xi=-8.0, device=REFERENCE)
     store, where = created(tmp_path)
     stops = 0
     while True:
         try:
-            go_on(Store(where), shuffled(where, REFERENCE, stops, stop=5))
+            go_on(Store(where), shuffled(store, stops, stop=5))
             break
         except Stop:
             stops += 1
@@ -218,22 +219,24 @@ def test_a_tile_that_is_done_twice_changes_nothing(tmp_path):
 
     def twice(turn, tiles):
         for number in tiles:
-            do(where, REFERENCE, turn, number)
+            do(where, store.name, REFERENCE, turn, number)
             before = store.tally(turn, number)
             store.root[f"work/tally{turn.number}"][number] = 0
-            do(where, REFERENCE, turn, number)
-            assert_same_bits([np.asarray(one) for one in store.tally(turn, number)], [np.asarray(one) for one in before])
+            do(where, store.name, REFERENCE, turn, number)
+            assert_same_bits(
+                [np.asarray(one) for one in store.tally(turn, number)], [np.asarray(one) for one in before]
+            )
             yield number
 
     go_on(store, twice)
-    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, device=REFERENCE)
+    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, xi=-8.0, device=REFERENCE)
     assert_same_bits(store.root["image"][...], whole)
 
 
 @pytest.mark.parametrize("moment", ["price", "attribute", "removal", "tally", "planes"])
 def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeypatch, moment):
     """Turns are changed in one piece: stopped before or after each of the writes around that, a run goes on."""
-    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, device=REFERENCE)
+    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, xi=-8.0, device=REFERENCE)
     store, where = created(tmp_path)
     calls = {"left": 0}
 
@@ -278,22 +281,20 @@ def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeyp
             super().__init__(where)
             self.root = Group(self.root)
 
-    stops = 0
-    while True:
-        calls["left"] = 2
+    for n in range(1, 1000):  # each time a little later
+        calls["left"] = n
         try:
-            go_on(Stopping(where), shuffled(where, REFERENCE, 0))
+            go_on(Stopping(where), shuffled(store, 0))
             break
         except Stop:
-            stops += 1
-            assert stops < 200
-    assert stops > 2
+            pass
+    assert n > 2
     assert_same_bits(store.root["image"][...], whole)
 
 
 def test_going_on_with_what_is_finished_changes_nothing(tmp_path):
     path = tmp_path / "out.zarr"
-    first = distributed.synthesize(SAMPLE, (20, 21), path, tiles=9, order=1, rng=1, device=REFERENCE).compute()
+    first = distributed.synthesize(SAMPLE, (20, 21), path, tiles=9, order=1, xi=-8.0, rng=1, device=REFERENCE).compute()
     assert_same_bits(distributed.resume(path).compute(), first)
 
 
@@ -307,9 +308,8 @@ def test_progress_tells_every_tile(tmp_path):
         assert isinstance(progress, Tiling)
         seen.append((progress.fraction, progress.doing, progress.image()))
 
-    distributed.synthesize(
-        SAMPLE, (30, 31), tmp_path / "o.zarr", tiles=16, order=1, rng=1, device=REFERENCE, callback=callback
-    )
+    options = {"order": 1, "xi": -8.0, "rng": 1, "device": REFERENCE}
+    distributed.synthesize(SAMPLE, (30, 31), tmp_path / "o.zarr", tiles=16, callback=callback, **options)
     fractions = [fraction for fraction, *_ in seen]
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
@@ -322,7 +322,7 @@ def test_a_picture_of_a_large_level_is_every_nth_site(tmp_path, monkeypatch):
     monkeypatch.setattr("simdtex.distributed.drive.SHOWN", 8)
     shapes = set()
     distributed.synthesize(
-        SAMPLE, (30, 31), tmp_path / "o.zarr", tiles=16, order=1, rng=1, device=REFERENCE,
+        SAMPLE, (30, 31), tmp_path / "o.zarr", tiles=16, order=1, xi=-8.0, rng=1, device=REFERENCE,
         callback=lambda progress: shapes.add(progress.image().shape[:2]),
     )  # fmt: skip
     assert (8, 8) in shapes
@@ -335,13 +335,13 @@ def test_the_plan_says_what_is_needed():
     plan = distributed.plan(SAMPLE, (4096, 4096), tiles=1024, order=18)
     finest = plan.levels[0]
     assert (finest.count, finest.side, finest.rows, finest.chunk) == (16, 1024, 4096, 512)
-    assert finest.halo == 4 * 28  # its colours: docs/concepts/coloring.rst
+    assert finest.halo == 4 * colors_of(Grid(4096, 4096), 18, 0).colors
     relaxed = sum(finest.relaxed(tile) for tile in finest.tiles())
     assert finest.redundant == pytest.approx(relaxed / 4096**2 - 1)
     assert 0.3 < finest.redundant < 0.4
     assert plan.levels[-1].count == 1
     lines = plan.lines()
-    assert lines[-2].startswith("level 0: 4096x4096 sites in 16 tiles of 1024x1024, halo 112, 3")
+    assert lines[-2].startswith("level 0: 4096x4096 sites in 16 tiles of 1024x1024, halo 116, 3")
     assert f"{plan.memory / 2**20:.0f} MiB" in lines[-1]
 
 
@@ -423,7 +423,7 @@ def test_windows_go_on_across_the_seam():
         ({"tiles": 0}, "tiles is 0; give 1 or more"),
         ({"workers": 0}, "workers is 0; give 1 or more"),
         ({"shape": (0, 3)}, "rows of the output is 0"),
-        ({"order": 50}, "does not fit the sample"),
+        ({"order": 200}, "does not fit the sample"),
     ],
 )
 def test_bad_input_is_said_before_anything_is_made(tmp_path, options, words):
@@ -452,7 +452,9 @@ def test_only_stores_of_ones_own_are_gone_on_with(tmp_path, monkeypatch):
     with pytest.raises(ValueError, match="is no output in tiles"):
         distributed.resume(tmp_path / "b.zarr")
     store, where = created(tmp_path)
-    with pytest.raises(ValueError, match="was begun by simdtex v and this is .*; go on with that version, or begin anew"):
+    with pytest.raises(
+        ValueError, match=r"was begun by simdtex v and this is .*; go on with that version, or begin anew"
+    ):
         distributed.resume(where)
     monkeypatch.setattr(store_module, "FORMAT", 2)
     with pytest.raises(ValueError, match="go on with that version"):
@@ -467,12 +469,12 @@ def test_a_schedule_of_ones_own_is_not_known_to_workers(tmp_path):
 
 def test_the_store_is_an_array_that_others_read(tmp_path):
     path = tmp_path / "out.zarr"
-    picture = distributed.synthesize(COLOUR, (20, 21), path, tiles=9, order=1, rng=1, device=REFERENCE, channel_axis=-1)
+    picture = distributed.synthesize(
+        COLOUR, (20, 21), path, tiles=9, order=1, xi=-8.0, rng=1, device=REFERENCE, channel_axis=-1
+    )
     assert picture.chunksize == (9, 9, 3)
     image = zarr.open_group(path, mode="r")["image"]
     assert image.metadata.dimension_names == ("y", "x", "channel")
     assert zarr.open_group(path).attrs["simdtex"]["seed"] == 1
     assert sorted(zarr.open_group(path).keys()) == ["image"]
-    with pytest.raises(ValueError, match="."):
-        read(path)
     assert Field._fields == store_module.PLANES

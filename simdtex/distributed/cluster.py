@@ -11,7 +11,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from simdtex.distributed.drive import Execute
-from simdtex.distributed.store import Turn
+from simdtex.distributed.store import Store, Turn
 from simdtex.distributed.tasks import do
 from simdtex.machine import Machine
 
@@ -22,26 +22,28 @@ AHEAD = 3
 """Tiles to a worker that the scheduler knows of: the next one is there when one is done, and no more."""
 
 
-def here(where: str, device: str | Machine | None) -> Execute:
+def here(store: Store, device: str | Machine | None) -> Execute:
     """Tiles are done by this process, one after another."""
+    name = store.name
 
     def execute(turn: Turn, tiles: Sequence[int]) -> Iterator[int]:
         for number in tiles:
-            yield do(where, device, turn, number)
+            yield do(store.where, name, device, turn, number)
 
     return execute
 
 
-def across(client: Client, where: str, device: str | None) -> Execute:
+def across(client: Client, store: Store, device: str | None) -> Execute:
     """Tiles are done by the workers of a cluster; one that is lost with its worker is done by another."""
     distributed: Any = import_module("distributed")
+    what = store.where, store.name, device
 
     def execute(turn: Turn, tiles: Sequence[int]) -> Iterator[int]:
         token, todo = os.urandom(8).hex(), iter(tiles)
 
         def begun(count: int) -> list[Any]:
             return [
-                client.submit(do, where, device, turn, number, key=f"tile-{token}-{turn.number}-{number}", pure=False)
+                client.submit(do, *what, turn, number, key=f"tile-{token}-{turn.number}-{number}", pure=False)
                 for number in islice(todo, count)
             ]
 

@@ -73,14 +73,15 @@ class Work:
         Without what is given of the output.
     plan : Plan
     beside : Beside
-    held : bool
-        Whether something is given of the output.
+    held, given : bool
+        Whether something is given of the output, and whether that is values.
     """
 
     outline: Outline
     plan: Plan
     beside: Beside
     held: bool
+    given: bool
 
 
 class Store:
@@ -95,6 +96,7 @@ class Store:
     def __init__(self, where: str) -> None:
         self.where = where
         self.root: Any = _zarr().open_group(where, mode="r+")
+        self._arrays: dict[str, Any] = {}
 
     @staticmethod
     def create(
@@ -136,6 +138,11 @@ class Store:
         """What is kept in JSON."""
         return cast(dict[str, Any], self.root["work"].attrs["about"])
 
+    @property
+    def name(self) -> str:
+        """What it was called when it was made: no other has this name."""
+        return str(self.about.get("name")) if "work" in self.root else ""
+
     def work(self) -> Work:
         """What it is about."""
         about = self.about
@@ -144,7 +151,7 @@ class Store:
         outline = restored(about["run"], arrays)
         guides, own, centre, hard = about["beside"]
         beside = Beside(int(guides), bool(own), np.float32(centre), np.float32(hard))
-        return Work(outline, laid(outline, about["sides"], about["workers"]), beside, about["held"])
+        return Work(outline, laid(outline, about["sides"], about["workers"]), beside, about["held"], about["given"])
 
     # -- turns ----------------------------------------------------------------------------------------------------
 
@@ -195,34 +202,34 @@ class Store:
     def told(self, turn: Turn, number: int, tally: Tally) -> None:
         """Note that a tile has had its turn."""
         row = np.concatenate([np.array([1, tally.warm, tally.heat], np.int64), tally.counts])
-        self.root[f"work/tally{turn.number}"][number] = row
+        self._at(f"tally{turn.number}")[number] = row
 
     def tally(self, turn: Turn, number: int) -> Tally | None:
         """What was noted of a tile, if it has had its turn."""
-        there, warm, heat, *_ = row = self.root[f"work/tally{turn.number}"][number]
+        there, warm, heat, *_ = row = self._at(f"tally{turn.number}")[number]
         return Tally(row[3:], int(warm), int(heat)) if there else None
 
     # -- arrays over sites ----------------------------------------------------------------------------------------
 
     def read(self, level: LevelPlan, which: int, window: Tile) -> Field:
         """The state of a level's sites in a window, which may go on across the seam."""
-        here = f"work/level{level.number}/{which}"
-        return Field(*(cut(self.root[f"{here}/{name}"], level, window) for name in PLANES))
+        here = f"level{level.number}/{which}"
+        return Field(*(cut(self._at(f"{here}/{name}"), level, window) for name in PLANES))
 
     def write(self, level: LevelPlan, which: int, tile: Tile, field: Field) -> None:
         """Write the state of a tile's sites."""
-        here = f"work/level{level.number}/{which}"
+        here = f"level{level.number}/{which}"
         for name, plane in zip(PLANES, field, strict=True):
-            self.root[f"{here}/{name}"][..., *spans(tile)] = plane
+            self._at(f"{here}/{name}")[..., *spans(tile)] = plane
 
     def held(self, level: LevelPlan, window: Tile) -> Held:
         """What is given of a level's sites in a window."""
-        here = f"work/given/held{level.number}"
-        return Held(*(cut(self.root[f"{here}/{name}"], level, window) for name in Held._fields))
+        here = f"given/held{level.number}"
+        return Held(*(cut(self._at(f"{here}/{name}"), level, window) for name in Held._fields))
 
     def given(self, tile: Tile) -> tuple[NDArray[Any], NDArray[np.bool_]]:
         """Values that are given of the output's pixels in a tile, and which of them are."""
-        values, known = (self.root[f"work/given/{name}"][spans(tile)] for name in ("values", "known"))
+        values, known = (self._at(f"given/{name}")[spans(tile)] for name in ("values", "known"))
         return values, known
 
     def show(self, tile: Tile, picture: NDArray[Any], place: NDArray[np.int32]) -> None:
@@ -231,6 +238,14 @@ class Store:
         image[spans(tile)] = picture[..., 0] if image.ndim == 2 else picture
         if "source" in self.root:
             self.root["source"][spans(tile)] = place
+
+    def _at(self, name: str) -> Any:
+        """An array of ``work``, opened once."""
+        if name not in self._arrays:
+            if len(self._arrays) >= 64:  # those of turns that are over
+                self._arrays.clear()
+            self._arrays[name] = self.root[f"work/{name}"]
+        return self._arrays[name]
 
     def _planes(self, name: str, level: LevelPlan, before: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
         shape, chunks = (*before, level.rows, level.cols), (*before, level.chunk, level.chunk)

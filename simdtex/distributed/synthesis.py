@@ -154,7 +154,7 @@ def resume(
         if crew is not None and not (device is None or isinstance(device, (str, int))):
             raise TypeError("each worker opens its own device; give its name, not an open machine")
         name = None if device is None else str(device)
-        go_on(opened, here(where, device) if crew is None else across(crew, where, name), callback)
+        go_on(opened, here(opened, device) if crew is None else across(crew, opened, name), callback)
     return _array(where, channel_axis)
 
 
@@ -232,8 +232,10 @@ def _opened(where: str) -> Any:
     from simdtex.distributed.store import FORMAT, KIND, Store
 
     try:
+        if "://" not in where and not os.path.isdir(where):
+            raise FileNotFoundError  # Zarr would make it
         store = Store(where)
-    except (FileNotFoundError, ValueError, KeyError):
+    except (OSError, ValueError, KeyError):
         raise ValueError(f"{where} is no Zarr store; give one that simdtex has begun") from None
     if "simdtex" not in store.root.attrs and "work" not in store.root:
         raise ValueError(f"{where} is no output in tiles; give one that simdtex has begun")

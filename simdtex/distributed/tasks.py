@@ -23,26 +23,25 @@ from simdtex.ops.neighbourhood import Field
 class Context:
     """What a process keeps between two tiles."""
 
-    name: str
     store: Store
     work: Work
     run: Run
 
 
-_contexts: dict[tuple[str, Any], Context] = {}
+_contexts: dict[tuple[str, str, Any], Context] = {}
 _one = Lock()
 """A process has one device, and two tiles at once would share it."""
 
 
-def context(where: str, device: str | Machine | None) -> Context:
+def context(where: str, name: str, device: str | Machine | None) -> Context:
     """The context of a store, laid out on a device once."""
-    key, store = (where, device), Store(where)
-    name = store.about["name"]
-    if key not in _contexts or _contexts[key].name != name:
+    key = (where, name, device)
+    if key not in _contexts:
         _contexts.clear()  # one at a time, so that memory has its bound
-        work, machine = store.work(), open_machine(device)
+        store, machine = Store(where), open_machine(device)
+        work = store.work()
         run = work.outline.run(machine, Stored(store, work, machine), machine.put(np.zeros((1, 1), np.int32)))
-        _contexts[key] = Context(name, store, work, run)
+        _contexts[key] = Context(store, work, run)
     return _contexts[key]
 
 
@@ -51,13 +50,13 @@ def forget() -> None:
     _contexts.clear()
 
 
-def do(where: str, device: str | Machine | None, turn: Turn, number: int) -> int:
+def do(where: str, name: str, device: str | Machine | None, turn: Turn, number: int) -> int:
     """A tile's turn, unless it has been done; returns the tile's number.
 
     Parameters
     ----------
-    where : str
-        The store.
+    where, name : str
+        The store, and the name that it was given when it was made: another may lie there later.
     device : str or Machine, optional
         As of `simdtex.open_machine`.
     turn : Turn
@@ -65,7 +64,7 @@ def do(where: str, device: str | Machine | None, turn: Turn, number: int) -> int
         Of the tile, row by row.
     """
     with _one:
-        here = context(where, device)
+        here = context(where, name, device)
         if here.store.tally(turn, number) is None:
             here.store.told(
                 turn, number, PHASES[turn.phase](here, turn, here.work.plan.levels[turn.level].tile(number))
@@ -107,7 +106,7 @@ def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
         shown = finished(run, grid, field, known, state.source[frame.rows], frame.rows.start)[:, frame.cols]
     else:
         shown = run.sample.picture(frame.cut(state.values), source)
-    if here.store.about["given"]:
+    if here.work.given:
         values, told = here.store.given(tile)
         shown = np.where(told, values, shown)
     here.store.show(tile, shown, run.sample.place(source))
