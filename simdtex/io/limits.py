@@ -105,8 +105,8 @@ def read_npy(file: IO[bytes], length: int, axes: int, most: int) -> NDArray[Any]
         shape, _, dtype = np.lib.format.read_array_header_2_0(file)
     else:
         raise ValueError("it holds no plain array of numbers")
-    if dtype.kind not in "buif":
-        raise ValueError(f"it holds {dtype} values and no real numbers")
+    if dtype.hasobject:
+        raise ValueError("it holds objects of Python and no numbers")
     check_array(shape, dtype.itemsize, axes, most)
     if file.tell() - begin + prod(shape) * dtype.itemsize > length:
         raise ValueError("it ends before its last value")
@@ -122,12 +122,12 @@ def check_zip(archive: zipfile.ZipFile, most: int) -> None:
     check_bytes(sum(one.file_size for one in inside), most)
 
 
-def read_npz(path: PathLike, name: str, axes: int, most: int) -> NDArray[Any]:
-    """Read the array of a name from an ``.npz`` file, or its only one."""
+def read_npz(path: PathLike, name: str, axes: int, most: int, *, alone: bool = True) -> NDArray[Any]:
+    """Read the array of a name from an ``.npz`` file or, if that suffices, the one that is `alone` in it."""
     with zipfile.ZipFile(path) as archive:
         check_zip(archive, most)
         names = [inside.removesuffix(".npy") for inside in archive.namelist()]
-        if name not in names and len(names) != 1:
+        if name not in names and not (alone and len(names) == 1):
             raise ValueError(f"it has the arrays {', '.join(names[:5])} and none called {name}")
         inside = archive.getinfo(f"{name if name in names else names[0]}.npy")
         with archive.open(inside) as file:
