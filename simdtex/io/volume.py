@@ -292,7 +292,7 @@ def _read_tiff(path: Path, most: int) -> Array:
         with tifffile.TiffFile(file) as tiff:
             slices: list[Array] = []
             for number in range(count):
-                page = tiff.pages.get(number)
+                page: Any = tiff.pages.get(number)
                 check_page(page, most)
                 pixels = page.imagewidth * page.imagelength * page.imagedepth
                 check_pixels(count * max(pixels, PAGE), most)

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from simdtex.bench import results as worked_out
+from simdtex.io.image import atomic_path
 from simdtex.report.profile import digits, rate_text, seconds_text
 
 if TYPE_CHECKING:
@@ -166,7 +167,8 @@ def _roofline(entry: dict[str, Any], path: Path) -> None:
     axes.grid(True, which="major", alpha=0.3)
     if points:
         axes.legend(loc="lower right")
-    figure.savefig(path, dpi=120)
+    with atomic_path(path) as whole:
+        figure.savefig(whole, dpi=120)
 
 
 def _curves(entry: dict[str, Any], path: Path) -> None:
@@ -184,4 +186,5 @@ def _curves(entry: dict[str, Any], path: Path) -> None:
         axes.set_ylabel("seconds")
         axes.grid(True, which="major", alpha=0.3)
         axes.legend(fontsize="small")
-    figure.savefig(path, dpi=120)
+    with atomic_path(path) as whole:
+        figure.savefig(whole, dpi=120)
