@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from simdtex.io.atomic import atomic_folder, atomic_path, check_place
 from simdtex.io.decode import decode, native
 from simdtex.io.limits import TooLarge, check_file, max_pixels_or_default
+from simdtex.options import unmasked
 
 __all__ = [
     "Image",
@@ -149,6 +150,7 @@ def split_alpha(pixels: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
     >>> colour.shape, hole.tolist()
     ((1, 2, 3), [[False, True]])
     """
+    unmasked("the picture", pixels)
     values = np.asarray(pixels)
     if values.dtype.kind not in "buif":
         raise TypeError(f"the picture holds {values.dtype} values: give integers or real floats")
@@ -240,7 +242,7 @@ def check_sample(array: ArrayLike, channel_axis: int | None, *, unknown: bool = 
     channel_axis : int or None
         The axis that holds the channels; negative counts from the end.
     unknown : bool
-        Whether floats may be NaN, which says that they are unknown.
+        Whether floats may be NaN, which says that they are unknown, and values masked, which is for the caller to see.
 
     Returns
     -------
@@ -253,8 +255,11 @@ def check_sample(array: ArrayLike, channel_axis: int | None, *, unknown: bool = 
     TypeError
         The values are not real numbers, or `channel_axis` is not an integer.
     ValueError
-        The number of axes does not fit, an axis is empty, or a value is infinite, or NaN where none may be unknown.
+        The number of axes does not fit, an axis is empty, or a value is infinite, or NaN or masked where none may be
+        unknown.
     """
+    if not unknown:
+        unmasked("the sample", array)
     try:
         pixels = np.asarray(array)
     except ValueError:
@@ -420,6 +425,7 @@ def write(path: PathLike, array: ArrayLike) -> None:
     ValueError
         The path cannot be written, or its format cannot hold such pixels; it names one that can.
     """
+    unmasked("the picture", array)
     pixels = np.asarray(array)
     if pixels.dtype.kind not in "buif":
         raise TypeError(f"the picture holds {pixels.dtype} values: give integers or real floats")

@@ -36,6 +36,7 @@ from simdtex.io.limits import (
     read_npy,
     read_npz,
 )
+from simdtex.options import unmasked
 
 __all__ = ["check_writable", "read", "write"]
 
@@ -155,6 +156,7 @@ def write(path: PathLike, volume: ArrayLike, channel_axis: int | None = None) ->
 
 def _checked(volume: ArrayLike, channel_axis: int | None) -> Array:
     """The values with their channels, if any, last; contiguous."""
+    unmasked("the volume", volume)
     values = np.asarray(volume)
     if values.dtype.kind not in "buif":
         raise TypeError(f"the volume holds {values.dtype} values: give integers or real floats")

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.image import atomic_path, check_writable, read, write
 from simdtex.io.limits import TooLarge, max_pixels_or_default, read_npz
+from simdtex.options import unmasked
 
 __all__ = ["SOURCE_SUFFIXES", "apply_source_map", "load_source_map", "save_source_map"]
 
@@ -99,9 +100,12 @@ def _maps(
 ) -> tuple[list[NDArray[Any]], list[tuple[int, ...] | None]]:
     """The map of each sample and the sample's size, or None where it is not known."""
     if positions.shape[2] == 3 and isinstance(other_map, (list, tuple)):
+        for one in other_map:
+            unmasked("another map", one)
         maps = [np.asarray(one) for one in other_map]
         shapes = [None] * len(maps) if sample_shape is None else list(sample_shape)
     else:
+        unmasked("the other map", other_map)
         maps, shapes = [np.asarray(other_map)], [sample_shape]
     wanted = 1 + (int(positions[..., 2].max(initial=0)) if positions.shape[2] == 3 else 0)
     if len(maps) < wanted:
@@ -231,6 +235,7 @@ def load_source_map(path: PathLike, *, max_pixels: int | None = None) -> SourceM
 
 
 def _checked(source: ArrayLike) -> SourceMap:
+    unmasked("the source map", source)
     positions = np.asarray(source)
     if (
         positions.ndim != 3
