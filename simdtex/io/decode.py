@@ -18,7 +18,16 @@ import numpy as np
 import PIL.Image
 from numpy.typing import NDArray
 
-from simdtex.io.limits import PAGE, check_array, check_bytes, check_pixels, read_npy
+from simdtex.io.limits import (
+    PAGE,
+    VARIABLE,
+    TooLarge,
+    check_array,
+    check_bytes,
+    check_parts,
+    check_pixels,
+    read_npy,
+)
 
 Array = NDArray[Any]
 
@@ -78,7 +87,7 @@ def _read_pillow(data: bytes, most: int) -> Array:
         # an animation's canvas is made for its first frame, whatever that is
         frames = getattr(picture, "n_frames", 1) if picture.format in ("WEBP", "PNG") else 1
         width, height = picture.size
-        check_pixels(frames * max(width * height, PAGE if frames > 1 else 1), most)
+        check_parts(frames, width * height, most)
         check_bytes(width * height * len(picture.getbands()) * (4 if picture.mode in ("F", "I") else 1), most)
         picture.load()
         orientation = int(picture.getexif().get(0x0112, 1))
@@ -98,7 +107,12 @@ def _read_pillow(data: bytes, most: int) -> Array:
 def _opened(data: bytes, most: int) -> PIL.Image.Image:
     """The picture, of which nothing but the header has been read."""
     if most <= (PIL.Image.MAX_IMAGE_PIXELS or most):
-        return PIL.Image.open(io.BytesIO(data), formats=FORMATS)
+        try:
+            return PIL.Image.open(io.BytesIO(data), formats=FORMATS)
+        except PIL.Image.DecompressionBombError:
+            raise TooLarge(
+                f"has far too many pixels and no more than {most} are read: crop it, or set {VARIABLE} higher"
+            ) from None
     with _PILLOW:  # more is wanted than Pillow's own limit, which is one for all
         before, PIL.Image.MAX_IMAGE_PIXELS = PIL.Image.MAX_IMAGE_PIXELS, None
         try:
@@ -113,7 +127,7 @@ def check_png(data: bytes, most: int, pages: int = 1) -> None:
         raise ValueError("it is no PNG")
     width, height, bits, colours = struct.unpack(">IIBB", data[16:26])
     channels = {0: 1, 2: 3, 3: 4, 4: 2, 6: 4}.get(colours, 4)
-    check_pixels(pages * max(width * height, PAGE if pages > 1 else 1), most)
+    check_parts(pages, width * height, most)
     check_bytes(pages * width * height * channels * (2 if bits == 16 else 1), most)
 
 
@@ -208,7 +222,7 @@ def count_pages(file: IO[bytes], most: int) -> int:
         if at in seen:
             raise ValueError("its pages lead back to one another")
         seen.add(at)
-        check_pixels(len(seen) * PAGE, most)
+        check_parts(len(seen), 1, most)
         file.seek(at)
         (entries,) = struct.unpack(counted, file.read(struct.calcsize(counted)))
         if entries > 4096:

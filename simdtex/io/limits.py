@@ -29,7 +29,7 @@ BYTES = 8
 """Bytes that a file may unpack to for each of these pixels."""
 
 PAGE = 2**13
-"""Pixels that a page, a slice or a frame counts for at least, since each takes time whatever its size."""
+"""There may be one page, slice or frame for so many pixels, since each takes time whatever its size."""
 
 
 class TooLarge(ValueError):
@@ -53,6 +53,16 @@ def check_pixels(pixels: int, most: int) -> None:
     """Raise where a file has more pixels than `most`."""
     if pixels > most:
         raise TooLarge(f"has {pixels} pixels and no more than {most} are read: crop it, or set {VARIABLE} higher")
+
+
+def check_parts(count: int, pixels: int, most: int) -> None:
+    """Raise where so many pages, slices or frames of so many pixels are too many, or too many pixels together."""
+    if count > max(1, most // PAGE):
+        raise TooLarge(
+            f"has {count} pages, slices or frames and no more than {max(1, most // PAGE)} are read: split it, or set "
+            f"{VARIABLE} higher"
+        )
+    check_pixels(count * pixels, most)
 
 
 def check_bytes(unpacked: int, most: int) -> None:

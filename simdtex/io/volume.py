@@ -26,12 +26,11 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from simdtex.io import image
 from simdtex.io.decode import check_page, check_png, count_pages, native, quiet
 from simdtex.io.limits import (
-    PAGE,
     TooLarge,
     check_array,
     check_bytes,
     check_file,
-    check_pixels,
+    check_parts,
     max_pixels_or_default,
     read_npy,
     read_npz,
@@ -235,7 +234,7 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Array:
         A file ``.npz`` (key ``"volume"``, or its only array), ``.npy``, ``.tif``, ``.tiff`` (a page for each slice) or
         ``.nrrd`` (with its data in the same file), or a folder of slices ``slice-000.png``, ...
     max_pixels : int, optional
-        Voxels that are read at most, and 8 bytes for each; a slice counts for 8192 or more. None:
+        Voxels that are read at most, and 8 bytes for each; and one slice for 8192 of them. None:
         ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27. The headers are asked, before anything is decoded.
 
     Returns
@@ -297,7 +296,7 @@ def _read_tiff(path: Path, most: int) -> Array:
                 page: Any = tiff.pages.get(number)
                 check_page(page, most)
                 pixels = page.imagewidth * page.imagelength * page.imagedepth
-                check_pixels(count * max(pixels, PAGE), most)
+                check_parts(count, pixels, most)
                 check_bytes(count * prod(page.shape) * (page.dtype.itemsize if page.dtype else 8), most)
                 slices.append(_page(page))
                 if slices[-1].shape != slices[0].shape or slices[-1].dtype != slices[0].dtype:
