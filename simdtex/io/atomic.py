@@ -19,6 +19,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from typing import IO
 
 __all__ = ["atomic_folder", "atomic_path", "check_place", "not_written"]
 
@@ -168,6 +169,13 @@ def scratch_folder(beside: PathLike) -> Iterator[Path]:
         yield temporary
     finally:
         _remove(temporary)
+
+
+class Unbuffered:
+    """A file for NumPy, which else writes past Python and does not find out that the last of it found no space."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self.write = file.write
 
 
 def _flush(file: Path) -> None:

@@ -9,6 +9,7 @@ colour) and the compressed strips of a TIFF.
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import warnings
@@ -21,7 +22,7 @@ import numpy as np
 import PIL.Image
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from simdtex.io.atomic import atomic_folder, atomic_path, check_place
+from simdtex.io.atomic import Unbuffered, atomic_folder, atomic_path, check_place
 from simdtex.io.decode import decode, native
 from simdtex.io.limits import TooLarge, check_file, max_pixels_or_default
 from simdtex.options import unmasked
@@ -444,8 +445,8 @@ def write(path: PathLike, array: ArrayLike) -> None:
 def encode(path: Path, suffix: str, pixels: Array) -> None:
     """Write pixels that the format of the suffix holds, over whatever is there."""
     if suffix == ".npy":
-        with path.open("wb") as file:  # np.save would add its own suffix to a name in capitals
-            np.save(file, pixels, allow_pickle=False)
+        with path.open("wb") as file:
+            np.save(Unbuffered(file), pixels, allow_pickle=False)
     elif suffix == ".png" and pixels.dtype == np.uint16:
         import imagecodecs  # here and below: a picture that needs the library waits for it, and no other
 
@@ -456,7 +457,15 @@ def encode(path: Path, suffix: str, pixels: Array) -> None:
         _write_pnm(path, pixels)
     else:
         options = _OPTIONS.get(suffix, {})
-        PIL.Image.fromarray(pixels).save(path, **options)
+        kind = PIL.Image.registered_extensions()[suffix]
+        path.write_bytes(pillow_bytes(PIL.Image.fromarray(pixels), kind, **options))
+
+
+def pillow_bytes(picture: PIL.Image.Image, kind: str, **options: Any) -> bytes:
+    """A picture in a format of Pillow, which does not find out that a disk has taken a part of it alone."""
+    buffer = io.BytesIO()
+    picture.save(buffer, format=kind, **options)
+    return buffer.getvalue()
 
 
 def _write_tiff(path: Path, pixels: Array) -> None:

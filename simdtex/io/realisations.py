@@ -273,7 +273,8 @@ def _write_npz(
 def _write_netcdf(path: Path, dataset: Dataset, name: str) -> None:
     encoding = _encoding(dataset)
     encoding[name] |= {"zlib": True, "complevel": 4, "chunksizes": _chunks(dataset[name].shape, dataset[name].dtype)}
-    dataset.to_netcdf(path, mode="w", engine="h5netcdf", encoding=encoding)
+    # in memory first: HDF5 does not survive a disk that is full
+    path.write_bytes(dataset.to_netcdf(engine="h5netcdf", encoding=encoding))
 
 
 def _write_zarr(path: Path, dataset: Dataset, name: str) -> None:

@@ -24,6 +24,7 @@ import tifffile
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io import image
+from simdtex.io.atomic import Unbuffered
 from simdtex.io.decode import check_page, check_png, count_pages, native, quiet
 from simdtex.io.limits import (
     TooLarge,
@@ -179,7 +180,7 @@ def _write_npz(path: Path, values: Array) -> None:
 
 def _write_npy(path: Path, values: Array) -> None:
     with path.open("wb") as file:
-        np.save(file, values, allow_pickle=False)
+        np.save(Unbuffered(file), values, allow_pickle=False)
 
 
 def _write_tiff(path: Path, values: Array) -> None:
