@@ -252,7 +252,7 @@ def command(folder, *words):
 def test_a_finished_picture_does_not_wait_for_its_stages(tmp_path, tiny):
     image.write(tmp_path / "sample.png", np.random.default_rng(1).integers(0, 256, (24, 20), dtype=np.uint8))
     (tiny / "ballast").write_bytes(bytes(56 * 1024))
-    words = ["--order", "2", "--size", "64x64", "--stages", str(tiny / "st"), "--source-map", str(tiny / "map.npz")]
+    words = ["--method", "multires", "--size", "64x64", "--stages", tiny / "st", "--source-map", tiny / "map.npz"]
     done = subprocess.run(
         command(tmp_path, *words), cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
     )
@@ -267,7 +267,7 @@ def test_a_finished_picture_does_not_wait_for_its_stages(tmp_path, tiny):
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_a_process_that_is_asked_to_end_cleans_up(tmp_path, number):
     image.write(tmp_path / "sample.png", np.random.default_rng(2).integers(0, 256, (64, 64), dtype=np.uint8))
-    words = command(tmp_path, "--size", "900x900", "--stages", "st", "--order", "8")
+    words = command(tmp_path, "--size", "200x200", "--stages", "st", "--order", "8")
     running = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 60
     while not any((tmp_path / "st").glob("level*.png")):
