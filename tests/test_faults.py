@@ -19,6 +19,7 @@ from simdtex.io.atomic import atomic_folder, atomic_path
 from simdtex.model.source_map import save_source_map
 from simdtex.report.page import Section, Text, write_report
 from simdtex.report.sheet import animation
+from simdtex.report.stages import StageWriter
 
 
 def picture(seed, dtype=np.uint8):
@@ -212,6 +213,18 @@ def test_what_a_killed_process_leaves_is_removed_and_what_a_live_one_writes_is_n
         live.communicate()
     volume.write(tmp_path / "slices", block(1))
     assert sorted(os.listdir(tmp_path)) == [".simdtex-notes", "b.npy", "slices"]
+
+
+def test_a_folder_of_stages_where_a_process_was_killed_is_used_again(tmp_path):
+    StageWriter(tmp_path)
+    dead = writer(tmp_path / "level0.png", "file")
+    with pytest.raises(ValueError, match="holds other files"):
+        StageWriter(tmp_path)
+    dead.kill()
+    dead.communicate()
+    StageWriter(tmp_path)
+    write_report(tmp_path, "Title", "Lead", [], {})
+    assert sorted(os.listdir(tmp_path)) == ["index.html", "results.json"]
 
 
 def test_what_another_host_writes_is_let_be(tmp_path):

@@ -21,7 +21,7 @@ from functools import cache
 from pathlib import Path
 from typing import IO
 
-__all__ = ["atomic_folder", "atomic_path", "check_place", "not_written"]
+__all__ = ["atomic_folder", "atomic_path", "check_place", "left_behind", "not_written"]
 
 PathLike = str | os.PathLike[str]
 
@@ -219,17 +219,20 @@ def _beside(target: Path, old: bool = False) -> Path:
     return target.with_name(f"{name}-old" if old else f"{name}{target.suffix}")
 
 
+def left_behind(name: str) -> re.Match[str] | None:
+    """Whether a name is of something that a dead process of this host has not finished writing."""
+    found = _PARTIAL.fullmatch(name) if name.startswith(".simdtex-") else None
+    return None if found is None or found[1] != _here() or _is_alive(int(found[2])) else found
+
+
 def _sweep(target: Path) -> None:
     """Remove what dead processes of this host have left in the target's folder."""
     for name in os.listdir(target.parent):
-        if not name.startswith(".simdtex-") or not (found := _PARTIAL.fullmatch(name)):
+        if not (found := left_behind(name)):
             continue
-        place, process, owner, old, _ = found.groups()
-        if place != _here() or _is_alive(int(process)):
-            continue
-        if not old:
+        if not found[4]:
             _remove(target.with_name(name))
-        elif owner == _digits(target.name):
+        elif found[3] == _digits(target.name):
             if target.exists():
                 _remove(target.with_name(name))
             else:  # it was killed between taking the old folder away and putting the new one there
