@@ -225,6 +225,16 @@ def test_names_that_differ_are_let_be(folder):
     assert (folder / "sample.png").read_bytes() == before and (folder / "Sample.png").exists()
 
 
+def test_where_case_makes_no_difference(folder, monkeypatch):
+    """As on the disks of other systems, where the folder is there by another case too."""
+    real = os.path.samefile
+    fold = {name.swapcase(): name for name in (str(folder), str(folder / "in"))}
+    fold |= {str(folder.parent / folder.name.swapcase()): str(folder)}
+    monkeypatch.setattr(os.path, "samefile", lambda a, b: real(fold.get(str(a), a), fold.get(str(b), b)))
+    args = ["sample.png", "-o", "out.png", "--source-map", "Out.PNG"]
+    refused(folder, "synth", args, "would be written twice")
+
+
 # -- what is not there ----------------------------------------------------------------------------------------
 
 
