@@ -55,8 +55,18 @@ def real(name: str, value: Any, least: float, *, above: bool = False) -> None:
         raise ValueError(f"{name} is {value}; give a number {'above' if above else 'of at least'} {least}")
 
 
+def unmasked(name: str, value: Any) -> None:
+    """Raise where a masked array hides values, which would be taken as if they were there."""
+    if np.ma.is_masked(value):
+        count = int(np.count_nonzero(np.ma.getmaskarray(value)))
+        raise ValueError(
+            f"{name} has {count} masked value{'s' * (count != 1)}, and none may be masked; fill them first"
+        )
+
+
 def real_array(name: str, value: Any) -> NDArray[Any]:
     """The value as an array of finite real numbers; raises where it is none."""
+    unmasked(name, value)
     try:
         array = np.asarray(value)
     except ValueError:

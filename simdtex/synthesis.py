@@ -17,7 +17,7 @@ from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine, open_machine
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
-from simdtex.options import one_of, real, whole
+from simdtex.options import one_of, real, unmasked, whole
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
@@ -374,6 +374,7 @@ def _check_block(shape: Any) -> tuple[int, int, int]:
 
 
 def _check_grey(name: str, array: ArrayLike, levels: int) -> NDArray[np.int64]:
+    unmasked(name, array)
     a = np.asarray(array)
     if a.ndim != 2 or not a.size:
         raise ValueError(f"{name} must be a (rows, cols) array that is not empty, not shape {a.shape}")
@@ -385,6 +386,7 @@ def _check_grey(name: str, array: ArrayLike, levels: int) -> NDArray[np.int64]:
 
 
 def _check_sites(sites: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.int32]:
+    unmasked("sites", sites)
     a = np.asarray(sites)
     if a.size == 0:
         return np.zeros(0, np.int32)
@@ -397,6 +399,7 @@ def _check_sites(sites: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.int32]:
 
 
 def _check_temperature(temperature: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.uint16]:
+    unmasked("temperature", temperature)
     t = np.zeros(shape) if temperature is None else np.asarray(temperature, np.float64)
     if t.shape != shape:
         raise ValueError(f"temperature has shape {t.shape}; give the image's, {shape}")

@@ -126,9 +126,12 @@ def test_bad_options_get_one_sentence_and_write_nothing(folder, case):
 
 @pytest.mark.parametrize(
     ("report", "words"),
-    [("sample.png", "is a file"), ("nowhere/report", "does not exist"), (".", "holds other files")],
+    [("file", "is a file"), ("nowhere/report", "does not exist"), ("full", "holds other files")],
 )
 def test_bad_folders_are_refused_before_the_work(folder, report, words):
+    (folder / "file").touch()
+    (folder / "full").mkdir()
+    (folder / "full" / "notes.txt").touch()
     before = listing(folder)
     result = run(folder / "sample.png", "-o", folder / report, "--order", 2)
     assert_refused(result, words)

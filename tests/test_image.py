@@ -480,7 +480,7 @@ def test_failure_leaves_the_old_file_alone(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(image, "_encode", full)
+    monkeypatch.setattr(image, "encode", full)
     with pytest.raises(ValueError, match="No space left"):
         image.write(path, np.zeros((2, 2), np.uint8))
     assert path.read_bytes() == b"old"

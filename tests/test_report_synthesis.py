@@ -158,7 +158,7 @@ def test_a_method_without_sources_has_a_report_without_them(folder):
 
 @pytest.mark.parametrize(
     ("report", "words"),
-    [("sample.png", "is a file"), ("nowhere/r", "does not exist"), (".", "holds other files"), ("out.png", "twice")],
+    [("sample.png", "overwritten"), ("nowhere/r", "does not exist"), (".", "lies in"), ("out.png", "twice")],
 )
 def test_bad_folders_are_refused_before_the_work(folder, report, words):
     result = synth(folder, "--order", 2, "--report", folder / report)

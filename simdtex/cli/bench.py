@@ -9,7 +9,8 @@ from pathlib import Path
 
 import click
 
-from simdtex.cli.common import plainly
+from simdtex.cli.common import afterwards, plainly
+from simdtex.cli.places import FOLDER, WRITE
 
 
 @click.command()
@@ -19,8 +20,8 @@ from simdtex.cli.common import plainly
     help="Measure this device alone: part of its name or platform, or an index of `simdtex devices`.  [all usable]",
 )
 @click.option("--quick", is_flag=True, help="Small sizes: within a minute instead of some six.")
-@click.option("--json", "path", type=click.Path(path_type=Path), metavar="FILE", help="Write all that was measured.")
-@click.option("--plot", "folder", type=click.Path(path_type=Path), metavar="DIR", help="Draw rooflines and growth.")
+@click.option("--json", "path", type=WRITE, metavar="FILE", help="Write all that was measured.")
+@click.option("--plot", "folder", type=FOLDER, metavar="DIR", help="Draw rooflines and growth.")
 @click.option("-q", "--quiet", is_flag=True, help="No word on what is being measured, and no tables.")
 @plainly
 def bench(device: str | None, quick: bool, path: Path | None, folder: Path | None, quiet: bool) -> None:
@@ -49,9 +50,12 @@ def bench(device: str | None, quick: bool, path: Path | None, folder: Path | Non
 
     found = benchmark.run(sizes.QUICK if quick else sizes.FULL, infos, tell)
     if path:
-        with atomic_path(path) as whole:
+        with afterwards(), atomic_path(path) as whole:
             whole.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    pictures = plot(found, folder) if folder else []
+    pictures: list[Path] = []
+    if folder:
+        with afterwards():
+            pictures = plot(found, folder)
     if not quiet:
         render(found, Console(width=None if sys.stdout.isatty() else 200))
         for picture in [*([path] if path else []), *pictures]:

@@ -8,6 +8,7 @@ import shlex
 import signal
 import sys
 import threading
+import time
 from _thread import interrupt_main
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,17 +19,28 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from simdtex.cli.places import check_places
+
+
+class Ended(BaseException):
+    """The process is asked to end, by the signal of this number."""
+
 
 def plainly(command: Callable[..., None]) -> Callable[..., None]:
-    """Turn bad input into one sentence and exit code 2, and Ctrl-C into exit code 130."""
+    """Check a command's files; turn bad input into one sentence and exit code 2, and signals into 128 and their number.
+
+    What `afterwards` has kept is said at the end, with exit code 2 as well.
+    """
 
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> None:
         try:
-            with _interruptible():
+            with _interruptible(), _ending():
+                check_places(click.get_current_context())
                 command(*args, **kwargs)
         except (ValueError, TypeError, OSError) as error:
-            click.echo(f"simdtex: {error}", err=True)
+            _say(error)
+            settle()
             sys.exit(2)
         except MemoryError:
             click.echo("simdtex: the memory does not suffice for this; give a smaller size", err=True)
@@ -36,6 +48,10 @@ def plainly(command: Callable[..., None]) -> Callable[..., None]:
         except KeyboardInterrupt:
             click.echo("simdtex: stopped; nothing but stages may have been written", err=True)
             sys.exit(130)
+        except Ended as signalled:
+            click.echo("simdtex: stopped; nothing but stages may have been written", err=True)
+            sys.exit(128 + signalled.args[0])
+        settle()
 
     return wrapped
 
@@ -66,6 +82,58 @@ def _interruptible() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def _say(error: Exception) -> None:
+    text = str(error)
+    if isinstance(error, OSError) and error.strerror:  # without its number
+        text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    click.echo(f"simdtex: {text}", err=True)
+
+
+@contextmanager
+def _ending() -> Iterator[None]:
+    """Where the process is asked to end it cleans up, and does not leave half a file behind."""
+    before: dict[int, Any] = {}
+    since = 0.0
+
+    def end(number: int, _: Any) -> None:
+        nonlocal since
+        earlier, since = since, time.monotonic()
+        if since - earlier > 1:  # some programs ask twice at once
+            raise Ended(number)
+
+    if threading.current_thread() is threading.main_thread():
+        for number in (getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP")):
+            if number is not None and signal.getsignal(number) == signal.SIG_DFL:
+                before[number] = signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def afterwards() -> Iterator[None]:
+    """Keep what cannot be written until the end, so that the rest is written all the same; see `settle`."""
+    try:
+        yield
+    except (ValueError, OSError) as error:
+        context = click.get_current_context(silent=True)
+        if context is None:
+            raise
+        context.meta.setdefault(__name__, []).append(error)
+
+
+def settle() -> None:
+    """Say what could not be written, if anything, and end with exit code 2."""
+    context = click.get_current_context(silent=True)
+    failures = context.meta.pop(__name__, []) if context else []
+    for error in failures:
+        _say(error)
+    if failures:
+        sys.exit(2)
 
 
 def opened(device: str | None, profile: bool) -> Any:
@@ -102,7 +170,8 @@ def given(options: dict[str, Any]) -> dict[str, Any]:
     for name in ("weights", "shares", "proportions"):
         if name in chosen:
             chosen[name] = tuple(numbers(f"--{name}", chosen[name]))
-    if channels := chosen.pop("categorical_channels", None):
+    channels = chosen.pop("categorical_channels", None)
+    if channels is not None:
         words = [word.strip() for word in channels.split(",")]
         if "categorical" in chosen:
             raise ValueError("--categorical is of all channels and --categorical-channels of some; give one of them")
@@ -131,6 +200,11 @@ def numbers(name: str, text: str) -> list[float]:
 
 def _table(path: Path) -> list[list[float]]:
     """Numbers parted by commas or blanks, a line for each level."""
+    from simdtex.io.limits import check_file
+
+    check_file(path, "the thresholds", 2**20)
+    if path.stat().st_size > 2**20:
+        raise ValueError(f"{path} is too long for a table of thresholds; give a line of numbers for each level")
     try:
         lines = path.read_text(encoding="utf-8").replace(",", " ").splitlines()
         return [[float(word) for word in line.split()] for line in lines if line.strip()]
@@ -173,22 +247,12 @@ def output_shape(size: str | None, pixels: Any, *like: Any) -> tuple[int, int]:
     """Rows and columns of ``--size``, or by default those of the first picture of `like`, or twice the sample's."""
     from simdtex.io.image import parse_size
 
-    if size:
+    if size is not None:
         return parse_size(size)
     for picture in like:
         if picture is not None:
             return (picture.shape[0], picture.shape[1])
     return (2 * pixels.shape[0], 2 * pixels.shape[1])
-
-
-def check_distinct(outputs: list[Path], inputs: list[Path]) -> None:
-    """Raise where an output would overwrite another or an input."""
-    resolved = [path.resolve() for path in outputs]
-    for path in outputs:
-        if resolved.count(path.resolve()) > 1:
-            raise ValueError(f"{path} would be written twice; give each output a file of its own")
-        if path.resolve() in [other.resolve() for other in inputs]:
-            raise ValueError(f"{path} is an input and would be overwritten; give the output another name")
 
 
 @contextmanager
@@ -241,11 +305,16 @@ def watching(
         with progress_bar(quiet) as show:
 
             def callback(progress: Any) -> None:
+                nonlocal writer
                 show(progress.fraction, progress.doing, "")
                 if writer:
-                    writer(progress)
+                    kept, writer = writer, None
+                    with afterwards():  # the picture does not wait for its stages
+                        kept(progress)
+                        writer = kept
 
             yield callback
     finally:
         if writer:
-            writer.finish()
+            with afterwards():
+                writer.finish()

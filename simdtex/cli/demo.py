@@ -10,12 +10,11 @@ import click
 
 from simdtex.cli.common import plainly, progress_bar
 from simdtex.cli.options import DEVICE
+from simdtex.cli.places import FOLDER
 
 
 @click.command()
-@click.option(
-    "-o", "--output", default="demo", show_default=True, type=click.Path(path_type=Path), help="Folder to write."
-)
+@click.option("-o", "--output", default="demo", show_default=True, type=FOLDER, help="Folder to write.")
 @click.option("--size", default="256x256", show_default=True, metavar="WIDTHxHEIGHT", help="Of each output.")
 @click.option("--seed", type=int, default=1, show_default=True)
 @DEVICE

@@ -9,16 +9,17 @@ from typing import Any
 
 import click
 
-from simdtex.cli.common import check_distinct, command_line, given, plainly, watching
+from simdtex.cli.common import afterwards, command_line, given, plainly, settle, watching
 from simdtex.cli.inputs import channels, check_source_map, read_also, read_material, write_arranged
 from simdtex.cli.options import DEVICE, QUIET, SEED, extend_options, stages_option
+from simdtex.cli.places import FOLDER, READ, WRITE, WRITE_PAIR
 
 SIDES = ("top", "bottom", "left", "right")
 
 
 @click.command()
-@click.argument("picture", type=click.Path(path_type=Path))
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Picture to write.")
+@click.argument("picture", type=READ)
+@click.option("-o", "--output", required=True, type=WRITE, help="Picture to write.")
 @click.option("--left", type=int, default=0, help="Pixels to add at the left.")
 @click.option("--right", type=int, default=0, help="Pixels to add at the right.")
 @click.option("--top", type=int, default=0, help="Pixels to add at the top.")
@@ -45,14 +46,15 @@ SIDES = ("top", "bottom", "left", "right")
 @click.option(
     "--also",
     multiple=True,
+    type=WRITE_PAIR,
     metavar="MAP=OUT",
     help="Extend another map of the material (normal, height) in the same arrangement; may be repeated.",
 )
-@click.option("--source-map", type=click.Path(path_type=Path), metavar="FILE", help="Write it: .npz, .npy, .png.")
+@click.option("--source-map", type=WRITE, metavar="FILE", help="Write it: .npz, .npy, .png.")
 @stages_option("every level and sweep")
 @click.option(
     "--report",
-    type=click.Path(path_type=Path),
+    type=FOLDER,
     metavar="DIR",
     help="Write a page of the run: pictures, and how evenly it uses the picture.",
 )
@@ -89,7 +91,7 @@ def extend(
     whole = read_material([picture])
     pixels = whole.pixels[0]
     sides = {name: options.pop(name) for name in SIDES}
-    if size:
+    if size is not None:
         sides = _sides(size, centre, sides, whole.sizes[0])
     elif centre:
         raise ValueError("--centre says where the picture lies in --size; give that too")
@@ -105,8 +107,6 @@ def extend(
         from simdtex.report.page import check_folder
 
         check_folder(report)
-    outputs = [output, *(path for path in (source_map, stages, report) if path), *(one.out for one in others)]
-    check_distinct(outputs, [picture, *(path for one in others for path in one.maps.paths)])
 
     began = time.perf_counter()
     with watching(quiet, stages, whole.limits) as callback:
@@ -127,7 +127,9 @@ def extend(
     if report:
         from simdtex.report.synthesis import write_synthesis
 
-        write_synthesis(report, pixels, made, run, command_line(click.get_current_context()))
+        with afterwards():
+            write_synthesis(report, pixels, made, run, command_line(click.get_current_context()))
+    settle()
     if not quiet:
         (rows, cols), (height, width) = whole.sizes[0], made.shape[:2]
         click.echo(

@@ -11,7 +11,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.common import check_distinct, given, plainly, watching
+from simdtex.cli.common import given, plainly, settle, watching
 from simdtex.cli.inputs import (
     Material,
     channels,
@@ -22,14 +22,15 @@ from simdtex.cli.inputs import (
     write_arranged,
 )
 from simdtex.cli.options import DEVICE, QUIET, SEED, fill_options
+from simdtex.cli.places import READ, WRITE, WRITE_PAIR
 
 
 @click.command()
-@click.argument("picture", type=click.Path(path_type=Path))
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Picture to write.")
+@click.argument("picture", type=READ)
+@click.option("-o", "--output", required=True, type=WRITE, help="Picture to write.")
 @click.option(
     "--mask",
-    type=click.Path(path_type=Path),
+    type=READ,
     metavar="FILE",
     help="A picture of the same size, white where there is to be something new. Default: what is transparent or NaN in "
     "PICTURE, and the output has no alpha.",
@@ -38,7 +39,7 @@ from simdtex.cli.options import DEVICE, QUIET, SEED, fill_options
     "--sample",
     "samples",
     multiple=True,
-    type=click.Path(path_type=Path),
+    type=READ,
     metavar="FILE",
     help="Fill with this texture, not with what is around; may be repeated.",
 )
@@ -48,10 +49,11 @@ from simdtex.cli.options import DEVICE, QUIET, SEED, fill_options
 @click.option(
     "--also",
     multiple=True,
+    type=WRITE_PAIR,
     metavar="MAP=OUT",
     help="Fill another map of the material (normal, height) in the same arrangement; may be repeated.",
 )
-@click.option("--source-map", type=click.Path(path_type=Path), metavar="FILE", help="Write it: .npz, .npy, .png.")
+@click.option("--source-map", type=WRITE, metavar="FILE", help="Write it: .npz, .npy, .png.")
 @SEED
 @DEVICE
 @fill_options
@@ -87,9 +89,6 @@ def fill(
     others = read_also(also, whole)
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, texture or whole, everywhere=not texture)
-    outputs = [output, *([source_map] if source_map else []), *(one.out for one in others)]
-    read = [picture, *([mask] if mask else []), *samples, *(path for one in others for path in one.maps.paths)]
-    check_distinct(outputs, read)
 
     began = time.perf_counter()
     with watching(quiet, None, (0.0, 1.0)) as callback:
@@ -107,6 +106,7 @@ def fill(
         )
     made, run = filled
     write_arranged(output, made, others, source_map, run.source)
+    settle()
     if not quiet:
         click.echo(
             f"{output}: {np.count_nonzero(hole)} of {hole.size} pixels filled in {time.perf_counter() - began:.1f} s "

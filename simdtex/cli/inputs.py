@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.cli.common import afterwards
+
 if TYPE_CHECKING:
     from simdtex.io.hard_data import HardData
     from simdtex.io.image import Image
@@ -156,11 +158,14 @@ def write_arranged(
     from simdtex.model.source_map import save_source_map
 
     carried = [(one.carried(source), one.out) for one in others]
-    image.write(output, made)
+    with afterwards():
+        image.write(output, made)
     for array, path in carried:
-        image.write(path, array)
+        with afterwards():
+            image.write(path, array)
     if source_map:
-        save_source_map(source_map, source)
+        with afterwards():
+            save_source_map(source_map, source)
 
 
 def check_source_map(path: Path | None, samples: Material, *, everywhere: bool = True) -> None:

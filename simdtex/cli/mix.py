@@ -10,7 +10,6 @@ from typing import Any
 import click
 
 from simdtex.cli.common import (
-    check_distinct,
     given,
     last_iteration,
     numbers,
@@ -18,17 +17,19 @@ from simdtex.cli.common import (
     output_shape,
     plainly,
     print_profile,
+    settle,
     watching,
 )
 from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
+from simdtex.cli.places import READ, WRITE
 
 CHOSEN = ("palette", "pattern", "low", "high")
 """Options that name a sample."""
 
 
 @click.command()
-@click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Picture to write.")
+@click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
+@click.option("-o", "--output", required=True, type=WRITE, help="Picture to write.")
 @click.option(
     "--size",
     metavar="WIDTHxHEIGHT",
@@ -79,7 +80,6 @@ def mix(
     shape = output_shape(size, arrays[0], begin)
     colour = any(picture.channel_axis is not None for picture in pictures)
     image.check_writable(output, arrays[0].dtype, channels)
-    check_distinct([output, *([stages] if stages else [])], [*samples, *([start] if start else [])])
 
     began = time.perf_counter()
     limits = min(float(array.min()) for array in arrays), max(float(array.max()) for array in arrays)
@@ -95,6 +95,7 @@ def mix(
             **given(options | chosen | {"average": weights, "start": begin}),
         )
     image.write(output, made)
+    settle()
     if not quiet:
         click.echo(
             f"{output}: {shape[1]}x{shape[0]} from {len(arrays)} {'sample' if len(arrays) == 1 else 'samples'} "

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import click
+
+from simdtex.cli.places import ENTER, FOLDER, READ
 
 Command = Callable[..., None]
 
@@ -58,7 +59,7 @@ _ORIENTATIONS = {
 
 def stages_option(what: str) -> Callable[[Command], Command]:
     """``--stages``, which writes these pictures."""
-    return option("--stages", type=click.Path(path_type=Path), metavar="DIR", help=f"Write {what} as pictures.")
+    return option("--stages", type=FOLDER, metavar="DIR", help=f"Write {what} as pictures.")
 
 
 def _shared(name: str, texts: dict[str, str], *methods: str, **kinds: Any) -> Callable[[Command], Command]:
@@ -149,7 +150,7 @@ _THRESHOLD_OPTIONS = (
     option("--target", type=float, help="multires: mean candidates for --alpha auto, in place of --strain."),
     option(
         "--thresholds",
-        type=click.Path(path_type=Path),
+        type=READ,
         metavar="FILE",
         help="multires: a table of thresholds, a line of numbers for each level.",
     ),
@@ -169,7 +170,9 @@ def _pyramid_options(start: str, prefix: str = "") -> list[Callable[[Command], C
         named("--match", "rank (exact) or lookup (the paper's tables).  [{pyramid.match}]"),
         named("--bins", "Of these tables, 2 to 4096.  [{pyramid.bins}]", type=int),
         named("--color", "decorrelate or channels: the colours that are matched.  [{pyramid.color}]"),
-        named("--start", f"{begin} to begin with.  [noise]", type=click.Path(path_type=Path), metavar=metavar),
+        named(
+            "--start", f"{begin} to begin with.  [noise]", type=ENTER if metavar == "VOLUME" else READ, metavar=metavar
+        ),
     ]
 
 

@@ -10,20 +10,21 @@ from typing import Any
 
 import click
 
-from simdtex.cli.common import command_line, given, plainly, progress_bar
+from simdtex.cli.common import afterwards, command_line, given, plainly, progress_bar
 from simdtex.cli.options import DEVICE, mrf_options
+from simdtex.cli.places import FOLDER, READ
 from simdtex.methods.mrf import Options
 from simdtex.schedules import TOGETHER
 
 
 @click.command()
-@click.argument("sample", required=False, type=click.Path(path_type=Path))
+@click.argument("sample", required=False, type=READ)
 @click.option(
     "-o",
     "--output",
     default="schedules-report",
     show_default=True,
-    type=click.Path(path_type=Path),
+    type=FOLDER,
     help="Folder for the report.",
 )
 @click.option(
@@ -89,7 +90,8 @@ def schedules(
             callback=tell,
             **given(options),
         )
-    write_comparison(output, found, command_line(click.get_current_context()))
+    with afterwards():
+        write_comparison(output, found, command_line(click.get_current_context()))
     if quiet:
         return
     console = Console(width=None if sys.stdout.isatty() else 200)

@@ -9,13 +9,14 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.common import candidates_per_level, check_distinct, given, numbers, output_shape, plainly, progress_bar
+from simdtex.cli.common import candidates_per_level, given, numbers, output_shape, plainly, progress_bar
 from simdtex.cli.options import DEVICE, multires_options
+from simdtex.cli.places import READ, WRITE
 
 
 @click.command()
-@click.argument("sample", type=click.Path(path_type=Path))
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Sheet to write.")
+@click.argument("sample", type=READ)
+@click.option("-o", "--output", required=True, type=WRITE, help="Sheet to write.")
 @click.option(
     "--alphas",
     default="0.05,0.10,...,0.30",
@@ -51,7 +52,6 @@ def sheet(
     from simdtex.report.sheet import contact_sheet
 
     image.check_writable(output, np.uint8, 3)
-    check_distinct([output], [sample])
     picture = image.read(sample)
     height, width = picture.pixels.shape[:2]
     shape = output_shape(size, picture.pixels)

@@ -11,19 +11,20 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.common import check_distinct, command_line, given, output_shape, plainly, watching
+from simdtex.cli.common import afterwards, command_line, given, output_shape, plainly, settle, watching
 from simdtex.cli.guides import read_guides
 from simdtex.cli.inputs import known_size, known_values, read_known, read_masks, read_material
 from simdtex.cli.options import DEVICE, QUIET, SEED, simulate_options
+from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
 
 
 @click.command()
-@click.argument("training_image", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("training_image", nargs=-1, required=True, type=READ)
 @click.option(
     "-o",
     "--output",
     required=True,
-    type=click.Path(path_type=Path),
+    type=EITHER,
     help="Where the realisations go: .zarr, .zarr.zip, .nc or .npz.",
 )
 @click.option("-n", "--number", default=1, show_default=True, type=int, help="How many realisations.")
@@ -35,7 +36,7 @@ from simdtex.cli.options import DEVICE, QUIET, SEED, simulate_options
 )
 @click.option(
     "--hard",
-    type=click.Path(path_type=Path),
+    type=READ,
     metavar="FILE",
     help="Hard data, the same in every realisation: a table x,y,value (.csv), or a picture, NaN or transparent where "
     "nothing is known.",
@@ -43,15 +44,20 @@ from simdtex.cli.options import DEVICE, QUIET, SEED, simulate_options
 @click.option(
     "--sample-mask",
     multiple=True,
-    type=click.Path(path_type=Path),
+    type=READ,
     metavar="FILE",
     help="White where the training image may be used; once for each of several.",
 )
-@click.option("--guide", metavar="A[,B...]=OUT", help="Secondary data: of each training image, and of realisations.")
+@click.option(
+    "--guide",
+    type=READ_PAIR,
+    metavar="A[,B...]=OUT",
+    help="Secondary data: of each training image, and of realisations.",
+)
 @click.option("--jobs", type=int, help="Realisations at a time.  [one for each core, at most 4; on a GPU 1]")
 @click.option(
     "--report",
-    type=click.Path(path_type=Path),
+    type=FOLDER,
     metavar="DIR",
     help="Write a page: realisations, shares, entropy, variograms, connectivity, variety.",
 )
@@ -86,14 +92,12 @@ def simulate(
     material = read_material(training_image, unknown=True)
     masks = read_masks(sample_mask, material)
     table = read_known(hard) if hard else None
-    guides = read_guides(guide, material, options["labels"]) if guide else None
+    guides = read_guides(guide, material, options["labels"]) if guide is not None else None
     shape = output_shape(size, material.pixels[0], known_size(table), material.pixels[0])
     known = known_values(table, hard, shape, material) if table is not None and hard else None
     check_realisations_path(output, material.pixels[0].dtype)
     if report:
         _check_report(report, material.pixels)
-    inputs = [*training_image, *sample_mask, *([hard] if hard else []), *(guides.paths if guides else ())]
-    check_distinct([output, *([report] if report else [])], inputs)
     if guides:
         options["labels"] = guides.labels
 
@@ -114,19 +118,22 @@ def simulate(
             callback=callback,
             **given(options),
         )
-    write_realisations(output, made)
+    with afterwards():
+        write_realisations(output, made)
     if report:
         from simdtex.report.ensemble import write_ensemble
 
         categorical = bool(made.attrs["options"]["categorical"])
-        write_ensemble(
-            report,
-            material.pixels[0],
-            made.values,
-            data=None if known is None else _rows(known),
-            categories=None if categorical else [],
-            command=command_line(click.get_current_context()),
-        )
+        with afterwards():
+            write_ensemble(
+                report,
+                material.pixels[0],
+                made.values,
+                data=None if known is None else _rows(known),
+                categories=None if categorical else [],
+                command=command_line(click.get_current_context()),
+            )
+    settle()
     if not quiet:
         seconds = time.perf_counter() - began
         click.echo(

@@ -11,8 +11,9 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.common import check_distinct, given, last_iteration, opened, plainly, print_profile, watching
+from simdtex.cli.common import afterwards, given, last_iteration, opened, plainly, print_profile, settle, watching
 from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
+from simdtex.cli.places import EITHER, READ, WRITE
 from simdtex.methods.pyramid import solid as method
 
 DEFAULTS = method.Options()
@@ -21,14 +22,14 @@ SIDE = 128
 
 
 @click.command()
-@click.argument("sample", type=click.Path(path_type=Path))
+@click.argument("sample", type=READ)
 @click.option(
     "-o",
     "--output",
     "outputs",
     multiple=True,
     required=True,
-    type=click.Path(path_type=Path),
+    type=EITHER,
     help="Block to write: .npz, .npy, .nrrd, .tif, or without suffix a folder of slices; may be repeated.",
 )
 @click.option(
@@ -40,7 +41,7 @@ SIDE = 128
 @click.option(
     "--view",
     "picture",
-    type=click.Path(path_type=Path),
+    type=WRITE,
     metavar="PNG",
     help="Write a picture of it: a cube, a sphere and three slices.",
 )
@@ -76,18 +77,17 @@ def solid(
     from simdtex.report.solid import view
     from simdtex.synthesis import synthesize_solid
 
-    shape = block_shape(size) if size else (SIDE, SIDE, SIDE)
+    shape = (SIDE, SIDE, SIDE) if size is None else block_shape(size)
     read = image.read(sample)
     pixels = read.pixels
     begin = volume.read(start) if start else None
-    if begin is not None and not size:
+    if begin is not None and size is None:
         shape = begin.shape[0], begin.shape[1], begin.shape[2]
     channels = 1 if read.channel_axis is None else pixels.shape[-1]
     for output in outputs:
         volume.check_writable(output, pixels.dtype, channels)
     if picture:
         image.check_writable(picture, suffixes=(".png",))
-    check_distinct([*outputs, *(p for p in (picture, stages) if p)], [sample, *([start] if start else [])])
 
     began = time.perf_counter()
     with watching(quiet, stages, (float(pixels.min()), float(pixels.max()))) as callback:
@@ -103,9 +103,12 @@ def solid(
         )
     seconds = time.perf_counter() - began
     for output in outputs:
-        volume.write(output, block, None if read.channel_axis is None else -1)
+        with afterwards():
+            volume.write(output, block, None if read.channel_axis is None else -1)
     if picture:
-        view(np.asarray(block), picture)
+        with afterwards():
+            view(np.asarray(block), picture)
+    settle()
     if not quiet:
         names = ", ".join(str(path) for path in (*outputs, *([picture] if picture else [])))
         click.echo(

@@ -10,8 +10,8 @@ from typing import Any
 import click
 
 from simdtex.cli.common import (
+    afterwards,
     candidates_per_level,
-    check_distinct,
     command_line,
     given,
     last_iteration,
@@ -19,6 +19,7 @@ from simdtex.cli.common import (
     output_shape,
     plainly,
     print_profile,
+    settle,
     watching,
 )
 from simdtex.cli.guides import read_guides
@@ -34,11 +35,12 @@ from simdtex.cli.inputs import (
     write_arranged,
 )
 from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, method_options, option, stages_option
+from simdtex.cli.places import FOLDER, READ, READ_PAIR, WRITE, WRITE_PAIR
 
 
 @click.command()
-@click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("-o", "--output", required=True, type=click.Path(path_type=Path), help="Picture to write.")
+@click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
+@click.option("-o", "--output", required=True, type=WRITE, help="Picture to write.")
 @click.option(
     "--size",
     metavar="WIDTHxHEIGHT",
@@ -54,19 +56,20 @@ from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, method_options, op
 @click.option(
     "--sample-mask",
     multiple=True,
-    type=click.Path(path_type=Path),
+    type=READ,
     metavar="FILE",
     help="mrf: a picture of the sample's size, white where pixels may be taken from; once for each sample.",
 )
 @click.option(
     "--known",
-    type=click.Path(path_type=Path),
+    type=READ,
     metavar="FILE",
     help="mrf: what of the output is known and stays: a table of x, y and values (.csv, .tsv, .txt, .dat), or a "
     "picture that is transparent or NaN where it is not known.",
 )
 @click.option(
     "--guide",
+    type=READ_PAIR,
     metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
     help="mrf: two pictures of labels or numbers; a place of the output comes from where the first has what the second "
     "has there. Of several samples: GUIDE0,GUIDE1=OUTPUT-GUIDE.",
@@ -89,17 +92,18 @@ from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, method_options, op
 @SEED
 @DEVICE
 @stages_option("every level, sweep or iteration")
-@click.option("--source-map", type=click.Path(path_type=Path), metavar="FILE", help="Write it: .npz, .npy, .png.")
+@click.option("--source-map", type=WRITE, metavar="FILE", help="Write it: .npz, .npy, .png.")
 @click.option(
     "--also",
     multiple=True,
+    type=WRITE_PAIR,
     metavar="MAP=OUT",
     help="Carry the arrangement over to another map of the material (normal, height); may be repeated. Of several "
     "samples: MAP0,MAP1=OUT.",
 )
 @click.option(
     "--report",
-    type=click.Path(path_type=Path),
+    type=FOLDER,
     metavar="DIR",
     help="Write a page of the run: pictures, and how evenly it uses the sample.",
 )
@@ -156,9 +160,6 @@ def synth(
         if material.several or told is not None or not material.known:
             raise ValueError("--report shows one sample, all of it known, and what is taken from it; leave it out")
         check_folder(report)
-    outputs = [output, *(path for path in (source_map, stages, report) if path), *(one.out for one in others)]
-    read = [*samples, *sample_mask, *(path for path in (known, start) if path), *(guides.paths if guides else ())]
-    check_distinct(outputs, [*read, *(path for one in others for path in one.maps.paths)])
     if guides:
         options["labels"] = guides.labels
 
@@ -182,7 +183,9 @@ def synth(
     if report:
         from simdtex.report.synthesis import write_synthesis
 
-        write_synthesis(report, pixels, made, run, command_line(click.get_current_context()))
+        with afterwards():
+            write_synthesis(report, pixels, made, run, command_line(click.get_current_context()))
+    settle()
     if not quiet:
         height, width = material.sizes[0]
         by = f"{len(samples)} samples" if material.several else f"{width}x{height}"

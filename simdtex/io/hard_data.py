@@ -17,10 +17,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from simdtex.io.limits import VARIABLE, TooLarge, check_file, max_pixels_or_default, read_npy
+
 __all__ = ["HardData", "place_hard_data", "read_hard_data"]
 
 PathLike = str | os.PathLike[str]
 Floats = NDArray[np.float64]
+
+_SPLIT = f"give fewer rows or columns, or set {VARIABLE} higher"
 
 _EXACT = 2**53 - 1
 """Integers up to here are exact in float64, which the values are read as; no larger one is rounded to one of them."""
@@ -58,7 +62,7 @@ class HardData:
 # ---------------------------------------------------------------- reading
 
 
-def read_hard_data(path: PathLike) -> HardData:
+def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData:
     """Read a table of known values.
 
     Parameters
@@ -69,6 +73,8 @@ def read_hard_data(path: PathLike) -> HardData:
         line. Numbers have a decimal point. An empty cell, or NaN, is an unknown value. A first line with names
         for x and y is a header, which names the variables. From ``#`` to the end of a line is a comment. Or a NumPy
         ``.npy`` of real numbers, (data, 3 or more), with the same columns.
+    max_pixels : int, optional
+        Cells, and bytes of a text, that are read at most. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
 
     Returns
     -------
@@ -78,22 +84,24 @@ def read_hard_data(path: PathLike) -> HardData:
     Raises
     ------
     ValueError
-        The file is missing, no table, has no rows, or a row is wrong; it names the line.
+        The file is missing, no table, too large, has no rows, or a row is wrong; it names the line.
 
     Notes
     -----
     About 8 s for a million rows of text.
     """
     name = os.fspath(path)
+    most = max_pixels_or_default(max_pixels)
+    check_file(path, "the hard data", most)
     try:
         if Path(path).suffix.lower() == ".npy":
-            return _table(_array(Path(path)))
+            return _table(_array(Path(path), most))
+        if os.path.getsize(path) > most:
+            raise TooLarge(f"is a text of {os.path.getsize(path)} bytes and no more than {most} are read: {_SPLIT}")
         with open(path, encoding="utf-8-sig", newline=None) as text:
-            return _parsed(text.read().split("\n"))
-    except FileNotFoundError:
-        raise ValueError(f"{name} does not exist: check the path of the hard data") from None
-    except IsADirectoryError:
-        raise ValueError(f"{name} is a folder: give the path of a table in it") from None
+            return _parsed(text.read().split("\n"), most)
+    except TooLarge as error:
+        raise ValueError(f"{name} {error}") from None
     except UnicodeDecodeError:
         raise ValueError(f"{name} is no text in UTF-8: save the table as CSV in UTF-8") from None
     except OSError as error:
@@ -102,15 +110,17 @@ def read_hard_data(path: PathLike) -> HardData:
         raise ValueError(f"{name}: {error}") from None
 
 
-def _array(path: Path) -> Any:
+def _array(path: Path, most: int) -> Any:
     try:
         with path.open("rb") as file:
-            return np.load(file, allow_pickle=False)
+            return read_npy(file, os.fstat(file.fileno()).st_size, 2, most)
+    except TooLarge:
+        raise
     except (ValueError, EOFError):
         raise ValueError("it is damaged, or holds no array of numbers: write it with numpy.save") from None
 
 
-def _parsed(text: Sequence[str]) -> HardData:
+def _parsed(text: Sequence[str], most: int) -> HardData:
     """The table in the lines of a text."""
     kept = [(number, line) for number, line in enumerate((one.partition("#")[0] for one in text), 1) if line.strip()]
     if not kept:
@@ -129,17 +139,20 @@ def _parsed(text: Sequence[str]) -> HardData:
         _check_order(header)
     if not rows:
         raise ValueError("the table has a header and no rows: give a line with x, y and a value for each datum")
-    numbers = np.empty((len(rows), columns))
-    for k, (number, cells) in enumerate(rows):
+    for number, cells in rows:
         if len(cells) != columns:
             raise ValueError(f"line {number} has {len(cells)} cells and those before it {columns}: give as many in all")
+    if len(rows) * columns > most:
+        raise TooLarge(f"has {len(rows) * columns} cells and no more than {most} are read: {_SPLIT}")
+    numbers = np.empty((len(rows), columns))
+    for k, (number, cells) in enumerate(rows):
         for column, cell in enumerate(cells):
             if not cell and column >= 2:
                 numbers[k, column] = np.nan
                 continue
             if not _is_number(cell):
                 raise ValueError(
-                    f"line {number} has {cell!r} in column {column + 1}, which is no number: write numbers with a "
+                    f"line {number} has {cell[:40]!r} in column {column + 1}, which is no number: write numbers with a "
                     "decimal point" + (", and leave the cell of an unknown value empty" if column >= 2 else "")
                 )
             numbers[k, column] = float(cell)

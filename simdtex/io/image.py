@@ -9,15 +9,11 @@ colour) and the compressed strips of a TIFF.
 
 from __future__ import annotations
 
-import errno
+import io
 import os
 import re
-import secrets
-import shutil
-import stat
 import warnings
-from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,7 +22,10 @@ import numpy as np
 import PIL.Image
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from simdtex.io.atomic import Unbuffered, atomic_folder, atomic_path, check_place
 from simdtex.io.decode import decode, native
+from simdtex.io.limits import TooLarge, check_file, max_pixels_or_default
+from simdtex.options import unmasked
 
 __all__ = [
     "Image",
@@ -65,16 +64,20 @@ class Image:
 # ---------------------------------------------------------------- reading
 
 
-def read(path: PathLike, *, unknown: bool = False) -> Image:
+def read(path: PathLike, *, unknown: bool = False, max_pixels: int | None = None) -> Image:
     """Read a picture file as a sample, telling the format by its content and not by its name.
 
     Parameters
     ----------
     path : path
-        PNG, JPEG, TIFF (first page), BMP, WebP, GIF (first frame), PPM/PGM, any other format that
-        Pillow knows, or a NumPy ``.npy`` of shape (rows, cols) or (rows, cols, channels).
+        PNG, JPEG, TIFF (first page), BMP, WebP, GIF (first frame), PPM/PGM, or a NumPy ``.npy`` of
+        shape (rows, cols) or (rows, cols, channels). No other format is tried, whatever the name.
     unknown : bool
         Whether float pixels may be NaN, which says that they are unknown.
+    max_pixels : int, optional
+        Pixels that are read at most, of all frames of an animation together, and 8 bytes for each.
+        None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27. The file's header is asked, before
+        anything is decoded.
 
     Returns
     -------
@@ -87,19 +90,22 @@ def read(path: PathLike, *, unknown: bool = False) -> Image:
     Raises
     ------
     ValueError
-        The file is missing, a folder, empty, truncated, not an image, or holds infinite pixels, or
-        NaN where none may be unknown.
+        The file is missing, a folder, empty, truncated, not an image, too large, or holds infinite
+        pixels, or NaN where none may be unknown.
 
     Notes
     -----
     The whole file is held in memory beside its pixels.
     """
     name = os.fspath(path)
-    data = _file_bytes(name)
+    most = max_pixels_or_default(max_pixels)
+    data = _file_bytes(name, most)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            pixels = np.asarray(decode(data))
+            pixels = np.asarray(decode(data, most))
+    except TooLarge as error:
+        raise ValueError(f"{name} {error}") from None
     except PIL.UnidentifiedImageError:
         raise ValueError(f"{name} is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF, PPM or .npy file") from None
     except MemoryError:
@@ -145,6 +151,7 @@ def split_alpha(pixels: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
     >>> colour.shape, hole.tolist()
     ((1, 2, 3), [[False, True]])
     """
+    unmasked("the picture", pixels)
     values = np.asarray(pixels)
     if values.dtype.kind not in "buif":
         raise TypeError(f"the picture holds {values.dtype} values: give integers or real floats")
@@ -160,7 +167,7 @@ def _half(dtype: np.dtype[Any]) -> float:
     return np.iinfo(dtype).max / 2 if dtype.kind in "iu" else 0.5
 
 
-def read_mask(path: PathLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def read_mask(path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None = None) -> NDArray[np.bool_]:
     """Read a picture that says of every pixel whether it is meant.
 
     Parameters
@@ -169,6 +176,8 @@ def read_mask(path: PathLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
         A picture as for `read`, grey or colour, of bool, 8 bits, 16 bits, or floats from 0 to 1.
     shape : (rows, cols)
         The size it must have; what comes after is not looked at.
+    max_pixels : int, optional
+        As for `read`.
 
     Returns
     -------
@@ -183,7 +192,7 @@ def read_mask(path: PathLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
         value than 1 of 255 or 65535, which is a mask of 0 and 1 saved as integers.
     """
     name = os.fspath(path)
-    pixels = read(path).pixels
+    pixels = read(path, max_pixels=max_pixels).pixels
     rows, cols = shape[:2]
     if pixels.shape[:2] != (rows, cols):
         raise ValueError(
@@ -204,18 +213,12 @@ def read_mask(path: PathLike, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     return (bright if bright.ndim == 2 else bright.any(axis=2)) & ~transparent
 
 
-def _file_bytes(name: str) -> bytes:
+def _file_bytes(name: str, most: int) -> bytes:
+    check_file(name, "the image", most)
     try:
-        mode = os.stat(name).st_mode
-        if stat.S_ISDIR(mode):
-            raise ValueError(f"{name} is a folder: give the path of an image file in it")
-        if not stat.S_ISREG(mode):
-            raise ValueError(f"{name} is not a regular file: give the path of an image file")
         data = Path(name).read_bytes()
-    except FileNotFoundError:
-        raise ValueError(f"{name} does not exist: check the path of the image") from None
     except OSError as error:
-        raise ValueError(f"{name} cannot be read ({error.strerror}): check the path") from None
+        raise ValueError(f"{name} cannot be read ({error.strerror}): check the path of the image") from None
     if not data:
         raise ValueError(f"{name} is empty (0 bytes): give a file with an image in it")
     return data
@@ -240,7 +243,7 @@ def check_sample(array: ArrayLike, channel_axis: int | None, *, unknown: bool = 
     channel_axis : int or None
         The axis that holds the channels; negative counts from the end.
     unknown : bool
-        Whether floats may be NaN, which says that they are unknown.
+        Whether floats may be NaN, which says that they are unknown, and values masked, which is for the caller to see.
 
     Returns
     -------
@@ -253,8 +256,11 @@ def check_sample(array: ArrayLike, channel_axis: int | None, *, unknown: bool = 
     TypeError
         The values are not real numbers, or `channel_axis` is not an integer.
     ValueError
-        The number of axes does not fit, an axis is empty, or a value is infinite, or NaN where none may be unknown.
+        The number of axes does not fit, an axis is empty, or a value is infinite, or NaN or masked where none may be
+        unknown.
     """
+    if not unknown:
+        unmasked("the sample", array)
     try:
         pixels = np.asarray(array)
     except ValueError:
@@ -381,7 +387,7 @@ def check_writable(
     target = Path(path)
     suffix = target.suffix.lower()
     known = _FORMATS if suffixes is None else suffixes
-    _check_place(target)
+    check_place(target)
     if suffix not in known:
         what = f"ends in {target.suffix}" if suffix else "has no suffix"
         raise ValueError(f"{target} {what}: end its name in one of {', '.join(sorted(known))}")
@@ -399,100 +405,6 @@ def _holds(suffix: str, dtype: DTypeLike | None, channels: int | None) -> bool:
     return (dtype is None or types is None or np.dtype(dtype).name in types) and (
         channels is None or counts is None or channels in counts
     )
-
-
-def _check_place(target: Path) -> None:
-    folder = target.parent
-    try:
-        if target.is_dir():
-            raise ValueError(f"{target} is a folder: add a file name to it")
-        if os.path.lexists(target) and target.exists() and not target.is_file():
-            raise ValueError(f"{target} is not a regular file: give another name")
-        if not folder.exists():
-            raise ValueError(f"the folder {folder} does not exist: create it first")
-        if not folder.is_dir():
-            raise ValueError(f"{folder} is not a folder: give another path")
-        os.stat(target)
-    except FileNotFoundError:
-        pass
-    except OSError as error:
-        raise ValueError(f"{_shortened(target)} cannot be written ({error.strerror}): give another path") from None
-    if not os.access(os.path.dirname(os.path.realpath(target)), os.W_OK | os.X_OK):
-        raise ValueError(f"the folder {folder} is not writable: choose another folder")
-
-
-def _shortened(target: Path) -> str:
-    text = str(target)
-    return text if len(text) <= 100 else text[:97] + "..."
-
-
-@contextmanager
-def atomic_path(path: PathLike) -> Iterator[Path]:
-    """Give a temporary name beside `path`, and rename it to `path` when the block succeeds.
-
-    A reader of `path` sees the old file or the whole new one, never a part. Whatever ends the
-    block early, Ctrl-C included, removes the temporary file and leaves `path` as it was.
-
-    Parameters
-    ----------
-    path : path
-        The file to write; a link is followed. The temporary name has the same suffix.
-
-    Yields
-    ------
-    Path
-        An empty file to be overwritten.
-
-    Raises
-    ------
-    ValueError
-        The folder is missing or not writable, or `path` is a folder.
-    """
-    _check_place(Path(path))
-    target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".{secrets.token_hex(8)}{target.suffix}")
-    try:
-        # not tempfile: it would leave the finished file readable by its owner alone
-        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-        yield temporary
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-@contextmanager
-def atomic_folder(path: PathLike) -> Iterator[Path]:
-    """Give an empty folder beside `path`, and rename it to `path` when the block succeeds.
-
-    A folder that is at `path` is replaced whole at the end; whether it may be is for the caller to check. Whatever ends
-    the block early, Ctrl-C included, removes the temporary folder and leaves `path` as it was.
-
-    Parameters
-    ----------
-    path : path
-        The folder to write; a link is followed. The temporary name has the same suffix.
-
-    Yields
-    ------
-    Path
-        An empty folder to be filled.
-    """
-    target = Path(os.path.realpath(path))
-    temporary, old = (target.with_name(f".{secrets.token_hex(8)}{target.suffix}") for _ in range(2))
-    try:
-        temporary.mkdir()
-        yield temporary
-        try:
-            if target.exists():
-                target.rename(old)
-            temporary.rename(target)
-        except BaseException:
-            if old.exists() and not target.exists():
-                old.rename(target)
-            raise
-    finally:
-        for folder in (temporary, old):
-            shutil.rmtree(folder, ignore_errors=True)
 
 
 def write(path: PathLike, array: ArrayLike) -> None:
@@ -514,6 +426,7 @@ def write(path: PathLike, array: ArrayLike) -> None:
     ValueError
         The path cannot be written, or its format cannot hold such pixels; it names one that can.
     """
+    unmasked("the picture", array)
     pixels = np.asarray(array)
     if pixels.dtype.kind not in "buif":
         raise TypeError(f"the picture holds {pixels.dtype} values: give integers or real floats")
@@ -525,19 +438,15 @@ def write(path: PathLike, array: ArrayLike) -> None:
     if suffix != ".npy":
         pixels = pixels * np.uint8(255) if pixels.dtype == bool else pixels
         pixels = native(pixels[..., 0] if channels == 1 and pixels.ndim == 3 else pixels)
-    try:
-        with atomic_path(path) as temporary:
-            _encode(temporary, suffix, pixels)
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else _one_line(error)
-        remedy = "free some space" if error.errno == errno.ENOSPC else "choose another path"
-        raise ValueError(f"{os.fspath(path)} could not be written ({reason}): {remedy}") from None
+    with atomic_path(path) as temporary:
+        encode(temporary, suffix, pixels)
 
 
-def _encode(path: Path, suffix: str, pixels: Array) -> None:
+def encode(path: Path, suffix: str, pixels: Array) -> None:
+    """Write pixels that the format of the suffix holds, over whatever is there."""
     if suffix == ".npy":
-        with path.open("wb") as file:  # np.save would add its own suffix to a name in capitals
-            np.save(file, pixels, allow_pickle=False)
+        with path.open("wb") as file:
+            np.save(Unbuffered(file), pixels, allow_pickle=False)
     elif suffix == ".png" and pixels.dtype == np.uint16:
         import imagecodecs  # here and below: a picture that needs the library waits for it, and no other
 
@@ -548,7 +457,15 @@ def _encode(path: Path, suffix: str, pixels: Array) -> None:
         _write_pnm(path, pixels)
     else:
         options = _OPTIONS.get(suffix, {})
-        PIL.Image.fromarray(pixels).save(path, **options)
+        kind = PIL.Image.registered_extensions()[suffix]
+        path.write_bytes(pillow_bytes(PIL.Image.fromarray(pixels), kind, **options))
+
+
+def pillow_bytes(picture: PIL.Image.Image, kind: str, **options: Any) -> bytes:
+    """A picture in a format of Pillow, which does not find out that a disk has taken a part of it alone."""
+    buffer = io.BytesIO()
+    picture.save(buffer, format=kind, **options)
+    return buffer.getvalue()
 
 
 def _write_tiff(path: Path, pixels: Array) -> None:

@@ -7,21 +7,30 @@ They are an `xarray.DataArray` with the dimensions (realisation, y, x), or (real
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import zipfile
 from collections.abc import Callable, Hashable, Mapping
 from importlib import import_module
+from math import prod
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from simdtex.io import image
+from simdtex.io.atomic import scratch_folder
 from simdtex.io.decode import native
+from simdtex.io.limits import (
+    TooLarge,
+    check_bytes,
+    check_file,
+    check_pixels,
+    check_zip,
+    max_pixels_or_default,
+    read_npy,
+)
 
 if TYPE_CHECKING:
     from xarray import DataArray, Dataset
@@ -150,22 +159,17 @@ def write_realisations(path: PathLike, array: DataArray) -> None:
     attributes = {name: _plain_attributes(one.attrs) for name, one in [(None, array), *array.coords.items()]}
     coordinates = {str(name): (one.dims, _plain_coordinate(name, one)) for name, one in array.coords.items()}
     values = native(np.asarray(array.values))
-    try:
-        if suffix == ".npz":
-            with image.atomic_path(path) as temporary:
-                _write_npz(temporary, array, values, coordinates, attributes)
-            return
-        stored = {name: _stored(given) for name, given in attributes.items()}
-        name = _NAME if array.name is None else str(array.name)
-        coords = {key: (dims, one, stored[key]) for key, (dims, one) in coordinates.items()}
-        dataset = xarray.Dataset({name: (array.dims, values, stored[None])}, coords)
-        dataset.attrs = {} if array.name is None else {"array": name}
-        with image.atomic_folder(path) if suffix == ".zarr" else image.atomic_path(path) as temporary:
-            _WRITERS[suffix](temporary, dataset, name)
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else " ".join(str(error).split())
-        remedy = "free some space" if error.errno == errno.ENOSPC else "choose another path"
-        raise ValueError(f"{os.fspath(path)} could not be written ({reason}): {remedy}") from None
+    if suffix == ".npz":
+        with image.atomic_path(path) as temporary:
+            _write_npz(temporary, array, values, coordinates, attributes)
+        return
+    stored = {name: _stored(given) for name, given in attributes.items()}
+    name = _NAME if array.name is None else str(array.name)
+    coords = {key: (dims, one, stored[key]) for key, (dims, one) in coordinates.items()}
+    dataset = xarray.Dataset({name: (array.dims, values, stored[None])}, coords)
+    dataset.attrs = {} if array.name is None else {"array": name}
+    with image.atomic_folder(path) if suffix == ".zarr" else image.atomic_path(path) as temporary:
+        _WRITERS[suffix](temporary, dataset, name)
 
 
 def _check_dimensions(array: DataArray) -> None:
@@ -269,7 +273,8 @@ def _write_npz(
 def _write_netcdf(path: Path, dataset: Dataset, name: str) -> None:
     encoding = _encoding(dataset)
     encoding[name] |= {"zlib": True, "complevel": 4, "chunksizes": _chunks(dataset[name].shape, dataset[name].dtype)}
-    dataset.to_netcdf(path, mode="w", engine="h5netcdf", encoding=encoding)
+    # in memory first: HDF5 does not survive a disk that is full
+    path.write_bytes(dataset.to_netcdf(engine="h5netcdf", encoding=encoding))
 
 
 def _write_zarr(path: Path, dataset: Dataset, name: str) -> None:
@@ -282,8 +287,7 @@ def _write_zarr(path: Path, dataset: Dataset, name: str) -> None:
 
 def _write_zip(path: Path, dataset: Dataset, name: str) -> None:
     # not Zarr's own store in a zip file, which has every file twice that is written twice
-    with TemporaryDirectory(prefix=".", dir=path.parent) as folder:
-        temporary = Path(folder)
+    with scratch_folder(path) as temporary:
         _write_zarr(temporary, dataset, name)
         with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
             for file in sorted(temporary.rglob("*")):
@@ -314,13 +318,16 @@ def _chunks(shape: tuple[int, ...], dtype: np.dtype[Any]) -> tuple[int, ...]:
 # ---------------------------------------------------------------- reading
 
 
-def read_realisations(path: PathLike) -> DataArray:
+def read_realisations(path: PathLike, *, max_pixels: int | None = None) -> DataArray:
     """Read realisations that `write_realisations` wrote, whole into memory.
 
     Parameters
     ----------
     path : path
         ``.zarr``, ``.zarr.zip``, ``.nc`` or ``.npz``. To read a part of many realisations use xarray itself.
+    max_pixels : int, optional
+        Pixels of all realisations together that are read at most, and 8 bytes for each. None: ``SIMDTEX_MAX_PIXELS`` of
+        the environment, else 2**27.
 
     Returns
     -------
@@ -330,19 +337,24 @@ def read_realisations(path: PathLike) -> DataArray:
     Raises
     ------
     ValueError
-        There is no such file, it is damaged or holds no realisations, or a library is not installed.
+        There is no such file, it is damaged, too large or holds no realisations, or a library is not installed.
     """
     target = Path(path)
     suffix = _suffix(target)
+    most = max_pixels_or_default(max_pixels)
     xarray = _libraries(suffix)
     if not target.exists():
         raise ValueError(f"{target} does not exist: check the path of the realisations")
     if target.is_dir() != (suffix == ".zarr"):
         kind, other = ("folder", "file") if target.is_dir() else ("file", "folder")
         raise ValueError(f"{target} is a {kind} and should be a {other}: check the path of the realisations")
+    if suffix != ".zarr":
+        check_file(target, "the realisations", most)
     try:
-        found: DataArray = _READERS[suffix](target, xarray)
+        found: DataArray = _READERS[suffix](target, xarray, most)
         _check_dimensions(found)
+    except TooLarge as error:
+        raise ValueError(f"{target} {error}") from None
     except Exception as error:  # every library has its own exceptions for a damaged file
         reason = " ".join(str(error).split()) or type(error).__name__
         reason = reason if len(reason) <= 200 else reason[:197] + "..."
@@ -350,14 +362,17 @@ def read_realisations(path: PathLike) -> DataArray:
     return found
 
 
-def _read_npz(path: Path, xarray: Any) -> Any:
+def _read_npz(path: Path, xarray: Any, most: int) -> Any:
+    with zipfile.ZipFile(path) as archive:
+        check_zip(archive, most)
+        with archive.open("values.npy") as packed:
+            values = read_npy(packed, archive.getinfo("values.npy").file_size, 3, most)
     with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
         description = json.loads(str(arrays["description"]))
         coordinates = {
             name: (tuple(one["dimensions"]), arrays[f"coordinate {name}"], one["attributes"])
             for name, one in description["coordinates"].items()
         }
-        values = arrays["values"]
     return xarray.DataArray(
         values, coordinates, description["dimensions"], name=description["name"], attrs=description["attributes"]
     )
@@ -367,22 +382,34 @@ def _read_npz(path: Path, xarray: Any) -> Any:
 _AS_IT_IS = {"mask_and_scale": False, "decode_times": False, "decode_timedelta": False}
 
 
-def _read_netcdf(path: Path, xarray: Any) -> Any:
+def _read_netcdf(path: Path, xarray: Any, most: int) -> Any:
     with xarray.open_dataset(path, engine="h5netcdf", **_AS_IT_IS) as dataset:
-        return _only(dataset.load())
+        return _only(_bounded(dataset, most).load())
 
 
-def _read_zarr(path: Path, xarray: Any) -> Any:
+def _read_zarr(path: Path, xarray: Any, most: int) -> Any:
     with xarray.open_dataset(path, engine="zarr", chunks=None, consolidated=False, **_AS_IT_IS) as dataset:
-        return _only(dataset.load())
+        return _only(_bounded(dataset, most).load())
 
 
-def _read_zip(path: Path, xarray: Any) -> Any:
+def _read_zip(path: Path, xarray: Any, most: int) -> Any:
+    with zipfile.ZipFile(path) as archive:
+        check_zip(archive, most)
     store = import_module("zarr.storage").ZipStore(path, mode="r")
     try:
-        return _read_zarr(store, xarray)
+        return _read_zarr(store, xarray, most)
     finally:
         store.close()
+
+
+def _bounded(dataset: Any, most: int) -> Any:
+    """The dataset, of which nothing has been loaded, if all of it and each of its chunks are no larger than may be."""
+    variables = list(dataset.variables.values())
+    check_bytes(sum(prod(one.shape) * one.dtype.itemsize for one in variables), most)
+    for one in variables:
+        check_pixels(prod(one.shape[:3]), most)
+        check_bytes(prod(one.encoding.get("chunksizes") or one.encoding.get("chunks") or ()) * one.dtype.itemsize, most)
+    return dataset
 
 
 def _only(dataset: Any) -> Any:
@@ -405,7 +432,7 @@ def _given(attributes: Mapping[str, Any]) -> dict[str, Any]:
     return {name: json.loads(value) if name in text else value for name, value in plain.items() if name != _JSON}
 
 
-_READERS: dict[str, Callable[[Path, Any], Any]] = {
+_READERS: dict[str, Callable[[Path, Any, int], Any]] = {
     ".zarr": _read_zarr,
     ".zarr.zip": _read_zip,
     ".nc": _read_netcdf,

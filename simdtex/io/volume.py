@@ -7,13 +7,15 @@ picture with row 0 at the top. x is the column, y the row, z the depth.
 
 from __future__ import annotations
 
-import errno
+import bz2
+import gzip
 import os
 import re
 import warnings
 from collections.abc import Callable
+from math import prod
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import imagecodecs
 import nrrd
@@ -22,7 +24,19 @@ import tifffile
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io import image
-from simdtex.io.decode import native
+from simdtex.io.atomic import Unbuffered
+from simdtex.io.decode import check_page, check_png, count_pages, native, quiet
+from simdtex.io.limits import (
+    TooLarge,
+    check_array,
+    check_bytes,
+    check_file,
+    check_parts,
+    max_pixels_or_default,
+    read_npy,
+    read_npz,
+)
+from simdtex.options import unmasked
 
 __all__ = ["check_writable", "read", "write"]
 
@@ -136,17 +150,13 @@ def write(path: PathLike, volume: ArrayLike, channel_axis: int | None = None) ->
     suffix = Path(path).suffix.lower()
     if suffix not in (".npz", ".npy") and values.ndim == 4 and values.shape[3] == 1:
         values = values[..., 0]
-    try:
-        with image.atomic_folder(path) if not suffix else image.atomic_path(path) as temporary:
-            _ENCODERS[suffix](temporary, values)
-    except OSError as error:
-        reason = os.strerror(error.errno) if error.errno else str(error)
-        remedy = "free some space" if error.errno == errno.ENOSPC else "choose another path"
-        raise ValueError(f"{os.fspath(path)} could not be written ({reason}): {remedy}") from None
+    with image.atomic_folder(path) if not suffix else image.atomic_path(path) as temporary:
+        _ENCODERS[suffix](temporary, values)
 
 
 def _checked(volume: ArrayLike, channel_axis: int | None) -> Array:
     """The values with their channels, if any, last; contiguous."""
+    unmasked("the volume", volume)
     values = np.asarray(volume)
     if values.dtype.kind not in "buif":
         raise TypeError(f"the volume holds {values.dtype} values: give integers or real floats")
@@ -170,7 +180,7 @@ def _write_npz(path: Path, values: Array) -> None:
 
 def _write_npy(path: Path, values: Array) -> None:
     with path.open("wb") as file:
-        np.save(file, values, allow_pickle=False)
+        np.save(Unbuffered(file), values, allow_pickle=False)
 
 
 def _write_tiff(path: Path, values: Array) -> None:
@@ -200,7 +210,7 @@ def _write_nrrd(path: Path, values: Array) -> None:
 def _write_slices(path: Path, values: Array) -> None:
     digits = max(3, len(str(len(values) - 1)))
     for number, picture in enumerate(values):
-        image.write(path / f"slice-{number:0{digits}}.png", picture)
+        image.encode(path / f"slice-{number:0{digits}}.png", ".png", native(picture))
 
 
 _ENCODERS: dict[str, Callable[[Path, Array], None]] = {
@@ -216,14 +226,17 @@ _ENCODERS: dict[str, Callable[[Path, Array], None]] = {
 # ---------------------------------------------------------------- reading
 
 
-def read(path: PathLike) -> Array:
+def read(path: PathLike, *, max_pixels: int | None = None) -> Array:
     """Read a solid texture that `write` or another program has written.
 
     Parameters
     ----------
     path : path
         A file ``.npz`` (key ``"volume"``, or its only array), ``.npy``, ``.tif``, ``.tiff`` (a page for each slice) or
-        ``.nrrd``, or a folder of slices ``slice-000.png``, ...
+        ``.nrrd`` (with its data in the same file), or a folder of slices ``slice-000.png``, ...
+    max_pixels : int, optional
+        Voxels that are read at most, and 8 bytes for each; and one slice for 8192 of them. None:
+        ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27. The headers are asked, before anything is decoded.
 
     Returns
     -------
@@ -233,9 +246,10 @@ def read(path: PathLike) -> Array:
     Raises
     ------
     ValueError
-        There is no such file or folder, it is damaged, or does not hold a volume.
+        There is no such file or folder, it is damaged, too large, or does not hold a volume.
     """
     target = Path(path)
+    most = max_pixels_or_default(max_pixels)
     folder = os.path.isdir(target)
     suffix = "" if folder else target.suffix.lower()
     if not os.path.exists(target):
@@ -245,8 +259,14 @@ def read(path: PathLike) -> Array:
             f"{target} is of no kind that is known here: give a folder of slices, or a file that ends in one of "
             f"{', '.join(sorted(filter(None, _DECODERS)))}"
         )
+    if not folder:
+        check_file(target, "the volume", most)
     try:
-        return _checked(_DECODERS[suffix](target), None)
+        return _checked(_DECODERS[suffix](target, most), None)
+    except TooLarge as error:
+        raise ValueError(f"{target} {error}") from None
+    except MemoryError:
+        raise ValueError(f"{target} is too large for the memory: crop it first") from None
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else _one_line(error)
         raise ValueError(f"{target} cannot be read ({reason}): check the file") from None
@@ -259,21 +279,30 @@ def _one_line(error: BaseException) -> str:
     return text if len(text) <= 200 else text[:197] + "..."
 
 
-def _read_npz(path: Path) -> Array:
-    with np.load(path, allow_pickle=False) as arrays:
-        names = list(arrays)
-        if KEY not in names and len(names) != 1:
-            raise ValueError(f"it has the arrays {', '.join(names)} and none called {KEY}")
-        return np.asarray(arrays[KEY if KEY in names else names[0]])
+def _read_npz(path: Path, most: int) -> Array:
+    return read_npz(path, KEY, 3, most)
 
 
-def _read_npy(path: Path) -> Array:
-    return np.asarray(np.load(path, allow_pickle=False))
+def _read_npy(path: Path, most: int) -> Array:
+    with path.open("rb") as file:
+        return read_npy(file, os.fstat(file.fileno()).st_size, 3, most)
 
 
-def _read_tiff(path: Path) -> Array:
-    with tifffile.TiffFile(path) as file:
-        return np.stack([_page(page) for page in file.pages])
+def _read_tiff(path: Path, most: int) -> Array:
+    with quiet("tifffile"), path.open("rb") as file:
+        count = count_pages(file, most)
+        with tifffile.TiffFile(file) as tiff:
+            slices: list[Array] = []
+            for number in range(count):
+                page: Any = tiff.pages.get(number)
+                check_page(page, most)
+                pixels = page.imagewidth * page.imagelength * page.imagedepth
+                check_parts(count, pixels, most)
+                check_bytes(count * prod(page.shape) * (page.dtype.itemsize if page.dtype else 8), most)
+                slices.append(_page(page))
+                if slices[-1].shape != slices[0].shape or slices[-1].dtype != slices[0].dtype:
+                    raise ValueError(f"page {number} is of another size or type than the first")
+            return np.stack(slices)
 
 
 def _page(page: Any) -> Array:
@@ -281,19 +310,63 @@ def _page(page: Any) -> Array:
     return np.moveaxis(page.asarray(), 0, -1) if separate else np.asarray(page.asarray())
 
 
-def _read_nrrd(path: Path) -> Array:
-    return np.asarray(nrrd.read(str(path), index_order="C")[0])
+_PACKED: dict[str, Callable[[Any], Any]] = {
+    **dict.fromkeys(("gzip", "gz"), lambda file: gzip.GzipFile(fileobj=file)),
+    **dict.fromkeys(("bzip2", "bz2"), bz2.BZ2File),
+}
+_PLAIN = ("raw", "ascii", "text", "txt")
 
 
-def _read_slices(path: Path) -> Array:
+def _read_nrrd(path: Path, most: int) -> Array:
+    size = path.stat().st_size
+    with warnings.catch_warnings(), path.open("rb") as file:
+        warnings.simplefilter("ignore")
+        header = nrrd.read_header(file)
+        if any(field.lower().replace(" ", "") == "datafile" for field in header):
+            raise ValueError("its data is in another file; save both as one .nrrd")
+        sides = [int(side) for side in header["sizes"]]
+        if min(sides) < 1 or int(header.get("line skip", header.get("lineskip", 0))) > size:
+            raise ValueError("its header tells of sides or lines that cannot be")
+        check_array(sorted(sides, reverse=True), 1, 3, most)
+        encoding = str(header.get("encoding")).lower()
+        if encoding in _PACKED:
+            begin = file.tell()
+            _check_packed(_PACKED[encoding](file), most)
+            file.seek(begin)
+        elif encoding not in _PLAIN:
+            raise ValueError(f"its encoding is {encoding[:40]} and not raw, ascii, gzip or bzip2")
+        return np.asarray(nrrd.read_data(header, file, str(path), index_order="C"))
+
+
+def _check_packed(stream: IO[bytes], most: int) -> None:
+    """Raise where data unpacks to too much; it is unpacked piece by piece, and nothing of it is kept."""
+    unpacked = 0
+    try:
+        while piece := stream.read(2**20):
+            unpacked += len(piece)
+            check_bytes(unpacked, most)
+    except EOFError:
+        pass  # it ends early, which is for the reader to say
+
+
+def _read_slices(path: Path, most: int) -> Array:
     numbered = {int(match[1]): name for name in os.listdir(path) if (match := _SLICE.fullmatch(name))}
     if sorted(numbered) != list(range(len(numbered))) or not numbered:
         raise ValueError("it has no slices slice-000.png, slice-001.png and so on without a gap")
     # not image.read, which leaves an opaque alpha channel out
-    return np.stack([imagecodecs.png_decode((path / numbered[k]).read_bytes()) for k in range(len(numbered))])
+    slices: list[Array] = []
+    for number in range(len(numbered)):
+        file = path / numbered[number]
+        check_file(file, "the slice", most)
+        data = file.read_bytes()
+        check_png(data, most, len(numbered))
+        slices.append(imagecodecs.png_decode(data))
+        if slices[-1].shape != slices[0].shape or slices[-1].dtype != slices[0].dtype:
+            raise ValueError(f"{file.name} is of another size or type than the first slice")
+    return np.stack(slices)
 
 
-_DECODERS: dict[str, Callable[[Path], Array]] = {
+_DECODERS: dict[str, Callable[[Path, int], Array]] = {
     ".npz": _read_npz,
     ".npy": _read_npy,
     ".tif": _read_tiff,

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex.io.image import check_sample
 from simdtex.model.given import Given
 from simdtex.model.pictures import Mask, Pictures
+from simdtex.options import unmasked
 
 
 class Inputs(NamedTuple):
@@ -81,6 +82,7 @@ def is_several(sample: Any, channel_axis: int | None) -> bool:
 
 def check_array(name: str, values: Any) -> NDArray[Any]:
     """An array, or one clear sentence."""
+    unmasked(name, values)
     try:
         return np.asarray(values)
     except ValueError:

@@ -20,6 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.image import atomic_path, check_writable, read, write
+from simdtex.io.limits import TooLarge, max_pixels_or_default, read_npz
+from simdtex.options import unmasked
 
 __all__ = ["SOURCE_SUFFIXES", "apply_source_map", "load_source_map", "save_source_map"]
 
@@ -98,9 +100,12 @@ def _maps(
 ) -> tuple[list[NDArray[Any]], list[tuple[int, ...] | None]]:
     """The map of each sample and the sample's size, or None where it is not known."""
     if positions.shape[2] == 3 and isinstance(other_map, (list, tuple)):
+        for one in other_map:
+            unmasked("another map", one)
         maps = [np.asarray(one) for one in other_map]
         shapes = [None] * len(maps) if sample_shape is None else list(sample_shape)
     else:
+        unmasked("the other map", other_map)
         maps, shapes = [np.asarray(other_map)], [sample_shape]
     wanted = 1 + (int(positions[..., 2].max(initial=0)) if positions.shape[2] == 3 else 0)
     if len(maps) < wanted:
@@ -189,13 +194,15 @@ def save_source_map(path: PathLike, source: ArrayLike) -> None:
         write(path, colours)
 
 
-def load_source_map(path: PathLike) -> SourceMap:
+def load_source_map(path: PathLike, *, max_pixels: int | None = None) -> SourceMap:
     """Read a source map that `save_source_map` wrote.
 
     Parameters
     ----------
     path : path
         ``.npz``, ``.npy`` or ``.png``.
+    max_pixels : int, optional
+        Pixels that are read at most. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
 
     Returns
     -------
@@ -209,16 +216,17 @@ def load_source_map(path: PathLike) -> SourceMap:
     """
     name = os.fspath(path)
     if Path(path).suffix.lower() != ".npz" or not Path(path).is_file():
-        pixels = read(path).pixels
+        pixels = read(path, max_pixels=max_pixels).pixels
         if pixels.dtype.kind == "u" and pixels.shape[2:] == (3,) and not pixels[..., 2].any():
             pixels = pixels[..., :2]
         elif pixels.dtype == np.uint8:
             raise ValueError(f"{name} is a picture of 8 bits and holds no source map: give one saved by simdtex")
     else:
         try:
-            with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
-                pixels = archive["source"]
-        except (KeyError, OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error):
+            pixels = read_npz(path, "source", 2, max_pixels_or_default(max_pixels), alone=False)
+        except TooLarge as error:
+            raise ValueError(f"{name} {error}") from None
+        except (KeyError, NotImplementedError, OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error):
             raise ValueError(f"{name} holds no source map: give one saved by simdtex") from None
     try:
         return _checked(pixels)
@@ -227,6 +235,7 @@ def load_source_map(path: PathLike) -> SourceMap:
 
 
 def _checked(source: ArrayLike) -> SourceMap:
+    unmasked("the source map", source)
     positions = np.asarray(source)
     if (
         positions.ndim != 3

@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from simdtex.options import unmasked
+
 __all__ = ["MostUsed", "Use", "counts", "effective_use"]
 
 PIECE = 8  # side of a piece of the sample, pixels
@@ -57,6 +59,7 @@ def counts(source: ArrayLike, sample_shape: tuple[int, ...], *, sample: int | No
         `source` is no source map, points outside the sample, or is of several samples and none is named.
     """
     rows, cols = sample_shape[:2]
+    unmasked("the source map", source)
     positions = np.asarray(source)
     if positions.ndim != 3 or positions.shape[2] not in (2, 3) or positions.dtype.kind not in "iu":
         raise ValueError("the source map is not (rows, cols, 2) or (rows, cols, 3) integers: pass the one of the run")

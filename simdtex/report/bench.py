@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from simdtex.bench import results as worked_out
+from simdtex.io.image import atomic_path
 from simdtex.report.profile import digits, rate_text, seconds_text
 
 if TYPE_CHECKING:
@@ -135,6 +136,14 @@ def _figure(entry: dict[str, Any], path: Path, panels: int) -> tuple[Any, list[A
     return figure, list(found)
 
 
+def _write(figure: Any, path: Path) -> None:
+    from simdtex.report.plots import figure_png
+
+    figure.set_dpi(120)
+    with atomic_path(path) as whole:
+        whole.write_bytes(figure_png(figure))
+
+
 def _roofline(entry: dict[str, Any], path: Path) -> None:
     """Fma a second against fma per byte, log-log: the device's roofs as measured, kernels as points."""
     figure, (axes,) = _figure(entry, path, 1)
@@ -166,7 +175,7 @@ def _roofline(entry: dict[str, Any], path: Path) -> None:
     axes.grid(True, which="major", alpha=0.3)
     if points:
         axes.legend(loc="lower right")
-    figure.savefig(path, dpi=120)
+    _write(figure, path)
 
 
 def _curves(entry: dict[str, Any], path: Path) -> None:
@@ -184,4 +193,4 @@ def _curves(entry: dict[str, Any], path: Path) -> None:
         axes.set_ylabel("seconds")
         axes.grid(True, which="major", alpha=0.3)
         axes.legend(fontsize="small")
-    figure.savefig(path, dpi=120)
+    _write(figure, path)

@@ -7,6 +7,8 @@ import os
 from collections.abc import Callable, Collection
 from pathlib import Path
 
+from simdtex.io.atomic import left_behind
+
 
 def earlier_files(folder: Path, what: str, own: Callable[[Path], Collection[str]]) -> list[Path]:
     """What an earlier run has left in a folder that is about to be written; raises before the work, not after it.
@@ -23,7 +25,7 @@ def earlier_files(folder: Path, what: str, own: Callable[[Path], Collection[str]
     Returns
     -------
     list of Path
-        All files there, by name.
+        All files there, by name, but for those that a killed process has not finished; writing removes them.
 
     Raises
     ------
@@ -32,7 +34,7 @@ def earlier_files(folder: Path, what: str, own: Callable[[Path], Collection[str]
     """
     try:
         if folder.is_dir():
-            found = sorted(folder.iterdir())
+            found = sorted(path for path in folder.iterdir() if not left_behind(path.name))
         elif folder.exists() or folder.is_symlink():
             raise ValueError(f"{folder} is a file: give a folder for {what}")
         elif not folder.parent.is_dir():

@@ -17,7 +17,7 @@ import PIL.ImageDraw
 import PIL.ImageFont
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.io.image import atomic_path, check_writable, to_display, write
+from simdtex.io.image import atomic_path, check_writable, pillow_bytes, to_display, write
 from simdtex.model.use import counts
 
 __all__ = [
@@ -227,15 +227,8 @@ def animation(frames: Iterable[ArrayLike], path: PathLike, *, ms: int = 120) -> 
     kind = {".gif": "GIF", ".webp": "WEBP"}.get(suffix, "PNG")
     options: dict[str, Any] = {"lossless": True} if kind == "WEBP" else {}
     with atomic_path(path) as temporary:
-        pictures[0].save(
-            temporary,
-            format=kind,
-            save_all=True,
-            append_images=pictures[1:],
-            duration=ms,
-            loop=0,
-            **options,
-        )
+        more: dict[str, Any] = {"save_all": True, "append_images": pictures[1:], "duration": ms, "loop": 0}
+        temporary.write_bytes(pillow_bytes(pictures[0], kind, **more, **options))
 
 
 def thinned(frames: Iterable[Picture]) -> list[Picture]:

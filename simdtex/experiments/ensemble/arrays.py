@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from simdtex.options import unmasked
+
 Array = NDArray[Any]
 
 MOST_CATEGORIES = 16  # integers of more values are taken for continuous ones
@@ -16,11 +18,13 @@ MOST_CATEGORIES = 16  # integers of more values are taken for continuous ones
 
 def as_image(array: ArrayLike, name: str = "image") -> Array:
     """An image (rows, cols), checked."""
+    unmasked(f"the {name}", array)
     return _checked(np.asarray(array), name, 2, "(rows, cols)")
 
 
 def as_ensemble(array: ArrayLike) -> Array:
     """An ensemble (realisations, rows, cols), checked."""
+    unmasked("the ensemble", array)
     return _checked(np.asarray(array), "ensemble", 3, "(realisations, rows, cols)")
 
 

@@ -23,7 +23,7 @@ from simdtex.methods.multires.analysis import Analysis, analyse
 from simdtex.model.use import effective_use
 from simdtex.ops.candidates import Sampled, Structure, candidates
 from simdtex.ops.laplacian import beside, laplacian_blend, laplacian_collapse, within
-from simdtex.options import build, one_of, real, whole, within_32_bits
+from simdtex.options import build, one_of, real, unmasked, whole, within_32_bits
 from simdtex.run import Callback, Output, Sampling, Stage, device_seconds, paced
 
 ANY = 2**32 - 1
@@ -523,6 +523,7 @@ def _collapsed(
 
 
 def _check_thresholds(table: ArrayLike) -> None:
+    unmasked("thresholds", table)
     try:
         values = np.asarray(table)
     except ValueError:

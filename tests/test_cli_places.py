@@ -1,0 +1,275 @@
+"""No command overwrites what it reads: every command, every option that is a path, every way to name a file twice."""
+
+import os
+from pathlib import Path
+
+import click
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from simdtex import cli
+from simdtex.cli.places import Pair, Place
+from simdtex.io import image
+
+COMMANDS = {name: cli.load(name) for name in cli.COMMANDS}
+READ, WRITE = ("read", "enter"), ("write", "folder", "either")
+TEXTS = {
+    # options and arguments of text that name no file; those of `mix` repeat the name of a SAMPLE
+    *("device", "size", "method", "preset", "relaxation", "pixel", "phases", "coarsest", "search", "edges", "boundary"),
+    *("categorical_channels", "weights", "shares", "proportions", "alpha", "features", "phase", "joins", "pyramid"),
+    *("match", "color", "schedule", "array", "mapping", "solids", "slices", "average", "blend", "pixels", "names"),
+    *("alphas", "betas", "palette", "pattern", "low", "high"),
+}
+PICTURES = ("synth", "fill", "extend", "mix", "sheet")
+ISING_START = ("ising", "start")  # up or random
+
+
+def parameters(*roles):
+    """The options of every command that have one of these roles."""
+    return [
+        (name, option)
+        for name, command in COMMANDS.items()
+        for option in command.params
+        if isinstance(option.type, (Place, Pair)) and (option.type.role in roles or isinstance(option.type, Pair))
+    ]
+
+
+def test_every_path_has_a_role():
+    """An option that is new fails here, until it has a role or is known to name no file."""
+    found = 0
+    for name, command in COMMANDS.items():
+        for option in command.params:
+            kind = option.type
+            assert not isinstance(kind, click.File), (name, option.name)
+            if isinstance(kind, (Place, Pair)):
+                found += 1
+                assert kind.role in READ + WRITE
+                continue
+            assert not isinstance(kind, click.Path), f"{name} {option.name}: give it a role of simdtex.cli.places"
+            if isinstance(kind, click.types.StringParamType) and (name, option.name) != ISING_START:
+                assert option.name in TEXTS, f"{name} {option.name}: give it a role, or name it in this test"
+    assert found > 40
+
+
+def test_what_writes_is_known_to_write():
+    """The roles of options that are called the same are the same, and outputs are outputs."""
+    for name, option in parameters(*READ, *WRITE):
+        if isinstance(option.type, Place) and option.name in ("output", "outputs", "stages", "report", "source_map"):
+            assert option.type.role in WRITE, (name, option.name)
+        if option.name in ("sample", "samples", "picture", "training_image") and isinstance(option, click.Argument):
+            assert option.type.role in READ
+
+
+# -- two names for one file -----------------------------------------------------------------------------------
+
+
+def words(option, text):
+    """An option with a value."""
+    return [text] if isinstance(option, click.Argument) else [option.opts[-1], text]
+
+
+def reading(option, text):
+    """An option that reads a file; of a pair, on the left."""
+    if isinstance(option.type, Pair):
+        text = f"{text}={'new.png' if option.type.role == 'write' else 'map.png'}"
+    return words(option, text)
+
+
+def writing(option, text):
+    """An option that writes a file; of a pair, on the right."""
+    return words(option, f"map.png={text}" if isinstance(option.type, Pair) else text)
+
+
+def required(command, *but):
+    """What a command cannot do without."""
+    given = []
+    for option in command.params:
+        if option.required and option not in but:
+            given += words(option, "sample.png" if option.type.role in READ else "fresh.npz")
+    return given
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "in").mkdir()
+    for number, name in enumerate(("sample.png", "in/given.png", "map.png", "other.png")):
+        image.write(tmp_path / name, np.random.default_rng(number).integers(0, 256, (12, 12), dtype=np.uint8))
+    return tmp_path
+
+
+def everything(folder):
+    return {str(p): (os.readlink(p) if p.is_symlink() else p.is_file() and p.read_bytes()) for p in folder.rglob("*")}
+
+
+def refused(folder, name, args, said):
+    before = everything(folder)
+    done = CliRunner().invoke(cli.main, [name, *map(str, args)])
+    assert done.exit_code == 2, (args, done.output, done.exception)
+    assert said in done.output and len(done.output.splitlines()) == 1, (args, done.output)
+    assert everything(folder) == before
+
+
+PAIRS = [
+    (name, out, given)
+    for name, out in parameters(*WRITE)
+    for other, given in parameters(*READ)
+    if name == other and out.type.role in WRITE and not (isinstance(given.type, Pair) and given is out)
+]
+
+
+def named(pair):
+    name, out, given = pair
+    return f"{name} {out.name} {given.name}"
+
+
+@pytest.mark.parametrize("pair", PAIRS, ids=named)
+def test_an_output_is_no_input(folder, pair):
+    name, out, given = pair
+    file = folder / "in" / "given.png"
+    (folder / "link.png").symlink_to(file)
+    (folder / "again.png").symlink_to("link.png")
+    os.link(file, folder / "hard.png")
+    (folder / "way").symlink_to("in")
+    rest = required(COMMANDS[name], out, given)
+    for one, other in [
+        ("in/given.png", "in/given.png"),
+        ("in/given.png", "./in/../in/given.png"),
+        ("in/given.png", file),
+        ("in/given.png", "link.png"),
+        ("again.png", "in/given.png"),
+        ("in/given.png", "hard.png"),
+        ("way/given.png", "in/given.png"),
+    ]:
+        args = [*reading(given, one), *rest, *writing(out, other)]
+        refused(folder, name, args, "is an input and would be overwritten; give the output another name")
+
+
+def test_both_sides_of_a_pair(folder):
+    for text in ("map.png=map.png", "map.png=./map.png", "map.png,other.png=other.png", "x, other.png=other.png"):
+        for name in ("synth", "fill", "extend"):
+            args = ["sample.png", "-o", "out.png", "--also", text]
+            refused(folder, name, args, "is an input and would be overwritten")
+    for text in ("other.png=out.png", "out.png=other.png", "other.png,out.png=map.png"):
+        (folder / "out.png").touch()
+        for name in ("synth", "simulate"):
+            args = ["sample.png", "-o", "out.png", "--guide", text]
+            refused(folder, name, args, "is an input and would be overwritten")
+
+
+@pytest.mark.parametrize("pair", [pair for pair in PAIRS if pair[1].type.role in ("folder", "either")], ids=named)
+def test_no_folder_that_is_made_anew_holds_an_input(folder, pair):
+    name, out, given = pair
+    (folder / "link.png").symlink_to("in/level0.png")
+    (folder / "in" / "level0.png").symlink_to(folder / "sample.png")
+    (folder / "way").symlink_to("in")
+    rest = required(COMMANDS[name], out, given)
+    for one, other in [("in/given.png", "in"), ("link.png", "in"), ("in/given.png", "way"), ("way/given.png", "in/.")]:
+        args = [*reading(given, one), *rest, *writing(out, other)]
+        refused(folder, name, args, "is an input and lies in")
+
+
+def test_the_sample_in_the_folder_of_stages(folder):
+    """As the names are those that an earlier run writes, it would be removed."""
+    (folder / "st").mkdir()
+    os.rename("sample.png", "st/level0.png")
+    refused(folder, "synth", ["st/level0.png", "-o", "out.png", "--stages", "st"], "is an input and lies in st")
+    refused(folder, "synth", ["map.png", "-o", "o.png", "--stages", "st", "--start", "st/level0.png"], "lies in st")
+
+
+def test_the_sample_among_the_slices_of_a_solid(folder):
+    (folder / "block").mkdir()
+    os.rename("sample.png", "block/slice-000.png")
+    refused(folder, "solid", ["block/slice-000.png", "-o", "block"], "is an input and lies in block")
+    refused(folder, "solid", ["map.png", "-o", "block", "--start", "block"], "is an input and would be overwritten")
+    for inner in ("block/slice-000.png", "block/new.npz", "block/../block/new.nrrd"):
+        option = ["--view", inner, "-o", "out.npz"] if inner.endswith(".png") else ["-o", inner]
+        said = "which is an input; give another folder"
+        refused(folder, "solid", ["map.png", "--start", "block", *option], said)
+
+
+def test_the_thresholds_that_are_written_over(folder):
+    (folder / "th.npy").write_text("0.1\n")
+    args = ["sample.png", "--method", "multires", "--thresholds", "th.npy", "-o", "th.npy"]
+    refused(folder, "synth", args, "th.npy is an input and would be overwritten")
+
+
+OUTPUTS = [
+    (name, one, other)
+    for name, one in parameters(*WRITE)
+    for also, other in parameters(*WRITE)
+    if name == also and one.type.role in WRITE and other.type.role in WRITE and one.name < other.name
+]
+
+
+@pytest.mark.parametrize("pair", OUTPUTS, ids=named)
+def test_no_output_is_another(folder, pair):
+    name, one, other = pair
+    rest = required(COMMANDS[name], one, other)
+    for a, b in (("new", "new"), ("new", "./in/../new"), ("in", "in")):
+        refused(folder, name, [*rest, *writing(one, a), *writing(other, b)], "would be written twice")
+    for outer, inner in ((one, other), (other, one)):
+        if outer.type.role != "write":
+            args = [*rest, *writing(outer, "new"), *writing(inner, "new/x.npz")]
+            refused(folder, name, args, "would be written into new, which another output has for itself")
+
+
+def test_names_that_differ_are_let_be(folder):
+    (folder / "st").mkdir()
+    os.link("sample.png", "st2.png")
+    args = ["sample.png", "-o", "Sample.png", "--stages", "st", "--device", "reference", "--order", "2", "-q"]
+    before = (folder / "sample.png").read_bytes()
+    done = CliRunner().invoke(cli.main, ["synth", *args, "--size", "9x9", "--source-map", "stmap.npz"])
+    assert done.exit_code == 0, done.output
+    assert (folder / "sample.png").read_bytes() == before and (folder / "Sample.png").exists()
+
+
+def test_where_case_makes_no_difference(folder, monkeypatch):
+    """As on the disks of other systems, where the folder is there by another case too."""
+    real = os.path.samefile
+    fold = {name.swapcase(): name for name in (str(folder), str(folder / "in"))}
+    fold |= {str(folder.parent / folder.name.swapcase()): str(folder)}
+    monkeypatch.setattr(os.path, "samefile", lambda a, b: real(fold.get(str(a), a), fold.get(str(b), b)))
+    args = ["sample.png", "-o", "out.png", "--source-map", "Out.PNG"]
+    refused(folder, "synth", args, "would be written twice")
+
+
+# -- what is not there ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("pair", parameters(*READ), ids=lambda pair: f"{pair[0]} {pair[1].name}")
+def test_a_missing_input_is_named(folder, pair):
+    name, given = pair
+    command = COMMANDS[name]
+    rest = [*required(command, given), "--device", "reference"]
+    if name in PICTURES:
+        rest = ["out.png" if word == "fresh.npz" else word for word in rest]
+    if given.name == "thresholds":
+        rest += ["--method", "multires"]
+    missing = "none.npz" if given.type.role == "enter" else "none.png"
+    if name == "fill" and given.name != "mask":
+        rest += ["--mask", "map.png"]
+    if name == "extend":
+        rest += ["--left", "3"]
+    refused(folder, name, [*reading(given, missing), *rest], "does not exist: check the path of")
+    if isinstance(given.type, Place) and given.type.role == "read":
+        refused(folder, name, [*words(given, "in"), *rest], "is a folder")
+    empty = CliRunner().invoke(cli.main, [name, *words(given, ""), *rest])
+    assert empty.exit_code == 2 and "empty" in empty.output
+
+
+@pytest.mark.parametrize("name", [name for name, c in COMMANDS.items() if any(p.name == "size" for p in c.params)])
+def test_an_empty_size_is_no_default(folder, name):
+    args = [*required(COMMANDS[name]), "--size", ""]
+    if name in PICTURES:
+        args = ["out.png" if word == "fresh.npz" else word for word in args]
+    if name in ("demo", "ising", "schedules"):
+        args += ["-o", "report"]
+    refused(folder, name, args, "size '' is not ")
+    assert not Path("report").exists()
+
+
+def test_empty_channels_are_no_default(folder):
+    args = ["sample.png", "-o", "out.png", "--categorical-channels", "", "--device", "reference"]
+    refused(folder, "synth", args, "--categorical-channels  must be channels parted by commas")

@@ -1,0 +1,305 @@
+"""Every write fails in turn: the old file stays, nothing is left beside it, and the sentence names the final file."""
+
+import errno
+import os
+import re
+import resource
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simdtex.io import atomic, image, realisations, volume
+from simdtex.io.atomic import atomic_folder, atomic_path
+from simdtex.model.source_map import save_source_map
+from simdtex.report.page import Section, Text, write_report
+from simdtex.report.sheet import animation
+from simdtex.report.stages import StageWriter
+
+
+def picture(seed, dtype=np.uint8):
+    return np.random.default_rng(seed).integers(0, 256, (40, 40)).astype(dtype)
+
+
+def block(seed):
+    return np.random.default_rng(seed).integers(0, 256, (4, 40, 40), dtype=np.uint8)
+
+
+def many(seed):
+    xarray = pytest.importorskip("xarray")
+    return xarray.DataArray(block(seed), dims=realisations.DIMENSIONS[:3])
+
+
+def page(path, seed):
+    write_report(path, f"Report {seed}", "What it is.", [Section("One", [Text("words " * 2000)])], {"seed": seed})
+
+
+WRITERS = {
+    **{
+        f"a{suffix}": lambda path, seed: image.write(path, picture(seed))
+        for suffix in (".png", ".tif", ".jpg", ".webp", ".bmp", ".gif", ".pgm", ".npy")
+    },
+    "deep.png": lambda path, seed: image.write(path, picture(seed, np.uint16)),
+    **{
+        f"v{suffix}": lambda path, seed: volume.write(path, block(seed)) for suffix in (".npz", ".npy", ".nrrd", ".tif")
+    },
+    "slices": lambda path, seed: volume.write(path, block(seed)),
+    **{
+        f"r{suffix}": lambda path, seed: realisations.write_realisations(path, many(seed))
+        for suffix in (".zarr", ".zarr.zip", ".nc", ".npz")
+    },
+    "map.npz": lambda path, seed: save_source_map(path, np.random.default_rng(seed).integers(0, 99, (40, 40, 2))),
+    "film.gif": lambda path, seed: animation([picture(seed), picture(seed + 9)], path),
+    "report": page,
+}
+
+
+def everything(folder):
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+@contextmanager
+def full_after(size):
+    """No file may grow beyond a size: what a full disk is to every library, whatever it writes with."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+def refused(name, path):
+    """The write fails, with one sentence that names what was to be written and nothing hidden."""
+    with pytest.raises(ValueError, match=r"could not be written \(.+\): (choose another|free some)") as said:
+        WRITERS[name](path, 2)
+    text = str(said.value)
+    assert text.startswith(str(path)) and ".simdtex-" not in text and "[Errno" not in text and "\n" not in text
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_no_more_space_at_any_byte(tmp_path, name):
+    path = tmp_path / name
+    WRITERS[name](path, 1)
+    before = everything(tmp_path)
+    largest = max(len(data) for data in before.values())
+    for size in (0, 1, 7, largest // 2, largest - 40):
+        with full_after(size):
+            refused(name, path)
+        assert everything(tmp_path) == before
+    WRITERS[name](path, 2)
+    assert everything(tmp_path).keys() == before.keys() and everything(tmp_path) != before
+
+
+FAULTS = ["open", "fsync", "replace", "rename", "mkdir"]
+
+
+@pytest.mark.parametrize("name", ["a.png", "v.nrrd", "slices", "r.zarr", "report"])
+@pytest.mark.parametrize("fault", FAULTS)
+def test_every_call_of_the_system_fails_in_turn(tmp_path, monkeypatch, name, fault):
+    path = tmp_path / name
+    WRITERS[name](path, 1)
+    before = everything(tmp_path)
+    real = getattr(os, fault)
+    calls = failing = 0
+
+    def faulty(*args, **kwargs):
+        nonlocal calls
+        if fault == "open" and not args[1] & (os.O_WRONLY | os.O_RDWR):
+            return real(*args, **kwargs)  # of a folder that is being removed
+        calls += 1
+        if calls == failing:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), args[0])
+        return real(*args, **kwargs)
+
+    monkeypatch.setattr(atomic.os, fault, faulty)
+    WRITERS[name](path, 1)
+    once, failed = calls, 0
+    for turn in range(1, min(once, 6) + 1):
+        calls, failing = 0, turn
+        try:
+            WRITERS[name](path, 2)
+        except ValueError as error:
+            failed += 1
+            assert "could not be written (No space left on device): free some space" in str(error)
+            assert str(error).startswith(str(path)) and ".simdtex-" not in str(error)
+            assert everything(tmp_path).keys() == before.keys()
+            if name != "report":  # whose files are renamed one after another
+                assert everything(tmp_path) == before
+        else:
+            assert fault == "mkdir"  # of a folder that is there
+            failing = 0
+            WRITERS[name](path, 1)
+            assert everything(tmp_path).keys() == before.keys()
+    assert failed or not once or fault == "mkdir"
+
+
+def test_a_report_that_is_not_finished_keeps_the_earlier_one(tmp_path):
+    page(tmp_path / "report", 1)
+    before = everything(tmp_path)
+    with full_after(500):
+        refused("report", tmp_path / "report")
+    assert everything(tmp_path) == before
+    with full_after(500):
+        refused("report", tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.fixture
+def tiny(tmp_path):
+    """A disk of 64 KiB."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "none", disk], capture_output=True, check=False)
+    if mounted.returncode:
+        pytest.skip("no disk may be mounted here")
+    yield disk
+    subprocess.run(["umount", "-l", disk], check=True)
+
+
+def test_a_disk_that_is_full(tiny):
+    with pytest.raises(OSError, match="No space left"), (tiny / "ballast").open("wb", buffering=0) as ballast:
+        for _ in range(10_000):
+            ballast.write(b"x" * 8)
+    for name, write in WRITERS.items():
+        with pytest.raises(ValueError, match=re.escape("No space left on device): free some space")) as said:
+            write(tiny / name, 1)
+        assert str(said.value).startswith(str(tiny / name))
+        assert os.listdir(tiny) == ["ballast"]
+
+
+# -- what killed processes leave ------------------------------------------------------------------------------
+
+KILLED = """
+import sys, time
+from simdtex.io.atomic import atomic_folder, atomic_path
+kind = atomic_folder if sys.argv[2] == "folder" else atomic_path
+with kind(sys.argv[1]) as temporary:
+    (temporary / "part" if kind is atomic_folder else temporary).write_bytes(b"half")
+    print(flush=True)
+    time.sleep(60)
+"""
+
+
+def writer(path, kind):
+    """A process that has half written a file, and waits."""
+    process = subprocess.Popen([sys.executable, "-c", KILLED, path, kind], stdout=subprocess.PIPE)
+    process.stdout.readline()
+    return process
+
+
+@pytest.mark.parametrize("kind", ["file", "folder"])
+def test_what_a_killed_process_leaves_is_removed_and_what_a_live_one_writes_is_not(tmp_path, kind):
+    live, dead = writer(tmp_path / "a.npy", kind), writer(tmp_path / "a.npy", kind)
+    try:
+        dead.kill()
+        dead.communicate()
+        assert len(os.listdir(tmp_path)) == 2
+        (tmp_path / ".simdtex-notes").touch()
+        image.write(tmp_path / "b.npy", picture(1))
+        assert len(os.listdir(tmp_path)) == 3
+        (own,) = [name for name in os.listdir(tmp_path) if str(live.pid) in name.split("-")]
+        assert not [name for name in os.listdir(tmp_path) if str(dead.pid) in name.split("-")]
+        assert (tmp_path / own).exists() and (tmp_path / ".simdtex-notes").exists()
+    finally:
+        live.kill()
+        live.communicate()
+    volume.write(tmp_path / "slices", block(1))
+    assert sorted(os.listdir(tmp_path)) == [".simdtex-notes", "b.npy", "slices"]
+
+
+def test_a_folder_of_stages_where_a_process_was_killed_is_used_again(tmp_path):
+    StageWriter(tmp_path)
+    dead = writer(tmp_path / "level0.png", "file")
+    with pytest.raises(ValueError, match="holds other files"):
+        StageWriter(tmp_path)
+    dead.kill()
+    dead.communicate()
+    StageWriter(tmp_path)
+    write_report(tmp_path, "Title", "Lead", [], {})
+    assert sorted(os.listdir(tmp_path)) == ["index.html", "results.json"]
+
+
+def test_what_another_host_writes_is_let_be(tmp_path):
+    name = f".simdtex-01234567-{2**22 + 1}-01234567-01234567.png"
+    (tmp_path / name).touch()
+    image.write(tmp_path / "a.png", picture(1))
+    assert sorted(os.listdir(tmp_path)) == [name, "a.png"]
+
+
+def test_a_folder_that_was_taken_away_comes_back(tmp_path):
+    """A process is killed between taking the old folder away and putting the new one there."""
+    volume.write(tmp_path / "a", block(1))
+    kill = "import os, sys; from pathlib import Path; from simdtex.io import atomic, volume; import numpy as np\n"
+    kill += "rename = Path.rename\n"
+    kill += "Path.rename = lambda self, to: rename(self, to) if 'old' in to.name else os.kill(os.getpid(), 9)\n"
+    kill += "volume.write(sys.argv[1], np.ones((2, 3, 4), np.uint8))\n"
+    done = subprocess.run([sys.executable, "-c", kill, tmp_path / "a"], check=False)
+    assert done.returncode == -9 and "a" not in os.listdir(tmp_path)
+    with pytest.raises(KeyboardInterrupt), atomic_folder(tmp_path / "a"):
+        raise KeyboardInterrupt
+    assert os.listdir(tmp_path) == ["a"] and np.array_equal(volume.read(tmp_path / "a"), block(1))
+
+
+def test_a_hidden_name_is_not_too_long(tmp_path):
+    image.write(tmp_path / f"{'a' * 251}.png", picture(1))
+    with atomic_path(tmp_path / "a.png") as temporary:
+        assert temporary.suffix == ".png" and len(temporary.name) < 60
+        temporary.write_bytes(b"1")
+
+
+# -- commands -------------------------------------------------------------------------------------------------
+
+
+def command(folder, *words):
+    return [sys.executable, "-m", "simdtex", "synth", "sample.png", "-o", "out.png", "--device", "reference", *words]
+
+
+def test_a_finished_picture_does_not_wait_for_its_stages(tmp_path, tiny):
+    image.write(tmp_path / "sample.png", np.random.default_rng(1).integers(0, 256, (24, 20), dtype=np.uint8))
+    (tiny / "ballast").write_bytes(bytes(56 * 1024))
+    words = ["--method", "multires", "--size", "64x64", "--stages", tiny / "st", "--source-map", tiny / "map.npz"]
+    done = subprocess.run(
+        command(tmp_path, *words), cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 2, done.stderr
+    assert image.read(tmp_path / "out.png").pixels.shape == (64, 64)
+    said = [line for line in done.stderr.splitlines() if line.startswith("simdtex: ")]
+    assert said and all("could not be written (No space left on device): free some space" in line for line in said)
+    assert any("/st/" in line for line in said)
+    assert not [path for path in tmp_path.rglob("*") if path.name.startswith(".")]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_process_that_is_asked_to_end_cleans_up(tmp_path, number):
+    image.write(tmp_path / "sample.png", np.random.default_rng(2).integers(0, 256, (64, 64), dtype=np.uint8))
+    words = command(tmp_path, "--size", "200x200", "--stages", "st", "--order", "8")
+    running = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 60
+    while not any((tmp_path / "st").glob("level*.png")):
+        assert running.poll() is None and time.monotonic() < deadline, running.communicate()
+        time.sleep(0.02)
+    running.send_signal(number)
+    running.send_signal(number)  # as timeout does
+    _, errors = running.communicate(timeout=60)
+    assert running.returncode == 128 + number, errors
+    assert "Traceback" not in errors and "stopped" in errors and not (tmp_path / "out.png").exists()
+    assert not [path for path in tmp_path.rglob("*") if path.name.startswith(".")]
+
+
+def test_signals_are_given_back(tmp_path):
+    from click.testing import CliRunner
+
+    from simdtex.cli import main
+
+    before = signal.getsignal(signal.SIGTERM)
+    assert CliRunner().invoke(main, ["synth", "none.png", "-o", str(tmp_path / "a.png")]).exit_code == 2
+    assert signal.getsignal(signal.SIGTERM) is before
+    assert Path(tmp_path).exists()

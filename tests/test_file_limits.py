@@ -1,0 +1,384 @@
+"""Files that unpack to far more than they are: told by their headers, before anything is decoded."""
+
+import bz2
+import gzip
+import io
+import os
+import struct
+import subprocess
+import tracemalloc
+import zipfile
+import zlib
+from pathlib import Path
+
+import imagecodecs
+import numpy as np
+import PIL.Image
+import PIL.ImageFile
+import pytest
+import tifffile
+from click.testing import CliRunner
+
+from simdtex.cli import main
+from simdtex.io import decode, image, limits, realisations, volume
+from simdtex.io.hard_data import read_hard_data
+from simdtex.model.source_map import load_source_map
+
+PIXELS = 10_000
+MANY = np.zeros((101, 100), np.uint8)  # just too many
+DOCS = Path(__file__).parent.parent / "docs"
+
+
+def saved(array, kind, **options):
+    file = io.BytesIO()
+    PIL.Image.fromarray(array).save(file, kind, **options)
+    return file.getvalue()
+
+
+def frames(kind, count=20, side=30):
+    first, *rest = [PIL.Image.fromarray(np.full((side, side, 3), 9 * k, np.uint8)) for k in range(count)]
+    file = io.BytesIO()
+    first.save(file, kind, save_all=True, append_images=rest)
+    return file.getvalue()
+
+
+def npy(shape, dtype="<f8", data=b""):
+    header = f"{{'descr': {dtype!r}, 'fortran_order': False, 'shape': {shape}, }}".encode()
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header) + 1) + header + b"\n" + data
+
+
+def zipped(**files):
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in files.items():
+            archive.writestr(f"{name}.npy", data)
+    return file.getvalue()
+
+
+def png(width, height, bits=8, colours=2, rows=b"", **more):
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", width, height, bits, colours, 0, 0, 0)
+    texts = b"".join(chunk(kind.encode(), data) for kind, data in more.items())
+    return (
+        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + texts + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+    )
+
+
+def tiff(*pages, **options):
+    file = io.BytesIO()
+    with tifffile.TiffWriter(file) as writer:
+        for page in pages:
+            writer.write(page, metadata=None, photometric="minisblack", **options)
+    return file.getvalue()
+
+
+def circular(pages=5, back=1):
+    """A TIFF whose last page leads back to an earlier one."""
+    data = bytearray(tiff(*[np.zeros((4, 4), np.uint8)] * pages))
+    with tifffile.TiffFile(io.BytesIO(bytes(data))) as file:
+        offsets = [page.offset for page in file.pages]
+    last = offsets[-1] + 2 + 12 * struct.unpack_from("<H", data, offsets[-1])[0]
+    struct.pack_into("<I", data, last, offsets[back])
+    return bytes(data)
+
+
+def sparse_tiff(width, height):
+    """A TIFF that says that it is large, and has next to no data."""
+    entries = [(256, 4, 1, width), (257, 4, 1, height), (258, 3, 1, 8), (259, 3, 1, 8), (262, 3, 1, 1)]
+    entries += [(273, 4, 1, 8), (277, 3, 1, 1), (278, 4, 1, height), (279, 4, 1, 4)]
+    data = b"II*\0" + struct.pack("<I", 12) + b"\0" * 4 + struct.pack("<H", len(entries))
+    return data + b"".join(struct.pack("<HHII", *entry) for entry in entries) + struct.pack("<I", 0)
+
+
+def swollen_jpeg():
+    """A TIFF of 16 x 16 pixels with a JPEG of many more in its place."""
+    data = bytearray(tiff(np.zeros((16, 16), np.uint8), compression="jpeg"))
+    for marker in (b"\xff\xc0", b"\xff\xc1"):
+        at = data.find(marker)
+        if at >= 0:
+            struct.pack_into(">HH", data, at + 5, 60000, 60000)
+    return bytes(data)
+
+
+PICTURES = {
+    "PNG": png(200_000, 200_000),
+    "16-bit PNG": png(200_000, 200_000, bits=16),
+    "a PNG of a pixel too many": saved(MANY, "PNG"),
+    "a 16-bit PNG of a pixel too many": imagecodecs.png_encode(MANY.astype(np.uint16)),
+    "JPEG": saved(MANY, "JPEG"),
+    "BMP": saved(MANY, "BMP"),
+    "GIF": b"GIF89a" + struct.pack("<HH", 65535, 65535) + b"\0\0\0,\0\0\0\0\1\0\1\0\0\2\2D\1\0;",
+    "WebP": saved(MANY, "WEBP"),
+    "an animated WebP": frames("WEBP"),
+    "an animated PNG": frames("PNG"),
+    "PPM": b"P6\n50000 50000\n255\n",
+    "16-bit PPM": b"P6\n50000 50000\n65535\n",
+    "TIFF": tiff(MANY),
+    "a sparse TIFF": sparse_tiff(2**31, 2**31),
+    "npy": npy((50_000, 50_000)),
+    "npy in channels": npy((10, 10, 10**9)),
+}
+
+
+def refused(reading, path, words, peak=4 * 2**20):
+    """Reading ends in one sentence that names the file, and takes no more memory than `peak`."""
+    tracemalloc.start()
+    try:
+        with pytest.raises(ValueError, match=words) as said:
+            reading(path)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert str(path) in str(said.value) and "\n" not in str(said.value) and len(str(said.value)) < 400
+    assert most < peak
+
+
+TOO_LARGE = rf"(pixels|bytes|cells|frames) and no more than \d+ are read: .*, or set {limits.VARIABLE} higher"
+
+
+@pytest.mark.parametrize("kind", PICTURES)
+def test_pictures_of_too_many_pixels_are_not_decoded(tmp_path, kind, monkeypatch, caplog, capfd):
+    def never(*_, **__):
+        raise AssertionError("it is decoded")
+
+    monkeypatch.setattr(PIL.ImageFile.ImageFile, "load", never)
+    monkeypatch.setattr(tifffile.TiffPage, "asarray", never)
+    monkeypatch.setattr(imagecodecs, "png_decode", never)
+    (tmp_path / "a.png").write_bytes(PICTURES[kind])
+    refused(lambda path: image.read(path, max_pixels=PIXELS), tmp_path / "a.png", TOO_LARGE)
+    assert not caplog.records and not "".join(capfd.readouterr())
+
+
+@pytest.mark.parametrize("kind", ["PNG", "WEBP", "GIF"])
+def test_animations_within_the_limit_are_read(tmp_path, kind):
+    (tmp_path / "a").write_bytes(frames(kind, count=3))
+    assert image.read(tmp_path / "a").pixels.shape == (30, 30, 3)
+
+
+def test_a_picture_as_large_as_allowed_is_read(tmp_path):
+    for kind, data in {"png": saved(MANY[:100], "PNG"), "tif": tiff(MANY[:100]), "npy": None}.items():
+        path = tmp_path / f"a.{kind}"
+        path.write_bytes(data) if data else np.save(path, MANY[:100])
+        assert image.read(path, max_pixels=PIXELS).pixels.shape == (100, 100)
+
+
+def test_more_than_pillow_allows_is_read_where_it_is_asked_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(PIL.Image, "MAX_IMAGE_PIXELS", 1000)
+    (tmp_path / "a.png").write_bytes(saved(MANY, "PNG"))
+    with pytest.raises(ValueError, match=TOO_LARGE):
+        image.read(tmp_path / "a.png", max_pixels=PIXELS)
+    assert image.read(tmp_path / "a.png", max_pixels=10_100).pixels.shape == (101, 100)
+    assert PIL.Image.MAX_IMAGE_PIXELS == 1000
+
+
+def test_the_environment_says_how_many(tmp_path, monkeypatch):
+    (tmp_path / "a.png").write_bytes(saved(MANY, "PNG"))
+    (tmp_path / "slices").mkdir()
+    (tmp_path / "slices" / "slice-000.png").write_bytes(saved(MANY, "PNG"))
+    for text, fits in (("10099", False), ("10100", True), ("", True), (" 20000 ", True)):
+        monkeypatch.setenv(limits.VARIABLE, text)
+        for reading, path in ((image.read, tmp_path / "a.png"), (volume.read, tmp_path / "slices")):
+            if fits:
+                reading(path)
+            else:
+                refused(reading, path, TOO_LARGE)
+            reading(path, max_pixels=10100)
+    for text in ("0", "-5", "many", "1e9", "9" * 30, "1.5"):
+        monkeypatch.setenv(limits.VARIABLE, text)
+        with pytest.raises(ValueError, match=rf"^{limits.VARIABLE} is .*: set it to a number of pixels"):
+            image.read(tmp_path / "a.png")
+    for number, error in ((0, ValueError), (1.5, TypeError), (True, TypeError)):
+        with pytest.raises(error, match="max_pixels"):
+            image.read(tmp_path / "a.png", max_pixels=number)
+
+
+def test_the_command_line_says_it_in_one_sentence(tmp_path, monkeypatch):
+    (tmp_path / "a.png").write_bytes(PICTURES["PNG"])
+    done = CliRunner().invoke(main, ["synth", str(tmp_path / "a.png"), "-o", str(tmp_path / "out.png")])
+    assert done.exit_code == 2 and limits.VARIABLE in done.output and len(done.output.splitlines()) == 1
+
+
+def test_texts_beside_the_pixels_are_not_unpacked(tmp_path):
+    """Of 8 bits they are refused by Pillow; of 16 bits nobody looks at them but for the orientation."""
+    bomb = zlib.compress(bytes(2**25), 9)
+    texts = {"zTXt": b"Comment\0\0" + bomb, "iTXt": b"Comment\0\1\0\0\0" + bomb, "iCCP": b"profile\0\0" + bomb}
+    for kind, data in texts.items():
+        for bits in (8, 16):
+            rows = bytes(4 * (1 + 3 * 4 * bits // 8))
+            (tmp_path / "a.png").write_bytes(png(4, 4, bits, rows=rows, **{kind: data}))
+            tracemalloc.start()
+            try:
+                assert image.read(tmp_path / "a.png").pixels.shape == (4, 4, 3)
+            except ValueError as error:
+                assert "cannot be decoded" in str(error)
+            finally:
+                most = tracemalloc.get_traced_memory()[1]
+                tracemalloc.stop()
+            assert most < 2**24, (kind, bits)
+
+
+# -- volumes --------------------------------------------------------------------------------------------------
+
+
+def nrrd(encoding="raw", sizes=(4, 4, 4), data=b"", **fields):
+    lines = ["NRRD0004", "type: uint8", "dimension: 3", f"sizes: {' '.join(map(str, sizes))}", f"encoding: {encoding}"]
+    lines += [f"{name.replace('_', ' ')}: {value}" for name, value in fields.items()]
+    return "\n".join([*lines, "", ""]).encode() + data
+
+
+LARGE = bytes(limits.BYTES * PIXELS + 1)
+VOLUMES = {
+    "pages.tif": (tiff(*[np.zeros((4, 4), np.uint8)] * 3), TOO_LARGE),  # each counts for 8192 pixels
+    "circle.tif": (circular(), "its pages lead back to one another"),
+    "self.tif": (circular(1, 0), "its pages lead back to one another"),
+    "sparse.tif": (sparse_tiff(2**31, 2**31), TOO_LARGE),
+    "jpeg.tif": (swollen_jpeg(), "JPEG data of more pixels than belong there"),
+    "a.npy": (npy((2000, 2000, 2000)), TOO_LARGE),
+    "short.npy": (npy((10, 10, 10)), "ends before its last value"),
+    "object.npy": (npy((10, 10, 10), "|O", b"x" * 8000), "objects of Python"),
+    "a.npz": (zipped(volume=npy((200, 200, 200), "|u1", bytes(8_000_000))), TOO_LARGE),
+    "shape.npz": (zipped(volume=npy((2000, 2000, 2000))), TOO_LARGE),
+    "beside.npz": (zipped(volume=npy((2, 2, 2), "|u1", bytes(8)), more=LARGE), TOO_LARGE),
+    "sizes.nrrd": (nrrd(sizes=(10**9, 10**9, 10**9)), TOO_LARGE),
+    "gzip.nrrd": (nrrd("gzip", data=gzip.compress(LARGE)), TOO_LARGE),
+    "bzip2.nrrd": (nrrd("bzip2", data=bz2.compress(LARGE)), TOO_LARGE),
+    "lines.nrrd": (nrrd(line_skip=10**15), "sides or lines that cannot be"),
+    "negative.nrrd": (nrrd(sizes=(-1, -1, 64)), "sides or lines that cannot be"),
+    "zstd.nrrd": (nrrd("zstd"), "its encoding is zstd"),
+}
+
+
+@pytest.mark.parametrize("name", VOLUMES)
+def test_volumes_that_are_too_large_are_not_decoded(tmp_path, name, caplog, capfd):
+    data, words = VOLUMES[name]
+    (tmp_path / name).write_bytes(data)
+    refused(lambda path: volume.read(path, max_pixels=PIXELS if words == TOO_LARGE else None), tmp_path / name, words)
+    assert not caplog.records and not "".join(capfd.readouterr())
+
+
+def test_packed_volumes_within_the_limit_are_read(tmp_path):
+    values = np.arange(64, dtype=np.uint8)
+    for encoding, packed in {"gzip": gzip.compress, "bz2": bz2.compress, "raw": bytes}.items():
+        (tmp_path / "a.nrrd").write_bytes(nrrd(encoding, data=packed(values.tobytes())))
+        assert np.array_equal(volume.read(tmp_path / "a.nrrd").ravel(), values)
+
+
+def test_slices_are_counted_together(tmp_path):
+    for number in range(3):
+        (tmp_path / f"slice-00{number}.png").write_bytes(saved(MANY[:50], "PNG"))
+    refused(lambda path: volume.read(path, max_pixels=3 * limits.PAGE - 1), tmp_path, TOO_LARGE)
+    assert volume.read(tmp_path, max_pixels=3 * limits.PAGE).shape == (3, 50, 100)
+
+
+def test_a_volume_of_no_file_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "a.nrrd")
+    with pytest.raises(ValueError, match="is not a regular file"):
+        volume.read(tmp_path / "a.nrrd")
+
+
+@pytest.mark.parametrize("field", ["data file", "datafile", "Data File"])
+def test_a_header_reads_no_other_file(tmp_path, field):
+    (tmp_path / "secret").write_bytes(bytes(range(64)))
+    for named in ("secret", tmp_path / "secret", "LIST"):
+        (tmp_path / "a.nrrd").write_bytes(nrrd(**{field: named}))
+        with pytest.raises(ValueError, match=r"its data is in another file; save both as one \.nrrd"):
+            volume.read(tmp_path / "a.nrrd")
+
+
+# -- realisations, source maps, hard data ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", [".zarr", ".zarr.zip", ".nc", ".npz"])
+def test_realisations_that_are_too_large_are_not_loaded(tmp_path, suffix):
+    xarray = pytest.importorskip("xarray")
+    path = tmp_path / f"a{suffix}"
+    array = xarray.DataArray(np.zeros((2, 100, 100), np.uint8), dims=realisations.DIMENSIONS[:3])
+    try:
+        realisations.write_realisations(path, array)
+    except ValueError as error:
+        pytest.skip(str(error))
+    assert realisations.read_realisations(path, max_pixels=20_000).shape == (2, 100, 100)
+    with pytest.raises(ValueError, match=TOO_LARGE):
+        realisations.read_realisations(path, max_pixels=19_999)
+
+
+def test_a_store_that_claims_to_be_huge_is_not_loaded(tmp_path):
+    zarr, xarray = pytest.importorskip("zarr"), pytest.importorskip("xarray")
+    for name, shape, chunks in (("wide", (10**6, 10**6, 10**3), (1, 100, 100)), ("chunk", (1, 9, 9), (2**15,) * 3)):
+        group = zarr.open_group(tmp_path / f"{name}.zarr", mode="w", zarr_format=3)
+        group.create_array(
+            "realisations", shape=shape, chunks=chunks, dtype="u1", dimension_names=realisations.DIMENSIONS[:3]
+        )
+        refused(realisations.read_realisations, tmp_path / f"{name}.zarr", TOO_LARGE, peak=2**25)
+    assert xarray
+
+
+def test_source_maps_and_hard_data(tmp_path):
+    files = {
+        "map.npz": (load_source_map, zipped(source=npy((50_000, 50_000, 2), "<i4"))),
+        "map.npy": (load_source_map, npy((50_000, 50_000, 2), "<i4")),
+        "table.npy": (read_hard_data, npy((10**9, 3))),
+        # a million of numbers
+        "table.csv": (lambda path: read_hard_data(path, max_pixels=12_000), b"1,2,3\n" * 2000 + b"1,2,3"),
+        "wide.csv": (lambda path: read_hard_data(path, max_pixels=3_000), b"1," * 1500 + b"1\n" + b"," * 1500),
+    }
+    for name, (reading, data) in files.items():
+        (tmp_path / name).write_bytes(data)
+        refused(reading, tmp_path / name, f"{TOO_LARGE}|no more than .* are read: give fewer rows", peak=2**23)
+
+
+def test_lines_that_no_table_has(tmp_path):
+    first = ",".join("1" * 30_000)
+    for text, words in {
+        first + "\n" + "1,2\n" * 3000: "line 2 has 2 cells and those before it 30000",
+        "1,2," + "9x" * 60_000: "which is no number",
+        "1,2," + "9" * 200_000: "cannot be taken apart",
+    }.items():
+        (tmp_path / "a.csv").write_text(text)
+        refused(read_hard_data, tmp_path / "a.csv", words, peak=2**24)
+
+
+# -- formats --------------------------------------------------------------------------------------------------
+
+
+def test_only_documented_formats_are_tried(tmp_path, monkeypatch):
+    """Pillow knows a PostScript file by its first bytes, and hands it to Ghostscript."""
+
+    def never(*_, **__):
+        raise AssertionError("a program is started")
+
+    for name in ("Popen", "check_call", "check_output", "run", "call"):
+        monkeypatch.setattr(subprocess, name, never)
+    (tmp_path / "a.png").write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 20 20\n%%EndComments\nshowpage\n")
+    for kind in ("TGA", "ICO", "PCX", "SGI", "DDS", "ICNS"):
+        (tmp_path / f"{kind}.png").write_bytes(saved(np.zeros((32, 32, 3), np.uint8), kind))
+    for path in sorted(tmp_path.iterdir()):
+        with pytest.raises(ValueError, match=r"is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF, PPM or \.npy"):
+            image.read(path)
+
+
+def test_the_documented_formats_are_those_that_are_read(tmp_path):
+    assert set(decode.FORMATS) == {"PNG", "JPEG", "TIFF", "BMP", "WEBP", "GIF", "PPM"}
+    for text in (image.read.__doc__, (DOCS / "reference" / "command-line.rst").read_text(encoding="utf-8")):
+        words = " ".join(text.split())
+        assert "PNG, JPEG, TIFF" in words and "BMP, WebP, GIF" in words and "PPM/PGM" in words
+        assert "Pillow" not in words.partition("PPM/PGM")[2][:80]
+    for kind in decode.FORMATS:
+        (tmp_path / "a").write_bytes(saved(np.full((8, 9, 3), 7, np.uint8), kind))
+        assert image.read(tmp_path / "a").pixels.shape[:2] == (8, 9)
+
+
+def test_how_a_tiff_may_be_compressed(tmp_path):
+    values = np.arange(256, dtype=np.uint8).reshape(16, 16)
+    for method in (None, "zlib", "lzw", "packbits", "zstd", "lzma"):
+        (tmp_path / "a.tif").write_bytes(tiff(values, values, compression=method))
+        assert np.array_equal(image.read(tmp_path / "a.tif").pixels, values)
+        assert np.array_equal(volume.read(tmp_path / "a.tif"), np.stack([values, values]))
+    (tmp_path / "a.tif").write_bytes(tiff(values, values, compression="jpeg"))
+    assert image.read(tmp_path / "a.tif").pixels.shape == (16, 16) and volume.read(tmp_path / "a.tif").shape[0] == 2
+    (tmp_path / "a.tif").write_bytes(tiff(values, compression="png"))
+    for reading in (image.read, volume.read):
+        with pytest.raises(ValueError, match="compressed by the method 34933; save it with Deflate"):
+            reading(tmp_path / "a.tif")
