@@ -39,7 +39,7 @@ def within(part):
 
 
 def test_there_are_kernels():
-    assert {"coloring", "lcpdf", "temperature"} <= set(KERNELS)
+    assert {"lcpdf", "luby", "temperature"} <= set(KERNELS)
 
 
 @pytest.mark.parametrize("stem", KERNELS)

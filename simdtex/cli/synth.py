@@ -35,12 +35,13 @@ from simdtex.cli.inputs import (
     write_arranged,
 )
 from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, method_options, option, stages_option
-from simdtex.cli.places import FOLDER, READ, READ_PAIR, WRITE, WRITE_PAIR
+from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR, WRITE, WRITE_PAIR
+from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 
 
 @click.command()
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
-@click.option("-o", "--output", required=True, type=WRITE, help="Picture to write.")
+@click.option("-o", "--output", required=True, type=EITHER, help="Picture to write; with --tiles a .zarr store.")
 @click.option(
     "--size",
     metavar="WIDTHxHEIGHT",
@@ -107,6 +108,7 @@ from simdtex.cli.places import FOLDER, READ, READ_PAIR, WRITE, WRITE_PAIR
     metavar="DIR",
     help="Write a page of the run: pictures, and how evenly it uses the sample.",
 )
+@tiles_options
 @PROFILE
 @QUIET
 @plainly
@@ -126,6 +128,10 @@ def synth(
     also: tuple[str, ...],
     report: Path | None,
     accounting: bool,
+    tiles: int | None,
+    workers: int | None,
+    scheduler: str | None,
+    dry_run: bool,
     profile: bool,
     quiet: bool,
     **options: Any,
@@ -137,6 +143,7 @@ def synth(
     from simdtex.io import image
     from simdtex.synthesis import synthesize
 
+    check_tiles(click.get_current_context())
     if accounting and method != "mrf":
         raise ValueError(f"--accounting is of the method mrf, not {method}; leave it out")
     if method == "pyramid" and (source_map or also):
@@ -149,6 +156,19 @@ def synth(
     begin = image.read(start).pixels if start else None
     shape = output_shape(size, pixels, known_size(table), guides and guides.output, begin)
     told = known_values(table, known, shape, material) if known and table else None
+    if guides:
+        options["labels"] = guides.labels
+    inputs = {
+        "channel_axis": material.channel_axis,
+        "mask": masks and (masks if material.several else masks[0]),
+        "known": told,
+        "guide": guides and guides.pair,
+        "rng": seed,
+    }
+    if tiles is not None:
+        more = inputs | {"device": device} | given(options)
+        synthesize_in_tiles(click.get_current_context(), material.array, shape, more)
+        return
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, material, everywhere=told is None)
     others = read_also(also, material)
@@ -160,8 +180,6 @@ def synth(
         if material.several or told is not None or not material.known:
             raise ValueError("--report shows one sample, all of it known, and what is taken from it; leave it out")
         check_folder(report)
-    if guides:
-        options["labels"] = guides.labels
 
     began = time.perf_counter()
     with watching(quiet, stages, material.limits) as callback:
@@ -169,14 +187,10 @@ def synth(
             material.array,
             shape,
             method=method,
-            channel_axis=material.channel_axis,
-            mask=masks and (masks if material.several else masks[0]),
-            known=told,
-            guide=guides and guides.pair,
-            rng=seed,
             device=opened(device, profile),
             callback=callback,
             full_output=True,
+            **inputs,
             **given(options | {"start": begin}),
         )
     write_arranged(output, made, others, source_map, run.source)

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex synth --tiles``: outputs larger than one machine, and ``simdtex resume`` of them."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from simdtex.cli.common import progress_bar
+
+ALONE = ("stages", "source_map", "also", "report", "start", "accounting", "profile", "array", "check_schedule")
+"""Options that are of a picture which one process holds."""
+
+
+def tiles_options(command: Callable[..., None]) -> Callable[..., None]:
+    """``--tiles`` and what goes with it."""
+    for one in (
+        click.option("--dry-run", is_flag=True, help="With --tiles: print the plan, and do nothing."),
+        scheduler_option,
+        workers_option,
+        click.option(
+            "--tiles",
+            type=int,
+            metavar="SIDE",
+            help="mrf: make the output in tiles of so many pixels to the side, into a .zarr store: for sizes beyond "
+            "one machine. The pixels are the same.",
+        ),
+    ):
+        command = one(command)
+    return command
+
+
+workers_option = click.option(
+    "--workers", type=int, metavar="N", help="With --tiles: start N processes on this machine to do them."
+)
+scheduler_option = click.option(
+    "--scheduler", metavar="ADDRESS", help="With --tiles: the workers of a Dask scheduler do them: tcp://HOST:8786."
+)
+
+
+def check_tiles(context: click.Context) -> None:
+    """Raise where options are given that do not go with one another."""
+    given = context.params
+    if given["tiles"] is None:
+        for name in ("workers", "scheduler", "dry_run"):
+            if given[name]:
+                raise ValueError(f"--{name.replace('_', '-')} goes with --tiles; give the side of a tile, as 2048")
+        return
+    if given["method"] != "mrf":
+        raise ValueError(f"the method {given['method']} needs the whole output at once; leave --tiles out")
+    for name in ALONE:
+        if given.get(name):
+            raise ValueError(f"--{name.replace('_', '-')} is of an output at once; leave it out, or --tiles")
+    if given["output"].suffix.lower() != ".zarr":
+        raise ValueError(f"{given['output']} is no .zarr store, which tiles are written to; end its name in .zarr")
+    if given["workers"] is not None and given["scheduler"] is not None:
+        raise ValueError("a scheduler has its own workers; give --workers or --scheduler, not both")
+
+
+def synthesize_in_tiles(context: click.Context, sample: Any, shape: tuple[int, int], options: dict[str, Any]) -> None:
+    """Make an output in tiles; ``options`` are keywords of `simdtex.distributed.synthesize`."""
+    from simdtex import distributed
+
+    given, began = context.params, time.perf_counter()
+    output: Path = given["output"]
+    plan_of = {name: value for name, value in options.items() if name not in ("rng", "device")}
+    plan = distributed.plan(sample, shape, tiles=given["tiles"], workers=given["workers"] or 1, **plan_of)
+    if given["dry_run"] or not given["quiet"]:
+        for line in plan.lines():
+            click.echo(line, err=not given["dry_run"])
+    if given["dry_run"]:
+        return
+    with _crew(given["workers"], given["scheduler"]) as crew, _shown(output, given["quiet"]) as callback:
+        distributed.synthesize(sample, shape, output, tiles=given["tiles"], callback=callback, **crew, **options)
+    _done(output, given["quiet"], began)
+
+
+def resume_tiles(store: Path, workers: int | None, scheduler: str | None, device: str | None, quiet: bool) -> None:
+    """Go on with an output in tiles."""
+    from simdtex import distributed
+
+    began = time.perf_counter()
+    with _crew(workers, scheduler) as crew, _shown(store, quiet) as callback:
+        distributed.resume(store, device=device, callback=callback, **crew)
+    _done(store, quiet, began)
+
+
+@contextmanager
+def _crew(workers: int | None, scheduler: str | None) -> Iterator[dict[str, Any]]:
+    """Who does the tiles, as keywords."""
+    from simdtex.distributed.cluster import connected
+
+    with connected(workers, scheduler) as client:
+        yield {} if client is None else {"client": client}
+
+
+@contextmanager
+def _shown(store: Path, quiet: bool) -> Iterator[Callable[[Any], None]]:
+    """A callback that moves a progress bar; Ctrl-C says how to go on."""
+    try:
+        with progress_bar(quiet) as show:
+            yield lambda progress: show(progress.fraction, progress.doing, "")
+    except KeyboardInterrupt:
+        if not store.exists():
+            raise
+        click.echo(f"simdtex: stopped; go on with: simdtex resume {store}", err=True)
+        sys.exit(130)
+
+
+def _done(store: Path, quiet: bool, began: float) -> None:
+    if quiet:
+        return
+    import zarr
+
+    root: Any = zarr.open_group(store, mode="r")
+    (rows, cols), seed = root["image"].shape[:2], root.attrs["simdtex"]["seed"]
+    click.echo(f"{store}: {cols}x{rows} in {time.perf_counter() - began:.1f} s, seed {seed}; the array is called image")
