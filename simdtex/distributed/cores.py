@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import os
+import signal
+import threading
 
 from distributed import Worker, WorkerPlugin
 
@@ -24,6 +26,8 @@ class Cores(WorkerPlugin):
 
     def setup(self, worker: Worker) -> None:
         """Called by the worker: its threads, and those of its device, inherit what is set here."""
+        if threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that has the workers
         if not hasattr(os, "sched_setaffinity"):
             return  # no such thing on this system: workers compete for cores
         free = sorted(os.sched_getaffinity(0))
