@@ -16,7 +16,6 @@ from simdtex.distributed.store import PLANES, Store, Stored, Turn, Work, phase_o
 from simdtex.machine.reference import Reference
 from simdtex.methods.mrf.level import Run
 from simdtex.methods.mrf.observers import expected_work
-from simdtex.methods.mrf.tiles import Tally
 from simdtex.ops.use import price
 from simdtex.run import Callback, Tiling
 
@@ -50,7 +49,7 @@ def go_on(store: Store, execute: Execute, callback: Callback | None = None) -> N
     while turn.phase != "done":
         level = work.plan.levels[turn.level]
         new = store.prepare(turn, level, work.plan.channels, _candidates(run, turn))
-        left = [number for number in range(level.count) if new or store.tally(turn, number) is None]
+        left = list(range(level.count)) if new else np.flatnonzero(~store.done(turn, level.count)).tolist()
         for done, _ in enumerate(execute(turn, left), level.count - len(left) + 1):
             teller.tell(turn, done)
         turn = _complete(store, work, run, turn)
@@ -72,18 +71,13 @@ def _complete(store: Store, work: Work, run: Run, turn: Turn) -> Turn:
     if turn.phase == "show":
         store.save(turn._replace(number=turn.number + 1, phase="done"))
         return turn._replace(phase="done")
-    counts: NDArray[Any] | int = 0
-    warm = heat = 0
-    for number in range(level.count):
-        tally = store.tally(turn, number)
-        assert isinstance(tally, Tally)
-        counts, warm, heat = counts + tally.counts, warm + tally.warm, heat + tally.heat
+    counts, warm, heat = store.total(turn, level.count)
     cooling = turn.cooling + (turn.phase == "sweep" and turn.warm > 0)
     free = turn.free + (turn.phase == "sweep" and turn.warm == 0)
     number, read = turn.number + 1, turn.write
     if turn.phase != "whole" and (warm or free < run.options.free_sweeps):
         before = store.price(turn) if turn.phase == "sweep" else None
-        costs = price(np.asarray(counts), run.market(turn.level), run.options.balance * run.usual, before)
+        costs = price(counts, run.market(turn.level), run.options.balance * run.usual, before)
         after = Turn(number, "sweep", turn.level, read, 1 - read, cooling, free, warm, heat)
         store.save(after, costs)
     elif turn.level:

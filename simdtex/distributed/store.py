@@ -41,6 +41,9 @@ FORMAT = 1
 
 KIND = "simdtex tiles"
 
+TOGETHER = 2**22
+"""Numbers that are read of tallies at once."""
+
 PLANES = ("values", "source", "temperature")
 
 
@@ -208,6 +211,22 @@ class Store:
         """What was noted of a tile, if it has had its turn."""
         there, warm, heat, *_ = row = self._at(f"tally{turn.number}")[number]
         return Tally(row[3:], int(warm), int(heat)) if there else None
+
+    def done(self, turn: Turn, count: int) -> NDArray[np.bool_]:
+        """Which of so many tiles have had their turn."""
+        return np.concatenate([rows[:, 0] > 0 for rows in self._rows(turn, count)])
+
+    def total(self, turn: Turn, count: int) -> Tally:
+        """The sum of what was noted of all tiles."""
+        _, warm, heat, *counts = sum(rows.sum(0) for rows in self._rows(turn, count))
+        return Tally(np.array(counts, np.int64), int(warm), int(heat))
+
+    def _rows(self, turn: Turn, count: int) -> Iterator[NDArray[np.int64]]:
+        """What was noted, many tiles at once: one by one they take longer."""
+        tally = self._at(f"tally{turn.number}")
+        some = max(1, TOGETHER // tally.shape[1])
+        for first in range(0, count, some):
+            yield tally[first : first + some]
 
     # -- arrays over sites ----------------------------------------------------------------------------------------
 
