@@ -38,7 +38,7 @@ WORKERS = (1, 10, 100, 1000, 10_000)
 
 
 def turns(sample: np.ndarray, tiles: int, device: str | None, folder: str) -> tuple[dict, float]:
-    """Seconds for each site of a tile, tile by tile, by level, kind and number of a turn; and the leader's for a turn."""
+    """Seconds a site, tile by tile, by level, kind and number of a turn; and the leader's of a turn."""
     side, options = 2 * tiles, make_options()
     outline = outlined(sample, (side, side), options, 1)
     plan = laid(outline, [max(1, tiles >> number) for number in range(outline.levels)], 1)  # four tiles to each level
