@@ -70,7 +70,9 @@ def synthesize_in_tiles(context: click.Context, sample: Any, shape: tuple[int, i
     given, began = context.params, time.perf_counter()
     output: Path = given["output"]
     plan_of = {name: value for name, value in options.items() if name not in ("rng", "device")}
-    plan = distributed.plan(sample, shape, tiles=given["tiles"], workers=given["workers"] or 1, **plan_of)
+    plan = distributed.plan(
+        sample, shape, tiles=given["tiles"], workers=1 if given["workers"] is None else given["workers"], **plan_of
+    )
     if given["dry_run"] or not given["quiet"]:
         for line in plan.lines():
             click.echo(line, err=not given["dry_run"])

@@ -14,6 +14,7 @@ from simdtex.distributed.drive import Execute
 from simdtex.distributed.store import Store, Turn
 from simdtex.distributed.tasks import do
 from simdtex.machine import Machine
+from simdtex.options import whole
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -84,6 +85,7 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Client | N
     from simdtex.distributed.cores import Cores
 
     assert workers is not None
+    whole("workers", workers, 1)
     each = max(1, (os.cpu_count() or 1) // workers)
     limits = {name: str(each) for name in ("POCL_MAX_PTHREAD_COUNT", "POCL_CPU_MAX_CU_COUNT")}
     with (

@@ -167,6 +167,7 @@ def planned(outline: Outline, tile: int, workers: int) -> Plan:
         The schedule does not relax a window as it does the whole.
     """
     whole("tiles", tile, 1)
+    whole("workers", workers, 1)
     options, schedule = outline.options, outline.schedule
     if not (schedule.windows and isinstance(schedule, Windowed)) or options.array:
         given = f"array {options.array}" if options.array else f"schedule {schedule.name}"

@@ -1,0 +1,131 @@
+"""``simdtex synth --tiles`` and ``simdtex resume`` of a store, end to end."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from cases import assert_same_bits, texture
+from click.testing import CliRunner
+
+from simdtex.cli import main
+from simdtex.io import image
+
+zarr = pytest.importorskip("zarr")
+
+OPTIONS = ["--size", "61x50", "--seed", "3", "--order", "2", "--xi", "-4", "--device", "reference"]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    image.write(tmp_path / "grey.png", texture((30, 33), seed=2))
+    image.write(tmp_path / "colour.png", np.stack([texture((30, 33), seed=k) for k in (1, 2, 3)], -1))
+    known = texture((50, 61), seed=4)
+    image.write(
+        tmp_path / "known.png", np.dstack([known, np.where(np.indices(known.shape)[1] < 20, 255, 0)]).astype("u1")
+    )
+    image.write(tmp_path / "from.png", (texture((30, 33), seed=2) > 128).astype(np.uint8))
+    image.write(tmp_path / "to.png", (np.indices((50, 61)).sum(0) // 20 % 2).astype(np.uint8))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def run(*args):
+    return CliRunner().invoke(main, [str(arg) for arg in args], catch_exceptions=False)
+
+
+def pixels(store):
+    return zarr.open_group(store, mode="r")["image"][...]
+
+
+@pytest.mark.parametrize(
+    "args", [["colour.png"], ["grey.png", "--known", "known.png"], ["grey.png", "--guide", "from.png=to.png"]], ids=str
+)
+def test_tiles_have_the_bytes_of_a_picture(folder, args):
+    whole, tiles = (
+        run("synth", *args, "-o", "whole.png", *OPTIONS),
+        run("synth", *args, "-o", "o.zarr", "--tiles", 24, *OPTIONS),
+    )
+    assert (whole.exit_code, tiles.exit_code) == (0, 0), whole.output + tiles.output
+    assert_same_bits(pixels("o.zarr"), image.read("whole.png").pixels)
+    assert "level 0: 61x50 sites in 9 tiles of 24x24, halo" in tiles.stderr
+    assert "o.zarr: 61x50 in" in tiles.stdout
+    assert "seed 3; the array is called image" in tiles.stdout
+
+
+def test_a_dry_run_prints_the_plan_and_makes_nothing(folder):
+    before = sorted(os.listdir())
+    result = run("synth", "grey.png", "-o", "o.zarr", "--tiles", 16, "--dry-run", "--workers", 2, *OPTIONS)
+    assert result.exit_code == 0, result.output
+    assert result.stdout.splitlines()[-1].startswith("a worker needs at most ")
+    assert sorted(os.listdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (["-o", "o.png", "--tiles", 16], "o.png is no .zarr store, which tiles are written to; end its name in .zarr"),
+        (["-o", "o.png", "--workers", 2], "--workers goes with --tiles"),
+        (["-o", "o.png", "--scheduler", "tcp://a"], "--scheduler goes with --tiles"),
+        (["-o", "o.png", "--dry-run"], "--dry-run goes with --tiles"),
+        (["-o", "o.zarr", "--tiles", 0], "tiles is 0; give 1 or more"),
+        (["-o", "o.zarr", "--tiles", 16, "--workers", 0], "workers is 0; give 1 or more"),
+        (["-o", "o.zarr", "--tiles", 16, "--workers", 1, "--scheduler", "x"], "not both"),
+        (["-o", "o.zarr", "--tiles", 16, "--method", "pyramid"], "the method pyramid needs the whole output at once"),
+        (
+            ["-o", "o.zarr", "--tiles", 16, "--stages", "s"],
+            "--stages is of an output at once; leave it out",
+        ),
+        (["-o", "o.zarr", "--tiles", 16, "--source-map", "s.npz"], "--source-map is of an output at once"),
+        (["-o", "o.zarr", "--tiles", 16, "--also", "grey.png=x.png"], "--also is of an output at once"),
+        (["-o", "o.zarr", "--tiles", 16, "--schedule", "raster"], "schedule raster needs the whole output at once"),
+        (["-o", "no/o.zarr", "--tiles", 16], "does not exist; make it first"),
+        (["-o", "there.zarr", "--tiles", 16], "is there already; remove it, give another name, or go on with"),
+        (
+            ["-o", "o.zarr", "--tiles", 16, "--scheduler", "nonsense"],
+            "no scheduler answers at nonsense; start one",
+        ),
+    ],
+    ids=str,
+)
+def test_what_is_wrong_is_said_before_anything_is_made(folder, args, words):
+    (folder / "there.zarr").mkdir()
+    before = sorted(os.listdir())
+    result = run("synth", "grey.png", *args, *OPTIONS)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert result.stderr.strip().splitlines()[-1].startswith("simdtex: ")
+    assert sorted(os.listdir()) == before
+
+
+@pytest.mark.parametrize("how", ["interrupt", "kill"])
+def test_a_run_that_is_stopped_goes_on(folder, how):
+    """The command and its workers get the signal, as from a terminal; or the command alone is killed."""
+    whole = run("synth", "colour.png", "-o", "whole.png", *OPTIONS)
+    assert whole.exit_code == 0
+    command = [sys.executable, "-m", "simdtex", "synth", "colour.png", "-o", "o.zarr", "--tiles", "16", *OPTIONS]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        began = time.monotonic()
+        while not (folder / "o.zarr/work/level0/1/values/c").exists() and time.monotonic() - began < 120:
+            time.sleep(0.01)  # until the finest level's first sweep writes
+        os.killpg(process.pid, signal.SIGINT if how == "interrupt" else signal.SIGKILL)
+        said = process.stderr.read()
+    assert process.returncode == (130 if how == "interrupt" else -signal.SIGKILL), said
+    if how == "interrupt":
+        assert said.strip().splitlines()[-1] == "simdtex: stopped; go on with: simdtex resume o.zarr"
+    result = run("resume", "o.zarr", "--device", "reference")
+    assert result.exit_code == 0, result.output
+    assert_same_bits(pixels("o.zarr"), image.read("whole.png").pixels)
+    again = run("resume", "o.zarr")
+    assert again.exit_code == 0
+    assert "o.zarr is finished; there is nothing to go on with" in again.stdout
+
+
+def test_resume_says_what_it_cannot_go_on_with(folder):
+    zarr.open_group("other.zarr", mode="w")
+    result = run("resume", "other.zarr")
+    assert result.exit_code == 2
+    assert "other.zarr is no output in tiles" in result.stderr
