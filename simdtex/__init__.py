@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from simdtex import quality
+    from simdtex.checkpoints import checkpoint
     from simdtex.io.hard_data import place_hard_data, read_hard_data
     from simdtex.jobs.filling import extend, fill
     from simdtex.jobs.simulation import simulate
@@ -20,6 +21,7 @@ __all__ = [
     "DeviceError",
     "Output",
     "Progress",
+    "checkpoint",
     "devices",
     "extend",
     "fill",
@@ -39,6 +41,7 @@ _HOMES = {
     "DeviceError": "simdtex.machine.devices",
     "Output": "simdtex.run",
     "Progress": "simdtex.run",
+    "checkpoint": "simdtex.checkpoints",
     "devices": "simdtex.machine.devices",
     "extend": "simdtex.jobs.filling",
     "fill": "simdtex.jobs.filling",

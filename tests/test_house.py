@@ -79,6 +79,7 @@ ROOMS = [
         "jobs",
         "methods",
         "envelope",
+        "checkpoints",
         "schedules",
     ),
     *("ops", "machine", "maspar", "model", "run", "io", "options", "random"),

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a method is handed to keep its state in, and how often it is kept."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from simdtex.checkpoints.folder import Folder
+
+FIRST = 1.0
+"""Seconds before the first state is written."""
+
+SHARE = 50
+"""Seconds between two writes, in units of what the last one took: at most 1 / (1 + 50) of the time goes into them."""
+
+
+class Keep:
+    """Where a run may keep its state; this one keeps nothing.
+
+    A state is a tree of plain arrays and numbers: see `simdtex.checkpoints.tree.packed`.
+    """
+
+    @property
+    def found(self) -> Any:
+        """The state that the run is to go on from, None to begin."""
+        return None
+
+    def offer(self, state: Callable[[], Any]) -> bool:
+        """Say that a state is at hand; it is asked for and written where it is time. Whether it was.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            The run is to stop here.
+        """
+        return False
+
+    def within(self, around: Callable[[], Any], found: Any) -> Keep:
+        """For a part of the run, whose states are kept together with what ``around`` gives, as ``(around, state)``.
+
+        ``found`` is the part's own state to go on from.
+        """
+        return self
+
+    def one(self, name: str) -> Keep:
+        """For one of several runs that go on beside each other, whose states have this name."""
+        return self
+
+    def all(self) -> list[Any]:
+        """What `add` was given so far."""
+        return []
+
+    def add(self, result: Callable[[], Any], *, now: bool = False) -> bool:
+        """Offer a result that is kept to the end, with others; with ``now`` it is written at once. Whether it was."""
+        return False
+
+    def drop(self) -> None:
+        """The states of this name are no longer needed."""
+
+
+NOTHING = Keep()
+"""Keeps nothing."""
+
+
+class Pace:
+    """When to write: not before a second, and then seldom enough.
+
+    Parameters
+    ----------
+    every : float, optional
+        Seconds between two writes. None: at least a second, and 50 times what the last one took.
+    """
+
+    def __init__(self, every: float | None) -> None:
+        self._every = every
+        self._next = time.perf_counter() + (FIRST if every is None else every)
+
+    @property
+    def due(self) -> bool:
+        """Whether it is time."""
+        return time.perf_counter() >= self._next
+
+    def wrote(self, began: float) -> None:
+        """Note a write that began then and ends now."""
+        now = time.perf_counter()
+        self._next = now + (max(FIRST, SHARE * (now - began)) if self._every is None else self._every)
+
+
+class Watch:
+    """What all keeps of a run share.
+
+    ``stopping`` whether the run is to stop at the next state; ``failed`` whether the last write failed; ``note`` what
+    tells the user a sentence.
+    """
+
+    def __init__(self, note: Callable[[str], None]) -> None:
+        self.stopping = self.failed = False
+        self.note = note
+
+
+class Kept(Keep):
+    """Keeps states of one name in a folder.
+
+    Parameters
+    ----------
+    folder : Folder
+    name : str
+        Letters, and digits after them.
+    every : float, optional
+        As of `Pace`.
+    watch : Watch
+    anew : bool
+        Whether to begin anew where all states are damaged.
+    """
+
+    def __init__(self, folder: Folder, name: str, every: float | None, watch: Watch, *, anew: bool = False) -> None:
+        self._folder, self._name, self._every, self._watch = folder, name, every, watch
+        self._pace = Pace(every)
+        self._found = folder.latest(name, anew=anew)
+        self._tell("an earlier one is gone on from" if self._found is not None else "it is made anew")
+
+    @property
+    def found(self) -> Any:
+        """The latest state that is whole."""
+        return self._found
+
+    def offer(self, state: Callable[[], Any]) -> bool:
+        """Write it where it is time, or where the run is to stop."""
+        self._found = None  # it has been gone on from, and need not be held
+        stopping = self._watch.stopping
+        wrote = (stopping or self._pace.due) and self._write(self._name, state)
+        if stopping:
+            raise KeyboardInterrupt
+        return wrote
+
+    def within(self, around: Callable[[], Any], found: Any) -> Keep:
+        """The same, with something around its states."""
+        return Within(self, around, found)
+
+    def one(self, name: str) -> Keep:
+        """The same folder under another name."""
+        return Kept(self._folder, name, self._every, self._watch, anew=True)
+
+    def all(self) -> list[Any]:
+        """All results that are whole."""
+        found = self._folder.all("results")
+        self._tell("what was in it is made anew")
+        return found
+
+    def add(self, result: Callable[[], Any], *, now: bool = False) -> bool:
+        """Write it where it is time, beside what is there."""
+        return (now or self._watch.stopping or self._pace.due) and self._write("results", result, beside=True)
+
+    def drop(self) -> None:
+        """Remove them."""
+        self._folder.forget(self._name)
+
+    def _tell(self, what: str) -> None:
+        for name in self._folder.damaged:
+            self._watch.note(f"the state {name} in {self._folder.path} is damaged; {what}")
+        self._folder.damaged.clear()
+
+    def _write(self, name: str, state: Callable[[], Any], beside: bool = False) -> bool:
+        began = time.perf_counter()
+        tree = state()
+        try:
+            self._folder.keep(name, tree, beside=beside)
+        except OSError as error:  # the run is worth more than its checkpoint
+            if not self._watch.failed:
+                self._watch.note(
+                    f"the checkpoint in {self._folder.path} could not be written ({error.strerror or error}); "
+                    "the run goes on, and will try again"
+                )
+            self._watch.failed = True
+            return False
+        finally:
+            self._pace.wrote(began)
+        self._watch.failed = False
+        return True
+
+
+class Within(Keep):
+    """Keeps the states of a part of a run: see `Keep.within`."""
+
+    def __init__(self, keep: Keep, around: Callable[[], Any], found: Any) -> None:
+        self._keep, self._around, self._found = keep, around, found
+
+    @property
+    def found(self) -> Any:
+        """The part's."""
+        return self._found
+
+    def offer(self, state: Callable[[], Any]) -> bool:
+        """The part's state, with what is around it."""
+        self._found = None
+        return self._keep.offer(lambda: (self._around(), state()))
