@@ -28,6 +28,11 @@ class Begun(NamedTuple):
         """Where the run on a device of this name keeps its state."""
         return self.keeper.on(device) if self.keeper else NOTHING
 
+    def end(self) -> None:
+        """The run is over, and what is left cannot be stopped between two states."""
+        if self.keeper:
+            self.keeper.running = False
+
 
 def begin(job: str, rng: Any, inputs: Callable[[], dict[str, Any]]) -> Begun:
     """Begin a job, once all it is given is checked; within `simdtex.checkpoint` it may be that of the folder.
@@ -59,6 +64,7 @@ def executed(
     machine = open_machine(device)
     machine.profile()  # forget what was before
     image, output = method(machine, seeing(callback, channel_axis), begun.on(machine.name))
+    begun.end()
     output.statistics.update(machine.profile() or {})
     image = restored(image, channel_axis)
     if not full_output:

@@ -41,6 +41,8 @@ class Keeper:
     ----------
     running : bool
         Whether a run is going on, which `stop` stops where its state is at hand.
+    resumed : bool
+        Whether that run goes on from a state.
     """
 
     def __init__(
@@ -53,7 +55,7 @@ class Keeper:
     ) -> None:
         if every is not None:
             real("every", every, 0)
-        self.running = False
+        self.running = self.resumed = False
         self._every, self._command = every, command
         self._folder = Folder(Path(folder))
         self._watch = Watch(note or _warned)
@@ -137,7 +139,7 @@ class Keeper:
                 f"the run in {self._folder.path} was begun on {before} and goes on on {device}; "
                 "the bytes are the same on every device"
             )
-        self.running = True
+        self.running, self.resumed = True, keep.found is not None
         return keep
 
     def close(self, finished: bool) -> None:
@@ -151,7 +153,9 @@ class Keeper:
                 self._folder.forget()
         except OSError as error:
             path = self._folder.path / JOB
-            self._watch.note(f"{path} could not be written ({error.strerror or error}): the run is finished all the same")
+            self._watch.note(
+                f"{path} could not be written ({error.strerror or error}): the run is finished all the same"
+            )
         finally:
             self._folder.release()
 

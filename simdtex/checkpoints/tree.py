@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Plain arrays and numbers, in dicts, lists and tuples, as JSON and a list of arrays; and what identifies such things."""
+"""Plain arrays and numbers, in dicts, lists and tuples, as JSON and a list of arrays; and what identifies them."""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
@@ -85,8 +85,10 @@ def identity(thing: Any) -> Any:
         return thing
     if isinstance(thing, np.bool_):
         return bool(thing)
+    if isinstance(thing, Integral) and abs(int(thing)) >= 2**53:
+        return str(int(thing))
     if isinstance(thing, Real):
-        return float(thing) if abs(thing) < 2**53 else str(thing)  # 1 and 1.0 say the same
+        return float(thing)  # 1 and 1.0 say the same
     if isinstance(thing, (list, tuple)):
         return [identity(one) for one in thing]
     if isinstance(thing, dict):

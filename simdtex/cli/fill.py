@@ -21,7 +21,8 @@ from simdtex.cli.inputs import (
     read_material,
     write_arranged,
 )
-from simdtex.cli.options import DEVICE, QUIET, SEED, fill_options
+from simdtex.cli.keeping import kept
+from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, fill_options
 
 
 @click.command()
@@ -55,8 +56,10 @@ from simdtex.cli.options import DEVICE, QUIET, SEED, fill_options
 @SEED
 @DEVICE
 @fill_options
+@CHECKPOINT
 @QUIET
 @plainly
+@kept
 def fill(
     picture: Path,
     output: Path,

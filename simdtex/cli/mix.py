@@ -20,7 +20,8 @@ from simdtex.cli.common import (
     print_profile,
     watching,
 )
-from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
+from simdtex.cli.keeping import kept
+from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
 
 CHOSEN = ("palette", "pattern", "low", "high")
 """Options that name a sample."""
@@ -47,8 +48,10 @@ CHOSEN = ("palette", "pattern", "low", "high")
 @DEVICE
 @stages_option("every iteration")
 @PROFILE
+@CHECKPOINT
 @QUIET
 @plainly
+@kept
 def mix(
     samples: tuple[Path, ...],
     output: Path,

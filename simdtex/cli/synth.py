@@ -33,7 +33,8 @@ from simdtex.cli.inputs import (
     read_material,
     write_arranged,
 )
-from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, method_options, option, stages_option
+from simdtex.cli.keeping import kept
+from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, method_options, option, stages_option
 
 
 @click.command()
@@ -104,8 +105,10 @@ from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, method_options, op
     help="Write a page of the run: pictures, and how evenly it uses the sample.",
 )
 @PROFILE
+@CHECKPOINT
 @QUIET
 @plainly
+@kept
 def synth(
     samples: tuple[Path, ...],
     output: Path,

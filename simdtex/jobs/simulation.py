@@ -118,9 +118,7 @@ def simulate(
     data, size = _hard(hard, shape, check_samples(training, channel_axis, mask).pixels[0], channel_axis)
     inputs = check_inputs(training, size, channel_axis, mask, data, None, guide)
     chosen = mrf.make_options(**DEFAULTS | options)
-    begun = begin(
-        "simulate", rng, lambda: {"shape": size, "n": n, "first": first, "options": chosen, **inputs.told()}
-    )
+    begun = begin("simulate", rng, lambda: {"shape": size, "n": n, "first": first, "options": chosen, **inputs.told()})
     seed = begun.seed
     seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
     pixels = inputs.pictures.pixels[0]
@@ -145,6 +143,7 @@ def simulate(
     except BaseException:
         shelf.write(now=True)
         raise
+    begun.end()
     dims, arrays = ["realisation", "y", "x", "variable"], made
     if channel_axis is None:
         dims, arrays = dims[:3], made[..., 0]

@@ -90,8 +90,8 @@ def synthesize(
     launches, worked = machine.launches, machine.seconds
     run = laid_out(machine, pixels, shape, options, seed, given, guide)
     observer, found = Observer(run, callback), keep.found
-    state = None if found is None else restored(run, observer, found)
-    for level, state, info in anneal(run, state, watch=observer.part):
+    state = begun = None if found is None else restored(run, observer, found)
+    for level, state, info in anneal(run, begun, watch=observer.part):
         observer.sweep(level, state, info)
         keep.offer(partial(kept, run, state, observer))
     assert state is not None  # there is a level, and it has a sweep
