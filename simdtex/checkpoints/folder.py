@@ -16,6 +16,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -212,14 +213,15 @@ class Folder:
 
     def _state(self, stem: str) -> Any:
         told = _read_json(self.path / f"{stem}.json")
-        if told.get("format") != FORMAT:
-            raise Damaged
         with open(self.path / f"{stem}.npz", "rb") as file:
-            if hashlib.file_digest(file, "sha256").hexdigest() != told["arrays"]:
+            if told.get("format") != FORMAT or hashlib.file_digest(file, "sha256").hexdigest() != told.get("arrays"):
                 raise Damaged
             file.seek(0)
-            with np.load(file, allow_pickle=False) as arrays:
-                return unpacked(told["tree"], [arrays[str(k)] for k in range(len(arrays.files))])
+            try:
+                with np.load(file, allow_pickle=False) as arrays:
+                    return unpacked(told["tree"], [arrays[str(k)] for k in range(len(arrays.files))])
+            except (ValueError, KeyError, IndexError, TypeError, BadZipFile):
+                raise Damaged from None
 
     def _files(self, name: str | None) -> list[tuple[int, str]]:
         """Number and kind of the files of states."""
