@@ -131,7 +131,7 @@ class Kept(Keep):
         self._found = None  # it has been gone on from, and need not be held
         stopping = self._watch.stopping
         wrote = (stopping or self._pace.due) and self._write(self._name, state)
-        if stopping:
+        if stopping or (wrote and self._watch.stopping):  # asked for before or during the write
             raise KeyboardInterrupt
         return wrote
 
