@@ -515,7 +515,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_work(tmp_path, mo
 # -- how often, and what --------------------------------------------------------------------------------------
 
 
-def test_a_write_waits_fifty_times_what_the_last_one_took(monkeypatch):
+def test_a_write_waits_75_times_what_the_last_one_took(monkeypatch):
     now = [100.0]
     monkeypatch.setattr(keeps.time, "perf_counter", lambda: now[0])
     pace = keeps.Pace(None)
@@ -524,16 +524,23 @@ def test_a_write_waits_fifty_times_what_the_last_one_took(monkeypatch):
     assert not pace.due
     now[0] += 0.02
     assert pace.due
+    assert pace.early(now[0], 2**27 // 10)  # a tenth of a second, so 7.5 from the beginning
+    assert not pace.due
+    now[0] += 6.4
+    assert not pace.due
+    now[0] += 0.2
+    assert pace.due and not pace.early(now[0], 2**27 // 10)
     began, now[0] = now[0], now[0] + 0.2
     pace.wrote(began)
-    now[0] += 9.9
+    assert not pace.early(now[0], 2**40)  # what is measured counts
+    now[0] += 14.9
     assert not pace.due
     now[0] += 0.2
     assert pace.due
     pace.wrote(now[0])
     now[0] += 0.9  # a write that took nothing
     assert not pace.due
-    assert keeps.SHARE >= 50 and keeps.FIRST >= 1
+    assert keeps.SHARE == 75 and keeps.FIRST == 1
 
 
 def test_a_short_run_writes_no_state(tmp_path, monkeypatch):

@@ -8,12 +8,16 @@ from collections.abc import Callable
 from typing import Any
 
 from simdtex.checkpoints.folder import Folder
+from simdtex.checkpoints.tree import size
 
 FIRST = 1.0
-"""Seconds before the first state is written."""
+"""Seconds before the first state is written, at least."""
 
-SHARE = 50
-"""Seconds between two writes, in units of what the last one took: at most 1 / (1 + 50) of the time goes into them."""
+SHARE = 75
+"""Seconds between two writes, in units of what the last one took: at most 1 / (1 + 75) of the time goes into them."""
+
+SPEED = 2.0**27
+"""Bytes a second that a first write is taken to manage, before any is measured."""
 
 
 class Keep:
@@ -70,21 +74,32 @@ class Pace:
     Parameters
     ----------
     every : float, optional
-        Seconds between two writes. None: at least a second, and 50 times what the last one took.
+        Seconds between two writes. None: at least a second, and 75 times what the last one took; the first waits as
+        long for what it should take.
     """
 
     def __init__(self, every: float | None) -> None:
         self._every = every
-        self._next = time.perf_counter() + (FIRST if every is None else every)
+        self._began = time.perf_counter()
+        self._next = self._began + (FIRST if every is None else every)
+        self._measured = every is not None
 
     @property
     def due(self) -> bool:
         """Whether it is time."""
         return time.perf_counter() >= self._next
 
+    def early(self, began: float, size: int) -> bool:
+        """Whether a first write of so many bytes, which were asked for then, had better wait; and have it wait."""
+        now = time.perf_counter()
+        if self._measured:
+            return False
+        self._next = self._began + SHARE * (now - began + size / SPEED)
+        return now < self._next
+
     def wrote(self, began: float) -> None:
         """Note a write that began then and ends now."""
-        now = time.perf_counter()
+        now, self._measured = time.perf_counter(), True
         self._next = now + (max(FIRST, SHARE * (now - began)) if self._every is None else self._every)
 
 
@@ -151,7 +166,7 @@ class Kept(Keep):
 
     def add(self, result: Callable[[], Any], *, now: bool = False) -> bool:
         """Write it where it is time, beside what is there."""
-        return (now or self._watch.stopping or self._pace.due) and self._write("results", result, beside=True)
+        return (now or self._watch.stopping or self._pace.due) and self._write("results", result, True, now)
 
     def drop(self) -> None:
         """Remove them."""
@@ -162,9 +177,11 @@ class Kept(Keep):
             self._watch.note(f"the state {name} in {self._folder.path} is damaged; {what}")
         self._folder.damaged.clear()
 
-    def _write(self, name: str, state: Callable[[], Any], beside: bool = False) -> bool:
+    def _write(self, name: str, state: Callable[[], Any], beside: bool = False, now: bool = False) -> bool:
         began = time.perf_counter()
         tree = state()
+        if not (now or self._watch.stopping) and self._pace.early(began, size(tree)):
+            return False
         try:
             self._folder.keep(name, tree, beside=beside)
         except OSError as error:  # the run is worth more than its checkpoint

@@ -219,7 +219,7 @@ def checkpoint(folder: str | os.PathLike[str], *, every: float | None = None) ->
     folder : path
         Empty or new to begin; else that of the same call. One process at a time uses it.
     every : float, optional
-        Seconds between two writes at least, 0 for one wherever the state is at hand. None: a second, and 50 times what
+        Seconds between two writes at least, 0 for one wherever the state is at hand. None: a second, and 75 times what
         the last write took, so that less than 2 % of the time goes into them.
 
     Yields

@@ -44,6 +44,11 @@ def packed(tree: Any) -> tuple[Any, list[NDArray[Any]]]:
     return pack(tree), arrays
 
 
+def size(tree: Any) -> int:
+    """Bytes of the arrays of a tree."""
+    return sum(array.nbytes for array in packed(tree)[1])
+
+
 def unpacked(told: Any, arrays: Sequence[NDArray[Any]]) -> Any:
     """What `packed` was given; tuples with names come back without them (see `like`)."""
     if not isinstance(told, dict):
