@@ -330,6 +330,20 @@ def test_other_folders_are_refused(tmp_path):
     assert not (tmp_path / "new").exists()
 
 
+def test_states_of_nobody_knows_what_are_refused(tmp_path):
+    stopped(tmp_path)
+    (tmp_path / JOB).unlink()
+    refused(tmp_path, r"holds other files \(state-000001.json\) and no checkpoint")
+
+
+def test_a_run_that_was_killed_at_its_very_beginning(whole, tmp_path):
+    (tmp_path / "lock").touch()
+    (tmp_path / f"{JOB}.new").write_text("half")
+    with simdtex.checkpoint(tmp_path):
+        assert_same_run(run(QUICK), whole("mrf"))
+    assert sorted(contents(tmp_path)) == [JOB, "lock"]
+
+
 def test_a_finished_run_says_so(tmp_path):
     folder = tmp_path / "new"
     with simdtex.checkpoint(folder, every=0):
@@ -537,6 +551,9 @@ def test_a_write_waits_75_times_what_the_last_one_took(monkeypatch):
     assert not pace.due
     now[0] += 0.2
     assert pace.due
+    pace.wrote(now[0] - 10, keeps.LONGEST)
+    now[0] += 60.1
+    assert pace.due
     pace.wrote(now[0])
     now[0] += 0.9  # a write that took nothing
     assert not pace.due
@@ -555,7 +572,7 @@ def test_two_states_are_kept(tmp_path):
     for number in range(5):
         folder.keep("state", {"number": number})
     assert sorted(contents(tmp_path)) == [f"state-00000{n}.{kind}" for n in (4, 5) for kind in ("json", "npz")]
-    assert Folder(tmp_path).latest("state") == {"number": 4}
+    assert folder.latest("state") == {"number": 4}
 
 
 Named = namedtuple("Named", "first second")
@@ -603,7 +620,7 @@ def test_nothing_is_unpickled(tmp_path):
     told = files._read_json(tmp_path / "state-000001.json") | {"arrays": check}
     files._write(tmp_path / "state-000001.json", files._json_of(told))
     with pytest.raises(ValueError, match="is damaged"):
-        Folder(tmp_path).latest("state")
+        folder.latest("state")
 
 
 def test_identities_tell_inputs_apart():

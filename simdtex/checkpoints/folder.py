@@ -13,7 +13,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 from zipfile import BadZipFile
@@ -61,9 +61,10 @@ class Folder:
         self._lock: int | None = None
         try:
             if self.path.is_dir():
-                if any(self.path.iterdir()) and not (self.path / JOB).exists() and self._others():
+                others = [] if (self.path / JOB).exists() else self._others()
+                if others:
                     raise ValueError(
-                        f"the folder {path} holds other files ({self._others()[0]}) and no checkpoint; "
+                        f"the folder {path} holds other files ({others[0]}) and no checkpoint; "
                         "give an empty or a new one"
                     )
             elif os.path.lexists(self.path):
@@ -76,9 +77,8 @@ class Folder:
             raise ValueError(f"{path} cannot be used ({error.strerror}); give another folder") from None
 
     def _others(self) -> list[str]:
-        """Files there that are no checkpoint's."""
-        names = sorted(entry.name for entry in self.path.iterdir())
-        return [name for name in names if not _ours(name)]
+        """Files there that a run that was killed at its very beginning has not left."""
+        return sorted(entry.name for entry in self.path.iterdir() if entry.name not in (LOCK, JOB + NEW))
 
     # -- one at a time ----------------------------------------------------------------------------------------
 
@@ -189,15 +189,15 @@ class Folder:
             )
         return None
 
-    def all(self, name: str) -> list[Any]:
+    def all(self, name: str) -> Iterator[Any]:
         """Every whole state of a name, in the order in which they were written."""
-        found = []
         for number in sorted({n for n, kind in self._files(name) if kind == "json"}):
             try:
-                found.append(self._state(f"{name}-{number:06d}"))
+                found = self._state(f"{name}-{number:06d}")
             except (Damaged, OSError):
                 self.damaged.append(f"{name}-{number:06d}")
-        return found
+                continue
+            yield found
 
     def forget(self, name: str | None = None) -> None:
         """Remove the states of a name, or all, and what an interrupted run left half written."""

@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from math import inf
 from typing import Any
 
 from simdtex.checkpoints.folder import Folder
@@ -15,6 +16,9 @@ FIRST = 1.0
 
 SHARE = 75
 """Seconds between two writes, in units of what the last one took: at most 1 / (1 + 75) of the time goes into them."""
+
+LONGEST = 60.0
+"""Seconds that results wait at most: they grow with the time, and so does what their next write takes."""
 
 SPEED = 2.0**27
 """Bytes a second that a first write is taken to manage, before any is measured."""
@@ -52,9 +56,9 @@ class Keep:
         """For one of several runs that go on beside each other, whose states have this name."""
         return self
 
-    def all(self) -> list[Any]:
+    def all(self) -> Iterator[Any]:
         """What `add` was given so far."""
-        return []
+        return iter(())
 
     def add(self, result: Callable[[], Any], *, now: bool = False) -> bool:
         """Offer a result that is kept to the end, with others; with ``now`` it is written at once. Whether it was."""
@@ -97,10 +101,10 @@ class Pace:
         self._next = self._began + SHARE * (now - began + size / SPEED)
         return now < self._next
 
-    def wrote(self, began: float) -> None:
-        """Note a write that began then and ends now."""
+    def wrote(self, began: float, longest: float = inf) -> None:
+        """Note a write that began then and ends now; the next one waits for so long at most."""
         now, self._measured = time.perf_counter(), True
-        self._next = now + (max(FIRST, SHARE * (now - began)) if self._every is None else self._every)
+        self._next = now + (min(longest, max(FIRST, SHARE * (now - began))) if self._every is None else self._every)
 
 
 class Watch:
@@ -158,15 +162,14 @@ class Kept(Keep):
         """The same folder under another name."""
         return Kept(self._folder, name, self._every, self._watch, anew=True)
 
-    def all(self) -> list[Any]:
+    def all(self) -> Iterator[Any]:
         """All results that are whole."""
-        found = self._folder.all("results")
+        yield from self._folder.all("results")
         self._tell("what was in it is made anew")
-        return found
 
     def add(self, result: Callable[[], Any], *, now: bool = False) -> bool:
         """Write it where it is time, beside what is there."""
-        return (now or self._watch.stopping or self._pace.due) and self._write("results", result, True, now)
+        return (now or self._watch.stopping or self._pace.due) and self._write("results", result, beside=True)
 
     def drop(self) -> None:
         """Remove them."""
@@ -177,10 +180,10 @@ class Kept(Keep):
             self._watch.note(f"the state {name} in {self._folder.path} is damaged; {what}")
         self._folder.damaged.clear()
 
-    def _write(self, name: str, state: Callable[[], Any], beside: bool = False, now: bool = False) -> bool:
+    def _write(self, name: str, state: Callable[[], Any], beside: bool = False) -> bool:
         began = time.perf_counter()
         tree = state()
-        if not (now or self._watch.stopping) and self._pace.early(began, size(tree)):
+        if not (beside or self._watch.stopping) and self._pace.early(began, size(tree)):
             return False
         try:
             self._folder.keep(name, tree, beside=beside)
@@ -193,7 +196,7 @@ class Kept(Keep):
             self._watch.failed = True
             return False
         finally:
-            self._pace.wrote(began)
+            self._pace.wrote(began, LONGEST if beside else inf)
         self._watch.failed = False
         return True
 

@@ -48,9 +48,11 @@ def checkpoint(folder: Path, more: list[str]) -> None:
     from simdtex.checkpoints.folder import Folder
     from simdtex.cli import load
 
-    job: dict[str, Any] = Folder(folder).job() or {}
+    kept = Folder(folder)
+    job: dict[str, Any] = kept.job() or {}
     command = job.get("command")
     if job.get("finished"):
+        kept.forget()  # where the process was killed before it had
         click.echo(f"{folder}: the run is finished; there is nothing to go on with")
         return
     if command is None:
