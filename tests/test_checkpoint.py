@@ -545,16 +545,17 @@ def test_a_write_waits_75_times_what_the_last_one_took(monkeypatch):
     now[0] += 0.2
     assert pace.due and not pace.early(now[0], 2**27 // 10)
     began, now[0] = now[0], now[0] + 0.2
-    pace.wrote(began)
-    assert not pace.early(now[0], 2**40)  # what is measured counts
+    pace.wrote(began, 2**20)
+    assert not pace.early(now[0], 2**21)  # what is measured counts
     now[0] += 14.9
     assert not pace.due
     now[0] += 0.2
     assert pace.due
-    pace.wrote(now[0] - 10, keeps.LONGEST)
+    assert pace.early(now[0], 2**40) and not pace.due  # but for far more bytes
+    pace.wrote(now[0] - 10, 2**40, keeps.LONGEST)
     now[0] += 60.1
     assert pace.due
-    pace.wrote(now[0])
+    pace.wrote(now[0], 2**40)
     now[0] += 0.9  # a write that took nothing
     assert not pace.due
     assert keeps.SHARE == 75 and keeps.FIRST == 1

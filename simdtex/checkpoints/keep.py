@@ -78,15 +78,15 @@ class Pace:
     Parameters
     ----------
     every : float, optional
-        Seconds between two writes. None: at least a second, and 75 times what the last one took; the first waits as
-        long for what it should take.
+        Seconds between two writes. None: at least a second, and 75 times what the last one took; the first, and one of
+        far more bytes than the last, waits as long for what it should take.
     """
 
     def __init__(self, every: float | None) -> None:
         self._every = every
-        self._began = time.perf_counter()
-        self._next = self._began + (FIRST if every is None else every)
-        self._measured = every is not None
+        self._since = time.perf_counter()
+        self._next = self._since + (FIRST if every is None else every)
+        self._size = 0
 
     @property
     def due(self) -> bool:
@@ -94,16 +94,17 @@ class Pace:
         return time.perf_counter() >= self._next
 
     def early(self, began: float, size: int) -> bool:
-        """Whether a first write of so many bytes, which were asked for then, had better wait; and have it wait."""
+        """Whether a write of so many bytes, which were asked for then, had better wait; and have it wait."""
         now = time.perf_counter()
-        if self._measured:
+        if self._every is not None or size <= 2 * self._size:
             return False
-        self._next = self._began + SHARE * (now - began + size / SPEED)
+        self._next = self._since + SHARE * (now - began + size / SPEED)
         return now < self._next
 
-    def wrote(self, began: float, longest: float = inf) -> None:
-        """Note a write that began then and ends now; the next one waits for so long at most."""
-        now, self._measured = time.perf_counter(), True
+    def wrote(self, began: float, size: int, longest: float = inf) -> None:
+        """Note a write of so many bytes that began then and ends now; the next one waits for so long at most."""
+        now, self._size = time.perf_counter(), size
+        self._since = now
         self._next = now + (min(longest, max(FIRST, SHARE * (now - began))) if self._every is None else self._every)
 
 
@@ -183,7 +184,8 @@ class Kept(Keep):
     def _write(self, name: str, state: Callable[[], Any], beside: bool = False) -> bool:
         began = time.perf_counter()
         tree = state()
-        if not (beside or self._watch.stopping) and self._pace.early(began, size(tree)):
+        much = size(tree)
+        if not (beside or self._watch.stopping) and self._pace.early(began, much):
             return False
         try:
             self._folder.keep(name, tree, beside=beside)
@@ -196,7 +198,7 @@ class Kept(Keep):
             self._watch.failed = True
             return False
         finally:
-            self._pace.wrote(began, LONGEST if beside else inf)
+            self._pace.wrote(began, much, LONGEST if beside else inf)
         self._watch.failed = False
         return True
 
