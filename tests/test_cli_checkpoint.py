@@ -298,7 +298,7 @@ def test_every_command_that_keeps_is_known():
 def test_a_command_that_is_killed(place, tmp_path):
     """Processes of their own, with states as seldom as they are by default."""
     image.write(place / "sample.png", texture((64, 64)))
-    words = ["synth", "sample.png", "-o", "out.png", "--size", "80x80", "--order", "4", "--seed", "1", "-q"]
+    words = ["synth", "sample.png", "-o", "out.png", "--size", "256x256", "--order", "4", "--seed", "1", "-q"]
     words += ["--device", "reference", "--checkpoint", "kept"]
     environment = os.environ | {"PYTHONPATH": str(Path(simdtex.__file__).parent.parent), "SIMDTEX_TUNE": "0"}
 
