@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from simdtex import quality
+    from simdtex.checkpoints import checkpoint
     from simdtex.io.hard_data import place_hard_data, read_hard_data
     from simdtex.jobs.filling import extend, fill
     from simdtex.jobs.simulation import simulate
@@ -23,6 +24,7 @@ __all__ = [
     "DeviceError",
     "Output",
     "Progress",
+    "checkpoint",
     "devices",
     "extend",
     "fill",
@@ -42,6 +44,7 @@ _HOMES = {
     "DeviceError": "simdtex.machine.devices",
     "Output": "simdtex.run",
     "Progress": "simdtex.run",
+    "checkpoint": "simdtex.checkpoints",
     "devices": "simdtex.machine.devices",
     "extend": "simdtex.jobs.filling",
     "fill": "simdtex.jobs.filling",

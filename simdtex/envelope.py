@@ -1,18 +1,55 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the public functions put around a method: the machine, the axes of pictures, the profile."""
+"""What the public functions put around a method: the machine, the axes of pictures, the profile, the checkpoint."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.checkpoints.keep import NOTHING, Keep
+from simdtex.checkpoints.keeper import CURRENT, Keeper
 from simdtex.machine import Machine, open_machine
 from simdtex.options import real_array, whole
+from simdtex.random import as_seed
 from simdtex.run import Callback, Output
+
+
+class Begun(NamedTuple):
+    """A job that is begun: its ``seed``, and the ``keeper`` of the checkpoint around it, None where there is none."""
+
+    seed: int
+    keeper: Keeper | None
+
+    def on(self, device: str) -> Keep:
+        """Where the run on a device of this name keeps its state."""
+        return self.keeper.on(device) if self.keeper else NOTHING
+
+    def end(self) -> None:
+        """The run is over, and what is left cannot be stopped between two states."""
+        if self.keeper:
+            self.keeper.running = False
+
+
+def begin(job: str, rng: Any, inputs: Callable[[], dict[str, Any]]) -> Begun:
+    """Begin a job, once all it is given is checked; within `simdtex.checkpoint` it may be that of the folder.
+
+    Parameters
+    ----------
+    job : str
+        The public function.
+    rng : None, int or numpy.random.Generator
+        As of `simdtex.random.as_seed`.
+    inputs : callable
+        What else determines the result, by name.
+    """
+    keeper = CURRENT.get()
+    if keeper is None:
+        return Begun(as_seed(rng), None)
+    return Begun(keeper.begin(job, None if rng is None else as_seed(rng), as_seed, inputs()), keeper)
 
 
 def executed(
@@ -20,12 +57,14 @@ def executed(
     channel_axis: int | None,
     callback: Callback | None,
     full_output: bool,
-    method: Callable[[Machine, Callback | None], tuple[NDArray[Any], Output]],
+    method: Callable[[Machine, Callback | None, Keep], tuple[NDArray[Any], Output]],
+    begun: Begun,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
-    """Run ``method(machine, callback)`` on a device, and give its pictures and stages the sample's own axes."""
+    """Run ``method(machine, callback, keep)`` on a device, and give its pictures and stages the sample's own axes."""
     machine = open_machine(device)
     machine.profile()  # forget what was before
-    image, output = method(machine, seeing(callback, channel_axis))
+    image, output = method(machine, seeing(callback, channel_axis), begun.on(machine.name))
+    begun.end()
     output.statistics.update(machine.profile() or {})
     image = restored(image, channel_axis)
     if not full_output:

@@ -309,12 +309,12 @@ def device_seconds(machine: Any, before: float | None) -> float | None:
     return None if before is None else (machine.seconds or 0.0) - before
 
 
-def paced(count: int, least: int) -> Iterator[tuple[int, int]]:
-    """Ranges (first, end) that make up 0..count, of a size that takes the loop's body about a tenth of a second.
+def paced(count: int, least: int, first: int = 0) -> Iterator[tuple[int, int]]:
+    """Ranges (first, end) that make up first..count, of a size that takes the loop's body about a tenth of a second.
 
     `least` is the size of the first, and of the smallest.
     """
-    first, size = 0, least
+    size = least
     while first < count:
         end, began = min(count, first + size), time.perf_counter()
         yield first, end

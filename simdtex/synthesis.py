@@ -11,14 +11,14 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.envelope import check_shape, executed, with_channels_last
+from simdtex.checkpoints.keep import Keep
+from simdtex.envelope import begin, check_shape, executed, with_channels_last
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine, open_machine
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
 from simdtex.options import one_of, real, unmasked, whole
-from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
 METHODS = ("mrf", "multires", "pyramid")
@@ -139,17 +139,18 @@ def synthesize(
         )
     package = import_module(f"simdtex.methods.{method}")
     chosen = package.make_options(**with_channels_last(options, channel_axis))
-    seed = as_seed(rng)
+    begun = begin("synthesize", rng, lambda: {"method": method, "shape": size, "options": chosen, **inputs.told()})
 
-    def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
+    def run(machine: Machine, seen: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
         result: tuple[NDArray[Any], Output]
         if method == "mrf":
-            result = package.synthesize(machine, inputs.pictures, size, chosen, seed, seen, inputs.given, inputs.guide)
+            given = (inputs.given, inputs.guide)
+            result = package.synthesize(machine, inputs.pictures, size, chosen, begun.seed, seen, *given, keep)
         else:
-            result = package.synthesize(machine, inputs.pictures.pixels[0], size, chosen, seed, seen)
+            result = package.synthesize(machine, inputs.pictures.pixels[0], size, chosen, begun.seed, seen, keep)
         return result
 
-    return executed(device, channel_axis, callback, full_output, run)
+    return executed(device, channel_axis, callback, full_output, run, begun)
 
 
 def synthesize_solid(
@@ -215,12 +216,12 @@ def synthesize_solid(
     pixels = check_sample(sample, channel_axis)
     size = _check_block(shape)
     chosen = solid.make_options(**options)
-    seed = as_seed(rng)
+    begun = begin("synthesize_solid", rng, lambda: {"shape": size, "options": chosen, "sample": pixels})
 
-    def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
-        return solid.synthesize(machine, pixels, size, chosen, seed, seen)
+    def run(machine: Machine, seen: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
+        return solid.synthesize(machine, pixels, size, chosen, begun.seed, seen, keep)
 
-    return executed(device, None if channel_axis is None else -1, callback, full_output, run)
+    return executed(device, None if channel_axis is None else -1, callback, full_output, run, begun)
 
 
 def suggest_alpha(

@@ -80,6 +80,7 @@ ROOMS = [
         "jobs",
         "methods",
         "envelope",
+        "checkpoints",
         "schedules",
     ),
     *("ops", "machine", "maspar", "model", "run", "io", "options", "random"),

@@ -21,7 +21,7 @@ HEAVY |= {"xarray", "zarr", "h5netcdf", "pandas"}
 PUBLIC = {
     *("DeviceError", "Output", "Progress", "devices", "lcpdf", "mix", "open_machine", "quality", "suggest_alpha"),
     *("place_hard_data", "read_hard_data", "synthesize", "synthesize_solid", "__version__"),
-    *("extend", "fill", "simulate"),
+    *("checkpoint", "extend", "fill", "simulate"),
 }
 COMMAND_LINE = """
 from simdtex.cli import main

@@ -17,6 +17,7 @@ COMMANDS = {
     "fill": "Fill the holes of PICTURE with more of what is around them.",
     "ising": "Relax Ising spins by each schedule and compare with the exact energy and magnetisation.",
     "mix": "Mix the textures SAMPLE...: a picture that looks a bit like each of them.",
+    "resume": "Go on with the run whose state is in DIR, and write what its command writes.",
     "schedules": "Run the same job under several schedules and compare them in a report.",
     "sheet": "Show what thresholds alpha / k^beta make of SAMPLE: Figures 11 and 12 of De Bonet (1997) on one sheet.",
     "simulate": "Simulate what TRAINING_IMAGE shows: realisations that look like it and honour data.",

@@ -229,18 +229,27 @@ def last_iteration(statistics: dict[str, Any]) -> str:
 
 def command_line(context: click.Context) -> str:
     """What was given to a command, so that a reader can give it again."""
-    words = ["simdtex", str(context.command.name)]
+    options, arguments = given_words(context, without=("checkpoint",))
+    return shlex.join(["simdtex", str(context.command.name), *arguments, *options])
+
+
+def given_words(context: click.Context, without: tuple[str, ...] = ()) -> tuple[list[str], list[str]]:
+    """The options that were given to a command, with their values, and the arguments; some options left out."""
+    options: list[str] = []
+    arguments: list[str] = []
     for parameter in context.command.params:
         name = parameter.name or ""
-        if context.get_parameter_source(name) is not ParameterSource.COMMANDLINE:
+        if context.get_parameter_source(name) is not ParameterSource.COMMANDLINE or name in without:
             continue
         given = context.params[name]
         for value in given if isinstance(given, tuple) else [given]:
-            if isinstance(parameter, click.Option):
-                words.append(parameter.opts[-1])
-            if not (isinstance(parameter, click.Option) and parameter.is_flag):
-                words.append(str(value))
-    return shlex.join(words)
+            if not isinstance(parameter, click.Option):
+                arguments.append(str(value))
+            elif parameter.is_flag:
+                options.append((parameter.opts if value else parameter.secondary_opts)[-1])
+            else:
+                options += [parameter.opts[-1], str(value)]
+    return options, arguments
 
 
 def output_shape(size: str | None, pixels: Any, *like: Any) -> tuple[int, int]:
@@ -300,7 +309,9 @@ def watching(
     if stages:
         from simdtex.report.stages import StageWriter
 
-        writer = StageWriter(stages, limits=limits)
+        context = click.get_current_context(silent=True)
+        keeper = context.obj if context else None  # of the checkpoint, where there is one
+        writer = StageWriter(stages, limits=limits, onward=(lambda: bool(keeper.resumed)) if keeper else None)
     try:
         with progress_bar(quiet) as show:
 

@@ -11,7 +11,8 @@ import click
 
 from simdtex.cli.common import afterwards, command_line, given, plainly, settle, watching
 from simdtex.cli.inputs import channels, check_source_map, read_also, read_material, write_arranged
-from simdtex.cli.options import DEVICE, QUIET, SEED, extend_options, stages_option
+from simdtex.cli.keeping import kept
+from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, extend_options, stages_option
 from simdtex.cli.places import FOLDER, READ, WRITE, WRITE_PAIR
 
 SIDES = ("top", "bottom", "left", "right")
@@ -61,8 +62,10 @@ SIDES = ("top", "bottom", "left", "right")
 @SEED
 @DEVICE
 @extend_options
+@CHECKPOINT
 @QUIET
 @plainly
+@kept
 def extend(
     picture: Path,
     output: Path,

@@ -21,7 +21,8 @@ from simdtex.cli.inputs import (
     read_material,
     write_arranged,
 )
-from simdtex.cli.options import DEVICE, QUIET, SEED, fill_options
+from simdtex.cli.keeping import kept
+from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, fill_options
 from simdtex.cli.places import READ, WRITE, WRITE_PAIR
 
 
@@ -57,8 +58,10 @@ from simdtex.cli.places import READ, WRITE, WRITE_PAIR
 @SEED
 @DEVICE
 @fill_options
+@CHECKPOINT
 @QUIET
 @plainly
+@kept
 def fill(
     picture: Path,
     output: Path,

@@ -20,7 +20,8 @@ from simdtex.cli.common import (
     settle,
     watching,
 )
-from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
+from simdtex.cli.keeping import kept
+from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
 from simdtex.cli.places import READ, WRITE
 
 CHOSEN = ("palette", "pattern", "low", "high")
@@ -48,8 +49,10 @@ CHOSEN = ("palette", "pattern", "low", "high")
 @DEVICE
 @stages_option("every iteration")
 @PROFILE
+@CHECKPOINT
 @QUIET
 @plainly
+@kept
 def mix(
     samples: tuple[Path, ...],
     output: Path,

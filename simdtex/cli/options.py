@@ -42,6 +42,12 @@ DEVICE = option(
 
 SEED = option("--seed", type=int, help="Same seed, same picture on every device.  [a fresh one, printed]")
 PROFILE = option("--profile", is_flag=True, help="Print what each kernel took, and what was left to the host.")
+CHECKPOINT = option(
+    "--checkpoint",
+    type=FOLDER,
+    metavar="DIR",
+    help="Keep the state of the run there; `simdtex resume DIR` goes on with it.",
+)
 QUIET = option("-q", "--quiet", is_flag=True, help="No progress bar and no summary.")
 LEVELS = option("--levels", type=int, help="Of the multigrid, or of the pyramid.  [as many as the sample feeds]")
 BOUNDARY = option("--boundary", help="mrf, multires: torus (the result tiles) or open.  [{mrf.boundary}]")

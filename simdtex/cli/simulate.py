@@ -14,7 +14,8 @@ import numpy as np
 from simdtex.cli.common import afterwards, command_line, given, output_shape, plainly, settle, watching
 from simdtex.cli.guides import read_guides
 from simdtex.cli.inputs import known_size, known_values, read_known, read_masks, read_material
-from simdtex.cli.options import DEVICE, QUIET, SEED, simulate_options
+from simdtex.cli.keeping import kept
+from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, simulate_options
 from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
 
 
@@ -64,8 +65,10 @@ from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
 @SEED
 @DEVICE
 @simulate_options
+@CHECKPOINT
 @QUIET
 @plainly
+@kept
 def simulate(
     training_image: tuple[Path, ...],
     output: Path,

@@ -12,7 +12,8 @@ import click
 import numpy as np
 
 from simdtex.cli.common import afterwards, given, last_iteration, opened, plainly, print_profile, settle, watching
-from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
+from simdtex.cli.keeping import kept
+from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
 from simdtex.cli.places import EITHER, READ, WRITE
 from simdtex.methods.pyramid import solid as method
 
@@ -54,8 +55,10 @@ SIDE = 128
 @DEVICE
 @stages_option("the middle slice of every iteration")
 @PROFILE
+@CHECKPOINT
 @QUIET
 @plainly
+@kept
 def solid(
     sample: Path,
     outputs: tuple[Path, ...],

@@ -34,7 +34,8 @@ from simdtex.cli.inputs import (
     read_material,
     write_arranged,
 )
-from simdtex.cli.options import DEVICE, PROFILE, QUIET, SEED, method_options, option, stages_option
+from simdtex.cli.keeping import kept
+from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, method_options, option, stages_option
 from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR, WRITE, WRITE_PAIR
 from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 
@@ -110,8 +111,10 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 )
 @tiles_options
 @PROFILE
+@CHECKPOINT
 @QUIET
 @plainly
+@kept
 def synth(
     samples: tuple[Path, ...],
     output: Path,

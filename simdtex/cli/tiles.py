@@ -61,6 +61,8 @@ def check_tiles(context: click.Context) -> None:
         raise ValueError(f"{given['output']} is no .zarr store, which tiles are written to; end its name in .zarr")
     if given["workers"] is not None and given["scheduler"] is not None:
         raise ValueError("a scheduler has its own workers; give --workers or --scheduler, not both")
+    if given.get("checkpoint"):
+        raise ValueError("the store of --tiles is a checkpoint itself; leave --checkpoint out")
 
 
 def synthesize_in_tiles(context: click.Context, sample: Any, shape: tuple[int, int], options: dict[str, Any]) -> None:
@@ -88,6 +90,9 @@ def resume_tiles(store: Path, workers: int | None, scheduler: str | None, device
     from simdtex import distributed
 
     began = time.perf_counter()
+    if distributed.finished(store):
+        click.echo(f"{store} is finished; there is nothing to go on with")
+        return
     with _crew(workers, scheduler) as crew, _shown(store, quiet) as callback:
         distributed.resume(store, device=device, callback=callback, **crew)
     _done(store, quiet, began)

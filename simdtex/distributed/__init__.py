@@ -5,6 +5,6 @@ The extra ``distributed`` brings the libraries: ``pip install 'simdtex[distribut
 """
 
 from simdtex.distributed.plan import Plan
-from simdtex.distributed.synthesis import plan, resume, synthesize
+from simdtex.distributed.synthesis import finished, plan, resume, synthesize
 
-__all__ = ["Plan", "plan", "resume", "synthesize"]
+__all__ = ["Plan", "finished", "plan", "resume", "synthesize"]

@@ -158,6 +158,11 @@ def resume(
     return _array(where, channel_axis)
 
 
+def finished(store: PathLike) -> bool:
+    """Whether nothing is left to do of an output; raises ValueError where it is none, as `resume` does."""
+    return bool(_opened(_address(store)).turn.phase == "done")
+
+
 def plan(
     sample: ArrayLike,
     shape: tuple[int, int],

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
-from simdtex.envelope import executed
+from simdtex.checkpoints.keep import Keep
+from simdtex.envelope import begin, executed
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_mask, check_samples, masked_in
 from simdtex.machine import Machine
@@ -23,7 +24,6 @@ from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures, unknown_in
 from simdtex.model.sample import NothingUsable
 from simdtex.options import whole
-from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
 OF_HOLES: dict[str, Any] = {"boundary": "open", "balance": 0.0, "novelty": 0.0, "chance": 16, "data_weight": 4.0}
@@ -93,6 +93,12 @@ class Job(NamedTuple):
     hole: Mask
     sample: Pictures | None
     reach: int | None
+
+    def told(self) -> dict[str, Any]:
+        """Everything, by the names that users give it, as what identifies a run."""
+        known = np.where(self.hole[..., None], 0, self.pixels)
+        sample = self.sample and (self.sample.pixels, self.sample.known)
+        return {"image": known, "mask": self.hole, "sample": sample, "reach": self.reach}
 
 
 def fill(
@@ -174,13 +180,13 @@ def fill(
         whole("reach", reach, 1)
     given = None if sample is None else _check_sample(sample, channel_axis, pixels)
     chosen = mrf.make_options(**OF_HOLES | options)
-    seed = as_seed(rng)
     job = Job(pixels, hole, given, reach)
+    begun = begin("fill", rng, lambda: {"options": chosen, **job.told()})
 
-    def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
-        return filled(machine, job, chosen, seed, seen)
+    def run(machine: Machine, seen: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
+        return filled(machine, job, chosen, begun.seed, seen, keep)
 
-    return executed(device, channel_axis, callback, full_output, run)
+    return executed(device, channel_axis, callback, full_output, run, begun)
 
 
 def extend(
@@ -260,22 +266,37 @@ def extend(
     if "boundary" in options:
         raise ValueError("the boundary of what is extended follows from tile; leave boundary out")
     chosen = mrf.make_options(**{"boundary": "torus" if tile else "open"} | OF_EDGES | options)
-    seed = as_seed(rng)
+    sides = {"top": top, "bottom": bottom, "left": left, "right": right, "tile": tile, "band": width}
+    begun = begin("extend", rng, lambda: {"options": chosen, "image": pixels, **sides})
     place = np.full((*hole.shape, 2), -1, np.int32)
     place[top : top + rows, left : left + cols] = np.moveaxis(np.indices((rows, cols)), 0, -1)
     place[hole] = -1
     given = Given(canvas, np.repeat(~hole[..., None], canvas.shape[2], -1), place, suggests=bool(tile))
 
-    def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
-        made, output = mrf.synthesize(machine, Pictures((pixels,)), hole.shape, chosen, seed, seen, given)
+    def run(machine: Machine, seen: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
+        what = (Pictures((pixels,)), hole.shape, chosen, begun.seed)
+        made, output = mrf.synthesize(machine, *what, seen, given, keep=keep)
         assert output.source is not None
         return made, replace(output, source=np.where(hole[..., None], output.source, place))
 
-    return executed(device, channel_axis, callback, full_output, run)
+    return executed(device, channel_axis, callback, full_output, run, begun)
+
+
+class Made(NamedTuple):
+    """What came of a window: where its sample begins in the picture, and values, temperatures and sources of its hole.
+
+    ``statistics`` are those of its run.
+    """
+
+    corner: tuple[int, int]
+    values: NDArray[Any]
+    temperature: NDArray[np.float64]
+    source: NDArray[np.int32]
+    statistics: dict[str, Any]
 
 
 def filled(
-    machine: Machine, job: Job, options: Options, seed: int, callback: Callback | None
+    machine: Machine, job: Job, options: Options, seed: int, callback: Callback | None, keep: Keep
 ) -> tuple[NDArray[Any], Output]:
     """Make one window of a picture after the other; the arguments are those of `fill`."""
     began, shape = time.perf_counter(), job.hole.shape
@@ -287,16 +308,24 @@ def filled(
     radius = int(neighbourhood_offsets(options.order).max())
     everything = [Window(slice(0, shape[0]), slice(0, shape[1]), options.levels or 0)]
     parts = everything if options.boundary == "torus" else windows(job.hole, radius, options.levels)
-    runs: list[dict[str, Any]] = []
+    done, inside = keep.found or ([], None)
+    finished = [Made(*made) for made in done]
     for number, window in enumerate(parts):
-        seen = callback and _pasting(callback, image, window, number, len(parts))
-        here, made, output = _window(machine, job, window, options, seed, seen)
         at = (window.rows, window.cols)
         hole = job.hole[at]
-        assert output.source is not None and output.temperature is not None
-        image[at][hole], temperature[at][hole] = made[hole], output.temperature[hole]
-        place[at][hole] = output.source[hole] + (np.array(here, np.int32) if job.sample is None else 0)
-        runs.append(output.statistics | {"window": [s for part in at for s in (part.start, part.stop)]})
+        if number == len(finished):
+            seen = callback and _pasting(callback, image, window, number, len(parts))
+            within = keep.within(finished.copy, inside)
+            corner, made, output = _window(machine, job, window, options, seed, seen, within)
+            assert output.source is not None and output.temperature is not None
+            told = output.statistics | {"window": [s for part in at for s in (part.start, part.stop)]}
+            finished.append(Made(corner, made[hole], output.temperature[hole], output.source[hole], told))
+            inside = None
+            keep.offer(lambda: (finished, None))
+        found = finished[number]
+        image[at][hole], temperature[at][hole] = found.values, found.temperature
+        place[at][hole] = found.source + (np.array(found.corner, np.int32) if job.sample is None else 0)
+    runs = [found.statistics for found in finished]
     statistics = {
         **{name: runs[0][name] for name in ("device", "seed", "options")},
         **{"seconds": time.perf_counter() - began, "windows": runs, "levels": runs[0]["levels"]},
@@ -306,7 +335,7 @@ def filled(
 
 
 def _window(
-    machine: Machine, job: Job, window: Window, options: Options, seed: int, callback: Callback | None
+    machine: Machine, job: Job, window: Window, options: Options, seed: int, callback: Callback | None, keep: Keep
 ) -> tuple[tuple[int, int], NDArray[Any], Output]:
     """Fill one window: where its sample begins in the picture, and what `simdtex.methods.mrf.synthesize` returns."""
     at, (rows, cols) = (window.rows, window.cols), job.hole.shape
@@ -332,7 +361,7 @@ def _window(
     given = Given(np.where(known, job.pixels[at], 0).astype(job.pixels.dtype), known, place, suggests=False)
     for levels in range(options.levels or 0, -1, -1):
         try:
-            made, output = mrf.synthesize(machine, pictures, hole.shape, options, seed, callback, given)
+            made, output = mrf.synthesize(machine, pictures, hole.shape, options, seed, callback, given, keep=keep)
         except NothingUsable:  # found before anything is made
             if asked or levels < 2:
                 raise

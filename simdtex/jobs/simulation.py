@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -17,13 +16,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.envelope import check_shape, restored
+from simdtex.checkpoints.keep import Keep
+from simdtex.checkpoints.tree import digest
+from simdtex.envelope import begin, check_shape, restored
 from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
 from simdtex.jobs.inputs import Inputs, check_array, check_inputs, check_samples
 from simdtex.machine import Machine, open_machine
 from simdtex.methods import mrf
 from simdtex.options import whole
-from simdtex.random import as_seed
 from simdtex.run import Callback, Simulating
 
 if TYPE_CHECKING:
@@ -118,26 +118,32 @@ def simulate(
     data, size = _hard(hard, shape, check_samples(training, channel_axis, mask).pixels[0], channel_axis)
     inputs = check_inputs(training, size, channel_axis, mask, data, None, guide)
     chosen = mrf.make_options(**DEFAULTS | options)
-    seed = as_seed(rng)
+    begun = begin("simulate", rng, lambda: {"shape": size, "n": n, "first": first, "options": chosen, **inputs.told()})
+    seed = begun.seed
     seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
     pixels = inputs.pictures.pixels[0]
     made = np.empty((n, *size, pixels.shape[2]), pixels.dtype)
-    finished, lock = 0, Lock()
     machines = _machines(device, jobs, n)
+    shelf, lock = _Shelf(begun.on(machines[0].name), made), Lock()
 
     def one(number: int, machine: Machine) -> None:
-        nonlocal finished
-        made[number], _ = mrf.synthesize(
-            machine, inputs.pictures, size, chosen, int(seeds[number]), None, inputs.given, inputs.guide
-        )
+        keep = shelf.keep.one(f"realisation{number}")
+        what = (inputs.pictures, size, chosen, int(seeds[number]), None, inputs.given, inputs.guide)
+        picture, _ = mrf.synthesize(machine, *what, keep)
         with lock:
-            finished += 1
+            made[number] = picture
+            shelf.add(number, keep)
             if callback:
-                picture = restored(made[number], None if channel_axis is None else -1)
+                finished, shown = len(shelf.finished), restored(picture, None if channel_axis is None else -1)
                 told = {"realisation": first + number, "finished": finished, "realisations": n}
-                callback(Simulating(level=0, levels=1, fraction=finished / n, image=lambda: picture, **told))
+                callback(Simulating(level=0, levels=1, fraction=finished / n, image=lambda: shown, **told))
 
-    _in_turn(one, n, machines)
+    try:
+        _in_turn(one, [number for number in range(n) if number not in shelf.finished], machines)
+    except BaseException:
+        shelf.write(now=True)
+        raise
+    begun.end()
     dims, arrays = ["realisation", "y", "x", "variable"], made
     if channel_axis is None:
         dims, arrays = dims[:3], made[..., 0]
@@ -164,7 +170,41 @@ def _machines(device: str | None, jobs: int | None, n: int) -> list[Machine]:
     return [first, *(open_machine(device) for _ in range(min(jobs, n) - 1))]
 
 
-def _in_turn(one: Callable[[int, Machine], None], n: int, machines: list[Machine]) -> None:
+class _Shelf:
+    """The realisations that are finished, kept some at a time.
+
+    Parameters
+    ----------
+    keep : Keep
+    made : (n, ...) array
+        Where realisations stand; those that are kept already are put there.
+    """
+
+    def __init__(self, keep: Keep, made: NDArray[Any]) -> None:
+        self.keep, self.finished = keep, set[int]()
+        self._made, self._waiting = made, dict[int, Keep]()
+        for numbers, pictures in keep.all():
+            made[numbers] = pictures
+            self.finished.update(numbers.tolist())
+
+    def add(self, number: int, keep: Keep) -> None:
+        """One more is finished; ``keep`` has its states."""
+        self.finished.add(number)
+        self._waiting[number] = keep
+        self.write()
+
+    def write(self, now: bool = False) -> None:
+        """Keep those that are not yet kept, where it is time."""
+        if not self._waiting:
+            return
+        numbers = np.array(list(self._waiting))
+        if self.keep.add(lambda: (numbers, self._made[numbers]), now=now):
+            for keep in self._waiting.values():
+                keep.drop()
+            self._waiting.clear()
+
+
+def _in_turn(one: Callable[[int, Machine], None], numbers: list[int], machines: list[Machine]) -> None:
     """Each number on a machine that is free; the first error ends it all."""
     free: SimpleQueue[Machine] = SimpleQueue()
     for machine in machines:
@@ -183,7 +223,7 @@ def _in_turn(one: Callable[[int, Machine], None], n: int, machines: list[Machine
             one(number, machine)
 
     with ThreadPoolExecutor(len(machines)) as workers:
-        futures = [workers.submit(job, number) for number in range(n)]
+        futures = [workers.submit(job, number) for number in numbers]
         try:
             for future in futures:
                 future.result()
@@ -218,23 +258,14 @@ def _hard(
 def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) -> dict[str, Any]:
     told: dict[str, Any] = {"seed": seed, "version": version("simdtex"), "device": device, "options": vars(options)}
     pictures = inputs.pictures  # whose pixels are completed where they are unknown
-    told["training_image"] = _digest(*pictures.pixels, *(pictures.known or ()))
+    told["training_image"] = digest(*pictures.pixels, *(pictures.known or ()))
     if inputs.given:
-        told["hard_data"] = _digest(np.where(inputs.given.known, inputs.given.values, 0), inputs.given.known)
+        told["hard_data"] = digest(np.where(inputs.given.known, inputs.given.values, 0), inputs.given.known)
     if inputs.guide:
-        told["guide"] = _digest(*inputs.guide[0], inputs.guide[1])
+        told["guide"] = digest(*inputs.guide[0], inputs.guide[1])
     if pictures.usable:
-        told["mask"] = _digest(*pictures.usable)
+        told["mask"] = digest(*pictures.usable)
     return told
-
-
-def _digest(*arrays: NDArray[Any]) -> str:
-    """SHA-256 over types, shapes and bytes in C order."""
-    found = hashlib.sha256()
-    for array in arrays:
-        found.update(f"{array.dtype.str}{array.shape}".encode())
-        found.update(np.ascontiguousarray(array).tobytes())
-    return found.hexdigest()
 
 
 def _xarray() -> Any:

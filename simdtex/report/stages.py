@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.image import to_display, write
+from simdtex.io.image import read, to_display, write
 from simdtex.report.folder import earlier_files
 from simdtex.report.sheet import (
     FRAME_SIDE,
@@ -32,6 +33,8 @@ _STAGE = re.compile(
     r"((temperature|candidates)-)?level\d+(-sweep\d+)?\.png|iteration\d+\.png|sheet\.png|animation\.gif"
 )
 
+_NUMBERS = re.compile(r"level(?P<level>\d+)(-sweep(?P<sweep>\d+))?|iteration(?P<iteration>\d+)")
+
 
 class StageWriter:
     """A callback that writes the pictures of a run into a folder as they are completed.
@@ -47,10 +50,13 @@ class StageWriter:
     ----------
     folder : path
         Made at the first picture. It may exist if it is empty or holds only the stages of an
-        earlier run; those are removed at the first picture.
+        earlier run; those are removed at the first picture, but for what `onward` keeps.
     limits : (low, high), optional
         The values shown as black and white where pixels are not uint8: the sample's smallest and
         largest. By default those of the first picture.
+    onward : callable, optional
+        Says, at the first picture, whether the run goes on from a checkpoint: the stages before that picture then stay
+        and have their places on the sheet and in the animation.
 
     Raises
     ------
@@ -62,8 +68,15 @@ class StageWriter:
     Holds at most 200 frames of at most 512 pixels a side for the animation, 160 MB in colour.
     """
 
-    def __init__(self, folder: str | os.PathLike[str], *, limits: tuple[float, float] | None = None) -> None:
+    def __init__(
+        self,
+        folder: str | os.PathLike[str],
+        *,
+        limits: tuple[float, float] | None = None,
+        onward: Callable[[], bool] | None = None,
+    ) -> None:
         self.folder = Path(folder)
+        self._onward = onward
         self._limits = limits
         self._earlier = earlier_files(self.folder, "the stages", _stages_in)
         self._started = False
@@ -78,7 +91,7 @@ class StageWriter:
         name = progress.stage
         if name is None:
             return
-        self._start()
+        self._start(name)
         values = progress.picture()
         if self._limits is None and values.dtype.kind != "b":
             self._limits = float(values.min()), float(values.max())
@@ -86,7 +99,7 @@ class StageWriter:
         write(self.folder / f"{name}.png", _savable(picture))
         for kind, values in progress.maps().items():
             write(self.folder / f"{kind}-{name}.png", heat(values))
-        self._keep(progress, picture)
+        self._keep(progress.level, progress.caption, picture)
 
     def finish(self) -> None:
         """Write the sheet and the animation of what was seen; nothing if nothing was."""
@@ -110,26 +123,47 @@ class StageWriter:
     def _reduction(self, level: int) -> int:
         return reduction(self._shapes[level], FRAME_SIDE)
 
-    def _start(self) -> None:
+    def _start(self, name: str) -> None:
         if self._started:
             return
         self._started = True
+        onward = self._onward is not None and self._onward()
+        before = [path for path in self._earlier if onward and _precedes(path.stem, name)]
         try:
             self.folder.mkdir(exist_ok=True)
             for path in self._earlier:
-                path.unlink(missing_ok=True)
+                if path not in before:
+                    path.unlink(missing_ok=True)
+            for path in sorted(before, key=lambda path: _turn(path.stem)):
+                if found := _NUMBERS.fullmatch(path.stem):
+                    level = int(found["level"] or 0)
+                    caption = f"iteration {int(found['iteration'])}" if found["iteration"] else f"level {level}"
+                    self._keep(level, caption, read(path).pixels)
         except OSError as error:
             raise ValueError(f"the folder {self.folder} cannot be written ({error.strerror}): choose another") from None
 
-    def _keep(self, progress: Progress, picture: Picture) -> None:
-        level, small = progress.level, fitted(picture, FRAME_SIDE)
-        self._last[progress.caption] = level, small
+    def _keep(self, level: int, caption: str, picture: Picture) -> None:
+        small = fitted(picture, FRAME_SIDE)
+        self._last[caption] = level, small
         self._shapes[level] = picture.shape[:2]
         if self._seen % self._every == 0:
             self._frames.append((level, small))
         if len(self._frames) == FRAMES:  # every other one from here on
             self._frames, self._every = self._frames[::2], self._every * 2
         self._seen += 1
+
+
+def _turn(stem: str) -> tuple[int, int]:
+    """Where a stage of this name comes among the others: coarse levels first."""
+    found = _NUMBERS.search(stem)
+    if found is None:
+        return 1, 0
+    return -int(found["level"] or 0), int(found["sweep"] or found["iteration"] or 0)
+
+
+def _precedes(stem: str, name: str) -> bool:
+    """Whether a file is of a stage before another."""
+    return _NUMBERS.search(stem) is not None and _turn(stem) < _turn(name)
 
 
 def _stages_in(folder: Path) -> list[str]:

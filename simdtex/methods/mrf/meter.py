@@ -28,6 +28,15 @@ class Meter:
         self._cooling = True
         self._began = self._level_began = time.perf_counter()
 
+    def kept(self) -> dict[str, Any]:
+        """All of it between two sweeps, with the seconds of the level so far in place of when it began."""
+        told = {name: value for name, value in vars(self).items() if name not in ("_expected", "_began")}
+        return told | {"_level_began": time.perf_counter() - self._level_began}
+
+    def restore(self, kept: dict[str, Any]) -> None:
+        """Go on from what `kept` gave."""
+        vars(self).update(kept | {"_level_began": time.perf_counter() - kept["_level_began"]})
+
     def begin(self, level: int, grid: Grid, candidates: int, weighed: int | None = None) -> None:
         """Begin a level; a relaxation weighs about `weighed` of its candidates, or all."""
         self._weighed = candidates if weighed is None else weighed

@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from simdtex.maspar.accounting import Account
 from simdtex.maspar.array import parse_array
 from simdtex.methods.mrf.algorithm import Info, Part, picture, warmth
 from simdtex.methods.mrf.level import Level, Run, State
 from simdtex.methods.mrf.meter import Meter
+from simdtex.model.lattice import Grid
 from simdtex.ops import active
 from simdtex.ops.relax import Listed
 from simdtex.run import Callback, Relaxing, Stage
@@ -42,14 +45,17 @@ class Observer:
         self.account = Account(array, packed=options.array is None)
         self._run, self._callback = run, callback
         self._level: Level | None = None
+        self._number: int | None = None  # of the level that has begun
+        self._slots = 0
         self._done = 0  # sites of the present sweep that are relaxed
         self._ended = True  # the next part begins a sweep
         self._spared = self._weighed = 0
 
     def part(self, level: Level, state: State, free: bool, part: Part) -> None:
         """Count a part of a sweep, and tell of it."""
-        if level is not self._level:
+        if level.number != self._number:
             self._begin(level)
+        self._level = level
         sites, phase = level.grid.rows * level.grid.cols, "free" if free else "relax"
         left = 0.0 if free else state.heat / (1024 * sites)
         if self._ended:
@@ -88,12 +94,36 @@ class Observer:
             self._end(level, state)
 
     def _begin(self, level: Level) -> None:
-        self._level, self._spared = level, level.machine.spared
-        candidates, slots = level.proposal.candidates.size, level.proposal.slots
+        self._number, self._spared = level.number, level.machine.spared
+        self._slots = level.proposal.slots
+        self.meter.begin(level.number, level.grid, level.proposal.candidates.size, self._slots)
+        self.account.begin(*self._costs(level.number))
+
+    def _costs(self, number: int) -> tuple[Grid, NDArray[np.int32], int, int, int]:
+        """What the account is told of a level."""
         channels, coherence = self._run.sample.channels, bool(self._run.options.coherence)
-        self.meter.begin(level.number, level.grid, candidates, slots)
         words = channels + 1 + coherence  # of a neighbour: pixel, temperature, source
-        self.account.begin(level.setting.grid, level.setting.offsets, slots, channels, words)
+        return self._run.grid(number), self._run.offsets, self._slots, channels, words
+
+    def kept(self) -> dict[str, Any]:
+        """What it has seen, between two sweeps, as plain arrays and numbers."""
+        spared, weighed = self._run.machine.spared - self._spared, 0
+        if self._level is not None and isinstance(self._level.proposal, Listed):
+            weighed = active.total(self._run.machine, self._level.grid, self._run.weighed) - self._weighed
+        return {
+            "stages": [(stage.level, stage.image) for stage in self.stages],
+            **{"meter": self.meter.kept(), "account": self.account.levels},
+            **{"slots": self._slots, "spared": spared, "weighed": weighed},
+        }
+
+    def restore(self, kept: dict[str, Any], number: int) -> None:
+        """Go on from what `kept` gave, within a level or at its end."""
+        self.stages[:] = [Stage(*stage) for stage in kept["stages"]]
+        self.meter.restore(kept["meter"])
+        self._number, self._slots = number, kept["slots"]
+        self._spared, self._weighed = self._run.machine.spared - kept["spared"], -kept["weighed"]
+        self.account.begin(*self._costs(number))
+        self.account.levels[:] = kept["account"]
 
     def _end(self, level: Level, state: State) -> None:
         weighed: tuple[int, int] | None = None

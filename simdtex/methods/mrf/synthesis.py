@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.checkpoints.keep import NOTHING, Keep
 from simdtex.machine.interface import Machine
 from simdtex.maspar.array import parse_array
 from simdtex.methods.mrf.algorithm import anneal
+from simdtex.methods.mrf.keeping import kept, restored
 from simdtex.methods.mrf.level import Run
 from simdtex.methods.mrf.observers import Observer
 from simdtex.methods.mrf.options import Options
@@ -39,6 +42,7 @@ def synthesize(
     callback: Callback | None = None,
     given: Given | None = None,
     guide: tuple[tuple[NDArray[Any], ...], NDArray[Any]] | None = None,
+    keep: Keep = NOTHING,
 ) -> tuple[NDArray[Any], Output]:
     """Algorithm 1: nonparametric multiscale MRF texture synthesis.
 
@@ -59,6 +63,8 @@ def synthesize(
         Sites of X whose values are given; they stay what they are.
     guide : (tuple of (rows, cols, G) arrays, (H, W, G) array), optional
         What tells where to be what: for each picture of the sample, and for X.
+    keep : Keep
+        Keeps the state after every sweep.
 
     Returns
     -------
@@ -77,9 +83,11 @@ def synthesize(
     """
     launches, worked = machine.launches, machine.seconds
     run = laid_out(machine, pixels, shape, options, seed, given, guide)
-    observer, state = Observer(run, callback), None
-    for level, state, info in anneal(run, watch=observer.part):
+    observer, found = Observer(run, callback), keep.found
+    state = begun = None if found is None else restored(run, observer, found)
+    for level, state, info in anneal(run, begun, watch=observer.part):
         observer.sweep(level, state, info)
+        keep.offer(partial(kept, run, state, observer))
     assert state is not None  # there is a level, and it has a sweep
     grid = Grid(*shape)
     source, temperatures = (grid.view(machine.get(plane)) for plane in (state.source, state.temperature))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf, prod
 from numbers import Real
 from time import perf_counter
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from simdtex.checkpoints.keep import NOTHING, Keep
 from simdtex.machine import Machine
 from simdtex.machine.interface import Array
 from simdtex.methods.multires.analysis import Analysis, analyse
@@ -318,12 +320,13 @@ def synthesize(
     options: Options,
     seed: int,
     callback: Callback | None = None,
+    keep: Keep = NOTHING,
 ) -> tuple[NDArray[Any], Output]:
     """Both phases: `analyse`, then `resample`, which says what comes in and out."""
     began, worked = perf_counter(), machine.seconds
     within_32_bits(shape, max(VALUES, sample.shape[-1]))  # before any work
     analysis = analyse(machine, sample, **options.analysis)
-    image, output = resample(machine, analysis, shape, options, seed, callback)
+    image, output = resample(machine, analysis, shape, options, seed, callback, keep)
     output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
     return image, output
 
@@ -335,6 +338,7 @@ def resample(
     options: Options,
     seed: int,
     callback: Callback | None = None,
+    keep: Keep = NOTHING,
 ) -> tuple[NDArray[Any], Output]:
     """The second phase of the paper: SynthesizePyramid and CollapsePyramid, level by level.
 
@@ -351,6 +355,8 @@ def resample(
         Key of every random number.
     callback : callable, optional
         Called with a `simdtex.run.Sampling` after every piece of a level.
+    keep : Keep
+        Keeps the state after every piece of a level.
 
     Returns
     -------
@@ -370,20 +376,23 @@ def resample(
     within_32_bits(shape, max(VALUES, channels))
     shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
     machine.require(pixels(shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis))
-    alpha = _alpha(machine, analysis, options)
+    kept = keep.found
+    alpha = _alpha(machine, analysis, options) if kept is None else kept["alpha"]
     structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
-    record = _Record(shapes, callback)
+    record = _Record(shapes, callback, kept and kept["seconds"])
 
     top = analysis.levels - 1
-    sampled = _copied(machine, shapes, analysis.shapes[top])
+    sampled = _copied(machine, shapes, analysis.shapes[top]) if kept is None else _restored(machine, shapes, kept)
     picture = None
     for level in reversed(range(analysis.levels)):  # Loop i from top level downto 0
         if level < top:
-            for first, end in paced(pixels([shapes[level]]), _first_launch(analysis, level)):  # Loop x', y'
+            done = _done(kept, level, shapes)
+            for first, end in paced(pixels([shapes[level]]), _first_launch(analysis, level), done):  # Loop x', y'
                 match = options.phase == "match"
                 sampled = candidates(machine, structure, sampled, level, first, end, match, seed)  # (9) to (12)
                 machine.sync()
                 record.tell(level, end)
+                keep.offer(partial(_kept, machine, sampled, shapes, level, end, alpha, record))
         source, counts = _read(machine, sampled, shapes, level)
         picture = _collapsed(machine, analysis, level, source, picture, options.joins == "blend")  # CollapsePyramid
         image = analysis.sample.picture(machine.get(picture), source if level == 0 else None)
@@ -406,14 +415,58 @@ def resample(
     return image, Output(place, None, record.stages, statistics)
 
 
-class _Record:
-    """The stages and reports of a run as it goes on, and what its callback is told of them."""
+def _kept(
+    machine: Machine,
+    sampled: Sampled,
+    shapes: list[tuple[int, int]],
+    level: int,
+    end: int,
+    alpha: float | None,
+    record: _Record,
+) -> dict[str, Any]:
+    """The state of a run: what is sampled of this level, as far as it goes, and all of those above."""
+    begin = pixels(shapes[:level])
+    source, counts = machine.get(sampled.source[begin:]), machine.get(sampled.counts[begin:])
+    told = {"alpha": alpha, "seconds": record.seconds}
+    return {"level": level, "end": end, "source": source, "counts": counts, **told}
 
-    def __init__(self, shapes: list[tuple[int, int]], callback: Callback | None) -> None:
+
+def _restored(machine: Machine, shapes: Sequence[tuple[int, int]], kept: dict[str, Any]) -> Sampled:
+    """What `_kept` gave, on a machine."""
+    more = pixels(shapes[: kept["level"]])
+    source, counts = np.pad(kept["source"], (more, 0)), np.pad(kept["counts"], ((more, 0), (0, 0)))
+    return Sampled(machine.put(source), machine.put(counts), machine.put(_lattice(shapes, 0)))
+
+
+def _done(kept: dict[str, Any] | None, level: int, shapes: Sequence[tuple[int, int]]) -> int:
+    """How many pixels of a level a run that is gone on with has sampled."""
+    if kept is None or level < kept["level"]:
+        return 0
+    return int(kept["end"]) if level == kept["level"] else pixels([shapes[level]])
+
+
+class _Record:
+    """The stages and reports of a run as it goes on, and what its callback is told of them.
+
+    ``before`` are the seconds that levels took before the run was gone on with.
+    """
+
+    def __init__(
+        self, shapes: list[tuple[int, int]], callback: Callback | None, before: list[float] | None = None
+    ) -> None:
         self.stages: list[Stage] = []
         self.reports: list[dict[str, Any]] = []
         self._shapes, self._callback = shapes, callback
-        self._began = perf_counter()
+        self._before, self._began = before or [], perf_counter()
+
+    @property
+    def seconds(self) -> list[float]:
+        """What each level took, and the present one so far."""
+        return [*(report["seconds"] for report in self.reports), self._so_far()]
+
+    def _so_far(self) -> float:
+        before = self._before[len(self.reports)] if len(self.reports) < len(self._before) else 0.0
+        return before + perf_counter() - self._began
 
     def tell(self, level: int, sampled: int, ended: bool = False) -> None:
         """So many pixels of a level are sampled. Pictures are those of the last stage, which has been read back."""
@@ -436,7 +489,7 @@ class _Record:
             "candidates": mean,
             "most": int(counts[..., 0].max()),
         }
-        self.reports.append(report | {"nodes": nodes, "compared": compared, "seconds": perf_counter() - self._began})
+        self.reports.append(report | {"nodes": nodes, "compared": compared, "seconds": self._so_far()})
         self._began = perf_counter()
         self.tell(stage.level, rows * cols, ended=True)
 

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from simdtex.checkpoints.keep import NOTHING, Keep
 from simdtex.machine import Machine
 from simdtex.machine.interface import Array
 from simdtex.methods.pyramid.histograms import Histograms, histograms
@@ -173,6 +174,14 @@ class Matcher:
             self._first[n] = sort(self._machine, bits, itself).reshape(n)
         return self._first[n]
 
+    def kept(self) -> list[tuple[str, NDArray[Any], NDArray[np.float64]]]:
+        """How far values were moved since the last call of `distances`, to be kept."""
+        return [(name, self._machine.get(moved), scale) for name, moved, scale in self._moved]
+
+    def restore(self, kept: list[tuple[str, NDArray[Any], NDArray[np.float64]]]) -> None:
+        """Go on from what `kept` gave."""
+        self._moved = [(name, self._machine.put(moved), scale) for name, moved, scale in kept]
+
     def distances(self) -> dict[str, float]:
         """Mean distance that the values of each subband were moved since the last call, in its standard deviations."""
         found: dict[str, list[float]] = {}
@@ -256,12 +265,13 @@ def synthesize(
     options: Options,
     seed: int,
     callback: Callback | None = None,
+    keep: Keep = NOTHING,
 ) -> tuple[NDArray[Any], Output]:
     """Analyse the sample and make more of it, see `match_texture`."""
     began, worked = perf_counter(), machine.seconds
     levels = number_of_levels(options, *shape, *sample.shape[:2])
     texture = analyse(machine, sample, options, transform(machine, options, levels, options.edges == "wrap"))
-    image, output = synthesize_from(machine, texture, shape, options, levels, seed, callback)
+    image, output = synthesize_from(machine, texture, shape, options, levels, seed, callback, keep)
     output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
     return image, output
 
@@ -274,6 +284,7 @@ def synthesize_from(
     levels: int,
     seed: int,
     callback: Callback | None = None,
+    keep: Keep = NOTHING,
 ) -> tuple[NDArray[Any], Output]:
     """A picture of a texture whose histograms are known, see `match_texture`."""
     within_32_bits(shape, max(VALUES, len(texture.histograms)))
@@ -285,7 +296,7 @@ def synthesize_from(
         matched = match_subbands(matcher, pyramid.names, synthesis_pyr, wanted)
         return pyramid.collapse(matched)  # Collapse-Pyramid(synthesis-pyr)
 
-    return match_texture(machine, texture, shape, turn, options, levels, seed, callback)
+    return match_texture(machine, texture, shape, turn, options, levels, seed, callback, keep)
 
 
 def match_subbands(
@@ -309,6 +320,7 @@ def match_texture(
     levels: int,
     seed: int,
     callback: Callback | None = None,
+    keep: Keep = NOTHING,
 ) -> tuple[NDArray[Any], Output]:
     """Match-texture of the paper, for each of the decorrelated channels.
 
@@ -329,6 +341,8 @@ def match_texture(
         Key of every random number.
     callback : callable, optional
         Called with a `simdtex.run.Iterating` after every channel, and after every part of a solid's turn.
+    keep : Keep
+        Keeps the state after every channel's turn.
 
     Returns
     -------
@@ -343,8 +357,11 @@ def match_texture(
     busy = [c for c, own in channels if own.pixels[0, 0] < own.pixels[0, -1]]  # the others are flat
     pixels = {c: matcher.wanted(texture.histograms[c].pixels) for c in busy}
     subbands = {c: [matcher.wanted(band) for band in texture.histograms[c].subbands] for c in busy}
-    begun = _begin(machine, texture, shape, options, seed)
-    pictures = {c: matcher.match("pixels", begun(c), pixels[c]) for c in busy}  # Match-Histogram(noise, texture)
+    begun, kept = _begin(machine, texture, shape, options, seed), keep.found
+    if kept is None:
+        pictures = {c: matcher.match("pixels", begun(c), pixels[c]) for c in busy}  # Match-Histogram(noise, texture)
+    else:
+        pictures = {c: machine.put(picture) for c, picture in zip(busy, kept["pictures"], strict=True)}
 
     def read() -> list[NDArray[np.int32]]:
         return [
@@ -354,13 +371,23 @@ def match_texture(
 
     record = _Record(options.iterations, len(busy), lambda: texture.image(read()), len(shape) == 3, callback)
     matcher.distances()  # forget those of the noise
-    for iteration in range(1, options.iterations + 1):  # Loop for several iterations do
-        for c in busy:
+    if kept is not None:
+        matcher.restore(kept["moved"])
+        record.restore(kept)
+
+    def state() -> dict[str, Any]:
+        return {"pictures": [machine.get(pictures[c]) for c in busy], "moved": matcher.kept(), **record.kept()}
+
+    for iteration in range(1 + len(record.reports), options.iterations + 1):  # Loop for several iterations do
+        for c in busy[record.turns - (iteration - 1) * len(busy) :]:
             picture = turn(pictures[c], subbands[c], matcher, record.part)
             pictures[c] = matcher.match("pixels", picture.reshape(pictures[c].shape), pixels[c])
             machine.sync()
             record.turn(c == busy[-1])
+            if c != busy[-1]:
+                keep.offer(state)
         record.end(iteration, matcher.distances())
+        keep.offer(state)
     record.nothing_to_do()
     if texture.own is not None and busy:  # grey: the k-th smallest pixel becomes the k-th smallest of the sample
         ranks = machine.put(np.arange(texture.own.size, dtype=np.int32)[None])
@@ -417,9 +444,18 @@ class _Record:
         callback: Callback | None,
     ) -> None:
         self.reports: list[dict[str, Any]] = []
-        self._iterations, self._channels, self._turns = iterations, channels, 0
+        self.turns = 0
+        self._iterations, self._channels = iterations, channels
         self._image, self._solid, self._callback = image, solid, callback
         self._began = perf_counter()
+
+    def kept(self) -> dict[str, Any]:
+        """What is to be kept of it."""
+        return {"turns": self.turns, "reports": self.reports, "seconds": perf_counter() - self._began}
+
+    def restore(self, kept: dict[str, Any]) -> None:
+        """Go on from what `kept` gave."""
+        self.turns, self.reports, self._began = kept["turns"], kept["reports"], perf_counter() - kept["seconds"]
 
     def part(self, share: float) -> None:
         """A share of the present channel's turn is done."""
@@ -427,7 +463,7 @@ class _Record:
 
     def turn(self, ended: bool) -> None:
         """A channel's turn is over, and with it perhaps the iteration."""
-        self._turns += 1
+        self.turns += 1
         self._tell(0.0, ended)
 
     def end(self, iteration: int, distances: dict[str, float]) -> None:
@@ -437,12 +473,12 @@ class _Record:
 
     def nothing_to_do(self) -> None:
         """Where there was no turn at all, be it that nothing varies or that no iteration was asked for, say so once."""
-        if self._callback and not self._turns:
+        if self._callback and not self.turns:
             self._call(1.0, self._iterations, ended=False)
 
     def _tell(self, share: float, ended: bool) -> None:
         if self._callback:
-            done = self._turns + share
+            done = self.turns + share
             iteration = min(self._iterations, int(done / self._channels) + (not ended))
             self._call(done / (self._iterations * self._channels), iteration, ended)
 

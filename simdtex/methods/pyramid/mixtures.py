@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.envelope import check_shape, executed, with_channels_last
+from simdtex.checkpoints.keep import Keep
+from simdtex.envelope import begin, check_shape, executed, with_channels_last
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine
 from simdtex.methods.pyramid import algorithm as pyramid
@@ -20,7 +21,6 @@ from simdtex.methods.pyramid.palette import decorrelated
 from simdtex.methods.pyramid.palette import palette as colours_of
 from simdtex.model.stretched import Stretched
 from simdtex.options import one_of, real, whole
-from simdtex.random import as_seed
 from simdtex.run import Callback, Output, device_seconds
 
 __all__ = ["mix"]
@@ -110,9 +110,16 @@ def mix(
     if palette is not None:
         _check_number("palette", palette, len(pictures))
     chosen = pyramid.make_options(**with_channels_last(options, channel_axis))
-    seed = as_seed(rng)
+    begun = begin(
+        "mix",
+        rng,
+        lambda: {
+            **{"shape": size, "options": chosen, "samples": pictures, "average": weights, "palette": palette},
+            **{"low": low, "high": high, "split": split, "blend": blend, "pixels": pixels},
+        },
+    )
 
-    def run(machine: Machine, seen: Callback | None) -> tuple[NDArray[Any], Output]:
+    def run(machine: Machine, seen: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
         began, worked = perf_counter(), machine.seconds
         used = [i for i, weight in enumerate(weights) if weight] + ([] if palette is None else [palette])
         levels = pyramid.number_of_levels(chosen, *size, *(side for i in used for side in pictures[i].shape[:2]))
@@ -123,11 +130,11 @@ def mix(
         else:
             found = blender.averaged(blend)
         texture = blender.texture(found, palette if pixels == "palette" else None)
-        image, output = pyramid.synthesize_from(machine, texture, size, chosen, levels, seed, seen)
+        image, output = pyramid.synthesize_from(machine, texture, size, chosen, levels, begun.seed, seen, keep)
         output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
         return image, output
 
-    return executed(device, channel_axis, callback, full_output, run)
+    return executed(device, channel_axis, callback, full_output, run, begun)
 
 
 class _Blender:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.checkpoints.keep import NOTHING, Keep
 from simdtex.machine import Machine
 from simdtex.machine.interface import Array
 from simdtex.methods.pyramid import algorithm as pyramid
@@ -83,6 +84,7 @@ def synthesize(
     options: Options,
     seed: int,
     callback: Callback | None = None,
+    keep: Keep = NOTHING,
 ) -> tuple[NDArray[Any], Output]:
     """Analyse the sample and make a block of it.
 
@@ -95,6 +97,8 @@ def synthesize(
     options : Options
     seed : int
     callback : callable, optional
+    keep : Keep
+        Keeps the state after every channel's turn.
 
     Returns
     -------
@@ -133,7 +137,7 @@ def synthesize(
                 del solids[0]
         return solid_mean(machine, solids) if len(solids) > 1 else solids[0]
 
-    volume, output = match_texture(machine, texture, shape, turn, options, levels, seed, callback)
+    volume, output = match_texture(machine, texture, shape, turn, options, levels, seed, callback, keep)
     output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
     return volume, output
 

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex resume``: go on with a run that was stopped."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import chdir
+from pathlib import Path
+from typing import Any
+
+import click
+
+from simdtex.cli.common import plainly
+from simdtex.cli.options import DEVICE, QUIET
+from simdtex.cli.places import ENTER
+from simdtex.cli.tiles import resume_tiles, scheduler_option, workers_option
+
+COMMANDS = ("extend", "fill", "mix", "simulate", "solid", "synth")
+"""Those that keep checkpoints."""
+
+
+@click.command()
+@click.argument("folder", metavar="DIR", type=ENTER)
+@workers_option
+@scheduler_option
+@DEVICE
+@QUIET
+@plainly
+def resume(folder: Path, workers: int | None, scheduler: str | None, device: str | None, quiet: bool) -> None:
+    """Go on with the run whose state is in DIR, and write what its command writes.
+
+    DIR is the folder of --checkpoint, or the .zarr store of --tiles.
+    """
+    if workers is not None and scheduler is not None:
+        raise ValueError("a scheduler has its own workers; give --workers or --scheduler, not both")
+    if is_store(folder):
+        resume_tiles(folder, workers, scheduler, device, quiet)
+        return
+    for name, value in (("workers", workers), ("scheduler", scheduler)):
+        if value is not None:
+            raise ValueError(f"--{name} goes with the .zarr store of --tiles; leave it out")
+    more = [*(["--device", device] if device else []), *(["--quiet"] if quiet else [])]
+    kind(folder)(folder, more)
+
+
+def is_store(folder: Path) -> bool:
+    """Whether a folder is a Zarr store, as ``--tiles`` makes."""
+    return (folder / "zarr.json").is_file()
+
+
+def kind(folder: Path) -> Callable[[Path, list[str]], None]:
+    """What goes on with what a folder holds; it is given the folder and more options."""
+    from simdtex.checkpoints.folder import JOB
+
+    if os.path.lexists(folder / JOB):
+        return checkpoint
+    if not folder.is_dir():
+        raise ValueError(f"there is no folder {folder}; give that of --checkpoint or --tiles")
+    raise ValueError(f"{folder} holds no checkpoint; give the folder of --checkpoint, or the store of --tiles")
+
+
+def checkpoint(folder: Path, more: list[str]) -> None:
+    """Give the command of a checkpoint again, where it was given."""
+    from simdtex.checkpoints.folder import Folder
+    from simdtex.cli import load
+
+    kept = Folder(folder)
+    job: dict[str, Any] = kept.job() or {}
+    command = job.get("command")
+    if job.get("finished"):
+        kept.forget()  # where the process was killed before it had
+        click.echo(f"{folder}: the run is finished; there is nothing to go on with")
+        return
+    if command is None:
+        raise ValueError(
+            f"the run in {folder} was begun in Python; make the same call within simdtex.checkpoint({str(folder)!r})"
+        )
+    if command["name"] not in COMMANDS:
+        raise ValueError(f"the checkpoint in {folder} is of no command that keeps one; remove the folder")
+    if not os.path.isdir(command["folder"]):
+        raise ValueError(f"{command['folder']}, where the run in {folder} was begun, is not there; put it back")
+    own = ["--checkpoint", str(folder.resolve())]
+    with chdir(command["folder"]):
+        words = [*command["options"], *more, *own, "--", *command["arguments"]]
+        load(command["name"]).main(words, prog_name=f"simdtex {command['name']}", standalone_mode=False)
+
+
+__all__ = ["resume"]

@@ -1,0 +1,118 @@
+"""Runs that are killed again and again: `python killed.py KILLS SEED [JOB...]` prints what came of them as JSON.
+
+A process that has nothing but NumPy forks children, each of which goes on with a job from its checkpoint, writes its
+result and ends; the parent kills them with SIGKILL at random moments, and starts the next until the job is done.
+"""
+
+import hashlib
+import json
+import os
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from pathlib import Path
+
+import numpy as np
+
+import simdtex
+from simdtex.checkpoints import folder as files
+
+
+def texture(*shape):
+    row, col = np.indices(shape[:2])
+    grey = 128 + 60 * np.sin(row / 3) + 50 * np.sin(col / 2 + row / 5)
+    grey = grey if len(shape) == 2 else grey[..., None] + np.arange(shape[2]) * 9 * np.cos(col / 4)[..., None]
+    return np.clip(grey, 0, 255).astype(np.uint8)
+
+
+GREY, COLOUR = texture(20, 22), texture(20, 22, 3)
+HOLE = np.zeros((20, 22), bool)
+HOLE[3:6, 4:7] = HOLE[14:18, 13:17] = True
+JOBS = {
+    "mrf": lambda **how: simdtex.synthesize(GREY, (20, 18), order=2, **how),
+    "multires": lambda **how: simdtex.synthesize(
+        COLOUR, (96, 80), method="multires", alpha="auto", channel_axis=-1, **how
+    ),
+    "pyramid": lambda **how: simdtex.synthesize(COLOUR, (64, 64), method="pyramid", channel_axis=-1, **how),
+    "solid": lambda **how: simdtex.synthesize_solid(GREY, (16, 16, 16), **how),
+    "fill": lambda **how: simdtex.fill(GREY, HOLE, order=2, levels=1, **how),
+    "simulate": lambda **how: (
+        simdtex.simulate(GREY, 4, shape=(12, 14), order=2, jobs=2, **{k: how[k] for k in ("rng", "device")}).values,
+        None,
+    ),
+}
+
+
+def digest(job):
+    image, output = job(rng=5, device="reference", full_output=True)
+    found = hashlib.sha256(image.tobytes())
+    if output is not None:
+        if output.source is not None:
+            found.update(output.source.tobytes())
+        for stage in output.stages:
+            found.update(stage.image.tobytes())
+    return found.hexdigest()
+
+
+def child(job, folder, result):
+    """What a forked child does; it never comes back."""
+    code = 1
+    try:
+        with simdtex.checkpoint(folder, every=0):
+            found = digest(job)
+            result.with_suffix(".new").write_text(found)
+            os.replace(result.with_suffix(".new"), result)
+        code = 0
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        os._exit(code)
+
+
+def finished(job, longest, rng, left):
+    """Go on with a job until it is done: its digest, how often it was killed, and how often while a file was open."""
+    kills = inside = 0
+    with tempfile.TemporaryDirectory() as place:
+        folder, result = Path(place, "kept"), Path(place, "result")
+        while True:
+            number = os.fork()
+            if not number:
+                child(job, folder, result)
+            if kills < left:
+                time.sleep(rng.uniform(0, longest))
+                os.kill(number, signal.SIGKILL)
+            _, status = os.waitpid(number, 0)
+            if os.WIFSIGNALED(status):
+                kills += 1
+                inside += any(folder.glob(f"*{files.NEW}"))
+                if not (files.Folder(folder).job() or {}).get("finished"):
+                    continue
+                return result.read_text(), kills, inside  # killed when all was done
+            assert os.WEXITSTATUS(status) == 0, "a child failed; its traceback is above"
+            return result.read_text(), kills, inside
+
+
+def main(wanted, seed, names):
+    rng = np.random.default_rng(seed)
+    told = {"kills": 0, "inside": 0, "runs": 0, "wrong": []}
+    expected, took = {}, {}
+    while told["kills"] < wanted:
+        name = names[told["runs"] % len(names)]
+        if name not in expected:
+            began = time.perf_counter()
+            expected[name] = digest(JOBS[name])
+            took[name] = time.perf_counter() - began
+        share = max(1, -(-wanted // len(names)))
+        found, kills, inside = finished(JOBS[name], took[name] * 0.8, rng, min(share, wanted - told["kills"]))
+        told["kills"] += kills
+        told["inside"] += inside
+        told["runs"] += 1
+        if found != expected[name]:
+            told["wrong"].append(name)
+    print(json.dumps(told))
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:] or list(JOBS))

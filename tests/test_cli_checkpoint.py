@@ -1,0 +1,319 @@
+"""``--checkpoint`` and ``simdtex resume``: the files of a run that was never stopped."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases import texture
+from click.testing import CliRunner
+
+import simdtex
+from simdtex.checkpoints import folder as files
+from simdtex.checkpoints import keep as keeps
+from simdtex.cli import COMMANDS, load, main, resume
+from simdtex.cli.resume import COMMANDS as KEEPING
+from simdtex.io import image
+
+SYNTH = ("synth", "sample.png", "-o", "out.png", "--size", "14x13", "--seed", "5")
+MRF = (*SYNTH, "--order", "2", "--xi", "-2", "--no-emulate", "--array", "4x4", "--source-map", "where.npz")
+RUNS = {
+    "synth-mrf": (*MRF, "--stages", "stages", "--also", "height.png=more.png"),
+    "synth-multires": (*SYNTH, "--method", "multires", "--alpha", "auto", "--stages", "stages"),
+    "synth-pyramid": (*SYNTH, "--method", "pyramid", "--stages", "stages"),
+    "fill": (
+        "fill",
+        "holed.png",
+        "--mask",
+        "mask.png",
+        "-o",
+        "out.png",
+        "--order",
+        "1",
+        "--levels",
+        "1",
+        "--seed",
+        "5",
+    ),
+    "extend": ("extend", "sample.png", "-o", "out.png", "--right", "3", "--order", "2", "--seed", "5"),
+    "mix": ("mix", "sample.png", "holed.png", "-o", "out.png", "--size", "16x16", "--seed", "5"),
+    "solid": ("solid", "sample.png", "-o", "out.npz", "--size", "8", "--iterations", "2", "--seed", "5"),
+    "simulate": (
+        *("simulate", "sample.png", "-o", "out.npz", "-n", "2", "--size", "9x8", "--order", "2", "--seed", "5"),
+        *("--jobs", "1"),
+    ),
+}
+
+
+@pytest.fixture(autouse=True)
+def often(monkeypatch):
+    """States are written wherever they are at hand."""
+    monkeypatch.setattr(keeps, "FIRST", 0.0)
+    monkeypatch.setattr(keeps, "SHARE", 0)
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    """A folder with inputs, from which commands are given."""
+    folder = tmp_path / "begun"
+    folder.mkdir()
+    image.write(folder / "sample.png", texture((14, 15)))
+    image.write(folder / "height.png", texture((14, 15), dtype=np.uint16, seed=3))
+    image.write(folder / "holed.png", texture((14, 15), seed=2))
+    mask = np.zeros((14, 15), np.uint8)
+    mask[2:4, 3:6] = mask[10:12, 9:12] = 255
+    image.write(folder / "mask.png", mask)
+    monkeypatch.chdir(folder)
+    return folder
+
+
+def run(*words):
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def given(*words, device="reference"):
+    return run(*words, "--device", device)
+
+
+def made(folder):
+    """What a command has written: files as they are, arrays as they are, since an npz tells the time."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        if path.suffix == ".npz":
+            with np.load(path) as arrays:
+                found[path.name] = {name: arrays[name].tobytes() for name in arrays.files}
+        elif path.is_file() and "kept" not in path.parts:
+            found[str(path.relative_to(folder))] = path.read_bytes()
+    return found
+
+
+def stopping(monkeypatch, after, kind=signal.SIGTERM):
+    """Send the process a signal after so many writes, which stops it at the next state."""
+    count, write = [0], keeps.Kept._write
+
+    def counted(self, *args, **kwargs):
+        wrote = write(self, *args, **kwargs)
+        count[0] += 1
+        if count[0] % after == 0:
+            os.kill(os.getpid(), kind)
+            time.sleep(0.001)  # a handler runs between two instructions
+        return wrote
+
+    monkeypatch.setattr(keeps.Kept, "_write", counted)
+
+
+def clear(folder, inputs):
+    for path in folder.rglob("*"):
+        if path.is_file() and path.name not in inputs:
+            path.unlink()
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_resume_writes_the_files_of_a_run_that_was_never_stopped(name, place, tmp_path, monkeypatch):
+    inputs = set(made(place))
+    result = given(*RUNS[name])
+    assert result.exit_code == 0, result.output
+    expected = made(place)
+    assert len(expected) > len(inputs)
+    clear(place, inputs)
+
+    with monkeypatch.context() as patch:
+        stopping(patch, 2)
+        result = given(*RUNS[name], "--checkpoint", "kept")
+        assert result.exit_code == 128 + signal.SIGTERM, result.output
+        assert "stopped; go on with: simdtex resume kept" in result.output
+        assert not {"out.png", "out.npz"} & set(os.listdir(place))
+        monkeypatch.chdir(tmp_path)  # paths mean what they meant where the command was given
+        for _ in range(40):
+            result = run("resume", "begun/kept")
+            assert result.exit_code in (0, 128 + signal.SIGTERM), result.output
+            if result.exit_code == 0:
+                break
+    assert result.exit_code == 0
+    assert made(place) == expected
+    assert Path.cwd() == tmp_path
+
+    again = run("resume", "begun/kept")
+    assert again.exit_code == 0
+    assert again.output == "begun/kept: the run is finished; there is nothing to go on with\n"
+    assert made(place) == expected
+
+
+def stopped(place, monkeypatch, *more, after=3):
+    with monkeypatch.context() as patch:
+        stopping(patch, after)
+        assert given(*MRF, "--checkpoint", "kept", *more).exit_code == 128 + signal.SIGTERM
+
+
+def refused(place, words, *command):
+    before = {path: path.read_bytes() for path in place.rglob("*") if path.is_file()}
+    result = run(*command)
+    assert result.exit_code == 2, result.output
+    assert words in result.output
+    assert result.output.startswith("simdtex: ") and len(result.output.splitlines()) == 1
+    assert {path: path.read_bytes() for path in place.rglob("*") if path.is_file()} == before
+
+
+def test_the_command_line_is_kept(place, monkeypatch):
+    stopped(place, monkeypatch, "-q")
+    kept = files.Folder(place / "kept").job()["command"]
+    assert kept == {
+        "name": "synth",
+        "options": kept["options"],
+        "arguments": ["sample.png"],
+        "folder": str(place),
+    }
+    assert [word for word in kept["options"] if "emulate" in word] == ["--no-emulate"]
+    assert "--checkpoint" not in kept["options"] and "--quiet" in kept["options"]
+    assert kept["options"][kept["options"].index("--xi") + 1] == "-2.0"
+
+
+def test_the_same_command_goes_on_too(place, monkeypatch):
+    given(*MRF)
+    expected = image.read("out.png").pixels
+    Path("out.png").unlink()
+    stopped(place, monkeypatch)
+    assert given(*MRF, "--checkpoint", "kept").exit_code == 0
+    assert np.array_equal(image.read("out.png").pixels, expected)
+
+
+def test_a_file_whose_name_looks_like_an_option(place, monkeypatch):
+    os.rename("sample.png", "--size.png")
+    words = ("synth", "-o", "out.png", "--seed", "5", "--order", "2", "--device", "reference", "--checkpoint", "kept")
+    with monkeypatch.context() as patch:
+        stopping(patch, 3)
+        assert run(*words, "--", "--size.png").exit_code == 128 + signal.SIGTERM
+    assert run("resume", "kept").exit_code == 0
+    assert Path("out.png").is_file()
+
+
+def test_another_sample_or_option_is_refused(place, monkeypatch):
+    stopped(place, monkeypatch)
+    refused(
+        place,
+        "another option order (2, not 3); give the same, or an empty folder",
+        *("synth", "sample.png", "-o", "out.png", "--size", "14x13", "--seed", "5", "--order", "3"),
+        *("--checkpoint", "kept", "--xi", "-2", "--device", "reference", "--no-emulate", "--array", "4x4"),
+    )
+    picture = image.read("sample.png").pixels.copy()
+    picture[3, 3] ^= 1
+    image.write("sample.png", picture)
+    refused(place, "is of another sample; give the same, or an empty folder for this run", "resume", "kept")
+
+
+def test_what_is_no_checkpoint(place):
+    refused(place, "there is no folder nothing; give that of --checkpoint", "resume", "nothing")
+    (place / "other").mkdir()
+    refused(place, "other holds no checkpoint; give the folder of --checkpoint", "resume", "other")
+    refused(place, "sample.png; give that of --checkpoint", "resume", "sample.png")
+    refused(place, "holds other files (height.png) and no checkpoint", *SYNTH, "--checkpoint", ".")
+    refused(place, "stages is given twice", *SYNTH, "--stages", "stages", "--checkpoint", "stages")
+    (place / "other" / files.JOB).write_text("{}")
+    refused(place, "is damaged, so nothing says what run this is; remove the folder", "resume", "other")
+
+
+def test_a_finished_folder_is_no_place_for_another_run(place):
+    assert given(*SYNTH, "--order", "2", "--checkpoint", "kept").exit_code == 0
+    refused(place, "the run in kept is finished; give an empty folder", *SYNTH, "--checkpoint", "kept")
+
+
+def test_what_was_begun_elsewhere(place, monkeypatch):
+    stopped(place, monkeypatch)
+    job = files._read_json(place / "kept" / files.JOB)
+
+    def edited(**command):
+        kept = job["command"] and job["command"] | command
+        files._write(place / "kept" / files.JOB, files._json_of(job | {"command": kept}))
+
+    edited(folder="/nowhere")
+    refused(place, "/nowhere, where the run in kept was begun, is not there; put it back", "resume", "kept")
+    edited(name="bench")
+    refused(place, "is of no command that keeps one; remove the folder", "resume", "kept")
+    job["command"] = None
+    edited()
+    refused(place, "was begun in Python; make the same call within simdtex.checkpoint('kept')", "resume", "kept")
+
+
+def test_an_output_that_cannot_be_written_leaves_the_run_to_go_on_with(place, monkeypatch):
+    def full(*args, **kwargs):
+        raise OSError(28, "No space left on device", "out.png")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(image, "write", full)
+        assert given(*MRF, "--checkpoint", "kept").exit_code == 2
+    began = list((place / "kept").glob("state*.npz"))
+    assert len(began) == 2
+    assert run("resume", "kept").exit_code == 0
+    assert Path("out.png").is_file()
+    assert not list((place / "kept").glob("state*"))
+
+
+def test_another_device_is_told_on_stderr(place, monkeypatch, any_device):
+    given(*MRF)
+    expected = image.read("out.png").pixels
+    stopped(place, monkeypatch)
+    result = run("resume", "kept", "--device", any_device.index, "-q")
+    assert result.exit_code == 0, result.output
+    assert "was begun on reference (NumPy) and goes on on " in result.stderr
+    assert len(result.output.splitlines()) == 1
+    assert np.array_equal(image.read("out.png").pixels, expected)
+
+
+def test_ctrl_c_ends_with_130(place, monkeypatch):
+    with monkeypatch.context() as patch:
+        stopping(patch, 1, signal.SIGINT)
+        result = given(*MRF, "--checkpoint", "kept")
+    assert result.exit_code == 130
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+    assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
+
+
+def test_a_second_ctrl_c_stops_at_once(place, monkeypatch):
+    stops = []
+
+    def impatient(self):
+        stops.append(self)
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.001)
+
+    with monkeypatch.context() as patch:
+        stopping(patch, 1, signal.SIGINT)
+        patch.setattr("simdtex.checkpoints.keeper.Keeper.stop", impatient)
+        assert given(*MRF, "--checkpoint", "kept").exit_code == 130
+    assert len(stops) == 1
+
+
+def test_every_command_that_keeps_is_known():
+    having = {name for name in COMMANDS if any(p.name == "checkpoint" for p in load(name).params)}
+    assert set(KEEPING) == having
+    assert callable(resume.kind)
+
+
+@pytest.mark.slow
+def test_a_command_that_is_killed(place, tmp_path):
+    """Processes of their own, with states as seldom as they are by default."""
+    image.write(place / "sample.png", texture((64, 64)))
+    words = ["synth", "sample.png", "-o", "out.png", "--size", "256x256", "--order", "4", "--seed", "1", "-q"]
+    words += ["--device", "reference", "--checkpoint", "kept"]
+    environment = os.environ | {"PYTHONPATH": str(Path(simdtex.__file__).parent.parent), "SIMDTEX_TUNE": "0"}
+
+    def process(*words):
+        return subprocess.Popen([sys.executable, "-m", "simdtex", *words], env=environment, cwd=place)
+
+    assert process(*words[:-2]).wait() == 0
+    expected = image.read(place / "out.png").pixels
+    (place / "out.png").unlink()
+    first = process(*words)
+    while not list(place.glob("kept/state*.json")):
+        assert first.poll() is None
+        time.sleep(0.05)
+    first.kill()
+    assert first.wait() == -signal.SIGKILL
+    assert process("resume", "kept").wait() == 0
+    assert np.array_equal(image.read(place / "out.png").pixels, expected)
+    assert json.loads((place / "kept" / files.JOB).read_text())["content"]["finished"]
