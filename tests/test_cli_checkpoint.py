@@ -207,11 +207,13 @@ def test_another_sample_or_option_is_refused(place, monkeypatch):
 
 
 def test_what_is_no_checkpoint(place):
-    refused(place, "there is no folder nothing; give that of --checkpoint", "resume", "nothing")
+    refused(place, "nothing does not exist: check the path of the checkpoint", "resume", "nothing")
     (place / "other").mkdir()
     refused(place, "other holds no checkpoint; give the folder of --checkpoint", "resume", "other")
-    refused(place, "sample.png; give that of --checkpoint", "resume", "sample.png")
-    refused(place, "holds other files (height.png) and no checkpoint", *SYNTH, "--checkpoint", ".")
+    refused(place, "sample.png is a file; give the folder of --checkpoint", "resume", "sample.png")
+    (place / "other/mine").touch()
+    refused(place, "other holds other files (mine) and no checkpoint", *SYNTH, "--checkpoint", "other")
+    refused(place, "is an input and lies in ., which is written anew", *SYNTH, "--checkpoint", ".")
     refused(place, "stages is given twice", *SYNTH, "--stages", "stages", "--checkpoint", "stages")
     (place / "other" / files.JOB).write_text("{}")
     refused(place, "is damaged, so nothing says what run this is; remove the folder", "resume", "other")

@@ -19,7 +19,7 @@ TEXTS = {
     *("device", "size", "method", "preset", "relaxation", "pixel", "phases", "coarsest", "search", "edges", "boundary"),
     *("categorical_channels", "weights", "shares", "proportions", "alpha", "features", "phase", "joins", "pyramid"),
     *("match", "color", "schedule", "array", "mapping", "solids", "slices", "average", "blend", "pixels", "names"),
-    *("alphas", "betas", "palette", "pattern", "low", "high"),
+    *("alphas", "betas", "palette", "pattern", "low", "high", "scheduler"),
 }
 PICTURES = ("synth", "fill", "extend", "mix", "sheet")
 ISING_START = ("ising", "start")  # up or random

@@ -1,7 +1,6 @@
 """An output in tiles has the bytes of one that is made at once, whatever the tiles, the workers and their order."""
 
 import json
-import random
 
 import numpy as np
 import pytest
@@ -171,7 +170,7 @@ class Stop(Exception):
 
 def shuffled(store, seed, stop=None):
     """Tiles in any order; an exception after so many of them, over all turns."""
-    order, done = random.Random(seed), [0]
+    order, done = np.random.default_rng(seed), [0]
 
     def execute(turn, tiles):
         tiles = list(tiles)

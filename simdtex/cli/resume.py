@@ -55,8 +55,10 @@ def kind(folder: Path) -> Callable[[Path, list[str]], None]:
 
     if os.path.lexists(folder / JOB):
         return checkpoint
+    if not folder.exists():
+        raise ValueError(f"{folder} does not exist: check the path of the checkpoint")
     if not folder.is_dir():
-        raise ValueError(f"there is no folder {folder}; give that of --checkpoint or --tiles")
+        raise ValueError(f"{folder} is a file; give the folder of --checkpoint, or the store of --tiles")
     raise ValueError(f"{folder} holds no checkpoint; give the folder of --checkpoint, or the store of --tiles")
 
 
