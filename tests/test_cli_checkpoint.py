@@ -214,7 +214,7 @@ def test_what_is_no_checkpoint(place):
     (place / "other/mine").touch()
     refused(place, "other holds other files (mine) and no checkpoint", *SYNTH, "--checkpoint", "other")
     refused(place, "is an input and lies in ., which is written anew", *SYNTH, "--checkpoint", ".")
-    refused(place, "stages is given twice", *SYNTH, "--stages", "stages", "--checkpoint", "stages")
+    refused(place, "stages would be written twice", *SYNTH, "--stages", "stages", "--checkpoint", "stages")
     (place / "other" / files.JOB).write_text("{}")
     refused(place, "is damaged, so nothing says what run this is; remove the folder", "resume", "other")
 
