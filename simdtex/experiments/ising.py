@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random, schedules
-from simdtex.machine import Machine
+from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.ising import heat_bath_chances, ising_commit, ising_relax, ising_sequence
@@ -136,7 +136,7 @@ def ising(
     host, and 32 there per chain and sweep.
     """
     check(size, temperatures, seeds, sweeps, burn_in, boundary, start)
-    machine.require(3 * size[0] * size[1] * seeds * len(temperatures))
+    memory.require(machine, 3 * size[0] * size[1] * seeds * len(temperatures))
     began, launches = time.perf_counter(), machine.launches
     schedule = schedules.get(schedule)
     grid, offsets = Grid(*size, torus=boundary == "torus"), neighbourhood_offsets(1)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import schedules
+from simdtex.machine import memory
 from simdtex.machine.interface import Machine
 from simdtex.maspar.array import parse_array
 from simdtex.methods.mrf.algorithm import anneal
@@ -275,4 +276,4 @@ def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], simi
     pixels, channels = shape[0] * shape[1], len(sample.working)
     within_32_bits(shape, channels * copies)
     field = copies * (6 + 2 * channels)
-    machine.require(pixels * (12 + field) + sample.rows * sample.cols * (14 * channels + 159 + 4 * similar))
+    memory.require(machine, pixels * (12 + field) + sample.rows * sample.cols * (14 * channels + 159 + 4 * similar))

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.machine import Machine
+from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.multires.analysis import Analysis, analyse
 from simdtex.model.use import effective_use
@@ -369,7 +369,7 @@ def resample(
     channels = len(analysis.sample.planes)
     within_32_bits(shape, max(VALUES, channels))
     shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
-    machine.require(pixels(shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis))
+    memory.require(machine, pixels(shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis))
     alpha = _alpha(machine, analysis, options)
     structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
     record = _Record(shapes, callback)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.machine import Machine
+from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.multires.mend import mend
 from simdtex.model.stretched import Stretched
@@ -129,7 +129,7 @@ def analyse(
     if edges == "mend":
         sample = Stretched(pixels.reshape(-1, channels)[place])
     shapes = _level_shapes((rows, cols), levels)
-    machine.require(rows * cols * (16 * (channels + (seen < channels)) + 3 * width))
+    memory.require(machine, rows * cols * (16 * (channels + (seen < channels)) + 3 * width))
 
     gaussian, bands = pyramid(machine, machine.put(sample.planes), len(shapes), torus)
     guide = gaussian, bands

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.machine import Machine
+from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.pyramid.histograms import Histograms, histograms
 from simdtex.methods.pyramid.palette import Decorrelated, Palette, decorrelated, palette
@@ -237,7 +237,7 @@ def number_of_levels(options: Options, *sides: int) -> int:
 
 def analyse(machine: Machine, sample: NDArray[Any], options: Options, *pyramids: Transform) -> Texture:
     """The histograms of a sample (rows, cols, channels): analysis-pyr of every decorrelated channel."""
-    machine.require(prod(sample.shape[:2]) * MEMORY)
+    memory.require(machine, prod(sample.shape[:2]) * MEMORY)
     stretched = Stretched(sample)
     colours = palette([stretched.planes], [1.0], options.color == "decorrelate")
     scale = decorrelated([stretched.planes], [colours])
@@ -277,7 +277,7 @@ def synthesize_from(
 ) -> tuple[NDArray[Any], Output]:
     """A picture of a texture whose histograms are known, see `match_texture`."""
     within_32_bits(shape, max(VALUES, len(texture.histograms)))
-    machine.require(prod(shape) * MEMORY)
+    memory.require(machine, prod(shape) * MEMORY)
     pyramid = transform(machine, options, levels, torus=True)
 
     def turn(picture: Array, wanted: list[Wanted], matcher: Matcher, tell: Callable[[float], None]) -> Array:

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.machine import Machine
+from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.pyramid import algorithm as pyramid
 from simdtex.methods.pyramid.algorithm import (
@@ -110,7 +110,7 @@ def synthesize(
     if prod(shape) * max(VALUES, sample.shape[-1]) >= 2**31:
         size = " x ".join(str(n) for n in shape)
         raise ValueError(f"a block of {size} is beyond 2**31 values; give a smaller size")
-    machine.require(prod(shape) * MEMORY)
+    memory.require(machine, prod(shape) * MEMORY)
     levels, oriented = number_of_levels(options, *shape, *sample.shape[:2]), options.pyramid == "steerable"
     wrap = options.edges == "wrap"
     flat = transform(machine, replace(options, pyramid="laplacian"), levels, wrap)
