@@ -195,6 +195,8 @@ class _Maker:
             words += ["--sweeps", "2", "--burn-in", "1", "--seeds", "2", "--schedules", rng.choice(("coloring", "raster", "block"))]
         if name == "schedules":
             words += ["--seeds", "1", "--schedules", "coloring", "--order", "1"]
+        if name == "bench":  # which measures for minutes
+            words += ["--json", "no/such/file.json"]
         if name == "sheet":
             words += ["--alphas", "0.1", "--betas", "0"]
         if name in ("simulate", "synth", "fill", "extend") and method in (None, "mrf") and rng.random() < 0.98:

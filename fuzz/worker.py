@@ -24,6 +24,12 @@ MEMORY = 2**30
 SECONDS = 10.0
 """Seconds that a try may take."""
 
+LIFE = 3000
+"""Tries of a process: what libraries keep would count for the memory of later ones."""
+
+LOOKING = ("uname", "fc-list", sys.executable)
+"""Programs that libraries ask what machine this is, and ourselves what devices work."""
+
 PROGRAMS = ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "os.fork", "os.startfile")
 HIDDEN = r"/\.[A-Za-z0-9_]|(?:^|[\s'])\.[a-z0-9_]{8}(?![a-z0-9_])|\.tmp\b|<[a-z_.]+ object at 0x"
 """What no user has named: a temporary file, an object."""
@@ -184,7 +190,7 @@ class Worker:
         if not code:
             return
         sentence = said.strip()
-        usage = re.fullmatch(r"Usage: [^\n]*\nTry [^\n]*\n\nError: ([^\n]+)", sentence)
+        usage = re.fullmatch(r"(?:Usage: [^\n]*\nTry [^\n]*\n\n)?Error: (.+)", sentence, re.DOTALL)
         lines = sentence.splitlines()
         quiet = "-q" in one.args or "--quiet" in one.args
         if usage or (not one.args and sentence.startswith("Usage: ")):
@@ -295,24 +301,66 @@ def _interrupted(seconds):
 def serve(root):
     """Answer tries from standard input until it ends; an answer is a line on what was standard output."""
     answers = os.fdopen(os.dup(1), "w", buffering=1)
-    questions = os.fdopen(os.dup(0), "r")
+    questions = os.fdopen(os.dup(0), "rb", buffering=0)  # so that nothing asked is lost with a process
     environment = {"HOME": "home", "TMPDIR": "tmp", "XDG_CACHE_HOME": "home/.cache", "MPLCONFIGDIR": "home/mpl"}
     os.environ.update({name: str(Path(root, value)) for name, value in environment.items()})
     os.environ.update(SIMDTEX_TUNE="0", SIMDTEX_DEVICE=os.environ.get("FUZZ_DEVICE", "reference"), COLUMNS="100")
     os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
+    reference = os.environ["SIMDTEX_DEVICE"] == "reference"
     worker = Worker(root)
+    _load(worker, reference)
+    while True:  # a child serves until it ends: what it has loaded need not be loaded again
+        child = os.fork() if reference else 0
+        if not child:
+            _answer(worker, questions, answers)
+            return
+        _, status = os.waitpid(child, 0)
+        if not status:
+            return
+        answers.write(f"ended {os.waitstatus_to_exitcode(status)}\n")
+
+
+LOADING = (
+    "synth L.png -o out.png --size 8x8 --order 1",
+    "synth RGB.png -o out.tif --size 8x8 --method multires",
+    "synth L.png -o out.npy --size 8x8 --method pyramid --iterations 1",
+    "fill L.png --mask hole.png -o out.webp --order 1",
+    "extend L.png -o out.jpg --left 1 --order 1",
+    "solid L.png -o out.nrrd --size 4 --iterations 1",
+    "mix L.png L.png -o out.gif --size 6x6 --iterations 1",
+    "ising --size 4x4 --sweeps 2 --burn-in 1 --seeds 2 --schedules coloring",
+    "simulate L.png -o out.npz --size 6x6 --order 1 --number 1",
+)
+"""Commands that load what others need."""
+
+
+def _load(worker, reference):
+    """Run something of everything, but for what starts threads: a child would not have them."""
+    import matplotlib.font_manager  # noqa: F401 - which asks the system for its fonts, once
+
+    from fuzz.lines import Try, seeds
+
+    files = {name: data for role in seeds().values() for name, data in role.items()}
+    for line in LOADING if reference else LOADING[:3]:
+        words = line.split()
+        worker.run(Try(words, {name: files[name] for name in words if name in files}))
+    if reference:
+        import h5netcdf  # noqa: F401
+        import zarr  # noqa: F401
+
+
+def _answer(worker, questions, answers):
+    """Answer until there are no more questions, or life ends."""
     from fuzz.lines import Try, made
 
-    import matplotlib.font_manager  # which asks the system for its fonts, once
-
-    for number in range(12):  # what is loaded late counts for no try
-        worker.run(made("warm", number))
-    if os.environ["SIMDTEX_DEVICE"] != "reference":
-        worker.run(Try(["synth", "none.png", "-o", "out.png"]))
     worker.limit()
-    answers.write("ready\n")
-    for line in questions:
+    answers.write(f"ready {os.getpid()}\n")
+    for _ in range(LIFE):
+        line = questions.readline()
+        if not line:
+            os._exit(0)
         asked = json.loads(line)
         asked.pop("job", None)
         one = made(asked["seed"], asked["number"]) if "seed" in asked else Try.from_json(asked)
         answers.write(json.dumps([one.kind, one.args[:1], vars(worker.run(one))]) + "\n")
+    os._exit(1)
