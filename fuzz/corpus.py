@@ -219,8 +219,22 @@ def build():
     return made
 
 
-WORDS = (b"0", b"-1", b"nan", b"inf", b"1e308", b"4294967295", b"2147483648", b"99999999999999999999", b"", b"\x00", b"\xff")
-NUMBERS = tuple(n.to_bytes(4, order) for n in (0, 1, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 10**9) for order in ("little", "big"))
+WORDS = (
+    b"0",
+    b"-1",
+    b"nan",
+    b"inf",
+    b"1e308",
+    b"4294967295",
+    b"2147483648",
+    b"99999999999999999999",
+    b"",
+    b"\x00",
+    b"\xff",
+)
+NUMBERS = tuple(
+    n.to_bytes(4, order) for n in (0, 1, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 10**9) for order in ("little", "big")
+)
 
 
 def mutated(rng, data, others):

@@ -88,7 +88,10 @@ def failing(fault, folder):
             calls.note("open", path)
         return real["open"](path, flags, *args, **kwargs)
 
-    changed = {name: wrapped(name, call) for name, call in zip(real, ("write", "fsync", *["replace"] * 2, "mkdir"), strict=False)}
+    changed = {
+        name: wrapped(name, call)
+        for name, call in zip(real, ("write", "fsync", *["replace"] * 2, "mkdir"), strict=False)
+    }
     changed["open"] = opening
     for name, function in changed.items():
         setattr(os, name, function)

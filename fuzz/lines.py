@@ -33,7 +33,21 @@ COMMANDS = {
 WHOLE = (0, -1, 2**31 - 1, 2**31, 2**32, 2**63, 2**64, 10**30, -(2**31), -(2**63) - 1, "", "nan", "1.5", "x", "0x10")
 REAL = (0, -1, -0.0, "nan", "inf", "-inf", 1e308, -1e308, 1e-320, 5e-324, 2**31, 2**63, "1e999", "", "x", "1,5", 1e-30)
 TEXT = ("", " ", "x", "-", "--", "nan", "\u00d7", "\U0001f4a9", "a" * 5000, "\n", "%s", "{0}", "../x", "\udc80", "0")
-SIZES = ("0x0", "", "x", "5", "1x1", "2x9", "100000x100000", "46341x46341", "1e3x4", "-4x4", "4x", "999999999999x1", "3x3x3")
+SIZES = (
+    "0x0",
+    "",
+    "x",
+    "5",
+    "1x1",
+    "2x9",
+    "100000x100000",
+    "46341x46341",
+    "1e3x4",
+    "-4x4",
+    "4x",
+    "999999999999x1",
+    "3x3x3",
+)
 
 MODEST = {
     **dict.fromkeys(("order",), (1, 2, 4)),
@@ -178,13 +192,19 @@ class _Maker:
         options = []
         for parameter in command.params:
             if isinstance(parameter, click.Argument):
-                count = rng.choices((1, 2, 3), (8, 1, 1) if name != "mix" else (3, 3, 1))[0] if parameter.nargs < 0 else 1
+                count = (
+                    rng.choices((1, 2, 3), (8, 1, 1) if name != "mix" else (3, 3, 1))[0] if parameter.nargs < 0 else 1
+                )
                 words += [self.file("picture") for _ in range(count)]
             else:
                 options.append(parameter)
         samples = words[:]
         words += ["-o", self.output(name)] if name not in ("devices", "bench", "ising") else []
-        words += ["--size", size] if any("--size" in option.opts for option in options) and (name != "extend" or rng.random() < 0.3) else []
+        words += (
+            ["--size", size]
+            if any("--size" in option.opts for option in options) and (name != "extend" or rng.random() < 0.3)
+            else []
+        )
         words += ["--method", method] if method and rng.random() < 0.97 else []
         words += ["-q"] if rng.random() < 0.8 else []
         if name == "fill" and rng.random() < 0.9:
@@ -192,7 +212,16 @@ class _Maker:
         if name == "extend" and "--size" not in words:
             words += [rng.choice(("--left", "--right", "--top", "--bottom", "--band")), rng.choice("123")]
         if name == "ising":
-            words += ["--sweeps", "2", "--burn-in", "1", "--seeds", "2", "--schedules", rng.choice(("coloring", "raster", "block"))]
+            words += [
+                "--sweeps",
+                "2",
+                "--burn-in",
+                "1",
+                "--seeds",
+                "2",
+                "--schedules",
+                rng.choice(("coloring", "raster", "block")),
+            ]
         if name == "schedules":
             words += ["--seeds", "1", "--schedules", "coloring", "--order", "1"]
         if name == "bench":  # which measures for minutes
@@ -251,7 +280,9 @@ class _Maker:
         if metavar.startswith("SAMPLE") and samples:
             return rng.choice((samples[0], "1", "2", "0"))
         if "," in metavar or name in ("alphas", "betas"):
-            return ",".join(str(rng.choice((0, 1, 2, 0.5) if modest else REAL)) for _ in range(rng.choice((1, 1, 2, 3))))
+            return ",".join(
+                str(rng.choice((0, 1, 2, 0.5) if modest else REAL)) for _ in range(rng.choice((1, 1, 2, 3)))
+            )
         if "x" in metavar.lower() and "HEIGHT" in metavar or "COLS" in metavar:
             return rng.choice(("4x4", "2x8", *SIZES))
         if name == "edges":
@@ -279,7 +310,13 @@ class _Maker:
             return rng.choice(("pages", "a/b", "out.png") if rng.random() < 0.3 else ("pages",))
         if name in ("source_map", "picture", "json", "plot"):
             return rng.choice(("map.npz", "map.npy", "map.png", "out.png", "view.png"))
-        roles = {"sample_mask": "mask", "known": "table", "hard": "table", "thresholds": "thresholds", "start": "picture"}
+        roles = {
+            "sample_mask": "mask",
+            "known": "table",
+            "hard": "table",
+            "thresholds": "thresholds",
+            "start": "picture",
+        }
         role = roles.get(name, "picture")
         if name == "start" and command == "solid":
             role = "volume"
@@ -327,5 +364,7 @@ class _Maker:
 def _of_method(option, method):
     """Whether an option of ``synth`` is of a method, as its help says."""
     head = (option.help or "").partition(":")[0] if ":" in (option.help or "") else ""
-    named = [one for one in ("mrf", "multires", "pyramid") if one in head.split(", ") or f"{one}:" in (option.help or "")]
+    named = [
+        one for one in ("mrf", "multires", "pyramid") if one in head.split(", ") or f"{one}:" in (option.help or "")
+    ]
     return not named or method in named

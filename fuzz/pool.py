@@ -97,7 +97,14 @@ class Process:
         question = {name: value for name, value in question.items() if name != "job"}
         one = made(question["seed"], question["number"]) if "seed" in question else Try.from_json(question)
         text = one.args[0] if what == "time" else f"{one.args[0]}: exit code {code}"
-        result = {"code": None, "said": "", "seconds": SECONDS + GRACE, "bytes": 0, "faults": [[what, text]], "fired": True}
+        result = {
+            "code": None,
+            "said": "",
+            "seconds": SECONDS + GRACE,
+            "bytes": 0,
+            "faults": [[what, text]],
+            "fired": True,
+        }
         return [one.kind, one.args[:1], result]
 
     def stop(self):

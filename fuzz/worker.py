@@ -35,7 +35,17 @@ HIDDEN = r"/\.[A-Za-z0-9_]|(?:^|[\s'])\.[a-z0-9_]{8}(?![a-z0-9_])|\.tmp\b|<[a-z_
 """What no user has named: a temporary file, an object."""
 
 NETWORK = ("socket.connect", "socket.getaddrinfo", "urllib.Request")
-CHANGES = ("os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.link", "os.symlink", "os.truncate", "os.chmod", "os.utime")
+CHANGES = (
+    "os.rename",
+    "os.remove",
+    "os.mkdir",
+    "os.rmdir",
+    "os.link",
+    "os.symlink",
+    "os.truncate",
+    "os.chmod",
+    "os.utime",
+)
 
 
 @dataclass
@@ -251,7 +261,9 @@ class Worker:
         for what, path in self.watch.seen:
             if what in ("program", "network"):
                 yield f"uses a {what}", path[:160]
-            elif what == "write" and not path.startswith((str(folder), str(self.sandbox.root / "tmp"), "/dev/", "/proc/")):
+            elif what == "write" and not path.startswith(
+                (str(folder), str(self.sandbox.root / "tmp"), "/dev/", "/proc/")
+            ):
                 if not _of_libraries(path):
                     yield "written elsewhere", _plain(path)
             elif what == "read" and path.startswith(str(self.sandbox.root / "beside")):
@@ -260,7 +272,10 @@ class Worker:
 
 def _of_libraries(path):
     """Whether a path is of caches that libraries keep in a home: of fonts, of compiled kernels."""
-    return any(word in path for word in ("/matplotlib", "/fontconfig", "/pocl", "/pyopencl", "/pytools", "__pycache__", "/home"))
+    return any(
+        word in path
+        for word in ("/matplotlib", "/fontconfig", "/pocl", "/pyopencl", "/pytools", "__pycache__", "/home")
+    )
 
 
 def _plain(text):

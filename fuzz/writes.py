@@ -92,7 +92,9 @@ def write_faults(record, workers, tell):
         job = tuple(question["job"])
         if not result["fired"] and job[1] != "size":
             state[job] = "over"
-        record.add(lambda: Try.from_json({k: v for k, v in question.items() if k != "job"}), kind, args, result, "writes")
+        record.add(
+            lambda: Try.from_json({k: v for k, v in question.items() if k != "job"}), kind, args, result, "writes"
+        )
         tell()
 
     pool.run(questions(), workers, took)

@@ -22,7 +22,7 @@ from simdtex.model.given import Given
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures, unknown_in
 from simdtex.model.sample import NothingUsable
-from simdtex.options import whole
+from simdtex.options import whole, within_32_bits
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
@@ -248,6 +248,7 @@ def extend(
         raise ValueError("there is nothing to add; give top, bottom, left or right, or tile=True")
     width = min(64, max(8, min(rows, cols) // 8)) if band is None else band
     whole("band", width, 1)
+    within_32_bits((top + rows + bottom, left + cols + right), 1)
     canvas = np.zeros((top + rows + bottom, left + cols + right, pixels.shape[2]), pixels.dtype)
     canvas[top : top + rows, left : left + cols] = pixels
     hole = np.ones(canvas.shape[:2], bool)

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from queue import SimpleQueue
+from math import prod
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
@@ -20,9 +21,9 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex.envelope import check_shape, restored
 from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
 from simdtex.jobs.inputs import Inputs, check_array, check_inputs, check_samples
-from simdtex.machine import Machine, open_machine
+from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
-from simdtex.options import whole
+from simdtex.options import whole, within_32_bits
 from simdtex.random import as_seed
 from simdtex.run import Callback, Simulating
 
@@ -115,12 +116,15 @@ def simulate(
     whole("first", first, 0)
     if jobs is not None:
         whole("jobs", jobs, 1)
+    if shape is not None:
+        within_32_bits(check_shape(shape), 1)
     data, size = _hard(hard, shape, check_samples(training, channel_axis, mask).pixels[0], channel_axis)
     inputs = check_inputs(training, size, channel_axis, mask, data, None, guide)
     chosen = mrf.make_options(**DEFAULTS | options)
     seed = as_seed(rng)
     seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
     pixels = inputs.pictures.pixels[0]
+    memory.require_host(2 * n * prod((*size, pixels.shape[2])) * pixels.dtype.itemsize)  # they are copied once
     made = np.empty((n, *size, pixels.shape[2]), pixels.dtype)
     finished, lock = 0, Lock()
     machines = _machines(device, jobs, n)

@@ -38,7 +38,11 @@ def require(machine: Machine, device: int, host: int = 0) -> None:
         The device has less, or the host has less available; the sentence names the remedy.
     """
     machine.require(device)
-    wanted = host + device * shared(machine)
+    require_host(host + device * shared(machine))
+
+
+def require_host(wanted: int) -> None:
+    """Raise DeviceError where so many bytes are more than the host has available."""
     there = available()
     if there is not None and wanted > there:
         raise DeviceError(
@@ -123,7 +127,9 @@ def _of_addresses(root: Path) -> Iterator[int]:
 def _table(path: Path, after: str = ":") -> dict[str, int]:
     """Numbers by name, a line each."""
     words = (line.partition(after) for line in _text(path).splitlines())
-    return {name: int(value.split()[0]) for name, _, value in words if value.split()[:1] and value.split()[0].isdecimal()}
+    return {
+        name: int(value.split()[0]) for name, _, value in words if value.split()[:1] and value.split()[0].isdecimal()
+    }
 
 
 def _text(path: Path) -> str:

@@ -12,13 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+MOST_ORDER = 4096
+"""The largest order of a neighbourhood: 64 pixels to each side, 12852 neighbours."""
+
+
 def neighbourhood_offsets(order: int) -> NDArray[np.int32]:
     """Offsets r - s of the neighbourhood of an order, equation (3).
 
     Parameters
     ----------
     order : int
-        o >= 1: the neighbours are the sites within the distance sqrt(o).
+        o, 1 to `MOST_ORDER`: the neighbours are the sites within the distance sqrt(o).
 
     Returns
     -------
@@ -37,11 +41,13 @@ def neighbourhood_offsets(order: int) -> NDArray[np.int32]:
 
 
 def check_order(order: Any) -> None:
-    """Raise unless `order` is an integer from 1 up."""
+    """Raise unless `order` is an integer from 1 to `MOST_ORDER`."""
     if isinstance(order, bool) or not isinstance(order, (int, np.integer)):
         raise TypeError(f"order must be an integer, not {type(order).__name__}")
     if order < 1:
         raise ValueError(f"order {order} has no neighbours; give 1 (4 neighbours) or more, say 8 or 18")
+    if order > MOST_ORDER:
+        raise ValueError(f"order is {order}; give {MOST_ORDER} or less, say 8 or 18")
 
 
 LATTICE = np.dtype(

@@ -38,6 +38,9 @@ LAUNCH = 4e8
 WIDEST = 100
 """The largest sigma; a filter of one far narrower does not know it from a larger one."""
 
+DIRECTIONS, FILTER = 64, 101
+"""The most orientations, and the largest filters: any more are alike, or larger than the levels they are for."""
+
 STEPS, MOST = 100, 4
 """`suggest_alpha` tries the multiples of 1/100 up to 4 for a target."""
 
@@ -72,11 +75,12 @@ class Options:
         T itself, in place of alpha and beta: one row for each level but the finest, the lowest frequency first; one
         column for all features or one for each.
     orientations : int
-        Of the first and of the second derivatives of a Gaussian in the filter bank (7); 0 leaves the bands alone.
+        Of the first and of the second derivatives of a Gaussian in the filter bank (7), 64 or fewer; 0 leaves the bands
+        alone.
     sigma : float
         Of that Gaussian, in pixels; 0.2 to 100.
     filter_size : int
-        Rows and columns of the filters; odd. A level smaller than that has no responses.
+        Rows and columns of the filters; odd, 3 to 101. A level smaller than that has no responses.
     features : {"luminance", "channels"}
         Whether features are made of the luminance or of every channel. Bands are copied with all their channels.
     levels : int, optional
@@ -115,16 +119,14 @@ class Options:
             if self.alpha != "auto":
                 raise ValueError(f"alpha is {self.alpha!r}; give a number of at least 0, or 'auto'")
         elif not (isinstance(self.alpha, Real) and self.alpha == inf):
-            real("alpha", self.alpha, 0)
+            real("alpha", self.alpha, 0, inf)
         real("beta", self.beta, 0)
         real("strain", self.strain, 0)
         if self.target is not None:
-            real("target", self.target, 1)
-        whole("orientations", self.orientations, 0)
-        real("sigma", self.sigma, 0.2)
-        if self.sigma > WIDEST:
-            raise ValueError(f"sigma is {self.sigma}; give at most {WIDEST}")
-        whole("filter_size", self.filter_size, 3)
+            real("target", self.target, 1, 2**31)
+        whole("orientations", self.orientations, 0, DIRECTIONS)
+        real("sigma", self.sigma, 0.2, WIDEST)
+        whole("filter_size", self.filter_size, 3, FILTER)
         if self.filter_size % 2 == 0:
             raise ValueError(f"filter_size is {self.filter_size}; give an odd number, 3 or 5")
         one_of("features", self.features, ("luminance", "channels"))
