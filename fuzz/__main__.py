@@ -5,7 +5,8 @@
     python -m fuzz --replay FILE
 
 A try passes that ends with exit code 0, or 2 and one sentence, within 10 s and 1 GiB, changes no input, leaves no
-temporary file and writes nowhere else. Each fault is written once to build/fuzz, with all that it takes to see it again.
+temporary file and writes nowhere else. Each fault is written once to build/fuzz, with all that it takes to see it
+again.
 """
 
 import argparse
@@ -40,7 +41,7 @@ def main():
         serve(options.work)
         return 0
     from fuzz import pool
-    from fuzz.lines import Try, made
+    from fuzz.lines import made
     from fuzz.record import Record
     from fuzz.writes import write_faults
 

@@ -283,7 +283,7 @@ class _Maker:
             return ",".join(
                 str(rng.choice((0, 1, 2, 0.5) if modest else REAL)) for _ in range(rng.choice((1, 1, 2, 3)))
             )
-        if "x" in metavar.lower() and "HEIGHT" in metavar or "COLS" in metavar:
+        if ("x" in metavar.lower() and "HEIGHT" in metavar) or "COLS" in metavar:
             return rng.choice(("4x4", "2x8", *SIZES))
         if name == "edges":
             return rng.choice(EDGES[self.method])

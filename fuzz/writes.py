@@ -3,7 +3,6 @@
 
 from itertools import count, cycle
 
-
 from fuzz import pool
 from fuzz.corpus import build
 from fuzz.faults import CALLS, ERRORS, SIZES

@@ -54,7 +54,7 @@ def whole(name: str, value: Any, least: int, most: int = MOST) -> None:
         raise TypeError(f"{name} must be an integer, not {_shown(value)}")
     if value < least:
         raise ValueError(f"{name} is {_number(value)}; give {least} or more")
-    if value > most:
+    if int(value) > most:
         raise ValueError(f"{name} is {_number(value)}; give {most} or fewer")
 
 
@@ -64,7 +64,7 @@ def real(name: str, value: Any, least: float, most: float = GREATEST, *, above: 
         raise TypeError(f"{name} must be a number, not {_shown(value)}")
     if not _finite(value) or value < least or (above and value == least):
         raise ValueError(f"{name} is {_number(value)}; give a number {'above' if above else 'of at least'} {least}")
-    if value > most:
+    if float(value) > most:
         raise ValueError(f"{name} is {_number(value)}; give a number of at most {most:g}")
 
 

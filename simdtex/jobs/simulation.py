@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib.metadata import version
+from math import prod
 from pathlib import Path
 from queue import SimpleQueue
-from math import prod
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 

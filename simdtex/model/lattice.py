@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-
 MOST_ORDER = 4096
 """The largest order of a neighbourhood: 64 pixels to each side, 12852 neighbours."""
 
