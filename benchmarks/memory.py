@@ -47,8 +47,7 @@ print(json.dumps([peak() - before, max(asked)]))
 CASES = {
     "mrf": ("mrf", {}),
     "mrf, schedule block": ("mrf", {"schedule": "block"}),
-    "mrf, all at once": ("mrf", {"schedule": "synchronous"}),
-    "mrf, one level": ("mrf", {"levels": 1, "finish": 0, "free_sweeps": 0}),
+    "mrf, synchronous": ("mrf", {"schedule": "synchronous"}),
     "multires": ("multires", {}),
     "pyramid": ("pyramid", {"iterations": 2}),
     "pyramid, laplacian": ("pyramid", {"iterations": 2, "pyramid": "laplacian"}),

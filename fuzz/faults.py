@@ -88,10 +88,8 @@ def failing(fault, folder):
             calls.note("open", path)
         return real["open"](path, flags, *args, **kwargs)
 
-    changed = {
-        name: wrapped(name, call)
-        for name, call in zip(real, ("write", "fsync", *["replace"] * 2, "mkdir"), strict=False)
-    }
+    calls_of = {"write": "write", "fsync": "fsync", "replace": "replace", "rename": "replace", "mkdir": "mkdir"}
+    changed = {name: wrapped(name, call) for name, call in calls_of.items()}
     changed["open"] = opening
     for name, function in changed.items():
         setattr(os, name, function)

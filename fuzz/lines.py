@@ -228,7 +228,7 @@ class _Maker:
             words += ["--json", "no/such/file.json"]
         if name == "sheet":
             words += ["--alphas", "0.1", "--betas", "0"]
-        if name in ("simulate", "synth", "fill", "extend") and method in (None, "mrf") and rng.random() < 0.98:
+        if name in ("simulate", "synth", "fill", "extend") and method in (None, "mrf"):
             words += ["--order", rng.choice("1124")]
         words += ["--number", rng.choice("1112")] if name == "simulate" else []
         if name in ("solid", "mix") or method == "pyramid":

@@ -31,6 +31,8 @@ LOOKING = ("uname", "fc-list", sys.executable)
 """Programs that libraries ask what machine this is, and ourselves what devices work."""
 
 PROGRAMS = ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "os.fork", "os.startfile")
+SYSTEM = ("/dev/", "/proc/")
+CACHES = ("/matplotlib", "/mpl", "/fontconfig", "/pocl", "/pyopencl", "/pytools", "__pycache__", "/.cache")
 HIDDEN = r"/\.[A-Za-z0-9_]|(?:^|[\s'])\.[a-z0-9_]{8}(?![a-z0-9_])|\.tmp\b|<[a-z_.]+ object at 0x"
 """What no user has named: a temporary file, an object."""
 
@@ -81,7 +83,8 @@ class Watch:
                 if isinstance(path, (str, bytes, os.PathLike)):
                     self.seen.append(("write", os.path.abspath(os.fsdecode(path))))
         elif event in PROGRAMS:
-            self.seen.append(("program", f"{event} {args[0]!r}"))
+            if args[0] not in LOOKING:
+                self.seen.append(("program", f"{event} {args[0]!r}"))
         elif event in NETWORK:
             self.seen.append(("network", event))
 
@@ -248,7 +251,7 @@ class Worker:
             if any(part.startswith(".") or part.endswith((".tmp", ".part")) for part in Path(name).parts):
                 yield "left behind", f"{one.args[0]}: {_plain(re.sub(r'[a-z0-9_]{8}', '*', Path(name).name))}"
             elif not any(first == Path(word).parts[0] for word in named if word and Path(word).parts):
-                if not (one.args[0] == "schedules" and first == "schedules-report") and not (one.args[0] == "demo"):
+                if first != "schedules-report" and one.args[0] != "demo":
                     yield "file nobody named", f"{one.args[0]} {_plain(name)}"
             elif failed and not stopped and name == first and there[name].is_file():
                 yield "written on failure", f"{one.args[0]} {_plain(name)}"
@@ -261,9 +264,7 @@ class Worker:
         for what, path in self.watch.seen:
             if what in ("program", "network"):
                 yield f"uses a {what}", path[:160]
-            elif what == "write" and not path.startswith(
-                (str(folder), str(self.sandbox.root / "tmp"), "/dev/", "/proc/")
-            ):
+            elif what == "write" and not path.startswith((str(folder), str(self.sandbox.root / "tmp"), *SYSTEM)):
                 if not _of_libraries(path):
                     yield "written elsewhere", _plain(path)
             elif what == "read" and path.startswith(str(self.sandbox.root / "beside")):
@@ -272,10 +273,7 @@ class Worker:
 
 def _of_libraries(path):
     """Whether a path is of caches that libraries keep in a home: of fonts, of compiled kernels."""
-    return any(
-        word in path
-        for word in ("/matplotlib", "/fontconfig", "/pocl", "/pyopencl", "/pytools", "__pycache__", "/home")
-    )
+    return any(word in path for word in CACHES)
 
 
 def _plain(text):
