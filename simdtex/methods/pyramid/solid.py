@@ -31,7 +31,7 @@ from simdtex.methods.pyramid.algorithm import (
     transform,
 )
 from simdtex.ops.solid import solid_band, solid_collapse, solid_mean, solid_reduce, solid_turn
-from simdtex.options import build, one_of
+from simdtex.options import build, one_of, within_32_bits
 from simdtex.run import Callback, Output, device_seconds
 
 FAMILIES = {"x-y": ((0, 1, 2), (0, 1, 2)), "x-z": ((1, 0, 2), (1, 0, 2)), "y-z": ((2, 0, 1), (1, 2, 0))}
@@ -107,9 +107,7 @@ def synthesize(
     Cost: 5000 multiply-adds and 25 sorted values for every voxel, channel and iteration, with four orientations.
     """
     began, worked = perf_counter(), machine.seconds
-    if prod(shape) * max(VALUES, sample.shape[-1]) >= 2**31:
-        size = " x ".join(str(n) for n in shape)
-        raise ValueError(f"a block of {size} is beyond 2**31 values; give a smaller size")
+    within_32_bits(shape, max(VALUES, sample.shape[-1]))
     memory.require(machine, prod(shape) * MEMORY)
     levels, oriented = number_of_levels(options, *shape, *sample.shape[:2]), options.pyramid == "steerable"
     wrap = options.edges == "wrap"
