@@ -67,7 +67,7 @@ def main():
     if options.part != "lines":
         write_faults(record, options.workers, tell)
     if options.part != "faults":
-        end = time.monotonic() + 60 * options.minutes
+        end = record.began + 60 * options.minutes
 
         def questions():
             for number in itertools.count():

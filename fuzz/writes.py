@@ -42,7 +42,7 @@ COMMANDS = {
 NEWLY = ("pages", "out", "out.zarr")
 """Folders: nothing stands there before."""
 
-MOST = 12
+MOST = 8
 """Calls of a kind that fail in turn, where a folder takes hundreds."""
 
 

@@ -18,6 +18,10 @@ SHARED = ("cpu", "reference")
 """Kinds of machines whose arrays lie in the host's memory."""
 
 
+TEMPORARY = 2**26
+"""Bytes of the reference's intermediate arrays, beside its scratch memory, at most."""
+
+
 def shared(machine: Machine) -> bool:
     """Whether a machine's arrays lie in the host's memory."""
     return machine.kind in SHARED
@@ -38,7 +42,7 @@ def require(machine: Machine, device: int, host: int = 0) -> None:
         The device has less, or the host has less available; the sentence names the remedy.
     """
     machine.require(device)
-    require_host(host + device * shared(machine))
+    require_host(host + device * shared(machine) + TEMPORARY * (machine.kind == "reference"))
 
 
 def require_host(wanted: int) -> None:

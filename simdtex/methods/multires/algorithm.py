@@ -324,6 +324,7 @@ def synthesize(
     """Both phases: `analyse`, then `resample`, which says what comes in and out."""
     began, worked = perf_counter(), machine.seconds
     within_32_bits(shape, max(VALUES, sample.shape[-1]))  # before any work
+    memory.require_host(_on_host(shape, sample.shape[-1], sample.dtype.itemsize))
     analysis = analyse(machine, sample, **options.analysis)
     image, output = resample(machine, analysis, shape, options, seed, callback)
     output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
@@ -365,13 +366,15 @@ def resample(
     -----
     A level is one step: no pixel depends on another of its level. Cost: for every four pixels at most the nodes above
     them, times the features; some thousandths of that at usual thresholds. Memory on the device, in bytes per output
-    pixel: 20 + 5.3 channels, beside the analysis; on the host about 50 + 5 channels.
+    pixel: 20 + 5.3 channels, beside the analysis; on the host, where a CPU's device memory is too, 66 and 4 + n for
+    each channel, n the bytes of a value of the sample (benchmarks/memory.py). Both are asked for first.
     """
     began, worked = perf_counter(), machine.seconds
     channels = len(analysis.sample.planes)
     within_32_bits(shape, max(VALUES, channels))
     shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
-    memory.require(machine, pixels(shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis))
+    on_device = pixels(shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis)
+    memory.require(machine, on_device, _on_host(shape, channels, analysis.sample.pixels.dtype.itemsize))
     alpha = _alpha(machine, analysis, options)
     structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
     record = _Record(shapes, callback)
@@ -535,6 +538,11 @@ def _check_thresholds(table: ArrayLike) -> None:
         raise ValueError(f"thresholds has shape {values.shape}; give one row for each level but the finest")
     if not (values >= 0).all():
         raise ValueError("thresholds must be numbers of at least 0")
+
+
+def _on_host(shape: tuple[int, int], channels: int, itemsize: int) -> int:
+    """Bytes on the host of an output with its stages."""
+    return prod(shape) * (66 + channels * (4 + itemsize))
 
 
 def _held(analysis: Analysis) -> int:

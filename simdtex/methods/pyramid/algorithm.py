@@ -39,6 +39,9 @@ VALUES = 8
 MEMORY = 160
 """Bytes for each pixel of a picture on the device, at most (measured by benchmarks/pyramid_cost.py)."""
 
+HOST = 12, 35, 2
+"""Bytes for each pixel on the host: at all, for each channel, and for each byte of these (benchmarks/memory.py)."""
+
 MATCHING = 200
 """What a value's sort and match cost, about, in multiply-adds: when to wait for the device."""
 
@@ -277,7 +280,7 @@ def synthesize_from(
 ) -> tuple[NDArray[Any], Output]:
     """A picture of a texture whose histograms are known, see `match_texture`."""
     within_32_bits(shape, max(VALUES, len(texture.histograms)))
-    memory.require(machine, prod(shape) * MEMORY)
+    check_memory(machine, shape, texture, MEMORY)
     pyramid = transform(machine, options, levels, torus=True)
 
     def turn(picture: Array, wanted: list[Wanted], matcher: Matcher, tell: Callable[[float], None]) -> Array:
@@ -286,6 +289,13 @@ def synthesize_from(
         return pyramid.collapse(matched)  # Collapse-Pyramid(synthesis-pyr)
 
     return match_texture(machine, texture, shape, turn, options, levels, seed, callback)
+
+
+def check_memory(machine: Machine, shape: tuple[int, ...], texture: Texture, on_device: int) -> None:
+    """Raise where an output takes more memory than there is, so many bytes for each pixel on the device."""
+    each, channel, byte = HOST
+    host = each + len(texture.histograms) * (channel + byte * texture.stretched.pixels.dtype.itemsize)
+    memory.require(machine, prod(shape) * on_device, prod(shape) * host)
 
 
 def match_subbands(
@@ -336,6 +346,11 @@ def match_texture(
         In the sample's type.
     output : simdtex.run.Output
         Statistics: how far the histograms of each iteration were from the sample's.
+
+    Notes
+    -----
+    Memory in bytes per pixel: 160 on the device (240 per voxel of a block); on the host, where a CPU's device memory is
+    too, 12 + (35 + 2 n) channels, n the bytes of a value of the sample. Both are asked for before the run.
     """
     began, worked = perf_counter(), machine.seconds
     matcher = Matcher(machine, options, seed)

@@ -25,6 +25,7 @@ from simdtex.methods.pyramid.algorithm import (
     Matcher,
     Wanted,
     analyse,
+    check_memory,
     match_subbands,
     match_texture,
     number_of_levels,
@@ -108,12 +109,13 @@ def synthesize(
     """
     began, worked = perf_counter(), machine.seconds
     within_32_bits(shape, max(VALUES, sample.shape[-1]))
-    memory.require(machine, prod(shape) * MEMORY)
+    memory.require(machine, prod(shape) * MEMORY)  # before any work
     levels, oriented = number_of_levels(options, *shape, *sample.shape[:2]), options.pyramid == "steerable"
     wrap = options.edges == "wrap"
     flat = transform(machine, replace(options, pyramid="laplacian"), levels, wrap)
     steerable = [transform(machine, options, levels, wrap)] if oriented else []
     texture = analyse(machine, sample, options, flat, *steerable)
+    check_memory(machine, shape, texture, MEMORY)
     slices = transform(machine, options, levels, torus=True)
 
     def turn(block: Array, wanted: list[Wanted], matcher: Matcher, tell: Callable[[float], None]) -> Array:
