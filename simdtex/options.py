@@ -39,33 +39,33 @@ def one_of(name: str, value: Any, valid: Iterable[str]) -> None:
     """Raise ValueError unless the value is one of the valid ones, and list them."""
     valid = list(valid)
     if not isinstance(value, str) or value not in valid:
-        raise ValueError(f"unknown {name} {_shown(value)}; choose one of: {', '.join(valid)}")
+        raise ValueError(f"unknown {name} {shown(value)}; choose one of: {', '.join(valid)}")
 
 
 def true_or_false(name: str, value: Any) -> None:
     """Raise TypeError unless the value is True or False."""
     if not isinstance(value, bool):
-        raise TypeError(f"{name} must be True or False, not {_shown(value)}")
+        raise TypeError(f"{name} must be True or False, not {shown(value)}")
 
 
 def whole(name: str, value: Any, least: int, most: int = MOST) -> None:
     """Raise unless the value is an integer from `least` to `most`."""
     if isinstance(value, bool) or not isinstance(value, Integral):
-        raise TypeError(f"{name} must be an integer, not {_shown(value)}")
+        raise TypeError(f"{name} must be an integer, not {shown(value)}")
     if value < least:
-        raise ValueError(f"{name} is {_number(value)}; give {least} or more")
+        raise ValueError(f"{name} is {number(value)}; give {least} or more")
     if int(value) > most:
-        raise ValueError(f"{name} is {_number(value)}; give {most} or fewer")
+        raise ValueError(f"{name} is {number(value)}; give {most} or fewer")
 
 
 def real(name: str, value: Any, least: float, most: float = GREATEST, *, above: bool = False) -> None:
     """Raise unless the value is a number from `least`, or above it, to `most`."""
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise TypeError(f"{name} must be a number, not {_shown(value)}")
+        raise TypeError(f"{name} must be a number, not {shown(value)}")
     if not _finite(value) or value < least or (above and value == least):
-        raise ValueError(f"{name} is {_number(value)}; give a number {'above' if above else 'of at least'} {least}")
+        raise ValueError(f"{name} is {number(value)}; give a number {'above' if above else 'of at least'} {least}")
     if float(value) > most:
-        raise ValueError(f"{name} is {_number(value)}; give a number of at most {most:g}")
+        raise ValueError(f"{name} is {number(value)}; give a number of at most {most:g}")
 
 
 def real_array(name: str, value: Any) -> NDArray[Any]:
@@ -81,7 +81,7 @@ def real_array(name: str, value: Any) -> NDArray[Any]:
     return array
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
     """A value in one line, cut where it is long."""
     try:
         text = " ".join(repr(value).split())
@@ -90,7 +90,7 @@ def _shown(value: Any) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 
 
-def _number(value: Any) -> str:
+def number(value: Any) -> str:
     """A number, or what kind of number it is where it has too many digits."""
     try:
         text = str(value)

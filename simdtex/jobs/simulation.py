@@ -122,9 +122,10 @@ def simulate(
     inputs = check_inputs(training, size, channel_axis, mask, data, None, guide)
     chosen = mrf.make_options(**DEFAULTS | options)
     seed = as_seed(rng)
-    seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
     pixels = inputs.pictures.pixels[0]
-    memory.require_host(2 * n * prod((*size, pixels.shape[2])) * pixels.dtype.itemsize)  # they are copied once
+    each = 2 * prod((*size, pixels.shape[2])) * pixels.dtype.itemsize  # they are copied once
+    memory.require_host(n * (each + 64))
+    seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
     made = np.empty((n, *size, pixels.shape[2]), pixels.dtype)
     finished, lock = 0, Lock()
     machines = _machines(device, jobs, n)

@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.options import number
+
 MOST_ORDER = 4096
 """The largest order of a neighbourhood: 64 pixels to each side, 12852 neighbours."""
 
@@ -44,9 +46,9 @@ def check_order(order: Any) -> None:
     if isinstance(order, bool) or not isinstance(order, (int, np.integer)):
         raise TypeError(f"order must be an integer, not {type(order).__name__}")
     if order < 1:
-        raise ValueError(f"order {order} has no neighbours; give 1 (4 neighbours) or more, say 8 or 18")
+        raise ValueError(f"order {number(order)} has no neighbours; give 1 (4 neighbours) or more, say 8 or 18")
     if order > MOST_ORDER:
-        raise ValueError(f"order is {order}; give {MOST_ORDER} or less, say 8 or 18")
+        raise ValueError(f"order is {number(order)}; give {MOST_ORDER} or less, say 8 or 18")
 
 
 LATTICE = np.dtype(

@@ -14,7 +14,7 @@ from simdtex import schedules
 from simdtex.maspar.array import parse_array
 from simdtex.model.lattice import check_order
 from simdtex.model.pictures import Pictures
-from simdtex.options import build, one_of, real, true_or_false, whole
+from simdtex.options import build, one_of, real, shown, true_or_false, whole
 
 PRESETS: dict[str, dict[str, Any]] = {
     "default": {},
@@ -243,7 +243,9 @@ class Options:
             _numbers(name, value)
         if not isinstance(self.categorical, bool):
             if not isinstance(self.categorical, tuple) or not self.categorical:
-                raise TypeError(f"categorical must be True, False or a tuple of channels, not {self.categorical!r}")
+                raise TypeError(
+                    f"categorical must be True, False or a tuple of channels, not {shown(self.categorical)}"
+                )
             for channel in self.categorical:
                 whole("a channel of categorical", channel, 0)
         if self.pixel == "density" and (self.categorical or self.weights):
@@ -299,7 +301,7 @@ def _numbers(name: str, value: Any) -> None:
     if value is None:
         return
     if not isinstance(value, tuple) or not value:
-        raise TypeError(f"{name} must be a tuple of numbers, not {value!r}")
+        raise TypeError(f"{name} must be a tuple of numbers, not {shown(value)}")
     for number in value:
         real(f"one of {name}", number, 0)
     if not any(value):

@@ -23,7 +23,7 @@ from simdtex.methods.multires.analysis import Analysis, analyse
 from simdtex.model.use import effective_use
 from simdtex.ops.candidates import Sampled, Structure, candidates
 from simdtex.ops.laplacian import beside, laplacian_blend, laplacian_collapse, within
-from simdtex.options import build, one_of, real, whole, within_32_bits
+from simdtex.options import build, one_of, real, shown, whole, within_32_bits
 from simdtex.run import Callback, Output, Sampling, Stage, device_seconds, paced
 
 ANY = 2**32 - 1
@@ -117,7 +117,7 @@ class Options:
         """Check every value."""
         if isinstance(self.alpha, str):
             if self.alpha != "auto":
-                raise ValueError(f"alpha is {self.alpha!r}; give a number of at least 0, or 'auto'")
+                raise ValueError(f"alpha is {shown(self.alpha)}; give a number of at least 0, or 'auto'")
         elif not (isinstance(self.alpha, Real) and self.alpha == inf):
             real("alpha", self.alpha, 0, inf)
         real("beta", self.beta, 0)
