@@ -65,7 +65,8 @@ def main():
             print(f"\r{record.tries} tries, {len(record.first)} faults ", end="", file=sys.stderr, flush=True)
 
     if options.part != "lines":
-        write_faults(record, options.workers, tell)
+        share = 0.4 if options.part == "both" else 1.0
+        write_faults(record, options.workers, tell, record.began + 60 * share * options.minutes)
     if options.part != "faults":
         end = record.began + 60 * options.minutes
 

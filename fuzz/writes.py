@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every write of a command fails once: what is then on the disk, and what the command says."""
 
+import time
 from itertools import count, cycle
 
 from fuzz import pool
@@ -42,7 +43,7 @@ COMMANDS = {
 NEWLY = ("pages", "out", "out.zarr")
 """Folders: nothing stands there before."""
 
-MOST = 8
+MOST = 6
 """Calls of a kind that fail in turn, where a folder takes hundreds."""
 
 
@@ -56,7 +57,7 @@ def _try(line, fault=None):
     return Try(words, used | dict.fromkeys(old, OLD), "failing writes", old, None, fault)
 
 
-def write_faults(record, workers, tell):
+def write_faults(record, workers, tell, end):
     """Run every command with each of its calls failing, one at a time.
 
     Parameters
@@ -65,6 +66,8 @@ def write_faults(record, workers, tell):
     workers : int
     tell : callable
         Called after every try.
+    end : float
+        When to stop in any case, by `time.monotonic`.
     """
     jobs = [(name, call) for name in COMMANDS for call in (*CALLS, "size")]
     state = {}
@@ -73,7 +76,7 @@ def write_faults(record, workers, tell):
         """The next failing call of some job, until one has no more; jobs take turns so that workers do not wait."""
         todo = {job: iter(SIZES) if job[1] == "size" else count(1) for job in jobs}
         errors = cycle(ERRORS)
-        while todo:
+        while todo and time.monotonic() < end:
             for job in list(todo):
                 if state.get(job) == "over":
                     del todo[job]

@@ -23,16 +23,17 @@ STRANGE = [
     *(None, True, False, "", "x", "nan", "a" * 10**4, b"0", (), [], [[]], {}, object(), np.zeros(0), np.zeros((2, 2))),
 ]
 METHODS = {"mrf": mrf, "multires": multires, "pyramid": pyramid, "solid": solid}
-OPTIONS = [(method, field.name) for method, module in METHODS.items() for field in fields(module.Options)]
+OPTIONS = [
+    (method, field.name)
+    for method, module in METHODS.items()
+    for field in fields(module.Options)
+    if field.name != "schedule"  # any object may be one
+]
 
 
 @pytest.mark.parametrize("method, name", OPTIONS)
 def test_any_value_of_an_option_is_taken_or_refused_in_one_sentence(method, name):
     for value in STRANGE:
-        if name == "schedule" and (
-            (isinstance(value, str) and len(value) > 99) or (isinstance(value, int) and value > 2**64)
-        ):
-            continue  # whose sentence lists what a schedule has, and then the value
         try:
             METHODS[method].make_options(**{name: value})
         except (TypeError, ValueError) as error:
