@@ -48,7 +48,7 @@ def true_or_false(name: str, value: Any) -> None:
         raise TypeError(f"{name} must be True or False, not {shown(value)}")
 
 
-def whole(name: str, value: Any, least: int, most: int = MOST) -> None:
+def whole(name: str, value: Any, least: int, most: float = MOST) -> None:
     """Raise unless the value is an integer from `least` to `most`."""
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise TypeError(f"{name} must be an integer, not {shown(value)}")
@@ -112,5 +112,5 @@ def within_32_bits(shape: tuple[int, ...], values: int) -> None:
         return
     size = " x ".join(str(side) for side in shape)
     what = f"an output of {shape[0]} rows x {shape[1]} columns" if len(shape) == 2 else f"a block of {size}"
-    each = "" if values == 1 else f", at {values} values for each {'pixel' if len(shape) == 2 else 'voxel'},"
-    raise ValueError(f"{what}{each} is beyond 2**31 values; give a smaller size")
+    each = "" if values == 1 else f", {values} for each {'pixel' if len(shape) == 2 else 'voxel'}"
+    raise ValueError(f"{what} is beyond 2**31 values{each}; give a smaller size")
