@@ -65,7 +65,7 @@ def real(name: str, value: Any, least: float, most: float = GREATEST, *, above: 
     if not _finite(value) or value < least or (above and value == least):
         raise ValueError(f"{name} is {number(value)}; give a number {'above' if above else 'of at least'} {least}")
     if float(value) > most:
-        raise ValueError(f"{name} is {number(value)}; give a number of at most {most:g}")
+        raise ValueError(f"{name} is {number(value)}; give at most {most:g}")
 
 
 def real_array(name: str, value: Any) -> NDArray[Any]:
