@@ -205,7 +205,10 @@ class _Maker:
             if any("--size" in option.opts for option in options) and (name != "extend" or rng.random() < 0.3)
             else []
         )
-        words += ["--method", method] if method and rng.random() < 0.97 else []
+        if method and rng.random() < 0.03:
+            method = "mrf"  # as it is where none is named
+        else:
+            words += ["--method", method] if method else []
         words += ["-q"] if rng.random() < 0.8 else []
         if name == "fill" and rng.random() < 0.9:
             words += ["--mask", self.file("mask")]

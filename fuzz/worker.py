@@ -33,7 +33,7 @@ LOOKING = ("uname", "fc-list", sys.executable)
 PROGRAMS = ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "os.fork", "os.startfile")
 SYSTEM = ("/dev/", "/proc/")
 CACHES = ("/matplotlib", "/mpl", "/fontconfig", "/pocl", "/pyopencl", "/pytools", "__pycache__", "/.cache")
-HIDDEN = r"/\.[A-Za-z0-9_]|(?:^|[\s'])\.[a-z0-9_]{8}(?![a-z0-9_])|\.tmp\b|<[a-z_.]+ object at 0x"
+HIDDEN = r"/\.[A-Za-z0-9_]|(?:^|[\s'])\.[a-z0-9_]{8,}|\.tmp\b|<[a-z_.]+ object at 0x"
 """What no user has named: a temporary file, an object."""
 
 NETWORK = ("socket.connect", "socket.getaddrinfo", "urllib.Request")
@@ -295,7 +295,7 @@ def _of_libraries(path):
 def _plain(text):
     """A sentence without the numbers and names of one try, so that the same faults count as one."""
     text = re.sub(r"/dev/shm/fuzz[^ ]*/try/", "", text)
-    text = re.sub(r"(^|/|[\s'])\.[a-z0-9_]{8}(?![a-z0-9_])", r"\1.*", text)
+    text = re.sub(r"(^|/|[\s'])\.[a-z0-9_]{8,}", r"\1.*", text)
     text = re.sub(r"\d+", "N", text)
     text = re.sub(r"(N-)+", "", text)
     return re.sub(r"'[^']{0,300}'", "'...'", text)[:240]
