@@ -34,7 +34,7 @@ def peak():
 asked, require = [0], memory.require
 
 def noted(machine, device, host=0):
-    asked.append(device * memory.shared(machine) + host)
+    asked.append((device + memory.TEMPORARY) * memory.shared(machine) + host)
     require(machine, device, host)
 
 memory.require = noted

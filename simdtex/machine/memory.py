@@ -19,7 +19,7 @@ SHARED = ("cpu", "reference")
 
 
 TEMPORARY = 2**26
-"""Bytes of the reference's intermediate arrays, beside its scratch memory, at most."""
+"""Bytes that a machine takes of the host's memory whatever the size: scratch memory, sorting, rests of its pool."""
 
 
 def shared(machine: Machine) -> bool:
@@ -42,7 +42,7 @@ def require(machine: Machine, device: int, host: int = 0) -> None:
         The device has less, or the host has less available; the sentence names the remedy.
     """
     machine.require(device)
-    require_host(host + device * shared(machine) + TEMPORARY * (machine.kind == "reference"))
+    require_host(host + (device + TEMPORARY) * shared(machine))
 
 
 def require_host(wanted: int) -> None:
