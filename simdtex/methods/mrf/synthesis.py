@@ -80,9 +80,9 @@ def synthesize(
     6 candidates, the exact search all of the level; the structure channel is a channel more. Memory on the device, in
     bytes: 18 + 2 channels per output pixel (24 + 4 channels with the schedule ``block``), 14 channels + 4 similar + 159
     per pixel of the sample with its margin, and the machine's scratch memory or, if that is more, 65 per candidate. On
-    the host, where a CPU's device memory is too: 84 per output pixel (100 with ``block``) and 10 + 1.5 n for each of its
-    channels, n the bytes of a value of the sample, and 64 per pixel of the sample (benchmarks/memory.py). Both are asked
-    for first.
+    the host, where a CPU's device memory is too: 84 per output pixel (100 with ``block``) and 10 + 1.5 n for each of
+    its channels, n the bytes of a value of the sample, and 64 per pixel of the sample (benchmarks/memory.py). Both are
+    asked for first.
     """
     launches, worked = machine.launches, machine.seconds
     run = laid_out(machine, pixels, shape, options, seed, given, guide)
