@@ -6,7 +6,7 @@ VENV ?= .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check -qq
 
-.PHONY: help demo test slow lint docs mutants cpu clean
+.PHONY: help demo test slow lint docs mutants fuzz cpu clean
 
 help:
 	@echo "make demo    textures from real samples, into ./demo"
@@ -15,6 +15,7 @@ help:
 	@echo "make lint    ruff and mypy"
 	@echo "make docs    the documentation, into docs/_build/html"
 	@echo "make mutants mutation tests of the Markov random field"
+	@echo "make fuzz    command lines and files that nobody would give, for MINUTES=10"
 	@echo "make cpu     the CPU runtime of the package index, beside what is here already"
 	@echo "make clean   remove what these commands made, except $(VENV)"
 	@echo "Another Python: make PYTHON=python3.12 ..."
@@ -72,6 +73,14 @@ mutants:
 	$(call install,mutants,[mutants])
 	set -f; OCL_ICD_VENDORS=/nonexistent $(PY) -m mutmut run --max-children 1 $(MUTANTS)
 	$(PY) -m mutmut results
+
+# MINUTES=1 SEED=7 give others; RECORD=--record writes docs/fuzzing.json, which the page on it shows.
+MINUTES ?= 10
+SEED ?= 1
+RECORD ?=
+fuzz:
+	$(call install,test,[test])
+	$(PY) -m fuzz --minutes $(MINUTES) --seed $(SEED) $(RECORD)
 
 cpu:
 	$(call install,cpu,[cpu])

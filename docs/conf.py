@@ -2,6 +2,7 @@
 """How Sphinx builds the documentation: `make docs`. Nothing is fetched while it builds."""
 
 import csv
+import json
 from pathlib import Path
 
 import simdtex
@@ -84,3 +85,24 @@ by_sample = {
 tables = [table("What it takes: brick", by_sample["brick"], COST)]
 tables += [table(name.capitalize(), rows, RESULT) for name, rows in by_sample.items()]
 (HERE / "generated" / "schedules.txt").write_text("\n".join(tables), encoding="utf-8")
+
+# The page on fuzzing shows what `make fuzz RECORD=--record` has written.
+with open(HERE / "fuzzing.json", encoding="utf-8") as file:
+    fuzzed = json.load(file)
+counts = {
+    "tries": f"{fuzzed['tries']:,}",
+    "of these with failing writes": f"{fuzzed['parts'].get('writes', 0):,}",
+    "seconds": f"{fuzzed['seconds']:,.0f}",
+    "seed": fuzzed["seed"],
+    "ended with exit code 0": f"{fuzzed['codes'].get('0', 0):,}",
+    "ended with exit code 2 and a sentence": f"{fuzzed['codes'].get('2', 0):,}",
+    "ended by Ctrl-C": f"{fuzzed['codes'].get('130', 0):,}",
+    "slowest try, seconds": fuzzed["slowest"],
+    "most memory of a try, MiB": f"{fuzzed['largest'] / 2**20:.0f}",
+    "different faults": len(fuzzed["faults"]),
+}
+rows = [f'"{name}", "{value}"' for name, value in counts.items()]
+rows += [f'"tries with {name}", "{count:,}"' for name, count in fuzzed["kinds"].items() if name != "plain"]
+rows += [f'"fault: {fault["kind"]}", "{fault["tries"]}"' for fault in fuzzed["faults"]]
+body = "\n   ".join([".. csv-table::", ':header: "what", "how many"', "", *rows])
+(HERE / "generated" / "fuzzing.txt").write_text(body + "\n", encoding="utf-8")

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -104,6 +105,6 @@ def check_shape(shape: Any, least: int = 1) -> tuple[int, int]:
         rows, cols = shape
     except (TypeError, ValueError):
         raise ValueError(f"shape must be two integers (rows, columns), not {shape!r}") from None
-    whole("rows of the output", rows, least)
-    whole("columns of the output", cols, least)
+    whole("rows of the output", rows, least, inf)  # one sentence says what they are together
+    whole("columns of the output", cols, least, inf)  # one sentence says what they are together
     return int(rows), int(cols)

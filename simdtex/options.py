@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
-from math import isfinite
+from math import isfinite, prod
 from numbers import Integral, Real
 from typing import Any, TypeVar
 
@@ -13,6 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 T = TypeVar("T")
+
+MOST = 2**31 - 1
+"""The largest whole number that an option takes, where it names no other: kernels count in 32 bits."""
+
+GREATEST = 1e6
+"""The largest number that an option takes, where it names no other: beyond it a weight is the only one that counts."""
+
+LONGEST = 100
+"""Characters of a value that a sentence repeats, at most."""
 
 
 def build(options: type[T], method: str, given: Mapping[str, Any], also: tuple[str, ...] = ()) -> T:
@@ -29,30 +38,34 @@ def build(options: type[T], method: str, given: Mapping[str, Any], also: tuple[s
 def one_of(name: str, value: Any, valid: Iterable[str]) -> None:
     """Raise ValueError unless the value is one of the valid ones, and list them."""
     valid = list(valid)
-    if value not in valid:
-        raise ValueError(f"unknown {name} {value!r}; choose one of: {', '.join(valid)}")
+    if not isinstance(value, str) or value not in valid:
+        raise ValueError(f"unknown {name} {shown(value)}; choose one of: {', '.join(valid)}")
 
 
 def true_or_false(name: str, value: Any) -> None:
     """Raise TypeError unless the value is True or False."""
     if not isinstance(value, bool):
-        raise TypeError(f"{name} must be True or False, not {value!r}")
+        raise TypeError(f"{name} must be True or False, not {shown(value)}")
 
 
-def whole(name: str, value: Any, least: int) -> None:
-    """Raise unless the value is an integer of at least `least`."""
+def whole(name: str, value: Any, least: int, most: float = MOST) -> None:
+    """Raise unless the value is an integer from `least` to `most`."""
     if isinstance(value, bool) or not isinstance(value, Integral):
-        raise TypeError(f"{name} must be an integer, not {value!r}")
+        raise TypeError(f"{name} must be an integer, not {shown(value)}")
     if value < least:
-        raise ValueError(f"{name} is {value}; give {least} or more")
+        raise ValueError(f"{name} is {number(value)}; give {least} or more")
+    if int(value) > most:
+        raise ValueError(f"{name} is {number(value)}; give {most} or fewer")
 
 
-def real(name: str, value: Any, least: float, *, above: bool = False) -> None:
-    """Raise unless the value is a finite number of at least (or above) `least`."""
+def real(name: str, value: Any, least: float, most: float = GREATEST, *, above: bool = False) -> None:
+    """Raise unless the value is a number from `least`, or above it, to `most`."""
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise TypeError(f"{name} must be a number, not {value!r}")
+        raise TypeError(f"{name} must be a number, not {shown(value)}")
     if not _finite(value) or value < least or (above and value == least):
-        raise ValueError(f"{name} is {value}; give a number {'above' if above else 'of at least'} {least}")
+        raise ValueError(f"{name} is {number(value)}; give a number {'above' if above else 'of at least'} {least}")
+    if float(value) > most:
+        raise ValueError(f"{name} is {number(value)}; give at most {most:g}")
 
 
 def unmasked(name: str, value: Any) -> None:
@@ -78,6 +91,24 @@ def real_array(name: str, value: Any) -> NDArray[Any]:
     return array
 
 
+def shown(value: Any) -> str:
+    """A value in one line, cut where it is long."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # an integer of thousands of digits
+        text = f"a value of type {type(value).__name__}"
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+
+
+def number(value: Any) -> str:
+    """A number, or what kind of number it is where it has too many digits."""
+    try:
+        text = str(value)
+    except ValueError:
+        return "a number of thousands of digits"
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+
+
 def _finite(value: Real) -> bool:
     try:
         return isfinite(value)
@@ -85,9 +116,11 @@ def _finite(value: Real) -> bool:
         return False
 
 
-def within_32_bits(shape: tuple[int, int], values: int) -> None:
-    """Raise unless so many values for each pixel of an output can be counted in 32 bits."""
-    if shape[0] * shape[1] * values >= 2**31:
-        raise ValueError(
-            f"an output of {shape[0]} rows x {shape[1]} columns is beyond 2**31 values; give a smaller size"
-        )
+def within_32_bits(shape: tuple[int, ...], values: int) -> None:
+    """Raise unless so many values for each pixel of an output, or voxel of a block, can be counted in 32 bits."""
+    if prod(shape) * values < 2**31:
+        return
+    size = " x ".join(str(side) for side in shape)
+    what = f"an output of {shape[0]} rows x {shape[1]} columns" if len(shape) == 2 else f"a block of {size}"
+    each = "" if values == 1 else f", {values} for each {'pixel' if len(shape) == 2 else 'voxel'}"
+    raise ValueError(f"{what} is beyond 2**31 values{each}; give a smaller size")

@@ -241,7 +241,10 @@ SOLID_SIZES = ["0", "4x5", "4x5x0", "4x5x6x7", "-3", "large", "1.5", "4,5,6"]
 PICTURES_ONLY = {"size 0", "suffix", "overwritten sample", "start in colour", "stages in the output's place"}
 BAD_SOLID = {name: case for name, case in BAD_PYRAMID.items() if name not in PICTURES_ONLY} | {
     **{f"size {text}": (["--size", text], f"size '{text}' is not DEPTHxHEIGHTxWIDTH") for text in SOLID_SIZES},
-    "beyond 2**31": (["--size", "700"], "a block of 700 x 700 x 700 is beyond 2**31 values; give a smaller size"),
+    "beyond 2**31": (
+        ["--size", "700"],
+        "a block of 700 x 700 x 700 is beyond 2**31 values, 8 for each voxel; give a smaller size",
+    ),
     "solids": (["--solids", "sum"], "choose one of: turns, average"),
     "slices": (["--slices", "some"], "choose one of: each, together"),
     "suffix": (["-o", "out.xyz"], "end its name in one of .npy, .npz"),

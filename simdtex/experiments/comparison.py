@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
-from math import isqrt
+from math import isfinite, isqrt
 from statistics import mean, stdev
 from typing import Any
 
@@ -171,10 +171,12 @@ class Entry:
         return any(run.met for run in self.runs)
 
     def figure(self, name: str) -> Spread | None:
-        """One of `FIGURES` over the seeds; None where a run has none of it."""
+        """One of `FIGURES` over the seeds; None where a run has none of it, or one that is not finite."""
         found = [run.figure(name) for run in self.runs]
         values = tuple(value for value in found if value is not None)
         if len(values) < len(found):
+            return None
+        if not all(map(isfinite, values)):  # of samples near the largest number: they have no mean
             return None
         return Spread(mean(values), stdev(values) if len(values) > 1 else None, values)
 

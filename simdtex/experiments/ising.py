@@ -9,13 +9,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import prod
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random, schedules
-from simdtex.machine import Machine
+from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.ising import heat_bath_chances, ising_commit, ising_relax, ising_sequence
@@ -26,6 +27,9 @@ STARTS = ("up", "random")
 
 AT_ONCE = 2**22
 """Relaxations in one launch at most, so that none is long."""
+
+HOST, MEASURED = 24, 40
+"""Bytes on the host for each spin, and for each chain and sweep (benchmarks/memory.py)."""
 
 QUEUE = 2**16
 """Steps in one launch of `ising_sequence` at most: one work-item does them all."""
@@ -136,7 +140,8 @@ def ising(
     host, and 32 there per chain and sweep.
     """
     check(size, temperatures, seeds, sweeps, burn_in, boundary, start)
-    machine.require(3 * size[0] * size[1] * seeds * len(temperatures))
+    chains = seeds * len(temperatures)
+    memory.require(machine, 3 * prod(size) * chains, HOST * prod(size) * chains + MEASURED * sweeps * chains)
     began, launches = time.perf_counter(), machine.launches
     schedule = schedules.get(schedule)
     grid, offsets = Grid(*size, torus=boundary == "torus"), neighbourhood_offsets(1)

@@ -14,6 +14,9 @@ import numpy as np
 CRITICAL = 2 / log(1 + sqrt(2))
 """T_c = 2 / ln(1 + sqrt(2)) = 2.269..., in units of J / k_B."""
 
+COLDEST, HOTTEST = 1e-6, 1e6
+"""Below the first nothing moves any more; above the second 1 / T is lost in sums of order 1."""
+
 FROZEN = 20.0
 """From this coupling on the energy is -2 to the last bit: the first excitation weighs exp(-8 K)."""
 
@@ -24,7 +27,7 @@ def onsager_energy(temperature: float) -> float:
     Parameters
     ----------
     temperature : float
-        Above 0.
+        Above 0, at most 1e6.
 
     Returns
     -------
@@ -48,7 +51,7 @@ def torus_energy(temperature: float, rows: int, cols: int) -> float:
     Parameters
     ----------
     temperature : float
-        Above 0.
+        Above 0, at most 1e6.
     rows, cols : int
         2 or more. Between two sites that are neighbours both ways around (a side of 2) there are two bonds.
 
@@ -134,4 +137,6 @@ def correlation_length(temperature: float) -> float:
 def _coupling(temperature: float) -> float:
     if not temperature > 0:
         raise ValueError(f"temperature {temperature} is none; give a number above 0, say 2.0")
-    return 1 / temperature
+    if temperature > HOTTEST:
+        raise ValueError(f"temperature {temperature} is too high; give a number of at most {HOTTEST:g}, say 2.0")
+    return 1 / max(temperature, COLDEST)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from math import ceil, log2
+from math import ceil, log2, prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,14 +16,14 @@ from simdtex.checkpoints.keep import Keep
 from simdtex.envelope import begin, executed
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_mask, check_samples, masked_in
-from simdtex.machine import Machine
+from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures, unknown_in
 from simdtex.model.sample import NothingUsable
-from simdtex.options import whole
+from simdtex.options import whole, within_32_bits
 from simdtex.run import Callback, Output
 
 OF_HOLES: dict[str, Any] = {"boundary": "open", "balance": 0.0, "novelty": 0.0, "chance": 16, "data_weight": 4.0}
@@ -37,6 +37,9 @@ REACH = 128
 
 LEAST = 16
 """Candidates at the coarsest level of a hole, at least: what is known around it tells the layout."""
+
+GIVEN = 100
+"""Bytes on the host for each pixel of what is extended, with what is known of it, at least."""
 
 FEW = 16
 """Windows that are made one by one; where holes are in more places, one window holds them all."""
@@ -254,7 +257,10 @@ def extend(
         raise ValueError("there is nothing to add; give top, bottom, left or right, or tile=True")
     width = min(64, max(8, min(rows, cols) // 8)) if band is None else band
     whole("band", width, 1)
-    canvas = np.zeros((top + rows + bottom, left + cols + right, pixels.shape[2]), pixels.dtype)
+    shape = (top + rows + bottom, left + cols + right, pixels.shape[2])
+    within_32_bits(shape[:2], 1)
+    memory.require_host(prod(shape[:2]) * GIVEN + 2 * prod(shape) * pixels.dtype.itemsize)
+    canvas = np.zeros(shape, pixels.dtype)
     canvas[top : top + rows, left : left + cols] = pixels
     hole = np.ones(canvas.shape[:2], bool)
     across, along = (width if wide and not (left or right) else 0), (width if tall and not (top or bottom) else 0)

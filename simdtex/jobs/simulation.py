@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib.metadata import version
+from math import prod
 from pathlib import Path
 from queue import SimpleQueue
 from threading import Lock
@@ -21,9 +22,9 @@ from simdtex.checkpoints.tree import digest
 from simdtex.envelope import begin, check_shape, restored
 from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
 from simdtex.jobs.inputs import Inputs, check_array, check_inputs, check_samples
-from simdtex.machine import Machine, open_machine
+from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
-from simdtex.options import whole
+from simdtex.options import whole, within_32_bits
 from simdtex.run import Callback, Simulating
 
 if TYPE_CHECKING:
@@ -115,13 +116,17 @@ def simulate(
     whole("first", first, 0)
     if jobs is not None:
         whole("jobs", jobs, 1)
+    if shape is not None:
+        within_32_bits(check_shape(shape), 1)
     data, size = _hard(hard, shape, check_samples(training, channel_axis, mask).pixels[0], channel_axis)
     inputs = check_inputs(training, size, channel_axis, mask, data, None, guide)
     chosen = mrf.make_options(**DEFAULTS | options)
     begun = begin("simulate", rng, lambda: {"shape": size, "n": n, "first": first, "options": chosen, **inputs.told()})
     seed = begun.seed
-    seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
     pixels = inputs.pictures.pixels[0]
+    each = 2 * prod((*size, pixels.shape[2])) * pixels.dtype.itemsize  # they are copied once
+    memory.require_host(n * (each + 64))
+    seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
     made = np.empty((n, *size, pixels.shape[2]), pixels.dtype)
     machines = _machines(device, jobs, n)
     shelf, lock = _Shelf(begun.on(machines[0].name), made), Lock()

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.model.lattice import Grid
-from simdtex.options import one_of
+from simdtex.options import one_of, shown
 
 MAPPINGS = ("cut-and-stack", "hierarchical")
 
@@ -140,9 +140,12 @@ def parse_array(text: str, mapping: str = "cut-and-stack") -> ProcessorArray:
     ValueError
         The text is neither.
     """
+    text = text if isinstance(text, str) else shown(text)
     sides = re.fullmatch(r"([1-9]\d{0,4})x([1-9]\d{0,4})", str(text))
     if str(text) not in ARRAYS and not sides:
-        raise ValueError(f"unknown array {text!r}; give rows x columns such as 128x128, or one of: {', '.join(ARRAYS)}")
+        raise ValueError(
+            f"unknown array {shown(text)}; give rows x columns such as 128x128, or one of: {', '.join(ARRAYS)}"
+        )
     rows, cols = (int(sides[1]), int(sides[2])) if sides else ARRAYS[str(text)]
     if rows * cols > LARGEST:
         raise ValueError(f"an array of {text} PEs is beyond {LARGEST}; give a smaller one, say 128x128")

@@ -11,6 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.options import number
+
+MOST_ORDER = 4096
+"""The largest order of a neighbourhood: 64 pixels to each side, 12852 neighbours."""
+
 
 def neighbourhood_offsets(order: int) -> NDArray[np.int32]:
     """Offsets r - s of the neighbourhood of an order, equation (3).
@@ -18,7 +23,7 @@ def neighbourhood_offsets(order: int) -> NDArray[np.int32]:
     Parameters
     ----------
     order : int
-        o >= 1: the neighbours are the sites within the distance sqrt(o).
+        o, 1 to `MOST_ORDER`: the neighbours are the sites within the distance sqrt(o).
 
     Returns
     -------
@@ -37,11 +42,13 @@ def neighbourhood_offsets(order: int) -> NDArray[np.int32]:
 
 
 def check_order(order: Any) -> None:
-    """Raise unless `order` is an integer from 1 up."""
+    """Raise unless `order` is an integer from 1 to `MOST_ORDER`."""
     if isinstance(order, bool) or not isinstance(order, (int, np.integer)):
         raise TypeError(f"order must be an integer, not {type(order).__name__}")
     if order < 1:
-        raise ValueError(f"order {order} has no neighbours; give 1 (4 neighbours) or more, say 8 or 18")
+        raise ValueError(f"order {number(order)} has no neighbours; give 1 (4 neighbours) or more, say 8 or 18")
+    if order > MOST_ORDER:
+        raise ValueError(f"order is {number(order)}; give {MOST_ORDER} or less, say 8 or 18")
 
 
 LATTICE = np.dtype(

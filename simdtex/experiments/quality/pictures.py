@@ -13,6 +13,9 @@ from simdtex.io.image import check_sample
 Array = NDArray[Any]
 Planes = NDArray[np.float32]
 
+HUGE, SMALLER = 2.0**500, 2.0**1000
+"""Values above the first are divided by the second, since no float holds their squares; figures have no unit."""
+
 
 def as_planes(array: ArrayLike) -> Array:
     """A picture as (rows, cols, channels), checked."""
@@ -48,7 +51,15 @@ def as_pair(sample: ArrayLike, output: ArrayLike, side: int, *, keep_type: bool 
             )
     if keep_type:
         return first, second
-    return first.astype(np.float64), second.astype(np.float64)
+    first, second = moderate(first, second)
+    return first, second
+
+
+def moderate(*pictures: Array) -> tuple[Array, ...]:
+    """Pictures in double precision, in a larger unit where no float would hold the squares of their values."""
+    largest = max(float(np.abs(planes, dtype=np.float64).max()) for planes in pictures)
+    unit = SMALLER if largest > HUGE else 1.0
+    return tuple(planes.astype(np.float64) / unit for planes in pictures)
 
 
 def spread(planes: Array) -> float:

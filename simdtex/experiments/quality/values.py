@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import median_filter
 
-from simdtex.experiments.quality.pictures import Array, as_pair, as_planes, deviation, spread
+from simdtex.experiments.quality.pictures import Array, as_pair, as_planes, deviation, moderate, spread
 
 ODD = 0.005  # share of the sample's pixels that count as odd
 BLOCK = 16  # side of the blocks of the coarse scale, pixels
@@ -71,6 +71,7 @@ def seam(output: ArrayLike) -> float:
     planes = as_planes(output).astype(np.float64)
     if min(planes.shape[:2]) < 2:
         raise ValueError("the output is less than 2 pixels wide or high: give at least 2 x 2")
+    (planes,) = moderate(planes)
     return float(np.mean([_seam_along(planes, axis) for axis in (0, 1)]))
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from simdtex import schedules
 from simdtex.maspar.array import parse_array
 from simdtex.model.lattice import check_order
 from simdtex.model.pictures import Pictures
-from simdtex.options import build, one_of, real, true_or_false, whole
+from simdtex.options import build, one_of, real, shown, true_or_false, whole
 
 PRESETS: dict[str, dict[str, Any]] = {
     "default": {},
@@ -46,6 +45,12 @@ CATEGORIES = 16
 FINISH = 1.5
 """The default standard deviation of the finish, pixels."""
 
+NARROWEST, WIDEST = 0.01, 16.0
+"""The least and the largest standard deviation of a finish."""
+
+SIMILAR, CHANCE = 64, 4096
+"""The most of the candidates that a search by coherence weighs for each suggestion, and at random."""
+
 
 @dataclass(frozen=True)
 class Options:
@@ -54,7 +59,7 @@ class Options:
     Parameters
     ----------
     order : int
-        o of equation (3): neighbours within the distance sqrt(o).
+        o of equation (3): neighbours within the distance sqrt(o); 1 to 4096.
     levels : int, optional
         M of Algorithm 1. None: the most levels at which the sample still has `overview` candidates, and the output's
         lattice a whole neighbourhood.
@@ -64,7 +69,7 @@ class Options:
     relaxation : {"icm", "gibbs"}
         Take the LCPDF's mode, or draw from it.
     bandwidth : float
-        h in units of h_opt, equation (8).
+        h in units of h_opt, equation (8); above 0.
     coherence : float
         The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence.
     balance : float
@@ -81,7 +86,7 @@ class Options:
     finish : float, optional
         Each output pixel is the mean of what its neighbours' sources say of it, with Gaussian weights of this
         standard deviation, pixels; 0: it is its own source's. None: 1.5, but 0 where a sample has 16 different pixels
-        or fewer, since a mean of categories is none of them, and with ``pixel="density"``.
+        or fewer, since a mean of categories is none of them, and with ``pixel="density"``. 0.01 to 16, or 0.
     xi : float
         xi < 0 of equation (13): the further below 0, the fewer sweeps.
     free_sweeps : int
@@ -117,9 +122,10 @@ class Options:
     suggesting : int
         ``coherent``: nearest neighbours whose sources suggest a candidate each.
     similar : int
-        ``coherent``: candidates more for each of these, those whose neighbourhoods in the sample are most like its own.
+        ``coherent``: candidates more for each of these, those whose neighbourhoods in the sample are most like its own;
+        64 or fewer.
     chance : int
-        ``coherent``: candidates at random.
+        ``coherent``: candidates at random, 4096 or fewer.
     exhaustive : int
         ``coherent``: a level with so many candidates or fewer weighs them all.
     emulate : bool
@@ -146,6 +152,10 @@ class Options:
     unsure : float
         Where a sample is not known everywhere: the share of a candidate's neighbours that may be unknown, 0 to 1. These
         are taken to be as the nearest known pixel.
+
+    Notes
+    -----
+    Where no other range is said, numbers are 0 to 1e6, and whole numbers 2**31 - 1 or less.
     """
 
     order: int = 18
@@ -197,8 +207,10 @@ class Options:
         real("structure", self.structure, 0)
         real("novelty", self.novelty, 0)
         if self.finish is not None:
-            real("finish", self.finish, 0)
-        real("xi", self.xi, -inf)
+            real("finish", self.finish, 0, WIDEST)
+            if 0 < self.finish < NARROWEST:
+                raise ValueError(f"finish is {self.finish}; give 0, or a number of at least {NARROWEST}")
+        real("xi", self.xi, -1e6)
         if self.xi >= 0:
             raise ValueError(f"xi is {self.xi}; give a number below 0")
         whole("free_sweeps", self.free_sweeps, 0)
@@ -209,8 +221,8 @@ class Options:
         one_of("boundary", self.boundary, ("torus", "open"))
         one_of("search", self.search, ("auto", "exact", "coherent"))
         whole("suggesting", self.suggesting, 1)
-        whole("similar", self.similar, 0)
-        whole("chance", self.chance, 0)
+        whole("similar", self.similar, 0, SIMILAR)
+        whole("chance", self.chance, 0, CHANCE)
         whole("exhaustive", self.exhaustive, 0)
         if (self.search, self.relaxation, self.pixel) == ("coherent", "icm", "density"):
             raise ValueError(
@@ -225,13 +237,15 @@ class Options:
         real("guide_weight", self.guide_weight, 0)
         if self.labels is not None:
             true_or_false("labels", self.labels)
-        real("unsure", self.unsure, 0)
+        real("unsure", self.unsure, 0, 1)
         lists = {"weights": self.weights, "shares": self.shares, "proportions": self.proportions}
         for name, value in lists.items():
             _numbers(name, value)
         if not isinstance(self.categorical, bool):
             if not isinstance(self.categorical, tuple) or not self.categorical:
-                raise TypeError(f"categorical must be True, False or a tuple of channels, not {self.categorical!r}")
+                raise TypeError(
+                    f"categorical must be True, False or a tuple of channels, not {shown(self.categorical)}"
+                )
             for channel in self.categorical:
                 whole("a channel of categorical", channel, 0)
         if self.pixel == "density" and (self.categorical or self.weights):
@@ -287,7 +301,7 @@ def _numbers(name: str, value: Any) -> None:
     if value is None:
         return
     if not isinstance(value, tuple) or not value:
-        raise TypeError(f"{name} must be a tuple of numbers, not {value!r}")
+        raise TypeError(f"{name} must be a tuple of numbers, not {shown(value)}")
     for number in value:
         real(f"one of {name}", number, 0)
     if not any(value):

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.checkpoints.keep import NOTHING, Keep
+from simdtex.machine import memory
 from simdtex.machine.interface import Machine
 from simdtex.maspar.array import parse_array
 from simdtex.methods.mrf.algorithm import anneal
@@ -79,7 +80,9 @@ def synthesize(
     6 candidates, the exact search all of the level; the structure channel is a channel more. Memory on the device, in
     bytes: 18 + 2 channels per output pixel (24 + 4 channels with the schedule ``block``), 14 channels + 4 similar + 159
     per pixel of the sample with its margin, and the machine's scratch memory or, if that is more, 65 per candidate. On
-    the host: about 50 per output pixel.
+    the host, where a CPU's device memory is too: 84 per output pixel (100 with ``block``) and 10 + 1.5 n for each of
+    its channels, n the bytes of a value of the sample, and 64 per pixel of the sample (benchmarks/memory.py). Both are
+    asked for first.
     """
     launches, worked = machine.launches, machine.seconds
     run = laid_out(machine, pixels, shape, options, seed, given, guide)
@@ -174,5 +177,6 @@ def finished(
 def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], similar: int, copies: int) -> None:
     pixels, channels = shape[0] * shape[1], len(sample.working)
     within_32_bits(shape, channels * copies)
-    field = copies * (6 + 2 * channels)
-    machine.require(pixels * (12 + field) + sample.rows * sample.cols * (14 * channels + 159 + 4 * similar))
+    field, held = copies * (6 + 2 * channels), sample.rows * sample.cols
+    host = pixels * (68 + 16 * copies + channels * (10 + 3 * sample.pixels.dtype.itemsize // 2)) + 64 * held
+    memory.require(machine, pixels * (12 + field) + held * (14 * channels + 159 + 4 * similar), host)

@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoints.keep import NOTHING, Keep
-from simdtex.machine import Machine
+from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.multires.analysis import Analysis, analyse
 from simdtex.model.use import effective_use
 from simdtex.ops.candidates import Sampled, Structure, candidates
 from simdtex.ops.laplacian import beside, laplacian_blend, laplacian_collapse, within
-from simdtex.options import build, one_of, real, unmasked, whole, within_32_bits
+from simdtex.options import build, one_of, real, shown, unmasked, whole, within_32_bits
 from simdtex.run import Callback, Output, Sampling, Stage, device_seconds, paced
 
 ANY = 2**32 - 1
@@ -39,6 +39,9 @@ LAUNCH = 4e8
 
 WIDEST = 100
 """The largest sigma; a filter of one far narrower does not know it from a larger one."""
+
+DIRECTIONS, FILTER = 64, 101
+"""The most orientations, and the largest filters: any more are alike, or larger than the levels they are for."""
 
 STEPS, MOST = 100, 4
 """`suggest_alpha` tries the multiples of 1/100 up to 4 for a target."""
@@ -74,11 +77,12 @@ class Options:
         T itself, in place of alpha and beta: one row for each level but the finest, the lowest frequency first; one
         column for all features or one for each.
     orientations : int
-        Of the first and of the second derivatives of a Gaussian in the filter bank (7); 0 leaves the bands alone.
+        Of the first and of the second derivatives of a Gaussian in the filter bank (7), 64 or fewer; 0 leaves the bands
+        alone.
     sigma : float
         Of that Gaussian, in pixels; 0.2 to 100.
     filter_size : int
-        Rows and columns of the filters; odd. A level smaller than that has no responses.
+        Rows and columns of the filters; odd, 3 to 101. A level smaller than that has no responses.
     features : {"luminance", "channels"}
         Whether features are made of the luminance or of every channel. Bands are copied with all their channels.
     levels : int, optional
@@ -115,18 +119,16 @@ class Options:
         """Check every value."""
         if isinstance(self.alpha, str):
             if self.alpha != "auto":
-                raise ValueError(f"alpha is {self.alpha!r}; give a number of at least 0, or 'auto'")
+                raise ValueError(f"alpha is {shown(self.alpha)}; give a number of at least 0, or 'auto'")
         elif not (isinstance(self.alpha, Real) and self.alpha == inf):
-            real("alpha", self.alpha, 0)
+            real("alpha", self.alpha, 0, inf)
         real("beta", self.beta, 0)
         real("strain", self.strain, 0)
         if self.target is not None:
-            real("target", self.target, 1)
-        whole("orientations", self.orientations, 0)
-        real("sigma", self.sigma, 0.2)
-        if self.sigma > WIDEST:
-            raise ValueError(f"sigma is {self.sigma}; give at most {WIDEST}")
-        whole("filter_size", self.filter_size, 3)
+            real("target", self.target, 1, 2**31)
+        whole("orientations", self.orientations, 0, DIRECTIONS)
+        real("sigma", self.sigma, 0.2, WIDEST)
+        whole("filter_size", self.filter_size, 3, FILTER)
         if self.filter_size % 2 == 0:
             raise ValueError(f"filter_size is {self.filter_size}; give an odd number, 3 or 5")
         one_of("features", self.features, ("luminance", "channels"))
@@ -325,6 +327,7 @@ def synthesize(
     """Both phases: `analyse`, then `resample`, which says what comes in and out."""
     began, worked = perf_counter(), machine.seconds
     within_32_bits(shape, max(VALUES, sample.shape[-1]))  # before any work
+    memory.require_host(_on_host(shape, sample.shape[-1], sample.dtype.itemsize))
     analysis = analyse(machine, sample, **options.analysis)
     image, output = resample(machine, analysis, shape, options, seed, callback, keep)
     output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
@@ -369,13 +372,15 @@ def resample(
     -----
     A level is one step: no pixel depends on another of its level. Cost: for every four pixels at most the nodes above
     them, times the features; some thousandths of that at usual thresholds. Memory on the device, in bytes per output
-    pixel: 20 + 5.3 channels, beside the analysis; on the host about 50 + 5 channels.
+    pixel: 20 + 5.3 channels, beside the analysis; on the host, where a CPU's device memory is too, 66 and 4 + n for
+    each channel, n the bytes of a value of the sample (benchmarks/memory.py). Both are asked for first.
     """
     began, worked = perf_counter(), machine.seconds
     channels = len(analysis.sample.planes)
     within_32_bits(shape, max(VALUES, channels))
     shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
-    machine.require(pixels(shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis))
+    on_device = pixels(shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis)
+    memory.require(machine, on_device, _on_host(shape, channels, analysis.sample.pixels.dtype.itemsize))
     kept = keep.found
     alpha = _alpha(machine, analysis, options) if kept is None else kept["alpha"]
     structure = _structure(machine, analysis, thresholds(analysis.levels, options, alpha))
@@ -587,6 +592,11 @@ def _check_thresholds(table: ArrayLike) -> None:
         raise ValueError(f"thresholds has shape {values.shape}; give one row for each level but the finest")
     if not (values >= 0).all():
         raise ValueError("thresholds must be numbers of at least 0")
+
+
+def _on_host(shape: tuple[int, int], channels: int, itemsize: int) -> int:
+    """Bytes on the host of an output with its stages."""
+    return prod(shape) * (66 + channels * (4 + itemsize))
 
 
 def _held(analysis: Analysis) -> int:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.machine import Machine
+from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.multires.mend import mend
 from simdtex.model.stretched import Stretched
@@ -118,8 +118,7 @@ def analyse(
     """
     rows, cols, channels = pixels.shape
     seen = 1 if features == "luminance" else channels  # planes that features are made of
-    taps = bank(orientations, sigma, filter_size)
-    width = seen * (1 + len(taps))
+    width = seen * (1 + 2 * orientations)
     if rows * cols * max(width, channels) >= 2**31:
         raise ValueError(
             f"a sample of {rows} rows x {cols} columns with {width} features is beyond 2**31 values; give a smaller one"
@@ -129,14 +128,15 @@ def analyse(
     if edges == "mend":
         sample = Stretched(pixels.reshape(-1, channels)[place])
     shapes = _level_shapes((rows, cols), levels)
-    machine.require(rows * cols * (16 * (channels + (seen < channels)) + 3 * width))
+    fits = [min(shape) >= filter_size for shape in shapes]
+    taps = bank(orientations, sigma, filter_size if any(fits[1:]) else 3)  # of no level, they are left out
+    memory.require(machine, rows * cols * (16 * (channels + (seen < channels)) + 3 * width))
 
     gaussian, bands = pyramid(machine, machine.put(sample.planes), len(shapes), torus)
     guide = gaussian, bands
     if seen < channels:
         guide = pyramid(machine, machine.put(sample.luminance), len(shapes), torus)
     measured, energy = [np.zeros((0 if len(shapes) > 1 else 1, width), np.int32)], [np.zeros(width)]
-    fits = [min(shape) >= filter_size for shape in shapes]
     for level in range(1, len(shapes)):
         responses = machine.put(taps if fits[level] else np.zeros_like(taps))  # 0 otherwise, (7)
         measured.append(machine.get(filters(machine, guide[0][level], guide[1][level], responses, torus)))

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoints.keep import NOTHING, Keep
-from simdtex.machine import Machine
+from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.pyramid.histograms import Histograms, histograms
 from simdtex.methods.pyramid.palette import Decorrelated, Palette, decorrelated, palette
@@ -39,6 +39,9 @@ VALUES = 8
 
 MEMORY = 160
 """Bytes for each pixel of a picture on the device, at most (measured by benchmarks/pyramid_cost.py)."""
+
+HOST = 12, 35, 2
+"""Bytes for each pixel on the host: at all, for each channel, and for each byte of these (benchmarks/memory.py)."""
 
 MATCHING = 200
 """What a value's sort and match cost, about, in multiply-adds: when to wait for the device."""
@@ -246,7 +249,7 @@ def number_of_levels(options: Options, *sides: int) -> int:
 
 def analyse(machine: Machine, sample: NDArray[Any], options: Options, *pyramids: Transform) -> Texture:
     """The histograms of a sample (rows, cols, channels): analysis-pyr of every decorrelated channel."""
-    machine.require(prod(sample.shape[:2]) * MEMORY)
+    memory.require(machine, prod(sample.shape[:2]) * MEMORY)
     stretched = Stretched(sample)
     colours = palette([stretched.planes], [1.0], options.color == "decorrelate")
     scale = decorrelated([stretched.planes], [colours])
@@ -288,7 +291,7 @@ def synthesize_from(
 ) -> tuple[NDArray[Any], Output]:
     """A picture of a texture whose histograms are known, see `match_texture`."""
     within_32_bits(shape, max(VALUES, len(texture.histograms)))
-    machine.require(prod(shape) * MEMORY)
+    check_memory(machine, shape, texture, MEMORY)
     pyramid = transform(machine, options, levels, torus=True)
 
     def turn(picture: Array, wanted: list[Wanted], matcher: Matcher, tell: Callable[[float], None]) -> Array:
@@ -297,6 +300,13 @@ def synthesize_from(
         return pyramid.collapse(matched)  # Collapse-Pyramid(synthesis-pyr)
 
     return match_texture(machine, texture, shape, turn, options, levels, seed, callback, keep)
+
+
+def check_memory(machine: Machine, shape: tuple[int, ...], texture: Texture, on_device: int) -> None:
+    """Raise where an output takes more memory than there is, so many bytes for each pixel on the device."""
+    each, channel, byte = HOST
+    host = each + len(texture.histograms) * (channel + byte * texture.stretched.pixels.dtype.itemsize)
+    memory.require(machine, prod(shape) * on_device, prod(shape) * host)
 
 
 def match_subbands(
@@ -350,6 +360,11 @@ def match_texture(
         In the sample's type.
     output : simdtex.run.Output
         Statistics: how far the histograms of each iteration were from the sample's.
+
+    Notes
+    -----
+    Memory in bytes per pixel: 160 on the device (240 per voxel of a block); on the host, where a CPU's device memory is
+    too, 12 + (35 + 2 n) channels, n the bytes of a value of the sample. Both are asked for before the run.
     """
     began, worked = perf_counter(), machine.seconds
     matcher = Matcher(machine, options, seed)

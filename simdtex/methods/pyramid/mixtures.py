@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex.checkpoints.keep import Keep
 from simdtex.envelope import begin, check_shape, executed, with_channels_last
 from simdtex.io.image import check_sample
-from simdtex.machine import Machine
+from simdtex.machine import Machine, memory
 from simdtex.methods.pyramid import algorithm as pyramid
 from simdtex.methods.pyramid.histograms import Histograms, Sorted, averaged, histograms, spliced
 from simdtex.methods.pyramid.palette import decorrelated
@@ -154,7 +154,7 @@ class _Blender:
     ) -> None:
         self._weights = weights
         self._used = [i for i, weight in enumerate(weights) if weight]
-        machine.require(max(p.shape[0] * p.shape[1] for p in pictures) * pyramid.MEMORY)
+        memory.require(machine, max(p.shape[0] * p.shape[1] for p in pictures) * pyramid.MEMORY)
         together = np.concatenate([p.reshape(-1, 1, p.shape[-1]) for p in pictures])
         self._stretched = Stretched(together)
         planes = _parted(self._stretched.planes, pictures)

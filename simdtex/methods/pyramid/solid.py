@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.checkpoints.keep import NOTHING, Keep
-from simdtex.machine import Machine
+from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.pyramid import algorithm as pyramid
 from simdtex.methods.pyramid.algorithm import (
@@ -26,13 +26,14 @@ from simdtex.methods.pyramid.algorithm import (
     Matcher,
     Wanted,
     analyse,
+    check_memory,
     match_subbands,
     match_texture,
     number_of_levels,
     transform,
 )
 from simdtex.ops.solid import solid_band, solid_collapse, solid_mean, solid_reduce, solid_turn
-from simdtex.options import build, one_of
+from simdtex.options import build, one_of, within_32_bits
 from simdtex.run import Callback, Output, device_seconds
 
 FAMILIES = {"x-y": ((0, 1, 2), (0, 1, 2)), "x-z": ((1, 0, 2), (1, 0, 2)), "y-z": ((2, 0, 1), (1, 2, 0))}
@@ -111,15 +112,14 @@ def synthesize(
     Cost: 5000 multiply-adds and 25 sorted values for every voxel, channel and iteration, with four orientations.
     """
     began, worked = perf_counter(), machine.seconds
-    if prod(shape) * max(VALUES, sample.shape[-1]) >= 2**31:
-        size = " x ".join(str(n) for n in shape)
-        raise ValueError(f"a block of {size} is beyond 2**31 values; give a smaller size")
-    machine.require(prod(shape) * MEMORY)
+    within_32_bits(shape, max(VALUES, sample.shape[-1]))
+    memory.require(machine, prod(shape) * MEMORY)  # before any work
     levels, oriented = number_of_levels(options, *shape, *sample.shape[:2]), options.pyramid == "steerable"
     wrap = options.edges == "wrap"
     flat = transform(machine, replace(options, pyramid="laplacian"), levels, wrap)
     steerable = [transform(machine, options, levels, wrap)] if oriented else []
     texture = analyse(machine, sample, options, flat, *steerable)
+    check_memory(machine, shape, texture, MEMORY)
     slices = transform(machine, options, levels, torus=True)
 
     def turn(block: Array, wanted: list[Wanted], matcher: Matcher, tell: Callable[[float], None]) -> Array:

@@ -1,0 +1,373 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Command lines and files, drawn from a seed: what `simdtex` may be given, and what nobody should give it."""
+
+import random
+import re
+from base64 import b64decode, b64encode
+from dataclasses import asdict, dataclass, field
+from functools import cache
+
+import click
+
+from fuzz import corpus
+from simdtex.cli import load
+
+COMMANDS = {
+    "synth": 48,
+    "fill": 12,
+    "extend": 6,
+    "simulate": 8,
+    "solid": 8,
+    "mix": 8,
+    "ising": 6,
+    "sheet": 1,
+    "schedules": 0.1,
+    "devices": 0.1,
+    "demo": 0.05,
+    "bench": 0.05,
+    "": 0.2,
+    "nothing": 0.1,
+}
+"""How often each is tried; reports and their plots take long, so commands that always write one are rare."""
+
+WHOLE = (0, -1, 2**31 - 1, 2**31, 2**32, 2**63, 2**64, 10**30, -(2**31), -(2**63) - 1, "", "nan", "1.5", "x", "0x10")
+REAL = (0, -1, -0.0, "nan", "inf", "-inf", 1e308, -1e308, 1e-320, 5e-324, 2**31, 2**63, "1e999", "", "x", "1,5", 1e-30)
+TEXT = ("", " ", "x", "-", "--", "nan", "\u00d7", "\U0001f4a9", "a" * 5000, "\n", "%s", "{0}", "../x", "\udc80", "0")
+SIZES = (
+    "0x0",
+    "",
+    "x",
+    "5",
+    "1x1",
+    "2x9",
+    "100000x100000",
+    "46341x46341",
+    "1e3x4",
+    "-4x4",
+    "4x",
+    "999999999999x1",
+    "3x3x3",
+)
+
+MODEST = {
+    **dict.fromkeys(("order",), (1, 2, 4)),
+    **dict.fromkeys(("levels", "orientations", "iterations", "free_sweeps", "split"), (1, 2, 4)),
+    **dict.fromkeys(("similar", "chance", "suggesting", "overview", "exhaustive"), (0, 1, 4, 64)),
+    **dict.fromkeys(("left", "right", "top", "bottom", "band", "reach"), (0, 1, 3)),
+    **dict.fromkeys(("seeds", "sweeps"), (2, 3)),
+    **dict.fromkeys(("burn_in", "number", "jobs", "first"), (0, 1, 2)),
+    "filter_size": (3, 5),
+    "bins": (2, 16, 256),
+    "seed": (0, 1, 2**63),
+    "xi": (-1, -0.5, -5),
+    "sigma": (0.5, 0.7, 2),
+}
+"""Values that make sense on pictures of ten pixels a side; other numbers are small ones."""
+
+CHOICES = {
+    "relaxation": ("icm", "gibbs"),
+    "pixel": ("source", "density"),
+    "phases": ("all", "decimated"),
+    "coarsest": ("gibbs", "same"),
+    "search": ("auto", "exact", "coherent"),
+    "boundary": ("torus", "open"),
+    "features": ("luminance", "channels"),
+    "phase": ("match", "free"),
+    "joins": ("blend", "cut"),
+    "pyramid": ("steerable", "laplacian"),
+    "match": ("rank", "lookup"),
+    "color": ("decorrelate", "channels"),
+    "mapping": ("cut-and-stack", "hierarchical"),
+    "array": ("4x4", "maspar-mp1-1k", "2x3"),
+    "schedule": ("coloring", "luby", "checkerboard", "synchronous", "random-subset:0.5", "raster", "block:2x2"),
+    "names": ("coloring", "luby,raster", "block:2x2", "random-scan"),
+    "solids": ("turns", "average"),
+    "slices": ("together", "each"),
+    "blend": ("histograms", "quantiles"),
+    "pixels": ("palette", "pattern"),
+    "preset": ("default", "paper"),
+    "alpha": ("0", "0.3", "auto"),
+    "start": ("up", "random"),
+    "categorical_channels": ("0", "0,1", "2"),
+}
+"""Words that mean something to an option; those of ``--edges`` are the method's."""
+
+EDGES = {"multires": ("mend", "keep"), "pyramid": ("reflect", "wrap"), "mrf": ("auto", "reflect", "whole")}
+
+LONG = ("free_sweeps", "iterations", "sweeps", "burn_in", "number", "seeds")
+"""Counts of what is done one after another: whoever asks for a milliard is served, so no try does."""
+
+DEEP = {"synth": 0.6, "sheet": 0.8, "schedules": 0.7, "demo": 0.2, "bench": 0.0}
+"""Share of tries with options that make sense alone."""
+
+OUTPUTS = {
+    "solid": ("out.npz", "out.npy", "out.nrrd", "out.tif", "out", "out.png", "out.xyz"),
+    "simulate": ("out.zarr", "out.zarr.zip", "out.nc", "out.npz", "out.png", "out"),
+    "": ("out.npy", "out.tif", "out.png", "out.webp", "out.jpg", "out.bmp", "out.gif", "out.ppm", "out.xyz"),
+}
+
+
+@dataclass
+class Try:
+    """What a command is given.
+
+    ``args`` of ``simdtex``; ``files`` name -> bytes, in the folder it runs in; ``kind`` what is unusual about it;
+    ``old`` names of files that are there and may be replaced; ``interrupt`` seconds after which it gets a Ctrl-C;
+    ``fault`` the number of the call to the system that fails, and how.
+    """
+
+    args: list[str]
+    files: dict[str, bytes] = field(default_factory=dict)
+    kind: str = "plain"
+    old: list[str] = field(default_factory=list)
+    interrupt: float | None = None
+    fault: tuple[str, int, str] | None = None
+
+    def as_json(self):
+        return asdict(self) | {"files": {name: b64encode(data).decode() for name, data in self.files.items()}}
+
+    @classmethod
+    def from_json(cls, found):
+        files = {name: b64decode(data) for name, data in found["files"].items()}
+        return cls(**found | {"files": files, "fault": found["fault"] and tuple(found["fault"])})
+
+
+@cache
+def seeds():
+    """The corpus."""
+    return corpus.build()
+
+
+@cache
+def everything():
+    """The files of the corpus, for splices."""
+    return [data for files in seeds().values() for data in files.values() if len(data) < 10**5]
+
+
+@cache
+def _command(name):
+    return load(name)
+
+
+def made(seed, number):
+    """The try of a number under a seed; the same on every call."""
+    return _Maker(random.Random(f"{seed}-{number}")).make()
+
+
+class _Maker:
+    def __init__(self, rng):
+        self.rng, self.files, self.kinds = rng, {}, set()
+
+    def make(self):
+        rng = self.rng
+        name = rng.choices(list(COMMANDS), list(COMMANDS.values()))[0]
+        if name in ("", "nothing"):
+            return Try([word for word in (name, *rng.choices(TEXT, k=rng.randrange(3))) if word], kind="no command")
+        args = [name, *self.line(_command(name), name)]
+        if rng.random() < 0.03:
+            args.insert(rng.randrange(len(args) + 1), rng.choice((*TEXT, "--help", "-o", "--nothing", "-q", "--size")))
+            self.kinds.add("odd words")
+        interrupt = rng.uniform(0.0005, 0.08) if rng.random() < 0.02 else None
+        if interrupt:
+            self.kinds.add("interrupted")
+        old = self.old_outputs(args) if rng.random() < 0.1 else []
+        return Try(args, self.files, ", ".join(sorted(self.kinds)) or "plain", old, interrupt)
+
+    def old_outputs(self, args):
+        """Files that stand where outputs are to go."""
+        names = [word for word in args if word in ("out.png", "out.npy", "out.npz", "out.tif")]
+        for name in names:
+            self.files[name] = b"old"
+        return names
+
+    # -- words of a command ---------------------------------------------------------------------------------------
+
+    def line(self, command, name):
+        """Arguments and options of a command."""
+        rng, words = self.rng, []
+        deep = rng.random() < DEEP.get(name, 0.5)
+        method = rng.choices(("mrf", "multires", "pyramid"), (3, 4, 3))[0] if name == "synth" else None
+        fitting = rng.random() < 0.9  # options of the method alone
+        size = self.size(name, rng.random() < (0.97 if deep else 0.85))
+        options = []
+        for parameter in command.params:
+            if isinstance(parameter, click.Argument):
+                count = (
+                    rng.choices((1, 2, 3), (8, 1, 1) if name != "mix" else (3, 3, 1))[0] if parameter.nargs < 0 else 1
+                )
+                words += [self.file("picture") for _ in range(count)]
+            else:
+                options.append(parameter)
+        samples = words[:]
+        words += ["-o", self.output(name)] if name not in ("devices", "bench", "ising") else []
+        words += (
+            ["--size", size]
+            if any("--size" in option.opts for option in options) and (name != "extend" or rng.random() < 0.3)
+            else []
+        )
+        if method and rng.random() < 0.03:
+            method = "mrf"  # as it is where none is named
+        else:
+            words += ["--method", method] if method else []
+        words += ["-q"] if rng.random() < 0.8 else []
+        if name == "fill" and rng.random() < 0.9:
+            words += ["--mask", self.file("mask")]
+        if name == "extend" and "--size" not in words:
+            words += [rng.choice(("--left", "--right", "--top", "--bottom", "--band")), rng.choice("123")]
+        if name == "ising":
+            words += [
+                "--sweeps",
+                "2",
+                "--burn-in",
+                "1",
+                "--seeds",
+                "2",
+                "--schedules",
+                rng.choice(("coloring", "raster", "block")),
+            ]
+        if name == "schedules":
+            words += ["--seeds", "1", "--schedules", "coloring", "--order", "1"]
+        if name == "bench":  # which measures for minutes
+            words += ["--json", "no/such/file.json"]
+        if name == "sheet":
+            words += ["--alphas", "0.1", "--betas", "0"]
+        if name in ("simulate", "synth", "fill", "extend") and method in (None, "mrf"):
+            words += ["--order", rng.choice("1124")]
+        words += ["--number", rng.choice("1112")] if name == "simulate" else []
+        if name in ("solid", "mix") or method == "pyramid":
+            words += ["--iterations", "1"]
+        taken = {"-o", "--output", "--size", "--method", "-q", "--quiet", "--help", "--mask", "--device"}
+        usual = [option for option in options if not taken & set(option.opts)]
+        if method and fitting:
+            usual = [option for option in usual if _of_method(option, method)]
+        self.method = {"solid": "pyramid", "mix": "pyramid", "sheet": "multires"}.get(name, method or "mrf")
+        if fitting:
+            useless = ("profile", *(("source_map", "also", "accounting") if self.method == "pyramid" else ()))
+            usual = [option for option in usual if option.name not in useless]
+        for option in rng.sample(usual, min(len(usual), rng.choice((0, 0, 1, 1, 2, 3, 5)))):
+            words += self.option(option, samples, name, deep and rng.random() < 0.9)
+        if rng.random() < 0.02 and name != "devices":
+            words += ["--device", rng.choice(("reference", "0", "7", "nothing", "", "numpy", "-1"))]
+            self.kinds.add("device")
+        return words
+
+    def option(self, option, samples, command, modest):
+        rng, name, word = self.rng, option.name or "", option.opts[-1]
+        if option.is_flag:
+            return [rng.choice([*option.opts, *option.secondary_opts])]
+        kind = option.type.name
+        if isinstance(option.type, click.Path):
+            return [word, self.path(name, command)]
+        if not modest:
+            self.kinds.add("options")
+        if kind == "integer":
+            values = MODEST.get(name, (0, 1, 3)) if modest else WHOLE
+            if not modest and name in LONG:
+                values = tuple(v for v in WHOLE if not (isinstance(v, int) and 10 < v < 2**31))
+            return [word, str(rng.choice(values))]
+        if kind == "float":
+            values = MODEST.get(name, (0, 0.25, 1, 2)) if modest else REAL
+            if not modest and name == "xi":
+                values = tuple(v for v in REAL if not isinstance(v, float) or v >= 0 or v < -1)
+            return [word, str(rng.choice(values))]
+        return [word, self.text(option, name, samples, modest)]
+
+    def text(self, option, name, samples, modest):
+        rng, metavar = self.rng, option.metavar or ""
+        if not modest and rng.random() < 0.7:
+            return rng.choice(TEXT)
+        if "=" in metavar:
+            guide = self.file("picture" if name == "also" else "mask")
+            out = self.file("mask") if name == "guide" else rng.choice(("map.png", "map.npy", "map.tif"))
+            return ",".join([guide] * rng.choice((1, len(samples)))) + "=" + out
+        if metavar.startswith("SAMPLE") and samples:
+            return rng.choice((samples[0], "1", "2", "0"))
+        if "," in metavar or name in ("alphas", "betas"):
+            return ",".join(
+                str(rng.choice((0, 1, 2, 0.5) if modest else REAL)) for _ in range(rng.choice((1, 1, 2, 3)))
+            )
+        if ("x" in metavar.lower() and "HEIGHT" in metavar) or "COLS" in metavar:
+            return rng.choice(("4x4", "2x8", *SIZES))
+        if name == "edges":
+            return rng.choice(EDGES[self.method])
+        return rng.choice(CHOICES.get(name) or re.findall(r"[a-z][a-z-]+", option.help or "") or TEXT)
+
+    def size(self, name, modest):
+        rng = self.rng
+        if not modest:
+            self.kinds.add("options")
+            return rng.choice(SIZES)
+        if name == "demo":
+            return rng.choice(SIZES)
+        if name == "solid":
+            return rng.choice(("4", "5x6x7", "1x8x8"))
+        low = {"extend": 6, "schedules": 9}.get(name, 1 if rng.random() < 0.2 else 5)
+        return f"{rng.randint(low, max(12, low))}x{rng.randint(low, max(12, low))}"
+
+    # -- files ----------------------------------------------------------------------------------------------------
+
+    def path(self, name, command):
+        """A file or a folder for an option that takes one."""
+        rng = self.rng
+        if name in ("stages", "report"):
+            return rng.choice(("pages", "a/b", "out.png") if rng.random() < 0.3 else ("pages",))
+        if name in ("source_map", "picture", "json", "plot"):
+            return rng.choice(("map.npz", "map.npy", "map.png", "out.png", "view.png"))
+        roles = {
+            "sample_mask": "mask",
+            "known": "table",
+            "hard": "table",
+            "thresholds": "thresholds",
+            "start": "picture",
+        }
+        role = roles.get(name, "picture")
+        if name == "start" and command == "solid":
+            role = "volume"
+        if name == "known" and rng.random() < 0.4:
+            role = "picture"
+        return self.file(role)
+
+    def output(self, name):
+        rng = self.rng
+        names = OUTPUTS.get(name, OUTPUTS[""])
+        if name in ("schedules", "demo"):
+            names = ("out",)
+        if rng.random() < 0.85:
+            return names[0] if rng.random() < 0.5 else rng.choice(names)
+        if self.files and rng.random() < 0.2:
+            self.kinds.add("output is input")
+            return rng.choice(list(self.files))
+        return rng.choice((*names, "no/such/out.png", ".", "", "out.png/", "a" * 300 + ".png", "OUT.PNG"))
+
+    def file(self, role):
+        """The name of a file of a role, usually a good one."""
+        rng = self.rng
+        files = seeds()[role]
+        if role == "picture" and rng.random() < 0.6:
+            name = rng.choice(("L.png", "RGB.png", "L.tif", "uint8.npy", "labels.npy"))
+        else:
+            name = rng.choice(list(files))
+        data = files[name]
+        chance = rng.random()
+        if chance < 0.2:
+            data = corpus.mutated(rng, data, everything())
+            self.kinds.add("broken files")
+        elif chance < 0.22:
+            data = rng.choice(everything())
+            self.kinds.add("wrong files")
+        elif chance < 0.235:
+            self.kinds.add("no file")
+            return rng.choice(("none.png", "", ".", "/dev/null", "a/none.npy", "none.npz", "none.csv", "none.nrrd"))
+        while name in self.files and self.files[name] != data:
+            name = f"{rng.randrange(100)}-{name}"
+        self.files[name] = data
+        return name
+
+
+def _of_method(option, method):
+    """Whether an option of ``synth`` is of a method, as its help says."""
+    head = (option.help or "").partition(":")[0] if ":" in (option.help or "") else ""
+    named = [
+        one for one in ("mrf", "multires", "pyramid") if one in head.split(", ") or f"{one}:" in (option.help or "")
+    ]
+    return not named or method in named

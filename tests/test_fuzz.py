@@ -1,0 +1,95 @@
+"""The fuzzer: tries are the same for the same seed, faults are found, and a short run of it finds none."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fuzz import corpus
+from fuzz.faults import failing
+from fuzz.lines import COMMANDS, Try, made
+from fuzz.record import Record
+from simdtex.cli import COMMANDS as KNOWN
+from simdtex.io import image
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "memfd_create"), reason="the fuzzer runs on Linux")
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def fuzz(*args, timeout=100):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "fuzz", *map(str, args)]
+    return subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=timeout, check=False
+    )
+
+
+def test_every_command_is_tried():
+    assert set(KNOWN) <= set(COMMANDS)
+
+
+def test_a_seed_and_a_number_give_a_try():
+    tries = [made(1, number) for number in range(50)]
+    assert tries == [made(1, number) for number in range(50)] != [made(2, number) for number in range(50)]
+    assert tries == [Try.from_json(json.loads(json.dumps(one.as_json()))) for one in tries]
+    assert len({one.args[0] for one in tries if one.args}) > 4
+
+
+def test_valid_files_are_valid(tmp_path):
+    read = 0
+    for name, data in corpus.pictures().items():
+        path = tmp_path / name
+        path.write_bytes(data)
+        try:
+            image.read(path, unknown=True)
+            read += 1
+        except (ValueError, TypeError) as error:
+            assert name.partition(".")[0].partition("-")[0] in (
+                *("complex", "object", "empty", "inf", "pages", "animated", "bool", "huge", "tiny"),
+            ), error
+    assert read > 40
+
+
+@pytest.mark.parametrize("call, number", [("open", 1), ("write", 1), ("replace", 1), ("fsync", 1)])
+def test_a_call_fails(call, number, tmp_path):
+    with pytest.raises(OSError), failing((call, number, "ENOSPC"), tmp_path) as calls:
+        with open(tmp_path / "a", "wb") as file:
+            file.write(b"x" * 100)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(tmp_path / "a", tmp_path / "b")
+    assert calls.fired
+    with failing((call, number + 1, "EIO"), tmp_path) as calls, open(tmp_path / "c", "w") as file:
+        file.write("x")
+    assert not calls.fired and (tmp_path / "c").read_text() == "x"
+
+
+def test_a_fault_is_counted_and_kept_once(tmp_path):
+    record, one = Record(1, tmp_path), Try(["synth", "a.png"], {"a.png": b"\0"})
+    result = {"code": 1, "seconds": 0.5, "bytes": 9, "said": "oh", "faults": [("traceback", "KeyError"), ("time", "x")]}
+    for _ in range(3):
+        record.add(lambda: one, "plain", ["synth"], result)
+    found = record.results()
+    assert (found["tries"], len(found["faults"]), found["faulty"], len(list(tmp_path.iterdir()))) == (3, 2, 6, 2)
+    kept = json.loads(Path(found["faults"][0]["file"]).read_text())
+    assert Try.from_json(kept["try"]) == one and kept["command"] == "simdtex synth a.png"
+
+
+@pytest.mark.slow
+def test_a_replay_says_what_is_wrong(tmp_path):
+    one = Try(["synth", "L.png", "-o", "out.png", "--size", "4x4", "-q", "--method", "multires"], corpus.pictures())
+    path = tmp_path / "try.json"
+    path.write_text(json.dumps({"command": "simdtex synth", "try": one.as_json()}))
+    done = fuzz("--replay", path)
+    assert done.returncode == 0 and "exit code 0" in done.stdout, done.stdout + done.stderr
+
+
+def test_a_short_run_finds_nothing(tmp_path):
+    done = fuzz("--tries", 25, "--seed", 3, "--part", "lines", "--workers", 1, "--out", tmp_path / "found")
+    assert done.returncode == 0, done.stdout + done.stderr
+    found = json.loads((tmp_path / "found" / "fuzz.json").read_text())
+    assert found["tries"] == 25 and found["codes"]["0"] > 2

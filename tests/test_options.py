@@ -1,0 +1,149 @@
+"""Every option has a range: what is beyond it is said in one sentence, whatever is given."""
+
+from dataclasses import fields
+from math import inf, nan
+
+import numpy as np
+import pytest
+
+import simdtex
+from simdtex.cli.common import plainly
+from simdtex.experiments import onsager
+from simdtex.experiments.comparison import compare
+from simdtex.experiments.ising import ising
+from simdtex.machine.reference import Reference
+from simdtex.methods import mrf, multires, pyramid
+from simdtex.methods.pyramid import solid
+from simdtex.options import GREATEST, MOST, real, whole, within_32_bits
+
+SAMPLE = np.random.default_rng(1).integers(0, 256, (9, 9), dtype=np.uint8)
+STRANGE = [
+    *(0, -1, 1, 2**31 - 1, 2**31, 2**32, 2**63, 2**64, -(2**63) - 1, 10**400, 10**5000),
+    *(nan, inf, -inf, 1e308, -1e308, 1e-320, 5e-324, -3e6, np.float32(3e38), np.int64(2**62), 1j),
+    *(None, True, False, "", "x", "nan", "a" * 10**4, b"0", (), [], [[]], {}, object(), np.zeros(0), np.zeros((2, 2))),
+]
+METHODS = {"mrf": mrf, "multires": multires, "pyramid": pyramid, "solid": solid}
+OPTIONS = [
+    (method, field.name)
+    for method, module in METHODS.items()
+    for field in fields(module.Options)
+    if field.name != "schedule"  # any object may be one
+]
+
+
+@pytest.mark.parametrize("method, name", OPTIONS)
+def test_any_value_of_an_option_is_taken_or_refused_in_one_sentence(method, name):
+    for value in STRANGE:
+        try:
+            METHODS[method].make_options(**{name: value})
+        except (TypeError, ValueError) as error:
+            text = str(error)
+            assert "\n" not in text and 10 < len(text) < 400, (value, text)
+            assert name.rstrip("s") in text or "array" in text, text
+
+
+NUMBERS = ("order", "bandwidth", "coherence", "balance", "structure", "novelty", "finish", "xi", "data_weight")
+COUNTS = ("levels", "overview", "free_sweeps", "suggesting", "similar", "chance", "exhaustive")
+TOO_MUCH = {
+    **{f"mrf {name}": ("mrf", {name: 2**31}) for name in (*NUMBERS[:-1], *COUNTS)},
+    **{f"mrf {name} 1e308": ("mrf", {name: 1e308}) for name in (*NUMBERS[1:7], "guide_weight", "unsure")},
+    "xi": ("mrf", {"xi": -3e6}),
+    "a finish of next to nothing": ("mrf", {"finish": 1e-320}),
+    "beta": ("multires", {"beta": 1e308}),
+    "filters": ("multires", {"filter_size": 1001}),
+    "orientations": ("multires", {"orientations": 65}),
+    "sigma": ("multires", {"sigma": 1e308}),
+    "iterations": ("pyramid", {"iterations": 2**31}),
+}
+
+
+@pytest.mark.parametrize("case", TOO_MUCH)
+def test_what_is_beyond_a_range_is_refused(case):
+    method, given = TOO_MUCH[case]
+    with pytest.raises(ValueError, match=r"^\w+ is .*; give "):
+        simdtex.synthesize(SAMPLE, (5, 5), method=method, device="reference", rng=1, **given)
+
+
+LARGEST = {
+    "mrf": {
+        **{name: GREATEST for name in ("bandwidth", "coherence", "balance", "structure", "novelty", "data_weight")},
+        **{"finish": 16, "similar": 64, "chance": 4096, "suggesting": MOST, "overview": MOST, "exhaustive": MOST},
+        **{"xi": -GREATEST, "guide_weight": GREATEST, "unsure": 1, "weights": (GREATEST,), "shares": (GREATEST,)},
+    },
+    "multires": {"alpha": 1e308, "beta": GREATEST, "orientations": 64, "sigma": 100, "filter_size": 101},
+    "pyramid": {"bins": 4096},
+}
+SMALLEST = {
+    "mrf": {"bandwidth": 1e-320, "coherence": 5e-324, "balance": 1e-320, "finish": 0.01, "xi": -0.1},
+    "multires": {"alpha": 1e-320, "beta": 1e-320, "sigma": 0.2},
+}
+EXTREME = [
+    (method, {name: value})
+    for table in (LARGEST, SMALLEST)
+    for method in table
+    for name, value in table[method].items()
+]
+
+
+@pytest.mark.parametrize("method, given", EXTREME, ids=str)
+def test_the_ends_of_every_range_work(method, given):
+    order = {"order": 1} if method == "mrf" else {}
+    made = simdtex.synthesize(SAMPLE, (5, 5), method=method, device="reference", rng=1, **order, **given)
+    assert made.shape == (5, 5)
+
+
+def test_numbers_of_any_length_are_said_in_one_line():
+    for check, value in ((whole, 10**5000), (real, 10**5000), (whole, "a\n" * 500), (real, ["\n"] * 500)):
+        with pytest.raises((TypeError, ValueError)) as said:
+            check("n", value, 0)
+        assert len(str(said.value)) < 200 and "\n" not in str(said.value)
+
+
+@pytest.mark.parametrize("shape, what", [((2**16, 2**15), "rows x"), ((2**11, 2**10, 2**10), "a block of")])
+def test_so_many_values_cannot_be_counted(shape, what):
+    within_32_bits((*shape[:-1], shape[-1] - 1), 1)
+    with pytest.raises(ValueError, match=f"{what}.* is beyond 2..31 values; give a smaller size"):
+        within_32_bits(shape, 1)
+
+
+@pytest.mark.parametrize("temperature", [0, -1, nan, inf, 1e200, 1e7, 2**63])
+def test_a_temperature_that_is_none_is_refused(temperature):
+    with pytest.raises(ValueError, match=r"temperature.*; give a number"):
+        ising(Reference(), (4, 4), [temperature], "coloring", sweeps=1, burn_in=0, seeds=1)
+    for exact in (onsager.onsager_energy, onsager.spontaneous_magnetisation, onsager.correlation_length):
+        with pytest.raises(ValueError, match=r"temperature .*; give a number"):
+            exact(temperature)
+
+
+@pytest.mark.parametrize("temperature", [1e6, 1e-6, 1e-320, 5e-324])
+def test_the_ends_of_the_range_of_temperatures_work(temperature):
+    assert -2 <= onsager.torus_energy(temperature, 4, 5) <= 0
+    assert -2 <= onsager.onsager_energy(temperature) <= 0
+    assert 0 <= onsager.correlation_length(temperature) < 1
+    run = ising(Reference(), (4, 4), [temperature], "coloring", sweeps=2, burn_in=0, seeds=1)
+    assert np.isfinite(run.energy).all()
+
+
+def test_schedules_are_compared_near_the_largest_number():
+    sample = np.random.default_rng(1).random((12, 12)) * 1.7e308
+    found = compare(sample, (9, 9), ["coloring"], seeds=[1, 2], order=1, free_sweeps=1, device="reference")
+    figures = found.results()["schedules"][0]["figures"]
+    assert all(one is None or np.isfinite(one["values"]).all() for one in figures.values())
+    assert figures["plausibility"] and figures["histogram_distance"]
+
+
+def test_no_work_is_done_for_filters_that_fit_no_level():
+    made = simdtex.synthesize(
+        SAMPLE, (1, 1), method="multires", filter_size=101, orientations=64, device="reference", rng=1
+    )
+    assert made.shape == (1, 1)
+
+
+def test_memory_errors_are_said_in_one_sentence(capsys):
+    @plainly
+    def command():
+        raise MemoryError
+
+    with pytest.raises(SystemExit):
+        command()
+    assert capsys.readouterr().err.count("\n") == 1
