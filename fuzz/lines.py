@@ -21,6 +21,7 @@ COMMANDS = {
     "mix": 8,
     "ising": 6,
     "sheet": 1,
+    "resume": 0.5,
     "schedules": 0.1,
     "devices": 0.1,
     "demo": 0.05,
@@ -60,6 +61,7 @@ MODEST = {
     "bins": (2, 16, 256),
     "seed": (0, 1, 2**63),
     "xi": (-1, -0.5, -5),
+    "tiles": (8, 12, 16),
     "sigma": (0.5, 0.7, 2),
 }
 """Values that make sense on pictures of ten pixels a side; other numbers are small ones."""
@@ -96,6 +98,9 @@ EDGES = {"multires": ("mend", "keep"), "pyramid": ("reflect", "wrap"), "mrf": ("
 
 LONG = ("free_sweeps", "iterations", "sweeps", "burn_in", "number", "seeds")
 """Counts of what is done one after another: whoever asks for a milliard is served, so no try does."""
+
+OTHERS = ("workers", "scheduler")
+"""Options that start processes or ask the network."""
 
 DEEP = {"synth": 0.6, "sheet": 0.8, "schedules": 0.7, "demo": 0.2, "bench": 0.0}
 """Share of tries with options that make sense alone."""
@@ -199,7 +204,7 @@ class _Maker:
             else:
                 options.append(parameter)
         samples = words[:]
-        words += ["-o", self.output(name)] if name not in ("devices", "bench", "ising") else []
+        words += ["-o", self.output(name)] if name not in ("devices", "bench", "ising", "resume") else []
         words += (
             ["--size", size]
             if any("--size" in option.opts for option in options) and (name != "extend" or rng.random() < 0.3)
@@ -237,7 +242,7 @@ class _Maker:
         if name in ("solid", "mix") or method == "pyramid":
             words += ["--iterations", "1"]
         taken = {"-o", "--output", "--size", "--method", "-q", "--quiet", "--help", "--mask", "--device"}
-        usual = [option for option in options if not taken & set(option.opts)]
+        usual = [option for option in options if not taken & set(option.opts) and option.name not in OTHERS]
         if method and fitting:
             usual = [option for option in usual if _of_method(option, method)]
         self.method = {"solid": "pyramid", "mix": "pyramid", "sheet": "multires"}.get(name, method or "mrf")
@@ -246,6 +251,8 @@ class _Maker:
             usual = [option for option in usual if option.name not in useless]
         for option in rng.sample(usual, min(len(usual), rng.choice((0, 0, 1, 1, 2, 3, 5)))):
             words += self.option(option, samples, name, deep and rng.random() < 0.9)
+        if "--tiles" in words and rng.random() < 0.9:
+            words[words.index("-o") + 1] = "out.zarr"
         if rng.random() < 0.02 and name != "devices":
             words += ["--device", rng.choice(("reference", "0", "7", "nothing", "", "numpy", "-1"))]
             self.kinds.add("device")
@@ -309,7 +316,7 @@ class _Maker:
     def path(self, name, command):
         """A file or a folder for an option that takes one."""
         rng = self.rng
-        if name in ("stages", "report"):
+        if name in ("stages", "report", "checkpoint"):
             return rng.choice(("pages", "a/b", "out.png") if rng.random() < 0.3 else ("pages",))
         if name in ("source_map", "picture", "json", "plot"):
             return rng.choice(("map.npz", "map.npy", "map.png", "out.png", "view.png"))

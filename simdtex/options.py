@@ -35,6 +35,10 @@ def build(options: type[T], method: str, given: Mapping[str, Any], also: tuple[s
     return options(**given)
 
 
+SMALLER = "give a smaller size"
+"""What helps where an output is too large."""
+
+
 def one_of(name: str, value: Any, valid: Iterable[str]) -> None:
     """Raise ValueError unless the value is one of the valid ones, and list them."""
     valid = list(valid)
@@ -116,11 +120,11 @@ def _finite(value: Real) -> bool:
         return False
 
 
-def within_32_bits(shape: tuple[int, ...], values: int) -> None:
+def within_32_bits(shape: tuple[int, ...], values: int, remedy: str = SMALLER) -> None:
     """Raise unless so many values for each pixel of an output, or voxel of a block, can be counted in 32 bits."""
     if prod(shape) * values < 2**31:
         return
     size = " x ".join(str(side) for side in shape)
     what = f"an output of {shape[0]} rows x {shape[1]} columns" if len(shape) == 2 else f"a block of {size}"
     each = "" if values == 1 else f", {values} for each {'pixel' if len(shape) == 2 else 'voxel'}"
-    raise ValueError(f"{what} is beyond 2**31 values{each}; give a smaller size")
+    raise ValueError(f"{what} is beyond 2**31 values{each}; {remedy}")

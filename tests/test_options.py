@@ -3,8 +3,10 @@
 from dataclasses import fields
 from math import inf, nan
 
+import click
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import simdtex
 from simdtex.cli.common import plainly
@@ -108,10 +110,10 @@ def test_so_many_values_cannot_be_counted(shape, what):
 
 @pytest.mark.parametrize("temperature", [0, -1, nan, inf, 1e200, 1e7, 2**63])
 def test_a_temperature_that_is_none_is_refused(temperature):
-    with pytest.raises(ValueError, match=r"temperature.*; give a number"):
+    with pytest.raises(ValueError, match=r"temperature.*; give "):
         ising(Reference(), (4, 4), [temperature], "coloring", sweeps=1, burn_in=0, seeds=1)
     for exact in (onsager.onsager_energy, onsager.spontaneous_magnetisation, onsager.correlation_length):
-        with pytest.raises(ValueError, match=r"temperature .*; give a number"):
+        with pytest.raises(ValueError, match=r"temperature .*; give "):
             exact(temperature)
 
 
@@ -139,11 +141,11 @@ def test_no_work_is_done_for_filters_that_fit_no_level():
     assert made.shape == (1, 1)
 
 
-def test_memory_errors_are_said_in_one_sentence(capsys):
+def test_memory_errors_are_said_in_one_sentence():
+    @click.command()
     @plainly
     def command():
         raise MemoryError
 
-    with pytest.raises(SystemExit):
-        command()
-    assert capsys.readouterr().err.count("\n") == 1
+    result = CliRunner().invoke(command)
+    assert (result.exit_code, result.stderr.count("\n")) == (2, 1)

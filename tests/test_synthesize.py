@@ -401,7 +401,7 @@ BAD = [
     ({"shape": 5}, ValueError, "shape must be two integers"),
     ({"shape": (5, 5, 3)}, ValueError, "shape must be two integers"),
     ({"shape": "12"}, TypeError, "must be an integer"),
-    ({"shape": (2**16, 2**16)}, ValueError, "give a smaller size"),
+    ({"shape": (2**16, 2**16)}, ValueError, "give a smaller size, or make it in tiles: --tiles 2048"),
     # the options
     ({"order": 0}, ValueError, "order 0 has no neighbours; give 1"),
     ({"order": -8}, ValueError, "order -8 has no neighbours; give 1"),

@@ -85,7 +85,7 @@ def connected(workers: int | None, scheduler: str | None) -> Iterator[Client | N
     from simdtex.distributed.cores import Cores
 
     assert workers is not None
-    whole("workers", workers, 1)
+    whole("workers", workers, 1, 4 * (os.cpu_count() or 1))
     each = max(1, (os.cpu_count() or 1) // workers)
     limits = {name: str(each) for name in ("POCL_MAX_PTHREAD_COUNT", "POCL_CPU_MAX_CU_COUNT")}
     with (

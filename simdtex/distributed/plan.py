@@ -20,6 +20,12 @@ SMALLEST = 64
 CHUNK = 512
 """Sites to the side of a chunk in the store, at most where the tile's side has such a divisor."""
 
+TILES = 2**22
+"""Tiles of a level, at most: one process keeps count of them."""
+
+MOST = 10**5
+"""Workers that a plan is made for, at most."""
+
 PROCESS = 400 * 2**20
 """Bytes of a worker that has no work: Python, its libraries, an OpenCL runtime with its kernels."""
 
@@ -164,14 +170,17 @@ def planned(outline: Outline, tile: int, workers: int) -> Plan:
     Raises
     ------
     ValueError
-        The schedule does not relax a window as it does the whole.
+        The schedule does not relax a window as it does the whole, or there would be too many tiles.
     """
     whole("tiles", tile, 1)
-    whole("workers", workers, 1)
+    whole("workers", workers, 1, MOST)
     options, schedule = outline.options, outline.schedule
     if not (schedule.windows and isinstance(schedule, Windowed)) or options.array:
         given = f"array {options.array}" if options.array else f"schedule {schedule.name}"
         raise ValueError(f"{given} needs the whole output at once; give the schedule coloring, or leave tiles out")
+    count = ceil(outline.shape[0] / tile) * ceil(outline.shape[1] / tile)
+    if count > TILES:
+        raise ValueError(f"tiles of {tile}x{tile} pixels are {count}, more than {TILES}; give larger ones")
     levels = []
     for number in range(outline.levels):
         sides, least = [tile], max(SMALLEST, _halo(outline, number))

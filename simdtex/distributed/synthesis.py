@@ -18,7 +18,7 @@ from simdtex.distributed.plan import Plan, planned
 from simdtex.envelope import check_shape
 from simdtex.io.image import atomic_folder
 from simdtex.jobs.inputs import Inputs, check_inputs
-from simdtex.machine import Machine
+from simdtex.machine import Machine, memory
 from simdtex.methods.mrf import make_options
 from simdtex.methods.mrf.outline import Outline, outlined
 from simdtex.options import whole
@@ -106,6 +106,8 @@ def synthesize(
     outline = _outline(inputs, size, as_seed(rng), options)
     count = _workers(client, workers)
     layout, target = planned(outline, tiles, count), _address(store)
+    if client is None:
+        memory.require_host(layout.memory * count, "give smaller tiles or fewer workers")
     with _made(target) as temporary:
         from simdtex.distributed.store import Store
 
@@ -201,7 +203,7 @@ def _outline(inputs: Inputs, size: tuple[int, int], seed: int, options: dict[str
 def _workers(client: Client | None, workers: int | None) -> int:
     """How many there are."""
     if workers is not None:
-        whole("workers", workers, 1)
+        whole("workers", workers, 1, 4 * (os.cpu_count() or 1))
         if client is not None:
             raise TypeError("a client has its own workers; give client or workers, not both")
         return workers

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from simdtex.machine.devices import DeviceError
 from simdtex.machine.interface import Machine
+from simdtex.options import SMALLER
 
 SHARED = ("cpu", "reference")
 """Kinds of machines whose arrays lie in the host's memory."""
@@ -27,7 +28,7 @@ def shared(machine: Machine) -> bool:
     return machine.kind in SHARED
 
 
-def require(machine: Machine, device: int, host: int = 0) -> None:
+def require(machine: Machine, device: int, host: int = 0, remedy: str = SMALLER) -> None:
     """Raise where a run would not fit in the memory there is.
 
     Parameters
@@ -35,6 +36,8 @@ def require(machine: Machine, device: int, host: int = 0) -> None:
     machine : Machine
     device, host : int
         Bytes that the run takes at most in arrays of the machine, and of the host beside them.
+    remedy : str
+        What helps, as the sentence says it.
 
     Raises
     ------
@@ -42,16 +45,16 @@ def require(machine: Machine, device: int, host: int = 0) -> None:
         The device has less, or the host has less available; the sentence names the remedy.
     """
     machine.require(device)
-    require_host(host + (device + TEMPORARY) * shared(machine))
+    require_host(host + (device + TEMPORARY) * shared(machine), remedy)
 
 
-def require_host(wanted: int) -> None:
+def require_host(wanted: int, remedy: str = SMALLER) -> None:
     """Raise DeviceError where so many bytes are more than the host has available."""
     there = available()
     if there is not None and wanted > there:
         raise DeviceError(
             f"this needs about {_mebibytes(wanted)} of this computer's memory and {_mebibytes(there)} is available; "
-            "give a smaller size"
+            f"{remedy}"
         )
 
 

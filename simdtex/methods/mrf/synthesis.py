@@ -27,8 +27,11 @@ from simdtex.model.sample import Sample
 from simdtex.model.use import effective_use
 from simdtex.ops.finish import around, finish
 from simdtex.ops.neighbourhood import Field
-from simdtex.options import within_32_bits
+from simdtex.options import SMALLER, within_32_bits
 from simdtex.run import Callback, Output, device_seconds
+
+TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.distributed"
+"""What helps where an output is too large for this machine."""
 
 AT_ONCE = 2**20
 """Sites that are finished together."""
@@ -176,7 +179,7 @@ def finished(
 
 def _check_memory(machine: Machine, sample: Sample, shape: tuple[int, int], similar: int, copies: int) -> None:
     pixels, channels = shape[0] * shape[1], len(sample.working)
-    within_32_bits(shape, channels * copies)
+    within_32_bits(shape, channels * copies, TILED)
     field, held = copies * (6 + 2 * channels), sample.rows * sample.cols
     host = pixels * (68 + 16 * copies + channels * (10 + 3 * sample.pixels.dtype.itemsize // 2)) + 64 * held
-    memory.require(machine, pixels * (12 + field) + held * (14 * channels + 159 + 4 * similar), host)
+    memory.require(machine, pixels * (12 + field) + held * (14 * channels + 159 + 4 * similar), host, TILED)
