@@ -106,5 +106,5 @@ def check_shape(shape: Any, least: int = 1) -> tuple[int, int]:
     except (TypeError, ValueError):
         raise ValueError(f"shape must be two integers (rows, columns), not {shape!r}") from None
     whole("rows of the output", rows, least, inf)  # one sentence says what they are together
-    whole("columns of the output", cols, least, inf)  # one sentence says what they are together
+    whole("columns of the output", cols, least, inf)
     return int(rows), int(cols)

@@ -45,7 +45,14 @@ def assert_same(tmp_path, *given, **options):
     forget()
 
 
-TILINGS = [12, 16, 36, 1000]  # rows of 37: uneven; one site wide (36 + 1); more than all
+slow = pytest.mark.slow
+# Rows of 37: uneven tiles, a last one a single site wide (36 + 1), and one that is more than all.
+TILINGS = [12, pytest.param(16, marks=slow), 36, pytest.param(1000, marks=slow)]
+    12,
+    pytest.param(16, marks=slow),
+    36,
+    pytest.param(1000, marks=slow),
+]  # rows of 37: uneven; one site wide (36 + 1); more than all
 
 
 @pytest.mark.parametrize("boundary", ["torus", "open"])
@@ -69,12 +76,15 @@ VARIANTS = {
 }
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+QUICK = ("coherent", "draws", "checkerboard", "one level, no price")
+
+
+@pytest.mark.parametrize("name", [name if name in QUICK else pytest.param(name, marks=slow) for name in VARIANTS])
 def test_any_options(tmp_path, name):
     assert_same(tmp_path, SAMPLE, (29, 33), 16, **VARIANTS[name])
 
 
-@pytest.mark.parametrize("dtype", ["uint8", "bool", "uint16", "float32"])
+@pytest.mark.parametrize("dtype", [pytest.param("bool", marks=slow), "uint16", pytest.param("float32", marks=slow)])
 def test_any_type_and_channels(tmp_path, dtype):
     assert_same(tmp_path, COLOUR.astype(dtype), (26, 25), 13, order=1, channel_axis=-1)
 
@@ -88,13 +98,17 @@ def test_on_devices(tmp_path, any_device):
     assert_same(tmp_path, COLOUR, (61, 70), 33, opencl(any_device), order=2, channel_axis=-1)
 
 
+REST = [(0.3, "torus"), (0.02, "open")]
+
+
 def known_values(shape, share, seed):
     rng = np.random.default_rng(seed)
     return np.ma.masked_array(rng.choice(SAMPLE.ravel(), shape), rng.random(shape) > share)
 
 
-@pytest.mark.parametrize("boundary", ["torus", "open"])
-@pytest.mark.parametrize("share", [0.02, 0.3])
+@pytest.mark.parametrize(
+    ("share", "boundary"), [(0.02, "torus"), (0.3, "open"), *(pytest.param(*one, marks=slow) for one in REST)]
+)
 def test_known_sites(tmp_path, share, boundary):
     """Also data between the sites of coarse levels, whose stand-ins lie in other tiles."""
     shape = (39, 34)
