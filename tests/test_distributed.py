@@ -48,11 +48,6 @@ def assert_same(tmp_path, *given, **options):
 slow = pytest.mark.slow
 # Rows of 37: uneven tiles, a last one a single site wide (36 + 1), and one that is more than all.
 TILINGS = [12, pytest.param(16, marks=slow), 36, pytest.param(1000, marks=slow)]
-    12,
-    pytest.param(16, marks=slow),
-    36,
-    pytest.param(1000, marks=slow),
-]  # rows of 37: uneven; one site wide (36 + 1); more than all
 
 
 @pytest.mark.parametrize("boundary", ["torus", "open"])
