@@ -9,6 +9,7 @@ import time
 import numpy as np
 import pytest
 from cases import assert_same_bits, texture
+from skimage import data
 
 import simdtex
 from simdtex import distributed
@@ -115,3 +116,21 @@ def test_one_sentence_for_what_is_wrong(tmp_path):
         ]:
             with pytest.raises(TypeError, match=words):
                 distributed.synthesize(SAMPLE, (20, 20), tmp_path / f"{len(words)}.zarr", channel_axis=-1, **given)
+
+
+PEAK = """
+import resource, sys
+from simdtex import distributed
+from skimage import data
+distributed.synthesize(data.brick()[:128, :128], (1024, 1024), sys.argv[1], tiles=512, rng=1, device=sys.argv[2])
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="ru_maxrss is in other units elsewhere")
+def test_a_process_takes_no_more_memory_than_the_plan_says(tmp_path, cl_device):
+    plan = distributed.plan(data.brick()[:128, :128], (1024, 1024), tiles=512)
+    command = [sys.executable, "-c", PEAK, str(tmp_path / "o.zarr"), str(cl_device.index)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True, env={**os.environ, "SIMDTEX_TUNE": "0"})
+    assert plan.memory / 4 < int(done.stdout) < plan.memory
