@@ -104,6 +104,8 @@ def _crew(workers: int | None, scheduler: str | None) -> Iterator[dict[str, Any]
     from simdtex.distributed.cluster import connected
 
     with connected(workers, scheduler) as client:
+        if client is not None and not client.scheduler_info(n_workers=-1)["workers"]:
+            click.echo("the scheduler has no workers yet; start some with: dask worker ADDRESS", err=True)
         yield {} if client is None else {"client": client}
 
 

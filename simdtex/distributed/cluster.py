@@ -14,6 +14,7 @@ from simdtex.distributed.drive import Execute
 from simdtex.distributed.store import Store, Turn
 from simdtex.distributed.tasks import do
 from simdtex.machine import Machine
+from simdtex.machine.devices import DeviceError
 from simdtex.options import whole
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def across(client: Client, store: Store, device: str | None) -> Execute:
                 try:
                     yield future.result()
                 except distributed.KilledWorker:
-                    raise MemoryError(
+                    raise DeviceError(
                         "the workers that took a tile ended one after another; give smaller tiles, or workers more "
                         "memory, and go on with simdtex resume"
                     ) from None

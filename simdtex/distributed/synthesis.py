@@ -93,7 +93,7 @@ def synthesize(
     ------
     ValueError, TypeError
         What is wrong and what would be right, in one sentence.
-    MemoryError
+    DeviceError
         Workers end one after another over the same tile.
 
     Notes
