@@ -114,7 +114,8 @@ def main() -> None:
     if {"here", "workers"} <= set(found):
         ratio = found["here"]["seconds"] / found["workers"]["seconds"]
         print(f"efficiency of {given.workers} workers against one process with all their cores: {ratio:.2f}")
-    print("same bytes:", len({one["digest"] for one in found.values()}) == 1)
+    if len(found) > 1:
+        print("same bytes:", len({one["digest"] for one in found.values()}) == 1)
 
 
 if __name__ == "__main__":
