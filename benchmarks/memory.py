@@ -33,7 +33,7 @@ def peak():
 
 asked, require = [0], memory.require
 
-def noted(machine, device, host=0):
+def noted(machine, device, host=0, remedy=""):
     asked.append((device + memory.TEMPORARY) * memory.shared(machine) + host)
     require(machine, device, host)
 

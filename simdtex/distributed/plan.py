@@ -26,8 +26,9 @@ TILES = 2**22
 MOST = 10**5
 """Workers that a plan is made for, at most."""
 
-PROCESS = 400 * 2**20
-"""Bytes of a worker that has no work: Python, its libraries, an OpenCL runtime with its kernels."""
+PROCESS = 2**30
+"""Bytes of a worker that has no work: Python, its libraries, an OpenCL runtime that compiles kernels for the first time.
+Once they are compiled it is 400 MiB (`benchmarks/tiles.py`)."""
 
 SITE = 110, 12
 """Bytes of a worker for each site of a window, and for each of its channels besides (measured; see the docs)."""
