@@ -1,6 +1,6 @@
 """What more workers would do for an output in tiles, computed from what is measured here; as CSV.
 
-    python benchmarks/scaling.py --tiles 2048 > docs/tiles/scaling.csv
+    python benchmarks/scaling.py --tiles 1024 > docs/tiles/scaling.csv
 
 Measured on this machine, with one core: what a tile takes a worker in every turn of an output of twice the tile's
 side, for each site that it relaxes; and what the one process that leads the run takes for a turn, and for each of its
@@ -112,7 +112,7 @@ def main() -> None:
     lead = adding + task
     print(f"leader: {turn * 1e3:.0f} ms a turn, {adding * 1e3:.2f} + {task * 1e3:.2f} ms a tile", file=sys.stderr)
     levels = 1 + max(level for level, *_ in took)
-    writer = csv.writer(sys.stdout)
+    writer = csv.writer(sys.stdout, lineterminator="\n")
     writer.writerow(["workers", "days", "times as fast as one", "efficiency", "share of the leader"])
     first = None
     for workers in WORKERS:

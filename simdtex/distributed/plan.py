@@ -27,8 +27,9 @@ MOST = 10**5
 """Workers that a plan is made for, at most."""
 
 PROCESS = 2**30
-"""Bytes of a worker that has no work: Python, its libraries, an OpenCL runtime that compiles kernels for the first time.
-Once they are compiled it is 400 MiB (`benchmarks/tiles.py`)."""
+"""Bytes of a worker that has no work: Python, libraries, an OpenCL runtime that compiles kernels for the first time.
+
+Once they are compiled it is 400 MiB (``benchmarks/tiles.py``)."""
 
 SITE = 110, 12
 """Bytes of a worker for each site of a window, and for each of its channels besides (measured; see the docs)."""
