@@ -198,3 +198,12 @@ def test_the_colours_of_a_vast_torus_are_known_by_its_seam():
     colors = coloring(window, 2, 1)
     assert not conflicts(colors, 2, False)
     assert colors.max() < colors_of(grid, 2, 1).colors <= 9
+
+
+def test_a_vast_torus_takes_a_pattern_that_fits():
+    """The other one would be looked for along two million sites."""
+    grid = Grid(2**20, 2**20)
+    window = grid.window(2**20 - 20, 2**20 - 25, 45, 50)
+    assert not conflicts(coloring(window, 18, 1), 18, False)
+    plan = colors_of(grid, 18, 1)
+    assert (plan.seam.size, plan.colors) == (0, coloring_sublattice(18, 2**20, 2**20).index)

@@ -48,7 +48,7 @@ REFUSED = [
         for name in ("balance", "structure", "novelty", "finish")
     ),
     ("xi", 0, "xi is 0; give a number below 0"),
-    ("xi", math.nan, "xi is nan; give a number of at least -inf"),
+    ("xi", math.nan, "xi is nan; give a number of at least -1000000.0"),
     ("free_sweeps", -1, "free_sweeps is -1; give 0 or more"),
     ("suggesting", 0, "suggesting is 0; give 1 or more"),
     ("similar", -1, "similar is -1; give 0 or more"),
@@ -325,7 +325,7 @@ def test_a_meter_of_a_level_that_is_held_from_the_beginning():
         ({"search": "coherent"}, 13, 5.8),
         ({"search": "coherent", "similar": 2, "chance": 0, "xi": -2.0}, 28, 3.4),
         ({"search": "coherent", "suggesting": 3, "free_sweeps": 1}, 8, 5.8),
-        ({"search": "coherent", "suggesting": 8, "similar": 99}, 600, 5.8),
+        ({"search": "coherent", "suggesting": 12, "similar": 64}, 600, 5.8),
         ({"search": "coherent", "exhaustive": 600}, 600, 5.8),
         ({"search": "coherent", "exhaustive": 599, "xi": -1e-9}, 13, 1024),
     ],

@@ -19,6 +19,10 @@ from simdtex.model.lattice import Grid, Sublattice, coloring_sublattice, neighbo
 
 UNCOLORED = -1
 
+VAST = 2**17
+"""Rows and columns together beyond which a pattern that fits is taken, if there is one, without a look at the seam: it has
+a few more colours, and the other takes minutes to find."""
+
 TOGETHER = 2**20
 """Neighbours that are looked at together."""
 
@@ -43,7 +47,7 @@ def coloring(grid: Grid, order: int, seed: int = 0) -> NDArray[np.int32]:
 
     The best lattice colouring of the plane where the size of the lattice takes it without a seam. Else either a
     lattice colouring with more colours that fits, or the best one with its clashes along the seam coloured
-    greedily, whichever has fewer colours.
+    greedily, whichever has fewer colours; of a vast lattice the former, if there is one.
 
     Parameters
     ----------
@@ -83,7 +87,8 @@ def _plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Plan:
     neighbours = len(neighbourhood_offsets(order))
     seamless = coloring_sublattice(order, rows, cols, limit=max(best.index, neighbours + 1)) if torus else best
     nobody, own = np.zeros(0, np.int64), None
-    if seamless != best:
+    vast = rows + cols > VAST and seamless is not None
+    if seamless != best and not vast:
         seam = _clashing(rows, cols, order, best)
         own = _greedy(rows, cols, order, best, seam, seed, max(best.index, seamless.index - 1) if seamless else inf)
     if own is None:
