@@ -325,7 +325,7 @@ def test_a_meter_of_a_level_that_is_held_from_the_beginning():
         ({"search": "coherent"}, 13, 5.8),
         ({"search": "coherent", "similar": 2, "chance": 0, "xi": -2.0}, 28, 3.4),
         ({"search": "coherent", "suggesting": 3, "free_sweeps": 1}, 8, 5.8),
-        ({"search": "coherent", "suggesting": 12, "similar": 64}, 600, 5.8),
+        ({"search": "coherent", "suggesting": 8, "similar": 64, "chance": 99}, 600, 5.8),
         ({"search": "coherent", "exhaustive": 600}, 600, 5.8),
         ({"search": "coherent", "exhaustive": 599, "xi": -1e-9}, 13, 1024),
     ],

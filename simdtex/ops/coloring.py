@@ -20,8 +20,9 @@ from simdtex.model.lattice import Grid, Sublattice, coloring_sublattice, neighbo
 UNCOLORED = -1
 
 VAST = 2**17
-"""Rows and columns together beyond which a pattern that fits is taken, if there is one, without a look at the seam: it has
-a few more colours, and the other takes minutes to find."""
+"""Rows and columns together beyond which a pattern that fits is taken, if there is one, without a look at the seam.
+
+It has a few more colours, and the other takes minutes to find."""
 
 TOGETHER = 2**20
 """Neighbours that are looked at together."""
