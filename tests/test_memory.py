@@ -155,7 +155,7 @@ def test_no_run_takes_more_than_was_asked_for(name, channels, dtype, any_device)
     kind, options = benchmark().CASES[name]
     small, side = (24, 80) if kind == "solid" else (128, 1024)
     grown, asked = benchmark().measured(kind, small, side, channels, dtype, str(any_device.index), options)
-    assert 0.3 * asked < grown <= asked
+    assert 0.3 * (asked - memory.TEMPORARY) < grown <= asked, "and not far less, but for what is asked for at any size"
 
 
 @pytest.mark.slow

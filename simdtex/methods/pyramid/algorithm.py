@@ -34,13 +34,16 @@ from simdtex.run import Callback, Iterating, Output, device_seconds
 RESIDUE = 8
 """Rows and columns that the low-pass residue has at least, where the number of levels is not given."""
 
+PART = 2**16
+"""Pixels whose colours are restored at a time, in double precision: some megabytes on the host."""
+
 VALUES = 8
 """Values for each pixel of an output that kernels number at most: six oriented bands of a level, and more to spare."""
 
 MEMORY = 160
 """Bytes for each pixel of a picture on the device, at most (measured by benchmarks/pyramid_cost.py)."""
 
-HOST = 12, 35, 2
+HOST = 20, 20, 3
 """Bytes for each pixel on the host: at all, for each channel, and for each byte of these (benchmarks/memory.py)."""
 
 MATCHING = 200
@@ -226,8 +229,8 @@ class Texture:
         shape = channels[0].shape
         pixels = []
         flat = np.stack([channel.reshape(-1) for channel in channels])
-        for first in range(0, flat.shape[1], 2**20):  # double precision, for some pixels at a time
-            part = self.palette.restored(self.scale.normalised(flat[:, first : first + 2**20]))
+        for first in range(0, flat.shape[1], PART):  # double precision, for some pixels at a time
+            part = self.palette.restored(self.scale.normalised(flat[:, first : first + PART]))
             pixels.append(self.stretched.picture(part[:, None])[0])
         return np.concatenate(pixels).reshape(*shape, len(channels))
 
@@ -364,7 +367,7 @@ def match_texture(
     Notes
     -----
     Memory in bytes per pixel: 160 on the device (240 per voxel of a block); on the host, where a CPU's device memory is
-    too, 12 + (35 + 2 n) channels, n the bytes of a value of the sample. Both are asked for before the run.
+    too, 20 + (20 + 3 n) channels, n the bytes of a value of the sample. Both are asked for before the run.
     """
     began, worked = perf_counter(), machine.seconds
     matcher = Matcher(machine, options, seed)
