@@ -61,7 +61,9 @@ def main():
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--device", help="as of the command line")
     parser.add_argument("--folder", type=Path)
-    parser.add_argument("--jobs", nargs="*", choices=list(JOBS), default=[name for name in JOBS if name != "mrf, exact"])
+    parser.add_argument(
+        "--jobs", nargs="*", choices=list(JOBS), default=[name for name in JOBS if name != "mrf, exact"]
+    )
     arguments = parser.parse_args()
     machine = open_machine(arguments.device)
     print(f"{arguments.size}x{arguments.size} from 256x256 on {machine.name}, medians of {arguments.runs} in turn")

@@ -12,7 +12,7 @@ import tempfile
 import threading
 from pathlib import Path
 
-from fuzz.worker import SECONDS
+from fuzz.worker import DEMO, SECONDS
 
 GRACE = 3.0
 """Seconds that a process may take beyond its limit until it is killed."""
@@ -74,10 +74,10 @@ class Process:
         if self.process is None:
             self.start()
         self.process.stdin.write(json.dumps(question).encode() + b"\n")
-        line = self.line(SECONDS + GRACE)
+        line = self.line(DEMO + GRACE)
         if line and line.startswith(b"ended 1\n"):  # its life was over, and nobody has read the question
             self.child = int(line.split()[3]) if b"ready" in line else self.wait() or self.child
-            line = self.line(SECONDS + GRACE)
+            line = self.line(DEMO + GRACE)
         if line and not line.startswith(b"ended"):
             return json.loads(line)
         what, code = "time", 0
@@ -100,7 +100,7 @@ class Process:
         result = {
             "code": None,
             "said": "",
-            "seconds": SECONDS + GRACE,
+            "seconds": DEMO + GRACE,
             "bytes": 0,
             "faults": [[what, text]],
             "fired": True,

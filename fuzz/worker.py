@@ -24,6 +24,9 @@ MEMORY = 2**30
 SECONDS = 10.0
 """Seconds that a try may take."""
 
+DEMO = 60.0
+"""Seconds that `simdtex demo` may take, whose samples are those of the package."""
+
 LIFE = 3000
 """Tries of a process: what libraries keep would count for the memory of later ones."""
 
@@ -119,6 +122,11 @@ class Sandbox:
             (self.folder / name).write_bytes(data)
 
 
+def seconds_for(one):
+    """Seconds that a try may take."""
+    return DEMO if "demo" in one.args[:1] else SECONDS
+
+
 def _stamp(path):
     try:
         found = os.lstat(path)
@@ -182,7 +190,7 @@ class Worker:
         result.faults += self.left_wrong(one, result)
         if one.fault and any(what == "old output changed" for what, _ in result.faults):
             result.faults = self.without_whole(one, result.faults)
-        if seconds > SECONDS:
+        if seconds > seconds_for(one):
             result.faults.append(("time", one.args[0]))
         if size > MEMORY or "the memory does not suffice" in said:
             result.faults.append(("memory", one.args[0]))
@@ -219,6 +227,9 @@ class Worker:
         if not code:
             return
         sentence = said.strip()
+        if one.interrupt:  # told at once, and what came of it later
+            sentence = sentence.removeprefix("simdtex: stopping where the state is at hand; once more stops at once\n")
+            sentence = sentence.removesuffix("\nsimdtex: stopped")  # after the sentence of a command that failed
         usage = re.fullmatch(r"(?:Usage: [^\n]*\nTry [^\n]*\n\n)?Error: (.+)", sentence, re.DOTALL)
         lines = sentence.splitlines()
         quiet = "-q" in one.args or "--quiet" in one.args
@@ -322,11 +333,21 @@ def _interrupted(seconds):
         yield
         return
     signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
+    before = signal.signal(signal.SIGINT, _leave)
     signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGINT, lambda *_: None)
+        time.sleep(0.05)  # a Ctrl-C in an import comes again a little later
+        signal.signal(signal.SIGINT, before)
+
+
+def _leave(*_):
+    """Before a command begins: as `simdtex.__main__` does, but for this process, which goes on."""
+    os.write(2, b"simdtex: stopped\n")
+    raise SystemExit(130)
 
 
 def serve(root):

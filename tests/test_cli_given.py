@@ -286,3 +286,10 @@ def test_bad_input_gets_one_sentence_and_writes_nothing(folder, case):
 def test_a_sample_is_asked_for(folder):
     result = run(folder, "synth", "-o", "out.png")
     assert result.exit_code == 2 and "SAMPLE" in result.output
+
+
+def test_known_values_of_a_vast_picture_are_not_placed(folder, monkeypatch):
+    monkeypatch.setattr("simdtex.machine.memory.available", lambda: 2**30)
+    monkeypatch.setattr("simdtex.io.hard_data.place_hard_data", lambda *_: pytest.fail("which takes 4 GiB"))
+    result = synth(folder, *ONE, "--known", "wells.csv", "--size", "46341x46341")
+    assert result.exit_code == 2 and "4096 MiB of this computer's memory and 1024 MiB is available" in result.output

@@ -7,6 +7,7 @@ import resource
 import signal
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
 from pathlib import Path
@@ -215,6 +216,21 @@ def test_what_a_killed_process_leaves_is_removed_and_what_a_live_one_writes_is_n
     assert sorted(os.listdir(tmp_path)) == [".simdtex-notes", "b.npy", "slices"]
 
 
+def test_a_folder_in_which_a_thread_still_writes_is_removed(tmp_path):
+    def write(folder):
+        for number in range(12):
+            (folder / str(number)).mkdir(parents=True, exist_ok=True)
+            time.sleep(0.02)
+
+    with pytest.raises(KeyboardInterrupt), atomic_folder(tmp_path / "out.zarr") as temporary:
+        thread = threading.Thread(target=write, args=(temporary,))
+        thread.start()
+        time.sleep(0.05)
+        raise KeyboardInterrupt
+    thread.join()
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_folder_of_stages_where_a_process_was_killed_is_used_again(tmp_path):
     StageWriter(tmp_path)
     dead = writer(tmp_path / "level0.png", "file")
@@ -272,8 +288,12 @@ def test_a_finished_picture_does_not_wait_for_its_stages(tmp_path, tiny):
     assert done.returncode == 2, done.stderr
     assert image.read(tmp_path / "out.png").pixels.shape == (64, 64)
     said = [line for line in done.stderr.splitlines() if line.startswith("simdtex: ")]
-    assert said and all("could not be written (No space left on device): free some space" in line for line in said)
-    assert any("/st/" in line for line in said)
+    assert len(said) == 1, "one sentence, of all that could not be written"
+    each = said[0].split("; ")
+    assert len(each) > 1 and all(
+        "could not be written (No space left on device): free some space" in one for one in each
+    )
+    assert any("/st/" in one for one in each)
     assert not [path for path in tmp_path.rglob("*") if path.name.startswith(".")]
 
 

@@ -187,8 +187,9 @@ def test_levels_are_those_that_are_asked_for():
     for levels in (1, 2):
         _, output = fill(image, MIDDLE, levels=levels, full_output=True)
         assert len(output.statistics["levels"]) == levels
-    with pytest.raises(ValueError, match="levels=9 is too many"):
-        fill(image, MIDDLE, levels=9)
+    for levels in (9, 2**31 - 1):
+        with pytest.raises(ValueError, match=f"levels={levels} is too many"):
+            fill(image, MIDDLE, levels=levels)
 
 
 def test_the_window_of_a_pixel():

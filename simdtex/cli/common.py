@@ -21,6 +21,9 @@ from click.core import ParameterSource
 
 from simdtex.cli.places import check_places
 
+RUNTIMES = "simdtex.machine.runtimes"
+"""The module that looks for OpenCL runtimes."""
+
 
 class Ended(BaseException):
     """The process is asked to end, by the signal of this number."""
@@ -39,9 +42,7 @@ def plainly(command: Callable[..., None]) -> Callable[..., None]:
                 check_places(click.get_current_context())
                 command(*args, **kwargs)
         except (ValueError, TypeError, OSError) as error:
-            _say(error)
-            settle()
-            sys.exit(2)
+            settle(error)
         except MemoryError:
             click.echo("simdtex: the memory does not suffice for this; give a smaller size", err=True)
             sys.exit(2)
@@ -60,12 +61,13 @@ def plainly(command: Callable[..., None]) -> Callable[..., None]:
 def _interruptible() -> Iterator[None]:
     """Let Ctrl-C raise KeyboardInterrupt, since there is work that wants to be put in order, but not into an import.
 
-    What is being imported may swallow an exception, tell its traceback or, as C++ does, abort.
+    What is being imported may swallow an exception, tell its traceback or, as C++ does, abort. The search for runtimes
+    is over soon, and would leave its temporary folder behind.
     """
 
     def stop(_: int, frame: FrameType | None) -> None:
         while frame:
-            if frame.f_code.co_filename.startswith("<frozen importlib"):
+            if frame.f_code.co_filename.startswith("<frozen importlib") or frame.f_globals.get("__name__") == RUNTIMES:
                 again = threading.Timer(0.02, interrupt_main)
                 again.daemon = True
                 again.start()
@@ -84,11 +86,10 @@ def _interruptible() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _say(error: Exception) -> None:
-    text = str(error)
+def _sentence(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror:  # without its number
-        text = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    click.echo(f"simdtex: {text}", err=True)
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return str(error)
 
 
 @contextmanager
@@ -126,13 +127,12 @@ def afterwards() -> Iterator[None]:
         context.meta.setdefault(__name__, []).append(error)
 
 
-def settle() -> None:
-    """Say what could not be written, if anything, and end with exit code 2."""
+def settle(*errors: Exception) -> None:
+    """Say in one sentence what went wrong and what `afterwards` has kept, if anything, and end with exit code 2."""
     context = click.get_current_context(silent=True)
-    failures = context.meta.pop(__name__, []) if context else []
-    for error in failures:
-        _say(error)
+    failures = [*errors, *(context.meta.pop(__name__, []) if context else [])]
     if failures:
+        click.echo(f"simdtex: {'; '.join(_sentence(error) for error in failures)}", err=True)
         sys.exit(2)
 
 

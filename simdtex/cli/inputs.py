@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -206,9 +207,11 @@ def known_values(
     """
     from simdtex.io.hard_data import HardData, place_hard_data
     from simdtex.io.image import split_alpha
+    from simdtex.machine import memory
 
     like = samples.pixels[0]
     if isinstance(known, HardData):
+        memory.require_host(prod(shape) * channels(like) * (like.itemsize + 1))  # values and a mask
         if len(known.names) != channels(like):
             raise ValueError(
                 f"{path} has {len(known.names)} values to a datum and {samples.paths[0]} has {kind(like)}; give as many"

@@ -15,6 +15,7 @@ import re
 import secrets
 import shutil
 import socket
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -152,12 +153,24 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
             if old.exists() and not target.exists():
                 old.rename(target)
             raise
-    except OSError as error:
-        raise not_written(path, error) from None
+    except BaseException as error:
+        _outlast(temporary)
+        if isinstance(error, OSError):
+            raise not_written(path, error) from None
+        raise
     finally:
         _remove(temporary)
         if target.exists():
             _remove(old)
+
+
+def _outlast(folder: Path) -> None:
+    """Remove a folder in which threads of a library may go on to write for a while, as Zarr's do after Ctrl-C."""
+    for _ in range(20):
+        _remove(folder)
+        time.sleep(0.05)
+        if not folder.exists():
+            return
 
 
 @contextmanager
