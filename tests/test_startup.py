@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import click
@@ -176,6 +177,20 @@ def test_a_ctrl_c_that_was_to_be_ignored_is(tmp_path):
     result = interrupted(tmp_path, "module", "click", "4", lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
     assert (result.returncode, result.stderr) == (0, "")
     assert (tmp_path / "out.png").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
+def test_ctrl_c_waits_for_the_search_for_runtimes(monkeypatch):
+    """Which would leave its temporary folder behind."""
+    from simdtex.cli import common
+    from simdtex.machine import runtimes
+
+    over, names = [], {"__name__": runtimes.__name__, "signal": signal, "time": time}
+    exec("def search(over):\n signal.raise_signal(signal.SIGINT)\n time.sleep(0.05)\n over.append(True)", names)
+    with pytest.raises(KeyboardInterrupt), common._interruptible():
+        names["search"](over)
+        time.sleep(1)
+    assert over
 
 
 def test_the_script_begins_where_the_module_does():
