@@ -46,10 +46,12 @@ demo:
 	$(device)
 	@$(VENV)/bin/simdtex demo
 
+# JOBS=0 runs the tests one after another in this process, as one wants in a debugger.
+JOBS ?= auto
 test:
 	$(call install,test,[test])
 	$(device)
-	@$(PY) -m pytest
+	@$(PY) -m pytest --numprocesses $(JOBS) --maxprocesses 4 --dist worksteal
 
 slow:
 	$(call install,test,[test])

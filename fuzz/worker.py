@@ -188,7 +188,7 @@ class Worker:
         result = Result(code, said, seconds, size, wrong, fired)
         result.faults += self.said_wrong(one, result)
         result.faults += self.left_wrong(one, result)
-        if one.fault and any(what == "old output changed" for what, _ in result.faults):
+        if (one.fault or one.interrupt) and any(what == "old output changed" for what, _ in result.faults):
             result.faults = self.without_whole(one, result.faults)
         if seconds > seconds_for(one):
             result.faults.append(("time", one.args[0]))
@@ -197,13 +197,16 @@ class Worker:
         return result
 
     def without_whole(self, one, faults):
-        """The faults but for outputs that are what they are where nothing fails: the first of several may be new."""
+        """The faults but for outputs that are what they are where nothing fails.
+
+        The first of several may be new, and all of them where a Ctrl-C comes after the last.
+        """
         left = {
             name: (self.sandbox.folder / name).read_bytes()
             for name in one.old
             if (self.sandbox.folder / name).is_file()
         }
-        self.run(replace(one, fault=None))
+        self.run(replace(one, fault=None, interrupt=None))
         for name, data in left.items():
             path = self.sandbox.folder / name
             if data != one.files[name] and not (path.is_file() and path.read_bytes() == data):
@@ -229,7 +232,8 @@ class Worker:
         sentence = said.strip()
         if one.interrupt:  # told at once, and what came of it later
             sentence = sentence.removeprefix("simdtex: stopping where the state is at hand; once more stops at once\n")
-            sentence = sentence.removesuffix("\nsimdtex: stopped")  # after the sentence of a command that failed
+            if sentence.endswith("\nsimdtex: stopped"):  # after the sentence of a command that failed, or within it
+                return
         usage = re.fullmatch(r"(?:Usage: [^\n]*\nTry [^\n]*\n\n)?Error: (.+)", sentence, re.DOTALL)
         lines = sentence.splitlines()
         quiet = "-q" in one.args or "--quiet" in one.args

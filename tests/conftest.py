@@ -105,9 +105,19 @@ def pytest_runtest_call(item):
     return result
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node):
+    """Add what one of several processes counted, at its end."""
+    ran = node.config.stash[RAN]
+    for name, count in getattr(node, "workeroutput", {}).get("ran", {}).items():
+        ran[name] = ran.get(name, 0) + count
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_sessionfinish(session, exitstatus):
-    if os.environ.get(REQUIRE) and not session.config.option.collectonly:
+    if hasattr(session.config, "workeroutput"):  # the process that began this one adds up
+        session.config.workeroutput["ran"] = session.config.stash[RAN]
+    elif os.environ.get(REQUIRE) and not session.config.option.collectonly:
         ran = session.config.stash[RAN]
         if not ran and exitstatus == pytest.ExitCode.OK:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED

@@ -232,6 +232,7 @@ BAD = {
     "a guide of another size": ([*GREY, "--guide", "guide.png=guide.png"], "guide of the output is 16x20"),
     "an order": ([*GREY, "--xi", 2], "xi is 2"),
     "a report of several": (["grey.png", "second.png", "-o", "out.npz", "--report", "report"], "leave it out"),
+    "a report of next to nothing": (["grey.png", "-o", "out.npz", "--size", "9x3", "--report", "report"], "4x4 pixels"),
     "a report of colour": (["colour.png", "-o", "out.npz", "--report", "report"], "one variable"),
     "a report of gaps": (["holed.tif", "-o", "out.npz", "--report", "report"], "known everywhere"),
 }

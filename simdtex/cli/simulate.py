@@ -100,7 +100,7 @@ def simulate(
     known = known_values(table, hard, shape, material) if table is not None and hard else None
     check_realisations_path(output, material.pixels[0].dtype)
     if report:
-        _check_report(report, material.pixels)
+        _check_report(report, material.pixels, shape)
     if guides:
         options["labels"] = guides.labels
 
@@ -145,14 +145,17 @@ def simulate(
         )
 
 
-def _check_report(folder: Path, pictures: list[Any]) -> None:
+def _check_report(folder: Path, pictures: list[Any], shape: tuple[int, int]) -> None:
     """Raise where a report cannot be made, before anything is simulated."""
+    from simdtex.experiments.ensemble.summary import LEAST
     from simdtex.report.page import check_folder
 
     if len(pictures) > 1 or pictures[0].ndim > 2:
         raise ValueError("--report is of one training image of one variable; leave it out")
     if pictures[0].dtype.kind == "f" and np.isnan(pictures[0]).any():
         raise ValueError("--report is of a training image that is known everywhere; leave it out")
+    if min(*shape, *pictures[0].shape) < LEAST:
+        raise ValueError(f"--report is of {LEAST}x{LEAST} pixels or more; give a larger size, or leave it out")
     if find_spec("gstools") is None:
         raise ValueError("gstools is not installed; pip install 'simdtex[simulate]', or leave --report out")
     check_folder(folder)

@@ -18,6 +18,9 @@ from simdtex.experiments.ensemble.variograms import variogram
 
 Floats = NDArray[np.float64]
 
+LEAST = 4
+"""Pixels to the side of what figures can be computed of."""
+
 MOST_LAG = 100  # pixels, where none is given
 
 
@@ -104,8 +107,8 @@ def summary(
     known = categories_of(image, categories)
     points = as_data(data, array.shape[1:])
     shortest = min(*array.shape[1:], *image.shape)
-    if shortest < 4:
-        raise ValueError(f"an image has a side of {shortest} pixels: give at least 4 x 4")
+    if shortest < LEAST:
+        raise ValueError(f"an image has a side of {shortest} pixels: give at least {LEAST} x {LEAST}")
     lag = min(shortest // 2, MOST_LAG) if max_lag is None else max_lag
     images = [*array, image]
     own = image[np.newaxis]
