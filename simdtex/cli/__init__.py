@@ -9,22 +9,43 @@ from importlib import import_module
 
 import click
 
-COMMANDS = {
-    "bench": "Measure what devices can do at most, and what the methods take.",
-    "demo": "Synthesise brick, grass and gravel from scikit-image's own pictures.",
-    "devices": "List every OpenCL device, whether it works, and which one would be chosen.",
-    "extend": "Continue PICTURE beyond its edges, or make it seamless.",
-    "fill": "Fill the holes of PICTURE with more of what is around them.",
-    "ising": "Relax Ising spins by each schedule and compare with the exact energy and magnetisation.",
-    "mix": "Mix the textures SAMPLE...: a picture that looks a bit like each of them.",
-    "resume": "Go on with the run whose state is in DIR, and write what its command writes.",
-    "schedules": "Run the same job under several schedules and compare them in a report.",
-    "sheet": "Show what thresholds alpha / k^beta make of SAMPLE: Figures 11 and 12 of De Bonet (1997) on one sheet.",
-    "simulate": "Simulate what TRAINING_IMAGE shows: realisations that look like it and honour data.",
-    "solid": "Make a solid of the texture SAMPLE: a block whose slices look like it.",
-    "synth": "Make more of the texture SAMPLE.",
+from simdtex.cli.helping import write_examples
+
+GROUPS = {
+    "More of a texture": {
+        "synth": "Make more of the texture SAMPLE.",
+        "fill": "Fill the holes of PICTURE with more of what is around them.",
+        "extend": "Continue PICTURE beyond its edges, or make it seamless.",
+        "mix": "Mix the textures SAMPLE...: a picture that looks a bit like each of them.",
+        "solid": "Make a solid of the texture SAMPLE: a block whose slices look like it.",
+    },
+    "Realisations of a training image": {
+        "simulate": "Simulate what TRAINING_IMAGE shows: realisations that look like it and honour data.",
+    },
+    "Runs that were stopped": {
+        "resume": "Go on with the run whose state is in DIR, and write what its command writes.",
+    },
+    "Studies": {
+        "schedules": "Run the same job under several schedules and compare them in a report.",
+        "ising": "Relax Ising spins by each schedule and compare with the exact energy and magnetisation.",
+        "sheet": "Show what thresholds alpha / k^beta make of SAMPLE: Figures 11 and 12 of De Bonet (1997) "
+        "on one sheet.",
+    },
+    "This machine": {
+        "demo": "Synthesise brick, grass and gravel from scikit-image's own pictures.",
+        "devices": "List every OpenCL device, whether it works, and which one would be chosen.",
+        "bench": "Measure what devices can do at most, and what the methods take.",
+    },
 }
-"""The commands, each in the module of its name, and their first sentences."""
+"""The commands by what they are for, each in the module of its name, and their first sentences."""
+
+COMMANDS = {name: sentence for group in GROUPS.values() for name, sentence in group.items()}
+
+EXAMPLES = (
+    ("synth gravel.png -o more.png", "More of a texture; it tiles."),
+    ("extend photo.png -o seamless.png --tile", "A photo that tiles."),
+    ("fill photo.png -o whole.png --mask hole.png", "A hole that is filled."),
+)
 
 
 def load(name: str) -> click.Command:
@@ -34,7 +55,7 @@ def load(name: str) -> click.Command:
 
 
 class Commands(click.Group):
-    """A group that lists stand-ins, and loads a command when it is run or asked for its help."""
+    """A group that lists stand-ins by what they are for, and loads a command when it is run or asked for its help."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -43,9 +64,39 @@ class Commands(click.Group):
         name, _, rest = super().resolve_command(ctx, args)
         return name, load(str(name)), rest
 
+    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """What it does, and the examples."""
+        super().format_help_text(ctx, formatter)
+        write_examples(EXAMPLES, formatter)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The commands, in groups of one width."""
+        width = max(map(len, COMMANDS))
+        for title, group in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(f"{name:{width}}", sentence) for name, sentence in group.items()])
+
+
+def _versions(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
+    """Print the versions that a result may depend on, and the device that would be chosen."""
+    if not wanted or ctx.resilient_parsing:
+        return
+    from simdtex.report.versions import lines
+
+    for line in lines():
+        click.echo(line)
+    ctx.exit()
+
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
-@click.version_option(package_name="simdtex", prog_name="simdtex")
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_versions,
+    help="Show what runs here, and on which device.",
+)
 def main() -> None:
     """More of a texture from a sample of it, by parallel relaxation on any OpenCL device."""
     atexit.register(gc.freeze)  # the process ends: what it holds need not be looked through for cycles

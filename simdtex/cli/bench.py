@@ -10,10 +10,13 @@ from pathlib import Path
 import click
 
 from simdtex.cli.common import afterwards, plainly
+from simdtex.cli.helping import command
 from simdtex.cli.places import FOLDER, WRITE
 
 
-@click.command()
+@command(
+    ("bench --quick", "A first look, within a minute."),
+)
 @click.option(
     "--device",
     metavar="TEXT",

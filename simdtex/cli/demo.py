@@ -9,11 +9,14 @@ from pathlib import Path
 import click
 
 from simdtex.cli.common import plainly, progress_bar
+from simdtex.cli.helping import command
 from simdtex.cli.options import DEVICE
 from simdtex.cli.places import FOLDER
 
 
-@click.command()
+@command(
+    ("demo", "Three textures, and a sheet of them, in the folder demo."),
+)
 @click.option("-o", "--output", default="demo", show_default=True, type=FOLDER, help="Folder to write.")
 @click.option("--size", default="256x256", show_default=True, metavar="WIDTHxHEIGHT", help="Of each output.")
 @click.option("--seed", type=int, default=1, show_default=True)

@@ -5,12 +5,11 @@ from __future__ import annotations
 
 import sys
 
-import click
-
 from simdtex.cli.common import plainly
+from simdtex.cli.helping import command
 
 
-@click.command()
+@command()
 @plainly
 def devices() -> None:
     """List every OpenCL device, whether it works, and which one would be chosen."""

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from simdtex.cli.common import afterwards, command_line, given, plainly, settle, watching
+from simdtex.cli.helping import command
 from simdtex.cli.inputs import channels, check_source_map, read_also, read_material, write_arranged
 from simdtex.cli.keeping import kept
 from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, extend_options, stages_option
@@ -18,7 +19,11 @@ from simdtex.cli.places import FOLDER, READ, WRITE, WRITE_PAIR
 SIDES = ("top", "bottom", "left", "right")
 
 
-@click.command()
+@command(
+    ("extend photo.png -o seamless.png --tile", "Make a photo tile."),
+    ("extend photo.png -o wide.png --left 200 --right 200", "Continue it at both sides."),
+    ("extend photo.png -o seamless.png --tile --also normal.png=seamless-normal.png", "And its normal map with it."),
+)
 @click.argument("picture", type=READ)
 @click.option("-o", "--output", required=True, type=WRITE, help="Picture to write.")
 @click.option("--left", type=int, default=0, help="Pixels to add at the left.")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.common import given, plainly, settle, watching
+from simdtex.cli.helping import command
 from simdtex.cli.inputs import (
     Material,
     channels,
@@ -26,7 +27,14 @@ from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, fill_options
 from simdtex.cli.places import READ, WRITE, WRITE_PAIR
 
 
-@click.command()
+@command(
+    ("fill photo.png -o whole.png --mask hole.png", "What is white in the mask is made anew."),
+    ("fill cutout.png -o whole.png", "So is what is transparent in the picture."),
+    (
+        "fill photo.png -o grass.png --mask car.png --sample meadow.png",
+        "With another texture than what is around.",
+    ),
+)
 @click.argument("picture", type=READ)
 @click.option("-o", "--output", required=True, type=WRITE, help="Picture to write.")
 @click.option(

@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from simdtex.cli.common import command_line, plainly, progress_bar
+from simdtex.cli.helping import command
 from simdtex.cli.options import DEVICE
 from simdtex.cli.places import FOLDER
 
@@ -23,7 +24,10 @@ PICTURE_SWEEPS = 50
 """From a random start: enough for domains to grow, too few for one to win."""
 
 
-@click.command()
+@command(
+    ("ising -o page", "All schedules, and a report."),
+    ("ising --schedules coloring,synchronous --temperature 2.3", "Two schedules at one temperature."),
+)
 @click.option("--schedules", "names", default=SCHEDULES, metavar="A,B,...", help="Which to try.  [all kinds there are]")
 @click.option(
     "--temperature",

@@ -20,6 +20,7 @@ from simdtex.cli.common import (
     settle,
     watching,
 )
+from simdtex.cli.helping import command
 from simdtex.cli.keeping import kept
 from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
 from simdtex.cli.places import READ, WRITE
@@ -28,7 +29,10 @@ CHOSEN = ("palette", "pattern", "low", "high")
 """Options that name a sample."""
 
 
-@click.command()
+@command(
+    ("mix wood.png stone.png -o both.png", "A bit of each."),
+    ("mix wood.png stone.png -o both.png --palette wood.png --pattern stone.png", "Stone in the colours of wood."),
+)
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
 @click.option("-o", "--output", required=True, type=WRITE, help="Picture to write.")
 @click.option(

@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from simdtex.cli.common import plainly
+from simdtex.cli.helping import command
 from simdtex.cli.options import DEVICE, QUIET
 from simdtex.cli.places import ENTER
 from simdtex.cli.tiles import resume_tiles, scheduler_option, workers_option
@@ -20,7 +21,10 @@ COMMANDS = ("extend", "fill", "mix", "simulate", "solid", "synth")
 """Those that keep checkpoints."""
 
 
-@click.command()
+@command(
+    ("resume state", "The run of --checkpoint state."),
+    ("resume more.zarr --workers 4", "An output in tiles, with four processes."),
+)
 @click.argument("folder", metavar="DIR", type=ENTER)
 @workers_option
 @scheduler_option

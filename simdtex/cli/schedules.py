@@ -11,13 +11,17 @@ from typing import Any
 import click
 
 from simdtex.cli.common import afterwards, command_line, given, plainly, progress_bar
+from simdtex.cli.helping import command
 from simdtex.cli.options import DEVICE, mrf_options
 from simdtex.cli.places import FOLDER, READ
 from simdtex.methods.mrf import Options
 from simdtex.schedules import TOGETHER
 
 
-@click.command()
+@command(
+    ("schedules", "Compare them on a picture of brick, in the folder schedules-report."),
+    ("schedules gravel.png -o page --schedules coloring,synchronous --seeds 5", "Two of them, with five seeds."),
+)
 @click.argument("sample", required=False, type=READ)
 @click.option(
     "-o",

@@ -10,11 +10,14 @@ import click
 import numpy as np
 
 from simdtex.cli.common import candidates_per_level, given, numbers, output_shape, plainly, progress_bar
+from simdtex.cli.helping import command
 from simdtex.cli.options import DEVICE, multires_options
 from simdtex.cli.places import READ, WRITE
 
 
-@click.command()
+@command(
+    ("sheet gravel.png -o sheet.png --alphas 0.1,0.2,0.4", "Three thresholds."),
+)
 @click.argument("sample", type=READ)
 @click.option("-o", "--output", required=True, type=WRITE, help="Sheet to write.")
 @click.option(

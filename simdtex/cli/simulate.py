@@ -13,13 +13,20 @@ import numpy as np
 
 from simdtex.cli.common import afterwards, command_line, given, output_shape, plainly, settle, watching
 from simdtex.cli.guides import read_guides
+from simdtex.cli.helping import command
 from simdtex.cli.inputs import known_size, known_values, read_known, read_masks, read_material
 from simdtex.cli.keeping import kept
 from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, simulate_options
 from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
 
 
-@click.command()
+@command(
+    (
+        "simulate facies.png -o many.nc --number 50 --categorical --hard wells.csv",
+        "50 that honour the data of wells.",
+    ),
+    ("simulate facies.png -o many.zarr --number 10 --size 500x500 --report page", "A size, and a page of statistics."),
+)
 @click.argument("training_image", nargs=-1, required=True, type=READ)
 @click.option(
     "-o",

@@ -12,6 +12,7 @@ import click
 import numpy as np
 
 from simdtex.cli.common import afterwards, given, last_iteration, opened, plainly, print_profile, settle, watching
+from simdtex.cli.helping import command
 from simdtex.cli.keeping import kept
 from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
 from simdtex.cli.places import EITHER, READ, WRITE
@@ -22,7 +23,13 @@ SIDE = 128
 """Voxels a side, where no size is given."""
 
 
-@click.command()
+@command(
+    (
+        "solid marble.png -o block.npz --size 64 --view block.png",
+        "A cube of 64^3 voxels, and a picture of it.",
+    ),
+    ("solid marble.png -o slices --size 16x64x64", "A folder of 16 slices."),
+)
 @click.argument("sample", type=READ)
 @click.option(
     "-o",

@@ -23,6 +23,7 @@ from simdtex.cli.common import (
     watching,
 )
 from simdtex.cli.guides import read_guides
+from simdtex.cli.helping import command
 from simdtex.cli.inputs import (
     channels,
     check_source_map,
@@ -40,7 +41,14 @@ from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR, WRITE, WRITE_PAI
 from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 
 
-@click.command()
+@command(
+    ("synth gravel.png -o more.png", "Twice as much, and it tiles."),
+    (
+        "synth gravel.png -o more.png --size 1024x512 --seed 7 --also normal.png=more-normal.png",
+        "A size, a seed for the same pixels anywhere, a map carried along.",
+    ),
+    ("synth gravel.png -o more.zarr --size 32768x32768 --tiles 2048", "More than the memory holds."),
+)
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
 @click.option("-o", "--output", required=True, type=EITHER, help="Picture to write; with --tiles a .zarr store.")
 @click.option(
