@@ -157,6 +157,9 @@ def test_a_pool_of_forked_processes_gets_the_error_and_may_use_the_reference(any
 class Mute:
     """Neither a name nor a machine."""
 
+    def __repr__(self):
+        return "something mute"
+
 
 @pytest.mark.parametrize("wrong", [1.0, b"0", [], (), {}, True, Mute()], ids=repr)
 def test_what_is_no_device_is_a_type_error_of_one_sentence(wrong):
