@@ -1,6 +1,7 @@
 """An output in tiles has the bytes of one that is made at once, whatever the tiles, the workers and their order."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
@@ -307,6 +308,20 @@ def test_going_on_with_what_is_finished_changes_nothing(tmp_path):
 
 
 # -- progress --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps nobody off a folder")
+def test_one_process_at_a_time_leads(tmp_path):
+    path, said = tmp_path / "out.zarr", []
+
+    def another(_):
+        with pytest.raises(ValueError, match=r"another run is at work in .*out.zarr now; wait for it, or stop it"):
+            distributed.resume(path, device=REFERENCE)
+        said.append(True)
+
+    distributed.synthesize(SAMPLE, (20, 20), path, tiles=16, rng=1, device=REFERENCE, order=1, callback=another)
+    assert said
+    distributed.resume(path, device=REFERENCE)  # nobody is kept off for longer
 
 
 def test_progress_tells_every_tile(tmp_path):

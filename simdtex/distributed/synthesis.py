@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from simdtex.distributed.plan import Plan, planned
 from simdtex.envelope import check_shape
-from simdtex.io.image import atomic_folder
+from simdtex.io.atomic import alone, atomic_folder
 from simdtex.jobs.inputs import Inputs, check_inputs
 from simdtex.machine import Machine, memory
 from simdtex.methods.mrf import make_options
@@ -143,7 +143,7 @@ def resume(
     Raises
     ------
     ValueError
-        There is no such store, or one of another version.
+        There is no such store, or one of another version, or another process is at work in it.
     """
     from simdtex.distributed.cluster import across, connected, here
     from simdtex.distributed.drive import go_on
@@ -151,7 +151,7 @@ def resume(
     where = _address(store)
     opened = _opened(where)
     _workers(client, workers)
-    with connected(workers, None) as own:
+    with nullcontext() if "://" in where else alone(where), connected(workers, None) as own:
         crew = client or own
         if crew is not None and not (device is None or isinstance(device, (str, int))):
             raise TypeError("each worker opens its own device; give its name, not an open machine")

@@ -22,7 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import IO
 
-__all__ = ["atomic_folder", "atomic_path", "check_place", "left_behind", "not_written"]
+__all__ = ["alone", "atomic_folder", "atomic_path", "check_place", "left_behind", "not_written"]
 
 PathLike = str | os.PathLike[str]
 
@@ -182,6 +182,34 @@ def scratch_folder(beside: PathLike) -> Iterator[Path]:
         yield temporary
     finally:
         _remove(temporary)
+
+
+@contextmanager
+def alone(folder: PathLike) -> Iterator[None]:
+    """Keep other processes off a folder; one that is killed keeps nobody off. Windows has no such thing.
+
+    Raises
+    ------
+    ValueError
+        Another one is at work in it.
+    """
+    try:
+        import fcntl
+    except ModuleNotFoundError:
+        yield
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(descriptor)
+        raise ValueError(f"another run is at work in {os.fspath(folder)} now; wait for it, or stop it") from None
+    except OSError:  # a file system without locks
+        pass
+    try:
+        yield
+    finally:
+        os.close(descriptor)
 
 
 class Unbuffered:
