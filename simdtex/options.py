@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Checks that options share: one sentence that says what is wrong and what would be right."""
+"""What an option may be, said where it is declared; and one sentence that says what is wrong and what would be right.
+
+A field of a method's options has its kind in its metadata: `words`, `integer`, `number_of`, `switch`. From there it is
+checked, and the command line completes it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 from math import isfinite, prod
 from numbers import Integral, Real
 from typing import Any, TypeVar
@@ -22,6 +26,91 @@ GREATEST = 1e6
 
 LONGEST = 100
 """Characters of a value that a sentence repeats, at most."""
+
+
+@dataclass(frozen=True)
+class Words:
+    """One of some words."""
+
+    valid: tuple[str, ...]
+
+    def check(self, name: str, value: Any) -> None:
+        """Raise unless it is one of them."""
+        one_of(name, value, self.valid)
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A whole number from `least` to `most`."""
+
+    least: int
+    most: int = MOST
+
+    def check(self, name: str, value: Any) -> None:
+        """Raise unless it is one."""
+        whole(name, value, self.least, self.most)
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number from `least`, or above it, to `most`."""
+
+    least: float
+    most: float = GREATEST
+    above: bool = False
+
+    def check(self, name: str, value: Any) -> None:
+        """Raise unless it is one."""
+        real(name, value, self.least, self.most, above=self.above)
+
+
+@dataclass(frozen=True)
+class Switch:
+    """True or False."""
+
+    def check(self, name: str, value: Any) -> None:
+        """Raise unless it is one of them."""
+        true_or_false(name, value)
+
+
+Kind = Words | Whole | Number | Switch
+
+
+def words(default: str | None, *valid: str) -> Any:
+    """A field that is one of these words."""
+    return _declared(default, Words(valid))
+
+
+def integer(default: int | None, least: int, most: int = MOST) -> Any:
+    """A field that is a whole number."""
+    return _declared(default, Whole(least, most))
+
+
+def number_of(default: float | None, least: float, most: float = GREATEST, *, above: bool = False) -> Any:
+    """A field that is a number."""
+    return _declared(default, Number(least, most, above))
+
+
+def switch(default: bool | None) -> Any:
+    """A field that is True or False."""
+    return _declared(default, Switch())
+
+
+def _declared(default: Any, kind: Kind) -> Any:
+    return field(default=default, metadata={"kind": kind})
+
+
+def kinds(options: Any) -> dict[str, Kind]:
+    """The kinds of a method's options, a class or one of its kind, by name: of those that are declared with one."""
+    return {one.name: one.metadata["kind"] for one in fields(options) if "kind" in one.metadata}
+
+
+def check(options: Any) -> None:
+    """Raise unless every declared value is of its kind; None is where it is the default."""
+    for one in fields(options):
+        value = getattr(options, one.name)
+        if "kind" in one.metadata and not (value is None and one.default is None):
+            one.metadata["kind"].check(one.name, value)
 
 
 def build(options: type[T], method: str, given: Mapping[str, Any], also: tuple[str, ...] = ()) -> T:

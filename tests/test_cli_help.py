@@ -46,8 +46,10 @@ def test_every_option_is_shown_once(name):
 
 def test_a_group_that_names_a_method_need_not_be_told_it_again():
     said = help_of("synth")
-    assert "Method multires:\n  --alpha FLOAT|auto     Threshold; more is freer" in said
-    assert re.search(r"--search TEXT +exact \(all candidates\)", said), "words that are given stay as they are"
+    assert re.search(r"Method multires:\n  --alpha FLOAT\|auto +Threshold; more is freer", said)
+    assert re.search(r"--search auto\|exact\|coherent +exact \(all candidates\)", said), (
+        "words that are given stay as they are"
+    )
     assert re.search(r"--known FILE +mrf: what", said), "where options of several methods are together it is told"
 
 
@@ -112,10 +114,23 @@ def test_near_misses_are_named():
 
 @pytest.mark.parametrize(
     "words, last, found",
-    [([], "sy", ["synth"]), (["synth"], "--balan", ["--balance"]), (["fill", "a.png", "--mas"], "--mas", ["--mask"])],
+    [
+        ([], "sy", ["synth"]),
+        (["synth"], "--balan", ["--balance"]),
+        (["fill", "a.png"], "--mas", ["--mask"]),
+        (["synth", "--relaxation"], "g", ["gibbs"]),
+        (["synth", "--method"], "", ["mrf", "multires", "pyramid"]),
+        (["synth", "--schedule"], "ra", ["random-subset", "raster", "random-scan"]),
+        (["synth", "--edges"], "", ["auto", "reflect", "whole", "mend", "keep", "wrap"]),
+        (["solid", "--slices"], "e", ["each"]),
+        (["synth", "--order"], "1", []),
+    ],
 )
 def test_completion(words, last, found):
-    told = BashComplete(main, {}, "simdtex", "_SIMDTEX_COMPLETE").get_completions(words[:1], last)
+    told = BashComplete(main, {}, "simdtex", "_SIMDTEX_COMPLETE").get_completions(words, last)
     assert [one.value for one in told] == found
+
+
+def test_completion_of_files():
     files = BashComplete(main, {}, "simdtex", "_SIMDTEX_COMPLETE").get_completions(["synth"], "gr")
     assert [one.type for one in files] == ["file"]

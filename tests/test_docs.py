@@ -22,6 +22,7 @@ from simdtex.io.image import write
 from simdtex.methods import mrf, multires, pyramid
 from simdtex.methods.mrf import PRESETS
 from simdtex.methods.pyramid import solid
+from simdtex.options import Words, kinds
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -217,6 +218,15 @@ def test_every_option_of_a_method_is_on_the_command_line_and_in_the_docstrings(m
     described = set(re.findall(r"^    (\w+) : ", options.__doc__, re.MULTILINE))
     assert described == names
     assert names <= set(re.findall(r"``(\w+)``", simdtex.synthesize.__doc__))
+
+
+@pytest.mark.parametrize("options", [*(module.Options for module in METHODS.values()), solid.Options])
+def test_words_of_an_option_are_those_of_its_docstring(options):
+    told = dict(re.findall(r"^    (\w+) : \{(.+)\}", options.__doc__, re.MULTILINE))
+    own = {name: one.valid for name, one in kinds(options).items() if isinstance(one, Words)}
+    for name, words in told.items():
+        assert sorted(re.findall(r'"([\w-]+)"', words)) == sorted(own[name]), name
+    assert {name for name in own if f"\n    {name} : " in options.__doc__} <= set(told)
 
 
 def test_every_option_of_solids_and_mixtures_is_on_the_command_line_and_in_the_docstrings():

@@ -16,7 +16,7 @@ from simdtex.experiments.ising import ising
 from simdtex.machine.reference import Reference
 from simdtex.methods import mrf, multires, pyramid
 from simdtex.methods.pyramid import solid
-from simdtex.options import GREATEST, MOST, real, whole, within_32_bits
+from simdtex.options import GREATEST, MOST, Number, Whole, Words, kinds, real, whole, within_32_bits
 
 SAMPLE = np.random.default_rng(1).integers(0, 256, (9, 9), dtype=np.uint8)
 STRANGE = [
@@ -149,3 +149,24 @@ def test_memory_errors_are_said_in_one_sentence():
 
     result = CliRunner().invoke(command)
     assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_is_declared_is_what_is_checked(method):
+    options = METHODS[method].Options
+    defaults = {field.name: field.default for field in fields(options)}
+    for name, kind in kinds(options).items():
+        if defaults[name] is not None:
+            kind.check(name, defaults[name])
+            with pytest.raises((TypeError, ValueError), match=name):
+                options(**{name: None})
+        with pytest.raises((TypeError, ValueError), match=name):
+            options(**{name: object()})
+        if isinstance(kind, Words):
+            for word in kind.valid:
+                kind.check(name, word)
+        elif isinstance(kind, (Whole, Number)):
+            with pytest.raises(ValueError, match=name):
+                options(**{name: kind.least - 1})
+            with pytest.raises(ValueError, match=name):
+                options(**{name: kind.most + 1})

@@ -8,6 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
+from click.types import StringParamType
 
 from simdtex.cli.places import ENTER, FOLDER, READ
 
@@ -22,8 +24,35 @@ def _defaults() -> dict[str, Any]:
     return {"mrf": mrf.Options(), "multires": multires.Options(), "pyramid": pyramid.Options()}
 
 
+def _words(name: str) -> list[tuple[str, ...]]:
+    """What an option of this name may be, for each method in which it is one of some words."""
+    from simdtex import schedules
+    from simdtex.methods.mrf.options import PRESETS
+    from simdtex.methods.pyramid import solid
+    from simdtex.options import Words, kinds
+
+    others = {"method": tuple(_defaults()), "preset": tuple(PRESETS), "schedule": tuple(schedules.SCHEDULES)}
+    declared = (kinds(one).get(name) for one in (*_defaults().values(), solid.Options))
+    found = [one.valid for one in declared if isinstance(one, Words)]
+    return [others[name]] if name in others else list(dict.fromkeys(found))
+
+
 class Option(click.Option):
-    """An option whose help names defaults, as ``{mrf.order}``: the methods load only where it is shown."""
+    """An option whose help names defaults, as ``{mrf.order}``, and which the shell completes.
+
+    The methods load only where it is shown or completed.
+    """
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """The words that it may be; else what its type says."""
+        found = [word for valid in _words(str(self.name)) for word in valid if word.startswith(incomplete)]
+        return [CompletionItem(word) for word in dict.fromkeys(found)] or super().shell_complete(ctx, incomplete)
+
+    def make_metavar(self, ctx: click.Context) -> str:
+        """The words that it may be, where they are the same for all methods and few."""
+        found = _words(str(self.name)) if self.metavar is None and isinstance(self.type, StringParamType) else []
+        short = len(found) == 1 and len("|".join(found[0])) < 30
+        return "|".join(found[0]) if short else super().make_metavar(ctx)
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
         """The names of the option, and its help."""

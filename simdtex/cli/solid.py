@@ -14,7 +14,7 @@ import numpy as np
 from simdtex.cli.common import afterwards, given, last_iteration, opened, plainly, print_profile, settle, watching
 from simdtex.cli.helping import command
 from simdtex.cli.keeping import kept
-from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
+from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, option, pyramid_options, stages_option
 from simdtex.cli.places import EITHER, READ, WRITE
 from simdtex.methods.pyramid import solid as method
 
@@ -53,10 +53,8 @@ SIDE = 128
     metavar="PNG",
     help="Write a picture of it: a cube, a sphere and three slices.",
 )
-@click.option(
-    "--solids", help=f"turns or average: families of slices one after another, or a mean.  [{DEFAULTS.solids}]"
-)
-@click.option("--slices", help=f"together or each: whose histogram is matched.  [{DEFAULTS.slices}]")
+@option("--solids", help=f"turns or average: families of slices one after another, or a mean.  [{DEFAULTS.solids}]")
+@option("--slices", help=f"together or each: whose histogram is matched.  [{DEFAULTS.slices}]")
 @pyramid_options("VOLUME: A block")
 @SEED
 @DEVICE

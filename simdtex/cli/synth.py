@@ -57,7 +57,7 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
     help="Of the output, in pixels. Default: that of the picture of --known, of the output's guide, or of --start, "
     "else twice the first sample.",
 )
-@click.option(
+@option(
     "--method",
     default="mrf",
     show_default=True,

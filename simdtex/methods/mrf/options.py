@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import schedules
-from simdtex.maspar.array import parse_array
+from simdtex.maspar.array import MAPPINGS, parse_array
 from simdtex.model.lattice import check_order
 from simdtex.model.pictures import Pictures
-from simdtex.options import build, one_of, real, shown, true_or_false, whole
+from simdtex.options import build, check, integer, number_of, one_of, real, shown, switch, whole, words
 
 PRESETS: dict[str, dict[str, Any]] = {
     "default": {},
@@ -159,85 +159,56 @@ class Options:
     """
 
     order: int = 18
-    levels: int | None = None
-    overview: int = 128
-    relaxation: str = "icm"
-    bandwidth: float = 0.15
-    coherence: float = 0.5
-    balance: float = 0.5
-    structure: float = 2.0
-    novelty: float = 1.0
-    finish: float | None = None
-    xi: float = -1.0
-    free_sweeps: int = 2
-    pixel: str = "source"
-    phases: str = "decimated"
-    edges: str = "auto"
-    coarsest: str = "gibbs"
+    levels: int | None = integer(None, 1)
+    overview: int = integer(128, 1)
+    relaxation: str = words("icm", "icm", "gibbs")
+    bandwidth: float = number_of(0.15, 0, above=True)
+    coherence: float = number_of(0.5, 0)
+    balance: float = number_of(0.5, 0)
+    structure: float = number_of(2.0, 0)
+    novelty: float = number_of(1.0, 0)
+    finish: float | None = number_of(None, 0, WIDEST)
+    xi: float = number_of(-1.0, -1e6)
+    free_sweeps: int = integer(2, 0)
+    pixel: str = words("source", "source", "density")
+    phases: str = words("decimated", "all", "decimated")
+    edges: str = words("auto", "auto", "reflect", "whole")
+    coarsest: str = words("gibbs", "gibbs", "same")
     schedule: str | schedules.Schedule = "coloring"
-    check_schedule: bool = False
-    boundary: str = "torus"
+    check_schedule: bool = switch(False)
+    boundary: str = words("torus", "torus", "open")
     array: str | None = None
-    mapping: str = "cut-and-stack"
-    search: str = "auto"
-    suggesting: int = 12
-    similar: int = 0
-    chance: int = 4
-    exhaustive: int = 64
-    emulate: bool = True
+    mapping: str = words("cut-and-stack", *MAPPINGS)
+    search: str = words("auto", "auto", "exact", "coherent")
+    suggesting: int = integer(12, 1)
+    similar: int = integer(0, 0, SIMILAR)
+    chance: int = integer(4, 0, CHANCE)
+    exhaustive: int = integer(64, 0)
+    emulate: bool = switch(True)
     categorical: bool | tuple[int, ...] = False
     weights: tuple[float, ...] | None = None
     shares: tuple[float, ...] | None = None
     proportions: tuple[float, ...] | None = None
-    data_weight: float = 16.0
-    guide_weight: float = 1.0
-    labels: bool | None = None
-    unsure: float = 0.25
+    data_weight: float = number_of(16.0, 0)
+    guide_weight: float = number_of(1.0, 0)
+    labels: bool | None = switch(None)
+    unsure: float = number_of(0.25, 0, 1)
 
     def __post_init__(self) -> None:
         """Check every value."""
         check_order(self.order)
-        if self.levels is not None:
-            whole("levels", self.levels, 1)
-        whole("overview", self.overview, 1)
-        one_of("relaxation", self.relaxation, ("icm", "gibbs"))
-        real("bandwidth", self.bandwidth, 0, above=True)
-        real("coherence", self.coherence, 0)
-        real("balance", self.balance, 0)
-        real("structure", self.structure, 0)
-        real("novelty", self.novelty, 0)
-        if self.finish is not None:
-            real("finish", self.finish, 0, WIDEST)
-            if 0 < self.finish < NARROWEST:
-                raise ValueError(f"finish is {self.finish}; give 0, or a number of at least {NARROWEST}")
-        real("xi", self.xi, -1e6)
+        check(self)
+        if self.finish and self.finish < NARROWEST:
+            raise ValueError(f"finish is {self.finish}; give 0, or a number of at least {NARROWEST}")
         if self.xi >= 0:
             raise ValueError(f"xi is {self.xi}; give a number below 0")
-        whole("free_sweeps", self.free_sweeps, 0)
-        one_of("pixel", self.pixel, ("source", "density"))
-        one_of("phases", self.phases, ("all", "decimated"))
-        one_of("edges", self.edges, ("auto", "reflect", "whole"))
-        one_of("coarsest", self.coarsest, ("gibbs", "same"))
-        one_of("boundary", self.boundary, ("torus", "open"))
-        one_of("search", self.search, ("auto", "exact", "coherent"))
-        whole("suggesting", self.suggesting, 1)
-        whole("similar", self.similar, 0, SIMILAR)
-        whole("chance", self.chance, 0, CHANCE)
-        whole("exhaustive", self.exhaustive, 0)
         if (self.search, self.relaxation, self.pixel) == ("coherent", "icm", "density"):
             raise ValueError(
                 'search="coherent" finds no mode of a density; '
                 'give search="exact", pixel="source" or relaxation="gibbs"'
             )
         schedules.get(self.schedule)
-        true_or_false("check_schedule", self.check_schedule)
         parse_array(self.array or "1x1", self.mapping)
-        true_or_false("emulate", self.emulate)
-        real("data_weight", self.data_weight, 0)
-        real("guide_weight", self.guide_weight, 0)
-        if self.labels is not None:
-            true_or_false("labels", self.labels)
-        real("unsure", self.unsure, 0, 1)
         lists = {"weights": self.weights, "shares": self.shares, "proportions": self.proportions}
         for name, value in lists.items():
             _numbers(name, value)

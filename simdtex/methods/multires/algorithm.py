@@ -25,7 +25,7 @@ from simdtex.methods.multires.analysis import Analysis, analyse
 from simdtex.model.use import effective_use
 from simdtex.ops.candidates import Sampled, Structure, candidates
 from simdtex.ops.laplacian import beside, laplacian_blend, laplacian_collapse, within
-from simdtex.options import build, one_of, real, shown, unmasked, whole, within_32_bits
+from simdtex.options import build, check, integer, number_of, real, shown, unmasked, within_32_bits, words
 from simdtex.run import Callback, Output, Sampling, Stage, device_seconds, paced
 
 ANY = 2**32 - 1
@@ -101,19 +101,19 @@ class Options:
     """
 
     alpha: float | str = 0.3
-    beta: float = 0.0
-    strain: float = 0.05
-    target: float | None = None
+    beta: float = number_of(0.0, 0)
+    strain: float = number_of(0.05, 0)
+    target: float | None = number_of(None, 1, 2**31)
     thresholds: ArrayLike | None = None
-    orientations: int = 4
-    sigma: float = 0.7
-    filter_size: int = 3
-    features: str = "luminance"
-    levels: int | None = None
-    phase: str = "match"
-    boundary: str = "torus"
-    edges: str = "mend"
-    joins: str = "blend"
+    orientations: int = integer(4, 0, DIRECTIONS)
+    sigma: float = number_of(0.7, 0.2, WIDEST)
+    filter_size: int = integer(3, 3, FILTER)
+    features: str = words("luminance", "luminance", "channels")
+    levels: int | None = integer(None, 1)
+    phase: str = words("match", "match", "free")
+    boundary: str = words("torus", "torus", "open")
+    edges: str = words("mend", "mend", "keep")
+    joins: str = words("blend", "blend", "cut")
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -122,22 +122,9 @@ class Options:
                 raise ValueError(f"alpha is {shown(self.alpha)}; give a number of at least 0, or 'auto'")
         elif not (isinstance(self.alpha, Real) and self.alpha == inf):
             real("alpha", self.alpha, 0, inf)
-        real("beta", self.beta, 0)
-        real("strain", self.strain, 0)
-        if self.target is not None:
-            real("target", self.target, 1, 2**31)
-        whole("orientations", self.orientations, 0, DIRECTIONS)
-        real("sigma", self.sigma, 0.2, WIDEST)
-        whole("filter_size", self.filter_size, 3, FILTER)
+        check(self)
         if self.filter_size % 2 == 0:
             raise ValueError(f"filter_size is {self.filter_size}; give an odd number, 3 or 5")
-        one_of("features", self.features, ("luminance", "channels"))
-        if self.levels is not None:
-            whole("levels", self.levels, 1)
-        one_of("phase", self.phase, ("match", "free"))
-        one_of("boundary", self.boundary, ("torus", "open"))
-        one_of("edges", self.edges, ("mend", "keep"))
-        one_of("joins", self.joins, ("blend", "cut"))
         if self.thresholds is not None:
             _check_thresholds(self.thresholds)
 

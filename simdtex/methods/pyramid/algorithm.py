@@ -22,13 +22,13 @@ from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.pyramid.histograms import Histograms, histograms
 from simdtex.methods.pyramid.palette import Decorrelated, Palette, decorrelated, palette
-from simdtex.methods.pyramid.pyramids import Transform, check_kind, most_levels
+from simdtex.methods.pyramid.pyramids import KINDS, Transform, check_kind, most_levels
 from simdtex.model.stretched import Stretched
 from simdtex.ops.matching import distance, inverse_cdf, match_lookup, match_ranks
 from simdtex.ops.noise import noise
 from simdtex.ops.ranking import ranking
 from simdtex.ops.sort import sort
-from simdtex.options import build, one_of, real_array, whole, within_32_bits
+from simdtex.options import build, check, integer, real_array, within_32_bits, words
 from simdtex.run import Callback, Iterating, Output, device_seconds
 
 RESIDUE = 8
@@ -81,26 +81,20 @@ class Options:
         What to begin with in place of noise, of the output's shape, with the sample's channels.
     """
 
-    pyramid: str = "steerable"
-    levels: int | None = None
-    orientations: int = 4
-    iterations: int = 5
-    match: str = "rank"
-    bins: int = 256
-    edges: str = "reflect"
-    color: str = "decorrelate"
+    pyramid: str = words("steerable", *KINDS)
+    levels: int | None = integer(None, 0)
+    orientations: int = integer(4, 1)
+    iterations: int = integer(5, 0)
+    match: str = words("rank", "rank", "lookup")
+    bins: int = integer(256, 2, 4096)
+    edges: str = words("reflect", "reflect", "wrap")
+    color: str = words("decorrelate", "decorrelate", "channels")
     start: ArrayLike | None = None
 
     def __post_init__(self) -> None:
         """Check every value."""
+        check(self)
         check_kind(self.pyramid, self.levels, self.orientations)
-        whole("iterations", self.iterations, 0)
-        one_of("match", self.match, ("rank", "lookup"))
-        whole("bins", self.bins, 2)
-        if self.bins > 4096:
-            raise ValueError(f"bins is {self.bins}; give 4096 or fewer")
-        one_of("edges", self.edges, ("reflect", "wrap"))
-        one_of("color", self.color, ("decorrelate", "channels"))
         if self.start is not None:
             real_array("start", self.start)
 

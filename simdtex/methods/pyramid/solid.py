@@ -33,7 +33,7 @@ from simdtex.methods.pyramid.algorithm import (
     transform,
 )
 from simdtex.ops.solid import solid_band, solid_collapse, solid_mean, solid_reduce, solid_turn
-from simdtex.options import build, one_of, within_32_bits
+from simdtex.options import build, within_32_bits, words
 from simdtex.run import Callback, Output, device_seconds
 
 FAMILIES = {"x-y": ((0, 1, 2), (0, 1, 2)), "x-z": ((1, 0, 2), (1, 0, 2)), "y-z": ((2, 0, 1), (1, 2, 0))}
@@ -63,14 +63,8 @@ class Options(pyramid.Options):
     pyramid alone.
     """
 
-    solids: str = "turns"
-    slices: str = "together"
-
-    def __post_init__(self) -> None:
-        """Check every value."""
-        super().__post_init__()
-        one_of("solids", self.solids, ("turns", "average"))
-        one_of("slices", self.slices, ("each", "together"))
+    solids: str = words("turns", "turns", "average")
+    slices: str = words("together", "each", "together")
 
 
 def make_options(**given: Any) -> Options:
