@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
+from difflib import get_close_matches
 from math import isfinite, prod
 from numbers import Integral, Real
 from typing import Any, TypeVar
@@ -118,8 +119,10 @@ def build(options: type[T], method: str, given: Mapping[str, Any], also: tuple[s
     valid = [f.name for f in fields(options)]  # type: ignore[arg-type]
     for name in given:
         if name not in valid:
+            near = get_close_matches(name, [*also, *valid], 1)
+            meant = f" (did you mean {near[0]!r}?)" if near else ""
             raise TypeError(
-                f"unknown option {name!r} of the method {method!r}; choose from: {', '.join([*also, *valid])}"
+                f"unknown option {name!r} of the method {method!r}{meant}; choose from: {', '.join([*also, *valid])}"
             )
     return options(**given)
 

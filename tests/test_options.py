@@ -170,3 +170,12 @@ def test_what_is_declared_is_what_is_checked(method):
                 options(**{name: kind.least - 1})
             with pytest.raises(ValueError, match=name):
                 options(**{name: kind.most + 1})
+
+
+def test_a_near_miss_is_named():
+    with pytest.raises(
+        TypeError, match=r"unknown option 'coherense' of the method 'mrf' \(did you mean 'coherence'\?\); choose"
+    ):
+        mrf.make_options(coherense=1)
+    with pytest.raises(TypeError, match=r"unknown option 'zzzz' of the method 'pyramid'; choose from: pyramid, levels"):
+        pyramid.make_options(zzzz=1)
