@@ -348,8 +348,12 @@ def _interrupted(seconds):
         signal.signal(signal.SIGINT, before)
 
 
-def _leave(*_):
+def _leave(_, frame):
     """Before a command begins: as `simdtex.__main__` does, but for this process, which goes on."""
+    from simdtex.cli.common import postponed
+
+    if postponed(frame):
+        return
     os.write(2, b"simdtex: stopped\n")
     raise SystemExit(130)
 

@@ -532,3 +532,14 @@ def test_image_is_read_from_a_path_object_and_text(tmp_path):
     PIL.Image.new("L", (3, 2), 9).save(buffer, "PNG")
     (tmp_path / "a.png").write_bytes(buffer.getvalue())
     assert image.read(str(tmp_path / "a.png")).pixels.shape == (2, 3)
+
+
+def test_nothing_is_told_of_a_damaged_png_but_the_sentence(tmp_path, capfd):
+    """libpng tells on standard error what it dislikes about chunks that no pixel needs."""
+    image.write(tmp_path / "a.png", np.arange(64, dtype=np.uint16).reshape(8, 8))
+    data = (tmp_path / "a.png").read_bytes()
+    head, damaged = data.index(b"IDAT") - 4, struct.pack(">I4s4sI", 4, b"gAMA", b"\0\0\0\1", 12345)
+    (tmp_path / "b.png").write_bytes(data[:head] + damaged + data[head:])
+    with pytest.raises(ValueError, match="cannot be decoded"):
+        image.read(tmp_path / "b.png")
+    assert capfd.readouterr().err == ""

@@ -6,11 +6,14 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
+from importlib.util import find_spec
 from pathlib import Path
 
 import click
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import simdtex
 from simdtex import cli
@@ -180,17 +183,34 @@ def test_a_ctrl_c_that_was_to_be_ignored_is(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no such signal")
-def test_ctrl_c_waits_for_the_search_for_runtimes(monkeypatch):
-    """Which would leave its temporary folder behind."""
+@pytest.mark.parametrize("module", ["simdtex.machine.runtimes", "weakref", "_weakrefset"])
+def test_ctrl_c_waits_where_an_exception_would_do_harm(module):
+    """In the search for runtimes, which would leave its temporary folder, and in callbacks of what is collected."""
     from simdtex.cli import common
-    from simdtex.machine import runtimes
 
-    over, names = [], {"__name__": runtimes.__name__, "signal": signal, "time": time}
+    assert find_spec(module)
+    over, names = [], {"__name__": module, "signal": signal, "time": time}
     exec("def search(over):\n signal.raise_signal(signal.SIGINT)\n time.sleep(0.05)\n over.append(True)", names)
     with pytest.raises(KeyboardInterrupt), common._interruptible():
         names["search"](over)
         time.sleep(1)
     assert over
+
+
+def test_what_ctrl_c_leaves_undone_is_not_warned_of():
+    from simdtex.cli.common import plainly
+
+    @click.command()
+    @plainly
+    def stopped():
+        raise KeyboardInterrupt
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert CliRunner().invoke(stopped).exit_code == 130
+        warnings.warn("coroutine 'AsyncGroup.create_array' was never awaited", RuntimeWarning, stacklevel=1)
+        with pytest.raises(RuntimeWarning):
+            warnings.warn("another", RuntimeWarning, stacklevel=1)
 
 
 def test_the_script_begins_where_the_module_does():

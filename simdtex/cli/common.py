@@ -9,6 +9,7 @@ import signal
 import sys
 import threading
 import time
+import warnings
 from _thread import interrupt_main
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -21,8 +22,8 @@ from click.core import ParameterSource
 
 from simdtex.cli.places import check_places
 
-RUNTIMES = "simdtex.machine.runtimes"
-"""The module that looks for OpenCL runtimes."""
+HARMED = ("simdtex.machine.runtimes", "weakref", "_weakrefset")
+"""Modules, the search for runtimes and callbacks of what is collected, in which an exception does harm."""
 
 
 class Ended(BaseException):
@@ -46,12 +47,10 @@ def plainly(command: Callable[..., None]) -> Callable[..., None]:
         except MemoryError:
             click.echo("simdtex: the memory does not suffice for this; give a smaller size", err=True)
             sys.exit(2)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, Ended) as signalled:
+            warnings.filterwarnings("ignore", "coroutine .* was never awaited")  # which Zarr had begun
             click.echo("simdtex: stopped; nothing but stages may have been written", err=True)
-            sys.exit(130)
-        except Ended as signalled:
-            click.echo("simdtex: stopped; nothing but stages may have been written", err=True)
-            sys.exit(128 + signalled.args[0])
+            sys.exit(128 + signalled.args[0] if isinstance(signalled, Ended) else 130)
         settle()
 
     return wrapped
@@ -59,21 +58,11 @@ def plainly(command: Callable[..., None]) -> Callable[..., None]:
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """Let Ctrl-C raise KeyboardInterrupt, since there is work that wants to be put in order, but not into an import.
-
-    What is being imported may swallow an exception, tell its traceback or, as C++ does, abort. The search for runtimes
-    is over soon, and would leave its temporary folder behind.
-    """
+    """Let Ctrl-C raise KeyboardInterrupt, since there is work that wants to be put in order, where that can be."""
 
     def stop(_: int, frame: FrameType | None) -> None:
-        while frame:
-            if frame.f_code.co_filename.startswith("<frozen importlib") or frame.f_globals.get("__name__") == RUNTIMES:
-                again = threading.Timer(0.02, interrupt_main)
-                again.daemon = True
-                again.start()
-                return
-            frame = frame.f_back
-        raise KeyboardInterrupt
+        if not postponed(frame):
+            raise KeyboardInterrupt
 
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(before):  # others' concern, or ignored
@@ -84,6 +73,23 @@ def _interruptible() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def postponed(frame: FrameType | None) -> bool:
+    """Have a Ctrl-C come again a little later, where an exception would do harm now.
+
+    What is being imported may swallow it, tell its traceback or, as C++ does, abort. Where something is collected, it
+    is ignored, and told all the same. The search for runtimes is over soon, and would leave its temporary folder.
+    """
+    while frame:
+        name, path = frame.f_globals.get("__name__"), frame.f_code.co_filename
+        if name in HARMED or path.startswith("<frozen importlib"):
+            again = threading.Timer(0.02, interrupt_main)
+            again.daemon = True
+            again.start()
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _sentence(error: Exception) -> str:

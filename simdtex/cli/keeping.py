@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from simdtex.cli.common import given_words
+from simdtex.cli.common import given_words, postponed
 
 if TYPE_CHECKING:
     from simdtex.checkpoints import Keeper
@@ -70,6 +70,8 @@ def _signals(keeper: Keeper) -> Iterator[list[int]]:
         return
 
     def handle(number: int, frame: Any) -> None:
+        if not keeper.running and number == signal.SIGINT and postponed(frame):
+            return
         caught.append(number)
         if len(caught) > 1 or not keeper.running:
             raise KeyboardInterrupt

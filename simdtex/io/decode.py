@@ -135,11 +135,22 @@ def _read_png16(data: bytes, most: int) -> Array:
     import imagecodecs  # here and below: a picture that needs the library waits for it, and no other
 
     check_png(data, most)
-    pixels: Array = imagecodecs.png_decode(data)
+    pixels: Array = imagecodecs.png_decode(_bare(data))
     if pixels.ndim == 3 and pixels.shape[2] in (2, 4):
         pixels = _without_opaque_alpha(pixels)
     with _opened(data, most) as picture:  # for its EXIF block alone
         return _upright(pixels, int(picture.getexif().get(0x0112, 1)))
+
+
+def _bare(data: bytes) -> bytes:
+    """A PNG of the chunks alone that its pixels need: of others, libpng tells on standard error what it dislikes."""
+    kept, at = [data[:8]], 8
+    while at + 12 <= len(data):
+        length, name = struct.unpack(">I4s", data[at : at + 8])
+        if name[:1].isupper() or name == b"tRNS":
+            kept.append(data[at : at + 12 + length])
+        at += 12 + length
+    return b"".join(kept)
 
 
 def _read_tiff(data: bytes, most: int) -> Array:
