@@ -7,6 +7,8 @@ import logging
 import os
 import stat
 import struct
+import subprocess
+import sys
 import zlib
 
 import imagecodecs
@@ -534,11 +536,10 @@ def test_image_is_read_from_a_path_object_and_text(tmp_path):
     assert image.read(str(tmp_path / "a.png")).pixels.shape == (2, 3)
 
 
-def test_nothing_is_told_of_a_damaged_png_but_the_sentence(tmp_path, capfd):
-    """libpng tells on standard error what it dislikes about chunks that no pixel needs."""
+def test_nothing_is_told_of_a_damaged_png_but_the_sentence(tmp_path):
+    """libpng prints what it dislikes about chunks that no pixel needs, when the process ends."""
     image.write(tmp_path / "a.png", np.arange(64, dtype=np.uint16).reshape(8, 8))
-    damaged = (tmp_path / "a.png").read_bytes().replace(b"IHDR", b"rHDR")
-    (tmp_path / "b.png").write_bytes(damaged)
-    with pytest.raises(ValueError, match="b.png cannot be decoded"):
-        image.read(tmp_path / "b.png")
-    assert capfd.readouterr().err == ""
+    (tmp_path / "b.png").write_bytes((tmp_path / "a.png").read_bytes().replace(b"IHDR", b"rHDR"))
+    reading = f"from simdtex.io import image; image.read({str(tmp_path / 'b.png')!r})"
+    done = subprocess.run([sys.executable, "-c", reading], capture_output=True, text=True, check=False, timeout=120)
+    assert "b.png cannot be decoded" in done.stderr and "warning" not in done.stdout + done.stderr
