@@ -58,7 +58,7 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
 
     Parameters
     ----------
-    hole : (rows, cols) bool array
+    hole : (rows, cols) bool array, true somewhere
     radius : int
         Of a neighbourhood.
     levels : int, optional
