@@ -119,7 +119,7 @@ def build(options: type[T], method: str, given: Mapping[str, Any], also: tuple[s
     valid = [f.name for f in fields(options)]  # type: ignore[arg-type]
     for name in given:
         if name not in valid:
-            near = get_close_matches(name, [*also, *valid], 1)
+            near = get_close_matches(name, [*also, *valid], 1, 0.75)
             meant = f" (did you mean {near[0]!r}?)" if near else ""
             raise TypeError(
                 f"unknown option {name!r} of the method {method!r}{meant}; choose from: {', '.join([*also, *valid])}"
