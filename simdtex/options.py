@@ -109,9 +109,9 @@ def kinds(options: Any) -> dict[str, Kind]:
 def check(options: Any) -> None:
     """Raise unless every declared value is of its kind; None is where it is the default."""
     for one in fields(options):
-        value = getattr(options, one.name)
-        if "kind" in one.metadata and not (value is None and one.default is None):
-            one.metadata["kind"].check(one.name, value)
+        kind, value = one.metadata.get("kind"), getattr(options, one.name)
+        if kind and not (value is None and one.default is None):
+            kind.check(one.name, value)
 
 
 def build(options: type[T], method: str, given: Mapping[str, Any], also: tuple[str, ...] = ()) -> T:

@@ -21,6 +21,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from simdtex.checkpoints.tree import packed, unpacked
+from simdtex.io.atomic import lock
 
 FORMAT = 1
 """Of the files; another one is refused."""
@@ -96,11 +97,7 @@ class Folder:
         except OSError as error:
             raise ValueError(f"the folder {self.path} cannot be written ({error.strerror}); choose another") from None
         try:
-            import fcntl
-        except ModuleNotFoundError:  # Windows
-            return
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock(self._lock)
         except OSError:
             self.release()
             raise ValueError(f"another run keeps its state in {self.path} now; wait for it, or stop it") from None

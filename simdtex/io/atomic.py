@@ -22,7 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import IO
 
-__all__ = ["alone", "atomic_folder", "atomic_path", "check_place", "left_behind", "not_written"]
+__all__ = ["alone", "atomic_folder", "atomic_path", "check_place", "left_behind", "lock", "not_written"]
 
 PathLike = str | os.PathLike[str]
 
@@ -193,23 +193,35 @@ def alone(folder: PathLike) -> Iterator[None]:
     ValueError
         Another one is at work in it.
     """
-    try:
-        import fcntl
-    except ModuleNotFoundError:
+    if os.name == "nt":  # where a folder cannot be opened
         yield
         return
     descriptor = os.open(folder, os.O_RDONLY)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(descriptor)
-        raise ValueError(f"another run is at work in {os.fspath(folder)} now; wait for it, or stop it") from None
-    except OSError:  # a file system without locks
-        pass
-    try:
+        try:
+            lock(descriptor)
+        except BlockingIOError:
+            raise ValueError(f"another run is at work in {os.fspath(folder)} now; wait for it, or stop it") from None
+        except OSError:  # a file system without locks
+            pass
         yield
     finally:
         os.close(descriptor)
+
+
+def lock(descriptor: int) -> None:
+    """Take an open file or folder for this process, until it is closed; on Windows nothing is done.
+
+    Raises
+    ------
+    OSError
+        BlockingIOError where another process has it; others where the file system has no locks.
+    """
+    try:
+        import fcntl
+    except ModuleNotFoundError:
+        return
+    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 class Unbuffered:
