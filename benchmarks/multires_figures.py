@@ -28,10 +28,11 @@ from simdtex.io.image import read
 from simdtex.methods.multires import tiled
 from simdtex.methods.multires.analysis import pyramid
 from simdtex.methods.multires.mend import mend
+from simdtex.model.colours import heat, source_colours
 from simdtex.model.stretched import TOP, Stretched
 from simdtex.ops.filters import UNIT_BITS, bank, filters
 from simdtex.report.plots import DPI, FAINT, INK, figure_png, new_figure
-from simdtex.report.sheet import contact_sheet, enlarged, heat, source_colours
+from simdtex.report.sheet import contact_sheet, enlarged
 
 ALPHAS = {0: (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, inf), 1: (0.1, 0.2, 0.3, 0.4, 0.6, 1, 1.5)}
 OWN, SIMILAR, FAILS, CANDIDATE = "#0072B2", "#8CC9A8", "#E07B4F", "#E69F00"

@@ -14,8 +14,9 @@ from skimage import data
 
 import simdtex
 from simdtex.io.image import write
+from simdtex.model.colours import heat, source_colours
 from simdtex.model.source_map import apply_source_map
-from simdtex.report.sheet import contact_sheet, enlarged, heat, source_colours
+from simdtex.report.sheet import contact_sheet, enlarged
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")

@@ -67,11 +67,11 @@ def executed(
     image, output = method(machine, seeing(callback, channel_axis), begun.on(machine.name))
     begun.end()
     output.statistics.update(machine.profile() or {})
-    image = restored(image, channel_axis)
+    picture = restored(image, channel_axis)
     if not full_output:
-        return image
+        return picture
     stages = [replace(stage, image=restored(stage.image, channel_axis)) for stage in output.stages]
-    return image, replace(output, stages=stages)
+    return picture, replace(output, stages=stages, made=image)
 
 
 def seeing(callback: Callback | None, channel_axis: int | None) -> Callback | None:

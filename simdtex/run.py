@@ -77,6 +77,9 @@ class Relaxing(Progress):
         Whether the sweep ends with this piece.
     temperature : callable
         ``temperature()`` reads back the level's temperatures, (rows, cols), 0 to 1.
+    source : callable
+        ``source()`` reads back where in the sample each site of the level is from, (rows, cols, 2) or, of several
+        samples, (rows, cols, 3) int32, as `Output.source`.
     """
 
     sweep: int
@@ -85,6 +88,7 @@ class Relaxing(Progress):
     temperature_left: float
     end_of_sweep: bool
     temperature: Callable[[], NDArray[Any]]
+    source: Callable[[], NDArray[np.int32]]
 
     @property
     def doing(self) -> str:  # noqa: D102
@@ -274,6 +278,9 @@ class Output:
         evenly the sample is used, as in `simdtex.model.use.effective_use`: ``effective_share``, above 0, to 1, and
         ``most_used``, the piece of the sample of which most is taken: ``times_fair_share``, its first pixel
         (``row``, ``col``) and its size (``rows``, ``cols``), pixels.
+    made : (rows, cols, channels) or (depth, rows, cols, channels) array or None
+        What was made, channels last whatever axes the sample has: a notebook that displays an Output shows it, with its
+        arrangement.
 
     Notes
     -----
@@ -302,6 +309,13 @@ class Output:
     temperature: NDArray[Any] | None = None
     stages: list[Stage] = field(default_factory=list)
     statistics: dict[str, Any] = field(default_factory=dict)
+    made: NDArray[Any] | None = field(default=None, repr=False)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the picture and its arrangement."""
+        from simdtex.model.display import as_html
+
+        return as_html(self.made, self.source, self.statistics)
 
 
 def device_seconds(machine: Any, before: float | None) -> float | None:

@@ -70,6 +70,7 @@ ROOMS = [
     *(
         "__main__",
         "cli",
+        "live",
         "report",
         "bench",
         "__init__",
@@ -83,7 +84,7 @@ ROOMS = [
         "checkpoints",
         "schedules",
     ),
-    *("ops", "machine", "maspar", "model", "run", "io", "options", "random"),
+    *("ops", "machine", "maspar", "run", "model", "io", "options", "random"),
 ]
 
 

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simdtex.io import image
+from simdtex.model import colours
 from simdtex.report import sheet
 from simdtex.report.stages import StageWriter
 from simdtex.run import Relaxing, Sampling
@@ -124,25 +125,25 @@ def test_thinned_keeps_first_and_last(count):
 
 
 def test_heat_grows_in_lightness():
-    colours = sheet.heat(np.linspace(0, 1, 256)).astype(float)
-    assert colours.shape == (256, 3)
-    grey = colours @ [0.2126, 0.7152, 0.0722]
+    found = colours.heat(np.linspace(0, 1, 256)).astype(float)
+    assert found.shape == (256, 3)
+    grey = found @ [0.2126, 0.7152, 0.0722]
     assert (np.diff(grey) > -1.0).all()  # rounding to 8 bits
     assert grey[0] < 30
     assert grey[-1] > 220
-    np.testing.assert_array_equal(sheet.heat([-1.0, 2.0]), sheet.heat([0.0, 1.0]))
+    np.testing.assert_array_equal(colours.heat([-1.0, 2.0]), sheet.heat([0.0, 1.0]))
 
 
 def test_source_colours_tell_positions_apart():
     source = np.stack(np.indices((16, 24)), axis=-1)
-    colours = sheet.source_colours(source, (16, 24))
-    assert len(np.unique(colours.reshape(-1, 3), axis=0)) == 16 * 24
-    steps = np.abs(np.diff(colours.astype(int), axis=1))
+    found = colours.source_colours(source, (16, 24))
+    assert len(np.unique(found.reshape(-1, 3), axis=0)) == 16 * 24
+    steps = np.abs(np.diff(found.astype(int), axis=1))
     assert steps.max() < 40
     source[3, 4] = -1
-    assert (sheet.source_colours(source, (16, 24))[3, 4] == 0).all()
+    assert (colours.source_colours(source, (16, 24))[3, 4] == 0).all()
     with pytest.raises(ValueError, match="source map"):
-        sheet.source_colours(source[..., 0], (16, 24))
+        colours.source_colours(source[..., 0], (16, 24))
 
 
 def moment(level, sweep, full, end_of_sweep=True):
@@ -159,6 +160,7 @@ def moment(level, sweep, full, end_of_sweep=True):
         temperature_left=0.5,
         end_of_sweep=end_of_sweep,
         temperature=lambda: np.full(picture.shape[:2], 0.5),
+        source=lambda: np.zeros((*picture.shape[:2], 2), np.int32),
     )
 
 
@@ -212,7 +214,7 @@ def test_stages_of_levels_without_sweeps(tmp_path):
     assert set(os.listdir(folder)) == names | {"sheet.png", "animation.gif"}
     np.testing.assert_array_equal(image.read(folder / "level1.png").pixels, full[::2, ::2])
     few, some, most = image.read(folder / "candidates-level0.png").pixels[0, :3]
-    np.testing.assert_array_equal([few, some, most], sheet.heat([0, 0.5, 1]))
+    np.testing.assert_array_equal([few, some, most], colours.heat([0, 0.5, 1]))
     StageWriter(folder)  # an earlier run's files may be replaced
 
 

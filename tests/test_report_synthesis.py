@@ -13,9 +13,9 @@ from test_page import assert_needs_nothing_else, read_page
 import simdtex
 from simdtex.cli import main
 from simdtex.io import image
+from simdtex.model.colours import heat, source_colours, use_colours
 from simdtex.model.use import counts, effective_use
 from simdtex.report.page import Figure
-from simdtex.report.sheet import heat, source_colours, use_colours
 from simdtex.report.synthesis import FRAME, _frame, _use, words_of_use
 from simdtex.run import Output
 

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 
 import simdtex
 from simdtex.experiments.quality import source_use
+from simdtex.model.colours import use_colours
 from simdtex.model.use import counts, effective_use
 from simdtex.ops.use import Market, price, use
-from simdtex.report.sheet import use_colours
 
 
 @given(p=problems(max_order=5))

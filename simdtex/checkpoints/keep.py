@@ -35,8 +35,10 @@ class Keep:
         """The state that the run is to go on from, None to begin."""
         return None
 
-    def offer(self, state: Callable[[], Any]) -> bool:
+    def offer(self, state: Callable[[], Any], ended: int | None = None) -> bool:
         """Say that a state is at hand; it is asked for and written where it is time. Whether it was.
+
+        ``ended`` is the level that ends with it, if one does.
 
         Raises
         ------
@@ -146,7 +148,7 @@ class Kept(Keep):
         """The latest state that is whole."""
         return self._found
 
-    def offer(self, state: Callable[[], Any]) -> bool:
+    def offer(self, state: Callable[[], Any], ended: int | None = None) -> bool:
         """Write it where it is time, or where the run is to stop."""
         self._found = None  # it has been gone on from, and need not be held
         stopping = self._watch.stopping
@@ -214,7 +216,7 @@ class Within(Keep):
         """The part's."""
         return self._found
 
-    def offer(self, state: Callable[[], Any]) -> bool:
+    def offer(self, state: Callable[[], Any], ended: int | None = None) -> bool:
         """The part's state, with what is around it."""
         self._found = None
         return self._keep.offer(lambda: (self._around(), state()))

@@ -35,6 +35,7 @@ __all__ = [
     "check_writable",
     "parse_size",
     "read",
+    "read_bytes",
     "read_mask",
     "split_alpha",
     "to_display",
@@ -99,7 +100,12 @@ def read(path: PathLike, *, unknown: bool = False, max_pixels: int | None = None
     """
     name = os.fspath(path)
     most = max_pixels_or_default(max_pixels)
-    data = _file_bytes(name, most)
+    return read_bytes(name, _file_bytes(name, most), unknown=unknown, max_pixels=most)
+
+
+def read_bytes(name: str, data: bytes, *, unknown: bool = False, max_pixels: int | None = None) -> Image:
+    """Read a picture from the bytes of its file, as `read` does; sentences call it by `name`."""
+    most = max_pixels_or_default(max_pixels)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.io.image import read, to_display, write
+from simdtex.model.colours import heat
 from simdtex.report.folder import earlier_files
 from simdtex.report.sheet import (
     FRAME_SIDE,
@@ -20,7 +21,6 @@ from simdtex.report.sheet import (
     contact_sheet,
     enlarged,
     fitted,
-    heat,
     reduction,
 )
 from simdtex.run import Progress

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from simdtex import __version__
 from simdtex.io.image import to_display
+from simdtex.model.colours import source_colours, use_colours
 from simdtex.model.use import counts
 from simdtex.report.page import Figure, Section, Table, Text, write_report
-from simdtex.report.sheet import contact_sheet, encoded, source_colours, use_colours
+from simdtex.report.sheet import contact_sheet, encoded
 from simdtex.run import Output
 
 __all__ = ["words_of_use", "write_synthesis"]

@@ -236,7 +236,12 @@ def warmth(run: Run, grid: Grid, field: Field) -> NDArray[np.float64]:
     return found
 
 
+def origin(run: Run, grid: Grid, field: Field) -> NDArray[np.int32]:
+    """Read back where in the sample each site of a level is from, (rows, cols, 2 or 3)."""
+    return run.sample.place(grid.view(run.machine.get(field.source)))
+
+
 __all__ = [
-    *("Info", "Part", "Watch", "anneal", "begin", "counted", "enter", "opened", "picture", "priced", "sweep", "swept"),
-    "warmth",
+    *("Info", "Part", "Watch", "anneal", "begin", "counted", "enter", "opened", "origin", "picture", "priced", "sweep"),
+    *("swept", "warmth"),
 ]

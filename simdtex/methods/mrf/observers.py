@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from simdtex.maspar.accounting import Account
 from simdtex.maspar.array import parse_array
-from simdtex.methods.mrf.algorithm import Info, Part, picture, warmth
+from simdtex.methods.mrf.algorithm import Info, Part, origin, picture, warmth
 from simdtex.methods.mrf.level import Level, Run, State
 from simdtex.methods.mrf.meter import Meter
 from simdtex.model.lattice import Grid
@@ -79,6 +79,7 @@ class Observer:
                     temperature_left=left,
                     end_of_sweep=part.last,
                     temperature=partial(warmth, self._run, level.grid, part.field),
+                    source=partial(origin, self._run, level.grid, part.field),
                 )
             )
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -50,6 +50,9 @@ NARROWEST, WIDEST = 0.01, 16.0
 
 SIMILAR, CHANCE = 64, 4096
 """The most of the candidates that a search by coherence weighs for each suggestion, and at random."""
+
+SEARCHED = ("search", "suggesting", "similar", "chance", "exhaustive")
+"""The options that say how candidates are searched for, which makes no difference at the coarsest level."""
 
 
 @dataclass(frozen=True)
@@ -253,6 +256,23 @@ class Options:
             finish = 0.0 if self.pixel == "density" or categories else FINISH
         structure = 0.0 if self.pixel == "density" else self.structure
         return replace(self, search=search, finish=finish, structure=structure)
+
+
+def begins(before: Options, now: Options, levels: int) -> int:
+    """The first level at which a run with other options differs from one before, of so many levels, all else the same.
+
+    Returns
+    -------
+    int
+        ``levels - 1``, the coarsest, where all of it may differ; the level after that where the search does; -1 where
+        nothing but the finish may.
+    """
+    different = {one.name for one in fields(Options) if getattr(before, one.name) != getattr(now, one.name)}
+    if different <= {"finish"}:
+        return -1
+    if different <= {"finish", *SEARCHED} and levels > 1:  # the coarsest level weighs all candidates
+        return levels - 2
+    return levels - 1
 
 
 def few(pictures: Sequence[NDArray[Any]]) -> bool:

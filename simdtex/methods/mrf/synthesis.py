@@ -93,7 +93,7 @@ def synthesize(
     state = begun = None if found is None else restored(run, observer, found)
     for level, state, info in anneal(run, begun, watch=observer.part):
         observer.sweep(level, state, info)
-        keep.offer(partial(kept, run, state, observer))
+        keep.offer(partial(kept, run, state, observer), ended=info.level if info.ended else None)
     assert state is not None  # there is a level, and it has a sweep
     grid = Grid(*shape)
     source, temperatures = (grid.view(machine.get(plane)) for plane in (state.source, state.temperature))

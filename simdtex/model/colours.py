@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Colours for what has none: temperatures, where pixels are from, and how often the sample's are taken."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simdtex.model.use import counts
+
+__all__ = ["heat", "source_colours", "use_colours"]
+
+Picture = NDArray[np.uint8]
+
+
+def heat(temperature: ArrayLike) -> Picture:
+    """Show temperatures as colours from near black (0, cold) to pale yellow (1, hot).
+
+    Parameters
+    ----------
+    temperature : array_like
+        Any shape; values outside 0 to 1 are clipped.
+
+    Returns
+    -------
+    ndarray of uint8, temperature.shape + (3,)
+        sRGB. Lightness grows in equal perceptual steps, so the map also reads in grey.
+    """
+    share = np.clip(np.asarray(temperature, dtype=np.float64), 0.0, 1.0)
+    return _heat_table()[np.round(share * 255.0).astype(np.intp)]
+
+
+@cache
+def _heat_table() -> Picture:
+    t = np.linspace(0.0, 1.0, 256)
+    # a path through OKLab: lightness a straight line, hue from violet over red to yellow
+    lightness = 0.16 + 0.79 * t
+    hue = np.radians(290.0 + 180.0 * t)
+    chroma = np.interp(t, [0.0, 0.3, 0.55, 0.8, 1.0], [0.03, 0.13, 0.18, 0.15, 0.10])
+    return _srgb(lightness, chroma * np.cos(hue), chroma * np.sin(hue))
+
+
+def source_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
+    """Colour each output pixel by the sample position it was taken from.
+
+    Neighbours in the sample have neighbouring colours of one lightness, so a patch copied whole
+    shows as a smooth area and a join as an edge.
+
+    Parameters
+    ----------
+    source : array_like of int, (rows, cols, 2)
+        The (row, column) in the sample; a negative one (not set) is black.
+    sample_shape : (rows, cols)
+        Of the sample, pixels.
+
+    Returns
+    -------
+    ndarray of uint8, (rows, cols, 3)
+    """
+    positions = np.asarray(source)
+    if positions.ndim != 3 or positions.shape[2] != 2:
+        raise ValueError("the source map is not (rows, cols, 2): pass the one of the run")
+    extent = np.maximum(np.asarray(sample_shape[:2]) - 1, 1)
+    across = np.clip(positions / extent, 0.0, 1.0) - 0.5
+    colours = _srgb(np.full(positions.shape[:2], 0.72), 0.19 * across[..., 0], 0.19 * across[..., 1])
+    colours[(positions < 0).any(axis=2)] = 0
+    return colours
+
+
+def use_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
+    """Colour each pixel of the sample by how often it was taken.
+
+    Parameters
+    ----------
+    source : array_like of int, (rows, cols, 2)
+        For every output pixel, the (row, column) of the sample that it was taken from.
+    sample_shape : (rows, cols)
+        Of the sample, pixels.
+
+    Returns
+    -------
+    ndarray of uint8, (sample rows, sample cols, 3)
+        The colours of `heat` for log(1 + u) / log(1 + max u), where u is how often: near black for
+        a pixel that was never taken, pale yellow for the one that was taken most.
+
+    Raises
+    ------
+    ValueError
+        `source` is no source map, or points outside the sample.
+    """
+    uses = np.log1p(counts(source, sample_shape))
+    return heat(uses / (uses.max() or 1.0))
+
+
+def _srgb(lightness: NDArray[Any], a: NDArray[Any], b: NDArray[Any]) -> Picture:
+    # OKLab to sRGB, B. Ottosson, "A perceptual color space for image processing", 2020
+    long = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3
+    medium = (lightness - 0.1055613458 * a - 0.0638541728 * b) ** 3
+    short = (lightness - 0.0894841775 * a - 1.2914855480 * b) ** 3
+    linear = np.stack(
+        [
+            4.0767416621 * long - 3.3077115913 * medium + 0.2309699292 * short,
+            -1.2684380046 * long + 2.6097574011 * medium - 0.3413193965 * short,
+            -0.0041960863 * long - 0.7034186147 * medium + 1.7076147010 * short,
+        ],
+        axis=-1,
+    ).clip(0.0, 1.0)
+    curve = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.round(curve * 255.0).astype(np.uint8)
