@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from simdtex.io.hard_data import place_hard_data, read_hard_data
     from simdtex.jobs.filling import extend, fill
     from simdtex.jobs.simulation import simulate
+    from simdtex.live.widget import Live
     from simdtex.machine import open_machine
     from simdtex.machine.devices import DeviceError, devices
     from simdtex.methods.pyramid.mixtures import mix
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "DeviceError",
+    "Live",
     "Output",
     "Progress",
     "checkpoint",
@@ -42,6 +44,7 @@ __all__ = [
 
 _HOMES = {
     "DeviceError": "simdtex.machine.devices",
+    "Live": "simdtex.live.widget",
     "Output": "simdtex.run",
     "Progress": "simdtex.run",
     "checkpoint": "simdtex.checkpoints",

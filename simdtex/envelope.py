@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.checkpoints.keep import NOTHING, Keep
-from simdtex.checkpoints.keeper import CURRENT, Keeper
+from simdtex.checkpoints.keeper import CURRENT, Around
 from simdtex.machine import Machine, open_machine
 from simdtex.options import real_array, whole
 from simdtex.random import as_seed
@@ -23,7 +23,7 @@ class Begun(NamedTuple):
     """A job that is begun: its ``seed``, and the ``keeper`` of the checkpoint around it, None where there is none."""
 
     seed: int
-    keeper: Keeper | None
+    keeper: Around | None
 
     def on(self, device: str) -> Keep:
         """Where the run on a device of this name keeps its state."""

@@ -70,10 +70,10 @@ ROOMS = [
     *(
         "__main__",
         "cli",
-        "live",
         "report",
         "bench",
         "__init__",
+        "live",
         "quality",
         "experiments",
         "distributed",

@@ -10,14 +10,30 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from simdtex.checkpoints.folder import JOB, Folder
 from simdtex.checkpoints.keep import Keep, Kept, Watch
 from simdtex.checkpoints.tree import identity
 from simdtex.options import real
 
-CURRENT: ContextVar[Keeper | None] = ContextVar("checkpoint", default=None)
+
+class Around(Protocol):
+    """What is around a run: it may keep the run's states, and give one to go on from; `Keeper` is one.
+
+    ``running`` says whether a run is going on.
+    """
+
+    running: bool
+
+    def begin(self, job: str, seed: int | None, fresh: Callable[[], int], inputs: dict[str, Any]) -> int:
+        """Hear of a job, and give its seed; see `Keeper.begin`."""
+
+    def on(self, device: str) -> Keep:
+        """Where the run on a device of this name keeps its states."""
+
+
+CURRENT: ContextVar[Around | None] = ContextVar("checkpoint", default=None)
 """The keeper of the block that is being run; `simdtex.envelope` reads it, and hands on what comes of it."""
 
 NAMES = {"job": "call", "shape": "shape of the output", "known_source": "known_source"}

@@ -13,6 +13,7 @@ from simdtex.cli.helping import write_examples
 
 GROUPS = {
     "More of a texture": {
+        "live": "Watch a texture take shape in the browser, and steer it.",
         "synth": "Make more of the texture SAMPLE.",
         "fill": "Fill the holes of PICTURE with more of what is around them.",
         "extend": "Continue PICTURE beyond its edges, or make it seamless.",

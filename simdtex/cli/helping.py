@@ -40,7 +40,7 @@ SECTIONS = {
     "Method pyramid": ("pyramid", "iterations", "match", "bins", "color", "start"),
     "Levels and edges, of several methods": ("levels", "boundary", "edges", "orientations"),
     "Large outputs, and runs that stop and go on": ("tiles", "workers", "scheduler", "dry_run", "checkpoint"),
-    "This machine, and what is told": ("device", "jobs", "profile", "quiet"),
+    "This machine, and what is told": ("device", "jobs", "port", "host", "browser", "profile", "quiet"),
 }
 """Titles, and the parameters under each."""
 

@@ -38,6 +38,7 @@ __all__ = [
     "read_bytes",
     "read_mask",
     "split_alpha",
+    "suitable_suffix",
     "to_display",
     "write",
 ]
@@ -399,11 +400,16 @@ def check_writable(
         raise ValueError(f"{target} {what}: end its name in one of {', '.join(sorted(known))}")
     if suffixes is not None or _holds(suffix, dtype, channels):
         return
-    other = next(s for s in (".png", ".tif", ".npy") if _holds(s, dtype, channels))
+    other = suitable_suffix(dtype, channels)
     what = f"{np.dtype(dtype)} pixels" if dtype is not None else "pixels"
     if channels is not None:
         what += f" of {channels} channel" + "s" * (channels != 1)
     raise ValueError(f"{target}: {suffix} cannot hold {what}: end its name in {other} instead")
+
+
+def suitable_suffix(dtype: DTypeLike | None, channels: int | None) -> str:
+    """The suffix of a format that holds such pixels without loss: PNG, else TIFF, else NumPy's own."""
+    return next(suffix for suffix in (".png", ".tif", ".npy") if _holds(suffix, dtype, channels))
 
 
 def _holds(suffix: str, dtype: DTypeLike | None, channels: int | None) -> bool:

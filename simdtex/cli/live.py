@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex live``: a page in the browser that shows a run while it goes on, and steers it."""
+
+from __future__ import annotations
+
+import webbrowser
+from contextlib import suppress
+from pathlib import Path
+
+import click
+
+from simdtex.cli.common import plainly
+from simdtex.cli.helping import command
+from simdtex.cli.options import DEVICE
+from simdtex.cli.places import READ
+from simdtex.machine import Machine
+
+EXTRA = "simdtex live needs packages of its own ({}); install them with: pip install 'simdtex[live]'"
+
+
+@command(
+    ("live", "A page in the browser; drop a picture on it."),
+    ("live gravel.png", "It begins with this one."),
+    ("live --no-browser --port 8080", "It prints its address alone, for a browser of your choice."),
+)
+@click.argument("picture", required=False, type=READ)
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="To listen to.  [a free one]")
+@click.option(
+    "--host",
+    default="127.0.0.1",
+    show_default=True,
+    help="To listen to. With another one, whoever reaches this machine and knows the page's address can use it.",
+)
+@click.option("--browser/--no-browser", default=True, help="Open the page, or print its address alone.")
+@DEVICE
+@plainly
+def live(picture: Path | None, port: int, host: str, browser: bool, device: str | None) -> None:
+    """Watch a texture take shape in the browser, and steer it.
+
+    The page is for this machine alone, and ends with this command.
+    """
+    from simdtex.io import image
+
+    try:
+        from simdtex.live.jobs import Picture
+        from simdtex.live.serving import serve
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.startswith("simdtex"):
+            raise
+        raise ValueError(EXTRA.format(error.name)) from None
+    given = None
+    if picture:
+        found = image.read(picture)
+        given = Picture(picture.name, found.pixels, found.channel_axis)
+
+    def ready(address: str, machine: Machine) -> None:
+        click.echo(f"{address}  (on {machine.name}; Ctrl-C ends it)")
+        if browser:
+            webbrowser.open(address)
+
+    with suppress(KeyboardInterrupt):
+        serve(given, device, host, port, ready)
+    click.echo("ended")
