@@ -131,7 +131,7 @@ def test_heat_grows_in_lightness():
     assert (np.diff(grey) > -1.0).all()  # rounding to 8 bits
     assert grey[0] < 30
     assert grey[-1] > 220
-    np.testing.assert_array_equal(colours.heat([-1.0, 2.0]), sheet.heat([0.0, 1.0]))
+    np.testing.assert_array_equal(colours.heat([-1.0, 2.0]), colours.heat([0.0, 1.0]))
 
 
 def test_source_colours_tell_positions_apart():

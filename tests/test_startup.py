@@ -23,7 +23,18 @@ from simdtex.machine import cache, programs, runtimes
 HEAVY = {"pyopencl", "scipy", "skimage", "matplotlib", "tifffile", "imagecodecs", "jinja2", "nrrd", "emcee", "rich"}
 HEAVY |= {"xarray", "zarr", "h5netcdf", "pandas"}
 PUBLIC = {
-    *("DeviceError", "Output", "Progress", "devices", "lcpdf", "mix", "open_machine", "quality", "suggest_alpha"),
+    *(
+        "DeviceError",
+        "Live",
+        "Output",
+        "Progress",
+        "devices",
+        "lcpdf",
+        "mix",
+        "open_machine",
+        "quality",
+        "suggest_alpha",
+    ),
     *("place_hard_data", "read_hard_data", "synthesize", "synthesize_solid", "__version__"),
     *("checkpoint", "extend", "fill", "simulate"),
 }

@@ -6,15 +6,13 @@ from __future__ import annotations
 import re
 import shlex
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.io.image import suitable_suffix
-
-if TYPE_CHECKING:
-    from simdtex.live.jobs import Settings
+from simdtex.live.settings import Settings
 
 FUNCTIONS = {"synth": "synthesize", "tile": "extend", "fill": "fill"}
 COMMANDS = {"synth": "synth", "tile": "extend", "fill": "fill"}

@@ -13,8 +13,8 @@ from functools import cache
 import numpy as np
 import uvicorn
 
-from simdtex.live.jobs import Picture
 from simdtex.live.server import LARGEST, Pages, application
+from simdtex.live.settings import Picture
 from simdtex.machine import Machine, open_machine
 from simdtex.synthesis import synthesize
 

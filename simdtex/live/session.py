@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 
 from simdtex.io.image import read_bytes
 from simdtex.live import looking, planes
-from simdtex.live.jobs import Earlier, Picture, job, parsed
+from simdtex.live.jobs import Earlier, job
 from simdtex.live.levels import Levels
 from simdtex.live.looking import Look, Plane
 from simdtex.live.recipe import stem
 from simdtex.live.results import Result, Results
+from simdtex.live.settings import Picture, parsed
 from simdtex.live.words import METHODS, OF_JOBS, WORDS, controls
 from simdtex.machine import Machine
 from simdtex.methods import mrf

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.image import check_sample
-from simdtex.live.jobs import Picture
 from simdtex.live.results import Result
 from simdtex.live.session import Session
+from simdtex.live.settings import Picture
 from simdtex.machine import Machine, open_machine
 
 try:

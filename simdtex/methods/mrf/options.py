@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -267,7 +267,8 @@ def begins(before: Options, now: Options, levels: int) -> int:
         ``levels - 1``, the coarsest, where all of it may differ; the level after that where the search does; -1 where
         nothing but the finish may.
     """
-    different = {one.name for one in fields(Options) if getattr(before, one.name) != getattr(now, one.name)}
+    old, new = vars(before), vars(now)
+    different = {name for name in old if old[name] != new[name]}
     if different <= {"finish"}:
         return -1
     if different <= {"finish", *SEARCHED} and levels > 1:  # the coarsest level weighs all candidates
