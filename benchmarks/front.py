@@ -2,13 +2,13 @@
 """The picture and the times of the README, made from pictures that scikit-image carries.
 
     python benchmarks/front.py [--out docs/_static/front.jpg] [--device TEXT]
-    python benchmarks/front.py --times [--runs 5] [--device TEXT]
+    python benchmarks/front.py --times [--runs 5] [--methods multires pyramid] [--device TEXT]
 
 The picture has gravel and tissue beside their samples, brick with its normal map carried over, and a hole in grass
 before and after; all of it at 1:1, with the default options and seed 1. ``--times`` runs ``simdtex synth`` as a
 process of its own for each method, on three colour samples of 128x128, for outputs of 256x256; it prints the user CPU
 seconds of the whole process and its wall seconds, least to most of the samples, each the median of the runs after the
-first.
+first. "start-up" is a process that makes one pixel.
 """
 
 import argparse
@@ -35,6 +35,7 @@ SIDE = 156  # of a sample, pixels
 SEED = 1  # of every picture
 GAP, TEXT = 12, 15  # between pictures, and the height of letters, pixels
 METHODS = {
+    "start-up": ["--size", "1x1", "--levels", "1", "--order", "1"],
     "mrf": [],
     "mrf, exact search": ["--search", "exact"],
     "multires": ["--method", "multires"],
@@ -113,7 +114,7 @@ def front(machine, side=SIDE):
     return placed(parts, (3 * wide - GAP, below + line + 2 * side))
 
 
-def processes(device, runs):
+def processes(device, runs, methods):
     """Time every method on every sample as a process; print a line for each method."""
     colour = {
         "tissue": data.immunohistochemistry()[300:428, 290:418],
@@ -122,7 +123,7 @@ def processes(device, runs):
     }
     print(f"{'':20} user CPU seconds   wall seconds")
     with tempfile.TemporaryDirectory() as folder:
-        for method, words in METHODS.items():
+        for method in methods:
             cpu, wall = [], []
             for name, sample in colour.items():
                 write(Path(folder) / f"{name}.png", sample)
@@ -137,7 +138,7 @@ def processes(device, runs):
                     "--size",
                     "256x256",
                 ]
-                command += [*words, "--seed", "1", "--quiet", *(["--device", device] if device else [])]
+                command += [*METHODS[method], "--seed", "1", "--quiet", *(["--device", device] if device else [])]
                 seconds = []
                 for _ in range(1 + runs):
                     before, began = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
@@ -155,12 +156,13 @@ def main(argv=None):
     parser.add_argument("--side", type=int, default=SIDE, help="of the samples, pixels; results have twice that")
     parser.add_argument("--times", action="store_true", help="print times instead")
     parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=list(METHODS), metavar="METHOD")
     parser.add_argument("--device")
     options = parser.parse_args(argv)
     machine = simdtex.open_machine(options.device)
     print(machine.name)
     if options.times:
-        processes(options.device, options.runs)
+        processes(options.device, options.runs, options.methods)
         return
     front(machine, options.side).save(options.out, quality=90)
     print(f"{options.out}: {options.out.stat().st_size // 1024} KiB")
