@@ -5,10 +5,8 @@ PYTHON ?= python3
 VENV ?= .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check -qq
-# within the arguments of a call
-comma := ,
 
-.PHONY: help demo test slow lint docs dist mutants fuzz cpu clean
+.PHONY: help demo test slow lint docs mutants fuzz cpu clean
 
 help:
 	@echo "make demo    textures from real samples, into ./demo"
@@ -16,12 +14,15 @@ help:
 	@echo "make slow    the tests that take long or need the package index"
 	@echo "make lint    ruff and mypy"
 	@echo "make docs    the documentation, into docs/_build/html"
-	@echo "make dist    the wheel and the source distribution, into dist, checked and tried"
 	@echo "make mutants mutation tests of the Markov random field"
 	@echo "make fuzz    command lines and files that nobody would give, for MINUTES=10"
 	@echo "make cpu     the CPU runtime of the package index, beside what is here already"
+	@echo "make dist    the wheel and the source distribution, into dist, checked and tried"
 	@echo "make clean   remove what these commands made, except $(VENV)"
 	@echo "Another Python: make PYTHON=python3.12 ..."
+
+# within the arguments of a call
+comma := ,
 
 # $(call install,NAME,EXTRAS): install once, again only when pyproject.toml or Python's version changed.
 define install
@@ -72,14 +73,6 @@ docs:
 	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	@echo "The documentation is in docs/_build/html/index.html"
 
-# What goes to the package index: built, checked, and tried in an empty environment.
-dist:
-	$(call install,slow,[test$(comma)release])
-	$(device)
-	rm -rf dist
-	$(PY) -m build --outdir dist
-	@SIMDTEX_DIST=dist $(PY) -m pytest -m slow tests/test_wheel.py
-
 # MUTANTS='simdtex.ops.*' or 'simdtex.schedules.*' does others, a list of names those alone. No OpenCL: mutmut forks.
 MUTANTS ?= simdtex.methods.mrf.*
 mutants:
@@ -94,6 +87,15 @@ RECORD ?=
 fuzz:
 	$(call install,test,[test])
 	$(PY) -m fuzz --minutes $(MINUTES) --seed $(SEED) $(RECORD)
+
+# What goes to the package index: built, checked, and tried in an empty environment.
+.PHONY: dist
+dist:
+	$(call install,slow,[test$(comma)release])
+	$(device)
+	rm -rf dist
+	$(PY) -m build --outdir dist
+	@SIMDTEX_DIST=dist $(PY) -m pytest -m slow tests/test_wheel.py
 
 cpu:
 	$(call install,cpu,[cpu])

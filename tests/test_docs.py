@@ -26,7 +26,6 @@ from simdtex.options import Words, kinds
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-TOUR = (ROOT / "docs" / "tour.rst").read_text(encoding="utf-8")
 PAGES = sorted(path for path in (ROOT / "docs").rglob("*.rst") if "_build" not in path.parts)
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 METHODS = {"mrf": mrf, "multires": multires, "pyramid": pyramid}
@@ -110,6 +109,7 @@ def test_python_runs(any_device, code, page, tmp_path, monkeypatch):
     exec(compile(small(code), page, "exec"), {"__name__": page})
 
 
+TOUR = (ROOT / "docs" / "tour.rst").read_text(encoding="utf-8")
 SHOWN = dict.fromkeys(commands(README) + commands(TOUR))  # each once
 
 
