@@ -41,26 +41,6 @@ def test_the_changelog_knows_the_version():
     assert ".dev" in PROJECT["version"] or PROJECT["version"] in headings
 
 
-def test_every_dependency_has_its_reason():
-    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    lines = [line for line in text.splitlines() if re.match(r' {4}"[a-z0-9-]+(\[\w+\])?[>=;]', line)]
-    bare = [line.strip() for line in lines if "#" not in line]
-    explained = (
-        "intel-",
-        "furo",
-        "numpydoc",
-        "sphinx",
-        "mypy",
-        "pre-commit",
-        "ruff",
-        "pytest>",
-        "hypothesis",
-        "mutmut",
-    )
-    assert lines
-    assert [line for line in bare if not line.strip('"').startswith((*explained, "pytest-timeout"))] == []
-
-
 @pytest.mark.parametrize("name", ["ci", "release"])
 def test_a_workflow_calls_what_there_is(name):
     runs = [step["run"] for step in steps(name) if "run" in step]
