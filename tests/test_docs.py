@@ -109,12 +109,8 @@ def test_python_runs(any_device, code, page, tmp_path, monkeypatch):
     exec(compile(small(code), page, "exec"), {"__name__": page})
 
 
-TOUR = (ROOT / "docs" / "tour.rst").read_text(encoding="utf-8")
-SHOWN = dict.fromkeys(commands(README) + commands(TOUR))  # each once
-
-
-@pytest.mark.parametrize("line", SHOWN)
-def test_shown_command_runs(any_device, material, line):
+@pytest.mark.parametrize("line", commands(README))
+def test_readme_command_runs(any_device, material, line):
     words = shlex.split(small(line))
     words += ["--order", "8"] if {"synth", "simulate"} & set(words) and "--method" not in words else []  # quicker
     words += ["--order", "8"] if {"fill", "extend"} & set(words) else []
@@ -164,6 +160,14 @@ def test_example_runs(any_device, example, tmp_path, monkeypatch, capsys):
     runpy.run_path(str(example), run_name="__main__")
     assert list((tmp_path / "out").rglob("*.png"))
     assert str(tmp_path / "out") in capsys.readouterr().out
+
+
+TOUR = (ROOT / "docs" / "tour.rst").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("line", [line for line in commands(TOUR) if line not in commands(README)])
+def test_command_of_the_tour_runs(any_device, material, line):
+    test_readme_command_runs(any_device, material, line)
 
 
 # ---------------------------------------------------------------- what is named exists
