@@ -16,6 +16,8 @@ CHANGELOG = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 WORKFLOWS = {path.stem: path for path in sorted((ROOT / ".github" / "workflows").glob("*.yml"))}
 TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
 
+CHECKOUT = pytest.mark.skipif(not (ROOT / ".ci").exists(), reason="a source distribution has no .ci")
+
 
 def read(name):
     """A workflow; YAML 1.1 takes its key ``on`` for a truth value."""
@@ -41,6 +43,7 @@ def test_the_changelog_knows_the_version():
     assert ".dev" in PROJECT["version"] or PROJECT["version"] in headings
 
 
+@CHECKOUT
 @pytest.mark.parametrize("name", ["ci", "release"])
 def test_a_workflow_calls_what_there_is(name):
     runs = [step["run"] for step in steps(name) if "run" in step]
@@ -51,6 +54,7 @@ def test_a_workflow_calls_what_there_is(name):
     assert all((ROOT / path).exists() for path in files)
 
 
+@CHECKOUT
 def test_the_ci_script_calls_targets_that_there_are():
     called = re.findall(r"^make ([a-z]+)", (ROOT / ".ci" / "run").read_text(encoding="utf-8"), re.MULTILINE)
     assert called

@@ -80,7 +80,7 @@ def test_the_wheel_carries_the_kernels_and_nothing_else(wheel):
     }
 
 
-def test_the_source_distribution_can_be_tested(sdist):
+def test_the_source_distribution_has_tests_and_documentation(sdist):
     with tarfile.open(sdist) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
     wanted = {
