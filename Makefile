@@ -17,8 +17,12 @@ help:
 	@echo "make mutants mutation tests of the Markov random field"
 	@echo "make fuzz    command lines and files that nobody would give, for MINUTES=10"
 	@echo "make cpu     the CPU runtime of the package index, beside what is here already"
+	@echo "make dist    the wheel and the source distribution, into dist, checked and tried"
 	@echo "make clean   remove what these commands made, except $(VENV)"
 	@echo "Another Python: make PYTHON=python3.12 ..."
+
+# within the arguments of a call
+comma := ,
 
 # $(call install,NAME,EXTRAS): install once, again only when pyproject.toml or Python's version changed.
 define install
@@ -54,7 +58,7 @@ test:
 	@$(PY) -m pytest --numprocesses $(JOBS) --maxprocesses 4 --dist worksteal
 
 slow:
-	$(call install,test,[test])
+	$(call install,slow,[test$(comma)release])
 	$(device)
 	@$(PY) -m pytest -m slow
 
@@ -83,6 +87,15 @@ RECORD ?=
 fuzz:
 	$(call install,test,[test])
 	$(PY) -m fuzz --minutes $(MINUTES) --seed $(SEED) $(RECORD)
+
+# What goes to the package index: built, checked, and tried in an empty environment.
+.PHONY: dist
+dist:
+	$(call install,slow,[test$(comma)release])
+	$(device)
+	rm -rf dist
+	$(PY) -m build --outdir dist
+	@SIMDTEX_DIST=dist $(PY) -m pytest -m slow tests/test_wheel.py
 
 cpu:
 	$(call install,cpu,[cpu])

@@ -1,0 +1,98 @@
+"""What a release needs: one version everywhere, a changelog, and workflows that call what there is."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+
+import simdtex
+
+ROOT = Path(__file__).resolve().parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+CITATION = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+CHANGELOG = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+WORKFLOWS = {path.stem: path for path in sorted((ROOT / ".github" / "workflows").glob("*.yml"))}
+TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+
+CHECKOUT = pytest.mark.skipif(not (ROOT / ".ci").exists(), reason="a source distribution has no .ci")
+
+
+def read(name):
+    """A workflow; YAML 1.1 takes its key ``on`` for a truth value."""
+    return yaml.safe_load(WORKFLOWS[name].read_text(encoding="utf-8"))
+
+
+def steps(name):
+    return [step for job in read(name)["jobs"].values() for step in job["steps"]]
+
+
+def test_the_citation_is_that_of_the_project():
+    assert CITATION["version"] == PROJECT["version"] == simdtex.__version__
+    assert CITATION["title"] == PROJECT["name"]
+    assert CITATION["license"] == PROJECT["license"]
+    assert [author["name"] for author in CITATION["authors"]] == [author["name"] for author in PROJECT["authors"]]
+    assert ("date-released" in CITATION) == (".dev" not in PROJECT["version"])
+    assert CITATION.get("repository-code") == PROJECT.get("urls", {}).get("Repository")
+
+
+def test_the_changelog_knows_the_version():
+    headings = re.findall(r"^## \[(.+?)\]", CHANGELOG, re.MULTILINE)
+    assert headings[0] == "Unreleased"
+    assert ".dev" in PROJECT["version"] or PROJECT["version"] in headings
+
+
+@CHECKOUT
+@pytest.mark.parametrize("name", ["ci", "release"])
+def test_a_workflow_calls_what_there_is(name):
+    runs = [step["run"] for step in steps(name) if "run" in step]
+    targets = {target for run in runs for target in re.findall(r"\bmake ([a-z]+)", run)}
+    assert targets <= TARGETS
+    files = {path for run in runs for path in re.findall(r"(?<![\w/])(\.ci/\w+|pyproject\.toml)", run)}
+    assert targets or files
+    assert all((ROOT / path).exists() for path in files)
+
+
+@CHECKOUT
+def test_the_ci_script_calls_targets_that_there_are():
+    called = re.findall(r"^make ([a-z]+)", (ROOT / ".ci" / "run").read_text(encoding="utf-8"), re.MULTILINE)
+    assert called
+    assert set(called) <= TARGETS
+
+
+@pytest.mark.parametrize("name", WORKFLOWS)
+def test_actions_are_pinned_and_jobs_end(name):
+    for step in steps(name):
+        if "uses" in step:
+            assert re.fullmatch(r"[\w-]+/[\w-]+@(v\d+|[0-9a-f]{40}|release/v\d+)", step["uses"])
+        if step.get("uses", "").startswith("actions/checkout@"):
+            assert step["with"]["persist-credentials"] is False
+    assert all(job["timeout-minutes"] <= 120 for job in read(name)["jobs"].values())
+
+
+def test_nobody_may_write_but_the_index_trusts_one_job():
+    assert read("ci")["permissions"] == {"contents": "read"}
+    release = read("release")
+    assert release["permissions"] == {}
+    asked = {name: job["permissions"] for name, job in release["jobs"].items()}
+    assert asked == {"build": {"contents": "read"}, "try": {}, "publish": {"id-token": "write"}}
+    assert release[True] == {"push": {"tags": ["v*"]}}
+
+
+def test_nothing_is_published_that_was_not_tried():
+    jobs = read("release")["jobs"]
+    assert set(jobs["publish"]["needs"]) == {"build", "try"}
+    assert jobs["publish"]["environment"] == "pypi"
+    assert [step["uses"].partition("@")[0] for step in jobs["publish"]["steps"]] == [
+        "actions/download-artifact",
+        "pypa/gh-action-pypi-publish",
+    ]
+    systems = {each["os"].partition("-")[0] for each in jobs["try"]["strategy"]["matrix"]["include"]}
+    assert systems == {"ubuntu", "windows", "macos"}
+
+
+def test_the_page_names_the_workflow_and_the_environment():
+    page = (ROOT / "docs" / "releasing.rst").read_text(encoding="utf-8")
+    for word in (".github/workflows/release.yml", "``pypi``", "make dist"):
+        assert word in page
