@@ -26,7 +26,7 @@ from simdtex.options import Words, kinds
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PAGES = sorted(path for path in (ROOT / "docs").rglob("*.rst") if "_build" not in path.parts)
+PAGES = sorted(path for path in (ROOT / "docs").rglob("*.rst") if not {"_build", "gallery"} & set(path.parts))
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 METHODS = {"mrf": mrf, "multires": multires, "pyramid": pyramid}
 OF_COMMANDS = {"sheet": METHODS["multires"], "mix": METHODS["pyramid"], "solid": solid}
