@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Check the built documentation: `python docs/check.py docs/_build/html`, which `make docs` does.
 
-Every link within the pages leads to a page and a place on it, and no page loads anything from elsewhere. Where Chromium,
-its driver and Selenium are installed, a browser without a network opens the pages: formulas are drawn, the search finds
-pages, and at the width of a phone no page scrolls sideways.
+Every link within the pages leads to a page and a place on it, and no page loads anything from elsewhere. Where
+Chromium, its driver and Selenium are installed, a browser without a network opens the pages: formulas are drawn, the
+search finds pages, and at the width of a phone no page scrolls sideways.
 """
 
 import argparse
@@ -150,8 +150,10 @@ def opened(folder, words=("temperature", "neighbourhood", "seamless")):
         for word in words:
             driver.get(f"{(folder / 'search.html').resolve().as_uri()}?q={word}")
             hits = WebDriverWait(driver, 20).until(
-                lambda d: d.find_elements(By.CSS_SELECTOR, "#search-results ul.search li a")
-                or "did not match any" in d.page_source
+                lambda d: (
+                    d.find_elements(By.CSS_SELECTOR, "#search-results ul.search li a")
+                    or "did not match any" in d.page_source
+                )
             )
             if hits is True:
                 faults.append(f"the search does not find {word!r}")
@@ -172,7 +174,10 @@ def main():
         print(f"Not checked in a browser: {why}.")
     else:
         faults += [*opened(args.folder), *sideways(args.folder)]
-    print("\n".join(dict.fromkeys(faults)) or f"{len(found)} pages: every link leads somewhere, nothing is loaded from elsewhere.")
+    print(
+        "\n".join(dict.fromkeys(faults))
+        or f"{len(found)} pages: every link leads somewhere, nothing is loaded from elsewhere."
+    )
     sys.exit(bool(faults))
 
 
