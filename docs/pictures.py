@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The pictures of the pages for readers and of the page of wishes.
+"""The pictures of the pages for readers and of the page of wishes, and what the page for researchers prints.
 
     python docs/pictures.py [NAME...]
 
@@ -8,6 +8,9 @@ name; without names all are written.
 """
 
 import argparse
+import io
+import re
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -191,6 +194,19 @@ def geoscience():
     ]
 
 
+def research():
+    """Run the blocks of the page for researchers from top to bottom, and keep what two of them print."""
+    page = (HERE / "readers" / "research.rst").read_text(encoding="utf-8")
+    names = {"__name__": "research"}
+    for block in re.findall(r"^\.\. code-block:: python\n\n((?:(?:   .*)?\n)+)", page, re.MULTILINE):
+        with redirect_stdout(io.StringIO()) as told:
+            exec(compile(re.sub(r"^   ", "", block, flags=re.MULTILINE), "research.rst", "exec"), names)
+        for mark, name in (("sigma", "research-ising"), ("exact", "research-draw")):
+            if mark in told.getvalue():
+                (HERE / "readers" / f"{name}.txt").write_text(told.getvalue(), encoding="utf-8")
+                print(told.getvalue(), end="")
+
+
 WISHES = (
     balance,
     novelty,
@@ -215,8 +231,11 @@ def main():
         make.__name__: (folder, make) for folder, some in (("wishes", WISHES), ("readers", READERS)) for make in some
     }
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(known))
-    for name in parser.parse_args().names or known:
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join([*known, "research"]))
+    for name in parser.parse_args().names or [*known, "research"]:
+        if name == "research":
+            research()
+            continue
         folder, make = known[name]
         path = HERE / folder / f"{name}.png"
         pictures = make()

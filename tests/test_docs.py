@@ -27,6 +27,7 @@ from simdtex.options import Words, kinds
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = sorted(path for path in (ROOT / "docs").rglob("*.rst") if not {"_build", "gallery"} & set(path.parts))
+STORIES = [page for page in PAGES if page.parent.name == "readers"]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 METHODS = {"mrf": mrf, "multires": multires, "pyramid": pyramid}
 OF_COMMANDS = {"sheet": METHODS["multires"], "mix": METHODS["pyramid"], "solid": solid}
@@ -91,7 +92,12 @@ def material(tmp_path, monkeypatch):
 # ---------------------------------------------------------------- what is shown runs
 
 
-PYTHON = {code: page_id(page) for page in PAGES for code in directive(page.read_text("utf-8"), "python")}
+PYTHON = {
+    code: page_id(page)
+    for page in PAGES
+    if page not in STORIES
+    for code in directive(page.read_text("utf-8"), "python")
+}
 PYTHON |= {code: "README.md" for code in fenced(README, "python")}  # the pages repeat some of these
 
 
@@ -102,6 +108,30 @@ def test_python_runs(any_device, code, page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert small(code) != code, "the sizes of this block are not known to the test"
     exec(compile(small(code), page, "exec"), {"__name__": page})
+
+
+def story(page):
+    """The Python blocks and the commands of a page in their order."""
+    text = page.read_text(encoding="utf-8")
+    for block in re.finditer(r"^\.\. code-block:: (python|console)\n\n((?:(?:   .*)?\n)+)", text, re.MULTILINE):
+        body = re.sub(r"^   ", "", block[2], flags=re.MULTILINE)
+        yield from [("python", body)] if block[1] == "python" else [("simdtex", line) for line in commands(block[0])]
+
+
+@pytest.mark.parametrize("page", STORIES, ids=page_id)
+def test_story_runs(any_device, page, tmp_path, monkeypatch):
+    """A page for readers, from top to bottom in one folder, at small sizes."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SIMDTEX_DEVICE", str(any_device.index))
+    names = {"__name__": page.stem}
+    for kind, text in story(page):
+        if kind == "python":
+            exec(compile(small(text), page_id(page), "exec"), names)
+            continue
+        words = shlex.split(small(text))[1:]
+        words += ["--order", "8"] if {"synth", "fill", "extend", "simulate"} & set(words) else []  # quicker
+        words += ["--band", "3"] if "extend" in words else []  # there is not more room on so small a picture
+        assert cli.main(words, standalone_mode=False) in (None, 0), text
 
 
 @pytest.mark.parametrize("line", commands(README))
