@@ -28,3 +28,4 @@ texture = simdtex.synthesize(sample, (args.size, args.size), rng=1)
 write(folder / "sample.png", sample)
 write(folder / "texture.png", texture)
 print(f"sample.png and texture.png are in {folder}")
+# sphinx_gallery_thumbnail_number = 2

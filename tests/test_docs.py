@@ -282,6 +282,35 @@ def test_every_option_of_a_method_has_its_page(method):
     assert set(METHODS[method].Options.__dataclass_fields__) <= set(re.findall(r"``(\w+)``", page))
 
 
+WISHES = (ROOT / "docs" / "wishes.rst").read_text(encoding="utf-8")
+ASKED = ("synth", "fill", "extend", "simulate")
+
+
+@pytest.mark.parametrize("command", ASKED)
+def test_every_option_of_a_command_answers_a_wish(command):
+    options = {max(p.opts, key=len) for p in cli.load(command).params if isinstance(p, click.Option)}
+    assert options - set(re.findall(r"``(--[\w-]+)", WISHES)) == set()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_option_of_a_method_answers_a_wish(method):
+    names = {f"--{name.replace('_', '-')}" for name in METHODS[method].Options.__dataclass_fields__}
+    assert names - set(re.findall(r"``(--[\w-]+)", WISHES)) == set()
+
+
+def test_no_wish_names_an_option_that_is_not_there():
+    params = [p for command in ASKED for p in cli.load(command).params if isinstance(p, click.Option)]
+    known = {name for p in params for name in (*p.opts, *p.secondary_opts)}
+    assert set(re.findall(r"``(--[\w-]+)", WISHES)) <= known
+
+
+def test_options_for_research_lead_to_a_page():
+    lines = re.findall(r"^\* .*(?:\n  .*)*", WISHES.partition(".. _wishes-research:")[2], re.MULTILINE)
+    assert lines
+    for line in lines:
+        assert "``--" in line and ":doc:" in line
+
+
 def test_paper_preset_is_described():
     page = (ROOT / "docs" / "decisions.rst").read_text(encoding="utf-8")
     for name, value in PRESETS["paper"].items():
