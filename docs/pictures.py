@@ -19,6 +19,7 @@ from skimage.transform import downscale_local_mean
 
 import simdtex
 from simdtex.experiments import ensemble
+from simdtex.io.image import write
 from simdtex.model.source_map import apply_source_map
 from simdtex.report.sheet import contact_sheet, heat, source_colours
 
@@ -46,6 +47,15 @@ def mosaic(side=120, period=20):
     joint = (row % period < 3) | (col % period < 3)
     grain = np.random.default_rng(2).integers(-8, 9, (side, side))
     return (np.where(joint, 60, tone[row // period, col // period]) + grain).astype(np.uint8)
+
+
+def front():
+    """The front page."""
+    samples = {name: getattr(data, name)()[:128, :128] for name in ("brick", "grass", "gravel")}
+    wide = {name: np.pad(one, ((0, 0), (0, 128)), constant_values=255) for name, one in samples.items()}
+    above = contact_sheet([(f"{name}, the sample", one) for name, one in wide.items()], columns=3, one_to_one=True)
+    made = [(f"more {name}", simdtex.synthesize(one, SHAPE, rng=1)) for name, one in samples.items()]
+    return np.vstack([above, contact_sheet(made, columns=3, one_to_one=True)])
 
 
 # ---------------------------------------------------------------- wishes: before and after
@@ -181,7 +191,7 @@ def maps():
 
 def geoscience():
     training = ensemble.channels(SHAPE, 1)
-    hidden = ensemble.channels((160, 160), 7)
+    hidden = ensemble.channels(SHAPE, 7)
     hard = np.ma.masked_all(hidden.shape, np.uint8)
     wells = np.random.default_rng(1).choice(hidden.size, 60, replace=False)
     hard.flat[wells] = hidden.flat[wells]
@@ -228,7 +238,9 @@ READERS = (materials, maps, geoscience)
 
 def main():
     known = {
-        make.__name__: (folder, make) for folder, some in (("wishes", WISHES), ("readers", READERS)) for make in some
+        make.__name__: (folder, make)
+        for folder, some in (("_static", (front,)), ("wishes", WISHES), ("readers", READERS))
+        for make in some
     }
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join([*known, "research"]))
@@ -239,7 +251,9 @@ def main():
         folder, make = known[name]
         path = HERE / folder / f"{name}.png"
         pictures = make()
-        contact_sheet(pictures, path, columns={"novelty": 2, "methods": 3}.get(name, len(pictures)), one_to_one=True)
+        columns = {"novelty": 2, "methods": 3}.get(name, len(pictures))
+        sheet = pictures if name == "front" else contact_sheet(pictures, columns=columns, one_to_one=True)
+        write(path, sheet if np.ptp(sheet, axis=2).any() else sheet[..., 0])
         print(f"{path.relative_to(HERE.parent)}: {path.stat().st_size / 1000:.0f} kB")
 
 

@@ -6,7 +6,6 @@ import re
 from docutils import nodes
 from latex2mathml.converter import convert
 
-
 BARS = re.compile(r"<mo([^>]*)>(\||&#x0007C;|&#x02016;)</mo>")
 
 
