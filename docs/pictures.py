@@ -97,7 +97,7 @@ def finish():
     wood = data.coffee()[266:362, 486:582]
     found = [simdtex.synthesize(wood, SHAPE, channel_axis=-1, finish=value, rng=2) for value in (0, 1.5, 4)]
     labels = ("finish 0", "finish 1.5, the default", "finish 4")
-    return [(label, larger(picture[100:200, 20:120], 3)) for label, picture in zip(labels, found, strict=True)]
+    return [(label, larger(picture[110:196, 30:116], 3)) for label, picture in zip(labels, found, strict=True)]
 
 
 def tile():

@@ -54,7 +54,7 @@ def directive(text, language):
 def commands(text):
     """Lines that call simdtex, without the prompt."""
     blocks = fenced(text, "console") + directive(text, "console")
-    lines = [line.removeprefix("$ ") for block in blocks for line in block.splitlines()]
+    lines = [line.removeprefix("$ ") for block in blocks for line in re.sub(r"\\\n *", "", block).splitlines()]
     return [line for line in lines if line.startswith("simdtex ")]
 
 
