@@ -66,9 +66,11 @@ lint:
 	$(PY) -m mypy --strict simdtex
 
 # The gallery runs the examples. With Chromium, its driver and Selenium the pages are looked at in a browser, too.
+# All is made anew: pages of an earlier build that are no more would be checked as well.
 docs:
 	$(call install,docs,[docs])
 	$(device)
+	@rm -rf docs/_build/html docs/gallery
 	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	@$(PY) docs/check.py docs/_build/html
 	@echo "The documentation is in docs/_build/html/index.html"

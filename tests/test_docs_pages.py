@@ -64,6 +64,15 @@ def test_a_link_may_lead_to_a_file_that_is_no_page(folder):
     assert faults(folder) == []
 
 
+def test_pictures_of_the_pages_are_small_and_have_a_command():
+    text = (ROOT / "docs" / "pictures.py").read_text(encoding="utf-8")
+    found = [*(ROOT / "docs" / "wishes").glob("*.png"), *(ROOT / "docs" / "readers").glob("*.png")]
+    assert found
+    for path in found:
+        assert path.stat().st_size < 300_000, path.name
+        assert f"def {path.stem}()" in text, path.name
+
+
 @pytest.fixture
 def browser():
     if check.missing():
