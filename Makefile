@@ -6,14 +6,15 @@ VENV ?= .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check -qq
 
-.PHONY: help demo test slow lint docs mutants fuzz cpu clean
+.PHONY: help demo test slow lint docs links mutants fuzz cpu clean
 
 help:
 	@echo "make demo    textures from real samples, into ./demo"
 	@echo "make test    the tests"
 	@echo "make slow    the tests that take long or need the package index"
 	@echo "make lint    ruff and mypy"
-	@echo "make docs    the documentation, into docs/_build/html"
+	@echo "make docs    the documentation, into docs/_build/html, and whether its links and pages are sound"
+	@echo "make links   whether the links of the documentation to other sites still lead there; needs the network"
 	@echo "make mutants mutation tests of the Markov random field"
 	@echo "make fuzz    command lines and files that nobody would give, for MINUTES=10"
 	@echo "make cpu     the CPU runtime of the package index, beside what is here already"
@@ -68,10 +69,19 @@ lint:
 	$(PY) -m ruff format --check
 	$(PY) -m mypy --strict simdtex
 
+# The gallery runs the examples. With Chromium, its driver and Selenium the pages are looked at in a browser, too.
+# All is made anew: pages of an earlier build that are no more would be checked as well.
 docs:
 	$(call install,docs,[docs])
+	$(device)
+	@rm -rf docs/_build/html docs/gallery
 	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	@$(PY) docs/check.py docs/_build/html
 	@echo "The documentation is in docs/_build/html/index.html"
+
+links:
+	$(call install,docs,[docs])
+	$(PY) -m sphinx -q -D plot_gallery=0 -b linkcheck docs docs/_build/links
 
 # MUTANTS='simdtex.ops.*' or 'simdtex.schedules.*' does others, a list of names those alone. No OpenCL: mutmut forks.
 MUTANTS ?= simdtex.methods.mrf.*
@@ -101,5 +111,5 @@ cpu:
 	$(call install,cpu,[cpu])
 
 clean:
-	rm -rf build dist demo docs/_build docs/generated .hypothesis .mypy_cache .pytest_cache .ruff_cache mutants
+	rm -rf build dist demo docs/_build docs/gallery docs/generated .hypothesis .mypy_cache .pytest_cache .ruff_cache mutants
 	find . -name __pycache__ -type d -not -path './$(VENV)/*' -prune -exec rm -rf {} +

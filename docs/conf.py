@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How Sphinx builds the documentation: `make docs`. Nothing is fetched while it builds."""
+"""How Sphinx builds the documentation: `make docs`. Nothing is fetched while it builds, or while a page is read."""
 
 import csv
 import json
+import sys
 from pathlib import Path
 
 import simdtex
@@ -14,12 +15,35 @@ author = "The simdtex developers"
 copyright = author
 release = simdtex.__version__
 
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.mathjax", "numpydoc"]
-exclude_patterns = ["_build", "generated"]
+sys.path.insert(0, str(HERE / "extensions"))
+extensions = ["sphinx.ext.autodoc", "numpydoc", "sphinx_gallery.gen_gallery", "formulas", "names"]
+exclude_patterns = ["_build", "generated", "extensions"]
 default_role = "py:obj"
+nitpicky = True
+html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = f"simdtex {release}"
 html_static_path = ["_static"]
+html_css_files = ["simdtex.css"]
+
+# The gallery is examples/*.py, all of which run at every build; one that fails is an error of the build.
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"\.py$",
+    "run_stale_examples": True,
+    "image_scrapers": ("pictures.written",),
+    "reset_modules": (),
+    "notebook_extensions": set(),  # the scripts read a command line, which a notebook has not
+    "download_all_examples": False,
+    "write_computation_times": False,
+    "show_signature": False,
+    "remove_config_comments": True,
+}
+
+# External links are asked for by `make links` alone.
+linkcheck_timeout = 20
+linkcheck_workers = 2
 
 autodoc_typehints = "none"  # the docstrings give types, shapes and units
 autodoc_member_order = "bysource"

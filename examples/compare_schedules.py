@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Compare parallel schedules, also one of your own, and see what they do: python compare_schedules.py [FOLDER]."""
+"""
+Schedules compared, one of your own among them
+==============================================
+
+Two schedules of simdtex and one that is written here make the same grass, and the report says what each one does:
+``python compare_schedules.py [FOLDER] [--size 64]``.
+"""
 
 import argparse
 import tempfile
@@ -12,9 +18,9 @@ from simdtex.experiments.comparison import compare
 from simdtex.report.schedules import write_comparison
 from simdtex.schedules import Partition
 
-parser = argparse.ArgumentParser(description=__doc__)
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
-parser.add_argument("--size", type=int, default=128, help="side of the textures and of the sample")
+parser.add_argument("--size", type=int, default=64, help="side of the textures and of the sample")
 args = parser.parse_args()
 folder = args.folder or Path(tempfile.mkdtemp(prefix="simdtex-"))
 

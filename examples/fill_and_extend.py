@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Fill holes in a picture, continue it, and make it seamless: python fill_and_extend.py [FOLDER] [--size 256].
+"""
+Holes filled, pictures continued and made seamless
+==================================================
+
+Gravel with holes, gravel that is to be wider, and a tile of it: ``python fill_and_extend.py [FOLDER] [--size 256]``.
 
 What is given of a picture comes out as it is, to the bit; only what is missing is made.
 """
@@ -15,7 +19,7 @@ import simdtex
 from simdtex.io.image import write
 from simdtex.report.sheet import contact_sheet
 
-parser = argparse.ArgumentParser(description=__doc__)
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
 parser.add_argument("--size", type=int, default=256, help="side of the picture")
 args = parser.parse_args()

@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""More brick from a piece of brick: python first_texture.py [FOLDER] [--size 256]."""
+"""
+The first texture
+=================
+
+More brick from a piece of brick: ``python first_texture.py [FOLDER] [--size 256]``.
+"""
 
 import argparse
 import tempfile
@@ -10,7 +15,7 @@ from skimage import data
 import simdtex
 from simdtex.io.image import write
 
-parser = argparse.ArgumentParser(description=__doc__)
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
 parser.add_argument("--size", type=int, default=256, help="side of the texture, twice that of the sample")
 args = parser.parse_args()
@@ -23,3 +28,4 @@ texture = simdtex.synthesize(sample, (args.size, args.size), rng=1)
 write(folder / "sample.png", sample)
 write(folder / "texture.png", texture)
 print(f"sample.png and texture.png are in {folder}")
+# sphinx_gallery_thumbnail_number = 2

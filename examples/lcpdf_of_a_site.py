@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How likely a picture's pixels are, given their neighbours: python lcpdf_of_a_site.py [FOLDER] [--size 128].
+"""
+The LCPDF of a site
+===================
+
+How likely a picture's pixels are, given their neighbours: ``python lcpdf_of_a_site.py [FOLDER] [--size 128]``.
 
 Half of the picture is grass, like the sample, and half is gravel. Where the model knows the texture, a pixel tends to
 be likely; surprise.png shows -log P of every pixel, which is dark where the pixel is likely.
@@ -15,7 +19,7 @@ from skimage import data
 import simdtex
 from simdtex.io.image import write
 
-parser = argparse.ArgumentParser(description=__doc__)
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
 parser.add_argument("--size", type=int, default=128, help="side of the picture and of the sample")
 args = parser.parse_args()

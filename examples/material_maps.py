@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A texture with height and normal maps that match it: python material_maps.py [FOLDER] [--size 256].
+"""
+Maps of a material
+==================
+
+A texture with height and normal maps that match it: ``python material_maps.py [FOLDER] [--size 256]``.
 
 The maps are made from the sample here, because there are no measured ones. They only need to lie over the sample: the
 source map arranges any such map.
@@ -16,7 +20,7 @@ import simdtex
 from simdtex.io.image import write
 from simdtex.model.source_map import apply_source_map, save_source_map
 
-parser = argparse.ArgumentParser(description=__doc__)
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
 parser.add_argument("--size", type=int, default=256, help="side of the texture, twice that of the sample")
 args = parser.parse_args()

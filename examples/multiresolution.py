@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Gravel by multiresolution sampling, at several thresholds: python multiresolution.py [FOLDER] [--size 256].
+"""
+Multiresolution sampling at several thresholds
+==============================================
+
+Gravel by the method ``multires``: ``python multiresolution.py [FOLDER] [--size 256]``.
 
 The threshold alpha says how alike two places must be to be exchanged. sheet.png shows what it does, and
 candidates.png shows among how many candidates each pixel of each level was drawn: the more, the brighter.
@@ -18,7 +22,7 @@ from simdtex.model.colours import heat, source_colours
 from simdtex.model.source_map import apply_source_map
 from simdtex.report.sheet import contact_sheet, enlarged
 
-parser = argparse.ArgumentParser(description=__doc__)
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
 parser.add_argument("--size", type=int, default=256, help="side of the textures, twice that of the sample")
 args = parser.parse_args()

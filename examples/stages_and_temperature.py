@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Watch a texture take shape, level by level: python stages_and_temperature.py [FOLDER] [--size 256]."""
+"""
+A texture takes shape
+=====================
+
+Every level and sweep of a run, with its temperatures: ``python stages_and_temperature.py [FOLDER] [--size 256]``.
+"""
 
 import argparse
 import tempfile
@@ -10,7 +15,7 @@ from skimage import data
 import simdtex
 from simdtex.report.stages import StageWriter
 
-parser = argparse.ArgumentParser(description=__doc__)
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
 parser.add_argument("--size", type=int, default=256, help="side of the texture, twice that of the sample")
 args = parser.parse_args()

@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Stone by pyramid matching, flat, solid and mixed: python stone_block.py [FOLDER] [--size 128].
+"""
+Stone: flat, solid and mixed
+============================
+
+Stone by pyramid matching: ``python stone_block.py [FOLDER] [--size 128]``.
 
 flat.png is a larger picture of the grain, iterations.png shows how noise becomes grain, solid.png shows a block of it
 with a ball carved out, and mixed.png shows the grain in the colours of wood.
@@ -17,7 +21,7 @@ from simdtex.io.image import write
 from simdtex.report.sheet import contact_sheet
 from simdtex.report.solid import view
 
-parser = argparse.ArgumentParser(description=__doc__)
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
 parser.add_argument("--size", type=int, default=128, help="side of the sample, half that of the flat texture")
 args = parser.parse_args()

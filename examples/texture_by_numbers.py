@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Guides say what goes where: python texture_by_numbers.py [FOLDER] [--size 256].
+"""
+Texture by numbers
+==================
+
+Guides say what goes where: ``python texture_by_numbers.py [FOLDER] [--size 256]``.
 
 river.png: a river of pebbles winds through grass. Labels say where the sample has pebbles, and where the output is to
 have them. portrait.png: a portrait in gravel. The gravel's own smoothed brightness and the photograph are the guides.
@@ -18,7 +22,7 @@ import simdtex
 from simdtex.io.image import write
 from simdtex.report.sheet import contact_sheet
 
-parser = argparse.ArgumentParser(description=__doc__)
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
 parser.add_argument("--size", type=int, default=256, help="side of the textures, twice that of the samples")
 args = parser.parse_args()

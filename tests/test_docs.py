@@ -26,7 +26,8 @@ from simdtex.options import Words, kinds
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PAGES = sorted(path for path in (ROOT / "docs").rglob("*.rst") if "_build" not in path.parts)
+PAGES = sorted(path for path in (ROOT / "docs").rglob("*.rst") if not {"_build", "gallery"} & set(path.parts))
+STORIES = [page for page in PAGES if page.parent.name == "readers"]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 METHODS = {"mrf": mrf, "multires": multires, "pyramid": pyramid}
 OF_COMMANDS = {"sheet": METHODS["multires"], "mix": METHODS["pyramid"], "solid": solid}
@@ -53,7 +54,7 @@ def directive(text, language):
 def commands(text):
     """Lines that call simdtex, without the prompt."""
     blocks = fenced(text, "console") + directive(text, "console")
-    lines = [line.removeprefix("$ ") for block in blocks for line in block.splitlines()]
+    lines = [line.removeprefix("$ ") for block in blocks for line in re.sub(r"\\\n *", "", block).splitlines()]
     return [line for line in lines if line.startswith("simdtex ")]
 
 
@@ -96,7 +97,12 @@ def material(tmp_path, monkeypatch):
 # ---------------------------------------------------------------- what is shown runs
 
 
-PYTHON = {code: page_id(page) for page in PAGES for code in directive(page.read_text("utf-8"), "python")}
+PYTHON = {
+    code: page_id(page)
+    for page in PAGES
+    if page not in STORIES
+    for code in directive(page.read_text("utf-8"), "python")
+}
 PYTHON |= {code: "README.md" for code in fenced(README, "python")}  # the pages repeat some of these
 
 
@@ -107,6 +113,30 @@ def test_python_runs(any_device, code, page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert small(code) != code, "the sizes of this block are not known to the test"
     exec(compile(small(code), page, "exec"), {"__name__": page})
+
+
+def story(page):
+    """The Python blocks and the commands of a page in their order."""
+    text = page.read_text(encoding="utf-8")
+    for block in re.finditer(r"^\.\. code-block:: (python|console)\n\n((?:(?:   .*)?\n)+)", text, re.MULTILINE):
+        body = re.sub(r"^   ", "", block[2], flags=re.MULTILINE)
+        yield from [("python", body)] if block[1] == "python" else [("simdtex", line) for line in commands(block[0])]
+
+
+@pytest.mark.parametrize("page", STORIES, ids=page_id)
+def test_story_runs(any_device, page, tmp_path, monkeypatch):
+    """A page for readers, from top to bottom in one folder, at small sizes."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SIMDTEX_DEVICE", str(any_device.index))
+    names = {"__name__": page.stem}
+    for kind, text in story(page):
+        if kind == "python":
+            exec(compile(small(text), page_id(page), "exec"), names)
+            continue
+        words = shlex.split(small(text))[1:]
+        words += ["--order", "8"] if {"synth", "fill", "extend", "simulate"} & set(words) else []  # quicker
+        words += ["--band", "3"] if "extend" in words else []  # there is not more room on so small a picture
+        assert cli.main(words, standalone_mode=False) in (None, 0), text
 
 
 @pytest.mark.parametrize("line", commands(README))
@@ -274,6 +304,35 @@ def test_every_option_of_solids_and_mixtures_is_on_the_command_line_and_in_the_d
 def test_every_option_of_a_method_has_its_page(method):
     page = (ROOT / "docs" / "reference" / "options.rst").read_text(encoding="utf-8")
     assert set(METHODS[method].Options.__dataclass_fields__) <= set(re.findall(r"``(\w+)``", page))
+
+
+WISHES = (ROOT / "docs" / "wishes.rst").read_text(encoding="utf-8")
+ASKED = ("synth", "fill", "extend", "simulate")
+
+
+@pytest.mark.parametrize("command", ASKED)
+def test_every_option_of_a_command_answers_a_wish(command):
+    options = {max(p.opts, key=len) for p in cli.load(command).params if isinstance(p, click.Option)}
+    assert options - set(re.findall(r"``(--[\w-]+)", WISHES)) == set()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_option_of_a_method_answers_a_wish(method):
+    names = {f"--{name.replace('_', '-')}" for name in METHODS[method].Options.__dataclass_fields__}
+    assert names - set(re.findall(r"``(--[\w-]+)", WISHES)) == set()
+
+
+def test_no_wish_names_an_option_that_is_not_there():
+    params = [p for command in ASKED for p in cli.load(command).params if isinstance(p, click.Option)]
+    known = {name for p in params for name in (*p.opts, *p.secondary_opts)}
+    assert set(re.findall(r"``(--[\w-]+)", WISHES)) <= known
+
+
+def test_options_for_research_lead_to_a_page():
+    lines = re.findall(r"^\* .*(?:\n  .*)*", WISHES.partition(".. _wishes-research:")[2], re.MULTILINE)
+    assert lines
+    for line in lines:
+        assert "``--" in line and ":doc:" in line
 
 
 def test_paper_preset_is_described():

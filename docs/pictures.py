@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The pictures of the pages for readers and of the page of wishes, and what the page for researchers prints.
+
+    python docs/pictures.py [NAME...]
+
+Samples are pictures that scikit-image carries, or drawn here; seeds are fixed. Each function writes the picture of its
+name; without names all are written.
+"""
+
+import argparse
+import io
+import re
+from contextlib import redirect_stdout
+from pathlib import Path
+
+import numpy as np
+from skimage import data
+from skimage.transform import downscale_local_mean
+
+import simdtex
+from simdtex.experiments import ensemble
+from simdtex.io.image import write
+from simdtex.model.source_map import apply_source_map
+from simdtex.report.sheet import contact_sheet, heat, source_colours
+
+HERE = Path(__file__).resolve().parent
+SHAPE = (256, 256)
+
+
+def gravel(side=128):
+    return data.gravel()[:side, :side]
+
+
+def brick(side=128):
+    return data.brick()[:side, :side]
+
+
+def larger(picture, times):
+    """Every pixel as a square of times x times."""
+    return np.repeat(np.repeat(picture, times, axis=0), times, axis=1)
+
+
+def mosaic(side=120, period=20):
+    """Light tiles in dark joints, every one a little different."""
+    row, col = np.indices((side, side))
+    tone = np.random.default_rng(1).integers(150, 230, (side // period + 1, side // period + 1))
+    joint = (row % period < 3) | (col % period < 3)
+    grain = np.random.default_rng(2).integers(-8, 9, (side, side))
+    return (np.where(joint, 60, tone[row // period, col // period]) + grain).astype(np.uint8)
+
+
+def front():
+    """The front page."""
+    samples = {name: getattr(data, name)()[:128, :128] for name in ("brick", "grass", "gravel")}
+    wide = {name: np.pad(one, ((0, 0), (0, 128)), constant_values=255) for name, one in samples.items()}
+    above = contact_sheet([(f"{name}, the sample", one) for name, one in wide.items()], columns=3, one_to_one=True)
+    made = [(f"more {name}", simdtex.synthesize(one, SHAPE, rng=1)) for name, one in samples.items()]
+    return np.vstack([above, contact_sheet(made, columns=3, one_to_one=True)])
+
+
+# ---------------------------------------------------------------- wishes: before and after
+
+
+def balance():
+    tissue = data.immunohistochemistry()[76:172, 126:222]
+    found = [simdtex.synthesize(tissue, SHAPE, channel_axis=-1, balance=b, rng=1) for b in (0, 0.5)]
+    return [("the sample", tissue), ("balance 0", found[0]), ("balance 0.5, the default", found[1])]
+
+
+def novelty():
+    pictures = []
+    for value in (0, 2):
+        picture, output = simdtex.synthesize(gravel(), SHAPE, novelty=value, rng=3, full_output=True)
+        pictures += [(f"novelty {value}", picture), ("where it is from", source_colours(output.source, (128, 128)))]
+    return pictures
+
+
+def structure():
+    found = [simdtex.synthesize(brick(), SHAPE, structure=value, rng=1) for value in (0, 2)]
+    return [("the sample", brick()), ("structure 0", found[0]), ("structure 2, the default", found[1])]
+
+
+def order():
+    found = [simdtex.synthesize(brick(), SHAPE, order=value, rng=2) for value in (4, 18, 32)]
+    return [("order 4", found[0]), ("order 18, the default", found[1]), ("order 32", found[2])]
+
+
+def period():
+    sample = mosaic()
+    wrapped = simdtex.synthesize(sample, (190, 190), rng=1)
+    free = simdtex.synthesize(sample, (190, 190), boundary="open", rng=1)
+    fitting = simdtex.synthesize(sample, (200, 200), rng=1)
+    return [("190 x 190, torus", wrapped), ("190 x 190, open", free), ("200 x 200, torus", fitting)]
+
+
+def finish():
+    wood = data.coffee()[266:362, 486:582]
+    found = [simdtex.synthesize(wood, SHAPE, channel_axis=-1, finish=value, rng=2) for value in (0, 1.5, 4)]
+    labels = ("finish 0", "finish 1.5, the default", "finish 4")
+    return [(label, larger(picture[110:196, 30:116], 3)) for label, picture in zip(labels, found, strict=True)]
+
+
+def tile():
+    photo = data.gravel()[100:228, 100:228]
+    seamless = simdtex.extend(photo, tile=True, rng=1)
+    return [(label, np.tile(one, (2, 2))) for label, one in (("as it is, 2 x 2", photo), ("--tile, 2 x 2", seamless))]
+
+
+def hole():
+    picture, missing = brick(192), np.zeros((192, 192), bool)
+    missing[70:110, 60:120] = True
+    found = [(f"seed {seed}", simdtex.fill(picture, missing, search="exact", rng=seed)) for seed in (1, 2, 3)]
+    return [("the hole", np.where(missing, 255, picture).astype(np.uint8)), *found]
+
+
+def some():
+    """A sample with something in it that is not to come again."""
+    sample = gravel().copy()
+    row, col = np.indices(sample.shape)
+    coin = np.hypot(row - 90, col - 40) < 18
+    sample[coin] = 235
+    mask = np.hypot(row - 90, col - 40) > 19
+    whole, part = (simdtex.synthesize(sample, SHAPE, mask=m, rng=1) for m in (None, mask))
+    return [("the sample", sample), ("all of it", whole), ("with a sample mask", part)]
+
+
+def proportions():
+    training = ensemble.channels((160, 160), 1)
+    found = [
+        simdtex.synthesize(training, (192, 192), categorical=True, boundary="open", proportions=p, rng=1)
+        for p in (None, (0.5, 0.5))
+    ]
+    return [
+        (f"{label}: {picture.mean():.0%} channel", picture * 255)
+        for label, picture in zip(
+            ("training image", "as it comes", "proportions 0.5,0.5"), (training, *found), strict=True
+        )
+    ]
+
+
+def shares():
+    pair = [brick(96)[:, :96], gravel(96)]
+    found = [simdtex.synthesize(pair, SHAPE, shares=s, rng=1) for s in ((3, 1), (1, 3))]
+    return [("shares 3,1", found[0]), ("shares 1,3", found[1])]
+
+
+def methods():
+    names = ("mrf", "multires", "pyramid")
+    grain = downscale_local_mean(data.gravel(), (4, 4)).astype(np.uint8)
+    return [
+        *((name, simdtex.synthesize(gravel(), (160, 160), method=name, rng=1)) for name in names),
+        *((name, simdtex.synthesize(grain, (160, 160), method=name, rng=1)) for name in names),
+    ]
+
+
+def alpha():
+    found = [simdtex.synthesize(gravel(), SHAPE, method="multires", alpha=a, rng=1) for a in (0, "auto", 1)]
+    return [("alpha 0", found[0]), ("alpha auto", found[1]), ("alpha 1", found[2])]
+
+
+def paper():
+    grass = data.grass()[:96, :96]
+    found = [simdtex.synthesize(grass, (192, 192), rng=1, **more) for more in ({"preset": "paper", "order": 8}, {})]
+    return [("the sample", grass), ("preset paper, order 8", found[0]), ("the defaults", found[1])]
+
+
+# ---------------------------------------------------------------- pages for readers
+
+
+def materials():
+    photo = data.gravel()[100:228, 100:228]
+    seamless = simdtex.extend(photo, tile=True, rng=1)
+    more = simdtex.synthesize(photo, SHAPE, rng=1)
+    return [("seamless, 3 x 3", np.tile(seamless, (3, 3))), ("more of it", more)]
+
+
+def maps():
+    photo = data.gravel()[100:228, 100:228]
+    height = photo / 255  # bright is high
+    down, right = np.gradient(8 * height)
+    normal = np.stack([-right, down, np.ones_like(height)], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    more, output = simdtex.synthesize(photo, (200, 200), rng=1, full_output=True)
+    same = apply_source_map(output.source, np.round((normal + 1) / 2 * 255).astype(np.uint8), photo.shape)
+    return [
+        ("the texture", more),
+        ("its normals", same),
+        ("where it is from", source_colours(output.source, photo.shape)),
+    ]
+
+
+def geoscience():
+    training = ensemble.channels(SHAPE, 1)
+    hidden = ensemble.channels(SHAPE, 7)
+    hard = np.ma.masked_all(hidden.shape, np.uint8)
+    wells = np.random.default_rng(1).choice(hidden.size, 60, replace=False)
+    hard.flat[wells] = hidden.flat[wells]
+    maps = simdtex.simulate(training, 20, hard=hard, categorical=True, rng=1).values
+    return [
+        ("what nobody knows", hidden * 255),
+        ("realisation 0", maps[0] * 255),
+        ("realisation 1", maps[1] * 255),
+        ("share of channel in 20", heat(maps.mean(axis=0))),
+    ]
+
+
+def research():
+    """Run the blocks of the page for researchers from top to bottom, and keep what two of them print."""
+    page = (HERE / "readers" / "research.rst").read_text(encoding="utf-8")
+    names = {"__name__": "research"}
+    for block in re.findall(r"^\.\. code-block:: python\n\n((?:(?:   .*)?\n)+)", page, re.MULTILINE):
+        with redirect_stdout(io.StringIO()) as told:
+            exec(compile(re.sub(r"^   ", "", block, flags=re.MULTILINE), "research.rst", "exec"), names)
+        for mark, name in (("sigma", "research-ising"), ("exact", "research-draw")):
+            if mark in told.getvalue():
+                (HERE / "readers" / f"{name}.txt").write_text(told.getvalue(), encoding="utf-8")
+                print(told.getvalue(), end="")
+
+
+WISHES = (
+    balance,
+    novelty,
+    structure,
+    order,
+    period,
+    finish,
+    tile,
+    hole,
+    some,
+    proportions,
+    shares,
+    methods,
+    alpha,
+    paper,
+)
+READERS = (materials, maps, geoscience)
+
+
+def main():
+    known = {
+        make.__name__: (folder, make)
+        for folder, some in (("_static", (front,)), ("wishes", WISHES), ("readers", READERS))
+        for make in some
+    }
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join([*known, "research"]))
+    for name in parser.parse_args().names or [*known, "research"]:
+        if name == "research":
+            research()
+            continue
+        folder, make = known[name]
+        path = HERE / folder / f"{name}.png"
+        pictures = make()
+        columns = {"novelty": 2, "methods": 3}.get(name, len(pictures))
+        sheet = pictures if name == "front" else contact_sheet(pictures, columns=columns, one_to_one=True)
+        write(path, sheet if np.ptp(sheet, axis=2).any() else sheet[..., 0])
+        print(f"{path.relative_to(HERE.parent)}: {path.stat().st_size / 1000:.0f} kB")
+
+
+if __name__ == "__main__":
+    main()
