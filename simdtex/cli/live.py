@@ -9,7 +9,7 @@ from pathlib import Path
 
 import click
 
-from simdtex.cli.common import plainly
+from simdtex.cli.common import Ended, plainly
 from simdtex.cli.helping import command
 from simdtex.cli.options import DEVICE
 from simdtex.cli.places import READ
@@ -58,6 +58,6 @@ def live(picture: Path | None, port: int, host: str, browser: bool, device: str 
         if browser:
             webbrowser.open(address)
 
-    with suppress(KeyboardInterrupt):
+    with suppress(KeyboardInterrupt, Ended):
         serve(given, device, host, port, ready)
     click.echo("ended")

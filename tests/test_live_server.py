@@ -1,0 +1,344 @@
+"""The server of the live page: who is let in, what a frame is, pages that are lost and come back, and its end."""
+
+import http.client
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import ExitStack, contextmanager
+from contextlib import closing as closing_of
+
+import pytest
+import uvicorn
+from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
+from live import asked, png, texture
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from simdtex import cli
+from simdtex.live import server as serving
+from simdtex.live.server import Pages, application, host_name, pack, unpack
+from simdtex.live.serving import TOKEN, serve
+from simdtex.machine import open_machine
+
+SECRET = "a-token-of-the-tests"
+OPEN = ExitStack()  # connections, which are closed when a test ends
+
+
+@contextmanager
+def running(address="127.0.0.1", begin=None):
+    """A server in this process; its port, and its pages."""
+    machine = open_machine("reference")
+    pages = Pages(lambda: machine, begin)
+    listening = socket.socket()
+    listening.bind(("127.0.0.1", 0))
+    config = uvicorn.Config(
+        application(pages, SECRET, address),
+        log_level="warning",
+        ws="websockets-sansio",
+        ws_max_size=2**20,
+        timeout_graceful_shutdown=1,
+    )
+    server = uvicorn.Server(config)
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
+    thread.start()
+    while not server.started:
+        time.sleep(0.01)
+    try:
+        yield listening.getsockname()[1], pages
+    finally:
+        server.should_exit = True
+        thread.join(10)
+        assert not thread.is_alive()
+
+
+@pytest.fixture
+def port():
+    with running() as (found, _):
+        yield found
+
+
+@pytest.fixture(autouse=True)
+def closing():
+    with OPEN:
+        yield
+
+
+def get(port, path, **headers):
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection.request("GET", path, headers={"Host": f"127.0.0.1:{port}"} | headers)
+    with closing_of(connection):
+        answer = connection.getresponse()
+        return answer, answer.read().decode()
+
+
+class Client:
+    """A page's end of a WebSocket."""
+
+    def __init__(self, port, token=SECRET, session=None, host=None, origin=...):
+        query = f"?session={session}" if session else ""
+        host = host or f"127.0.0.1:{port}"
+        origin = f"http://{host}" if origin is ... else origin
+        tcp = socket.create_connection(("127.0.0.1", port))
+        how = {"sock": tcp, "origin": origin, "max_size": None, "compression": None}
+        self.socket = OPEN.enter_context(connect(f"ws://{host}/{token}/socket{query}", **how))
+        self.key = self.wait("session")[0]["key"]
+
+    def say(self, *buffers, **message):
+        self.socket.send(pack(message, buffers))
+
+    def wait(self, *kinds):
+        while True:
+            message, buffers = unpack(self.socket.recv(timeout=60))
+            if message["kind"] == "frame":
+                self.say(kind="seen")
+            if message["kind"] in kinds:
+                return message, [bytes(one) for one in buffers]
+
+
+def test_the_page_is_served_to_whoever_knows_the_token(port):
+    for name, kind in {"": "text/html", "live.js": "text/javascript", "live.css": "text/css"}.items():
+        answer, text = get(port, f"/{SECRET}/{name}")
+        assert (answer.status, answer.headers["Content-Type"].split(";")[0]) == (200, kind)
+        assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+        assert (answer.headers["Referrer-Policy"], answer.headers["Cache-Control"]) == ("no-referrer", "no-store")
+        elsewhere = re.findall(r"https?://[^\s\"'`]*", text)
+        assert not elsewhere, "nothing is loaded from elsewhere"
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/live.js", "/wrong/", "/wrong/live.js", f"/{SECRET[:-1]}/", f"/{SECRET}x/", "/%C3%A4/"]
+)
+def test_a_wrong_token_is_refused(port, path):
+    answer, text = get(port, path)
+    assert (answer.status, text) == (403, serving.REFUSED)
+
+
+@pytest.mark.parametrize("path", [f"/{SECRET}/x", f"/{SECRET}/session.py", f"/{SECRET}/..%2fsession.py"])
+def test_there_is_nothing_else(port, path):
+    assert get(port, path)[0].status in (403, 404)
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "192.168.1.5", ""])
+def test_another_host_is_refused(port, host):
+    assert get(port, f"/{SECRET}/", Host=host)[0].status == 400
+    with pytest.raises(InvalidStatus) as refused:
+        Client(port, host=host or "x")
+    assert refused.value.response.status_code == 403
+
+
+@pytest.mark.parametrize("host", ["localhost", "LOCALHOST", "[::1]"])
+def test_this_machines_other_names_are_taken(port, host):
+    assert get(port, f"/{SECRET}/", Host=f"{host}:{port}")[0].status == 200
+
+
+def test_an_address_that_others_reach_has_no_names_but_its_own():
+    with running("0.0.0.0") as (port, _):
+        assert get(port, f"/{SECRET}/", Host="192.168.1.5:80")[0].status == 200
+        assert get(port, f"/{SECRET}/", Host="[fe80::1]:80")[0].status == 200
+        assert get(port, f"/{SECRET}/", Host="evil.example")[0].status == 400
+    assert host_name("[::1]:80") == "[::1]"
+
+
+@pytest.mark.parametrize("origin", [None, "http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"])
+def test_another_origin_is_refused(port, origin):
+    with pytest.raises(InvalidStatus) as refused:
+        Client(port, origin=origin)
+    assert refused.value.response.status_code == 403
+
+
+def test_a_socket_needs_the_token(port):
+    with pytest.raises(InvalidStatus) as refused:
+        Client(port, token="wrong")
+    assert refused.value.response.status_code == 403
+
+
+def test_a_page_gives_a_picture_and_takes_a_result_away(port):
+    page = Client(port)
+    page.say(kind="hello")
+    hello, _ = page.wait("hello")
+    assert hello["fresh"] and hello["device"] == "reference (NumPy)"
+    page.say(png(texture()), kind="open", name="a.png")
+    assert page.wait("picture")[0]["width"] == 48
+    page.say(**asked())
+    assert page.wait("result")[0]["result"] == 1
+    page.say(kind="take", result=1, what="picture")
+    message, (data,) = page.wait("file")
+    assert message["name"] == "texture.png" and data.startswith(b"\x89PNG")
+
+
+def test_two_pages_have_nothing_in_common(port):
+    first, second = Client(port), Client(port)
+    assert first.key != second.key
+    for page, seed in ((first, 1), (second, 2)):
+        page.say(png(texture(seed=seed)), kind="open", name=f"{seed}.png")
+        page.say(**asked(seed=seed))
+    assert [page.wait("result")[0]["asked"]["seed"] for page in (first, second)] == [1, 2]
+    other = Client(port, session=first.key)  # as a tab that was duplicated asks: the first is still open
+    assert other.key not in (first.key, second.key)
+
+
+def test_a_page_that_was_lost_comes_back_to_its_results(port):
+    page = Client(port)
+    page.say(png(texture()), kind="open", name="a.png")
+    page.say(**asked())
+    page.wait("begun")
+    page.socket.close()
+    for _ in range(100):
+        again = Client(port, session=page.key)
+        if again.key == page.key:  # the server has heard of it
+            break
+        again.socket.close()
+        time.sleep(0.02)
+    again.say(kind="hello")
+    assert again.wait("hello")[0]["fresh"] is False
+    assert again.wait("result")[0]["result"] == 1
+
+
+def test_pages_are_few_and_those_that_were_lost_give_way(monkeypatch):
+    monkeypatch.setattr(serving, "PAGES", 2)
+    with running() as (port, pages):
+        first, _ = Client(port), Client(port)
+        with pytest.raises(ConnectionClosed) as closed:
+            Client(port)
+        assert closed.value.rcvd.code == serving.TOO_MANY
+        first.socket.close()
+        while not pages._left:
+            time.sleep(0.01)
+        Client(port)
+        assert first.key not in pages._sessions
+        monkeypatch.setattr(serving, "WAITED", -1.0)
+        pages.leave(next(iter(pages._sessions)))
+        pages.join(None, lambda *_: None)
+        assert not pages._left
+
+
+@pytest.mark.parametrize("frame", [b"", b"\x05\x00\x00\x00", b"\x02\x00\x00\x00{}x", b"\x01\x00\x00\x00[", "text"])
+def test_a_frame_that_is_no_message_ends_the_connection(port, frame):
+    page = Client(port)
+    page.socket.send(frame)
+    with pytest.raises(ConnectionClosed):
+        page.wait("hello")
+    assert Client(port).key, "others go on"
+
+
+def test_a_frame_that_is_too_large_ends_the_connection(port):
+    page = Client(port)
+    with pytest.raises(ConnectionClosed) as closed:
+        page.socket.send(bytes(2**21))
+        page.wait("hello")
+    assert closed.value.rcvd.code == 1009
+
+
+@given(st.lists(st.binary(max_size=9), max_size=4), st.dictionaries(st.text(max_size=5), st.integers(), max_size=3))
+def test_a_frame_brings_a_message_back(buffers, message):
+    message = {name: value for name, value in message.items() if name != "buffers"}
+    found, parts = unpack(pack(message, buffers))
+    assert (found, [bytes(one) for one in parts]) == (message, buffers)
+
+
+@given(st.binary(max_size=40))
+def test_any_bytes_are_a_message_or_none(frame):
+    try:
+        message, _ = unpack(frame)
+    except ValueError as error:
+        assert str(error) == "a frame that is no message"
+    else:
+        assert isinstance(message, dict)
+
+
+# -- the command ------------------------------------------------------------------------------------------------------
+
+
+def started(*words, **environment):
+    """``simdtex live`` in a process of its own, and its address."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "simdtex", "live", "--no-browser", "--device", "reference", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | environment,
+    )
+    return process, process.stdout.readline()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_command_prints_an_address_serves_it_and_ends(number):
+    process, line = started()
+    found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/([\w-]{32})/  \(on reference \(NumPy\); Ctrl-C ends it\)\n", line)
+    assert found, line
+    port, token = int(found[1]), found[2]
+    for _ in range(100):
+        try:
+            answer, _ = get(port, f"/{token}/")
+            break
+        except ConnectionError:
+            time.sleep(0.05)
+    assert answer.status == 200
+    page = Client(port, token)
+    page.say(png(texture()), kind="open", name="a.png")
+    page.say(**asked(width=400, height=400))
+    page.wait("begun")
+    process.send_signal(number)
+    output, errors = process.communicate(timeout=20)
+    assert (process.returncode, output, errors) == (0, "ended\n", "")
+    with pytest.raises(ConnectionClosed):
+        page.wait("result")
+
+
+def test_the_token_can_be_given_and_must_be_long():
+    process, line = started(**{TOKEN: SECRET})
+    try:
+        assert f"/{SECRET}/" in line
+    finally:
+        process.kill()
+        process.communicate()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(TOKEN, "short")
+        with pytest.raises(ValueError, match="must be 16 or more letters"):
+            serve(None, "reference", "127.0.0.1", 0, lambda *_: None)
+
+
+def test_a_picture_of_the_command_line_is_there_at_once(tmp_path):
+    (tmp_path / "wall.png").write_bytes(png(texture()))
+    process, line = started(str(tmp_path / "wall.png"))
+    try:
+        _, token, _ = line.split()[0].rsplit("/", 2)
+        port = int(line.split(":")[2].split("/")[0])
+        for _ in range(100):
+            try:
+                page = Client(port, token)
+                break
+            except ConnectionError:
+                time.sleep(0.05)
+        assert page.wait("picture")[0]["name"] == "wall.png"
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_what_cannot_be_listened_to_is_said(tmp_path):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        words = ["live", "--no-browser", "--device", "reference", "--port", str(port)]
+        found = CliRunner().invoke(cli.main, words)
+    assert found.exit_code == 2
+    assert f"127.0.0.1 port {port} cannot be listened to" in found.output
+    found = CliRunner().invoke(cli.main, [*words[:4], str(tmp_path / "none.png")])
+    assert (found.exit_code, "none.png does not exist" in found.output) == (2, True)
+
+
+def test_a_missing_package_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    monkeypatch.delitem(sys.modules, "simdtex.live.serving", raising=False)
+    found = CliRunner().invoke(cli.main, ["live"])
+    assert found.exit_code == 2
+    assert "pip install 'simdtex[live]'" in found.output
