@@ -1,0 +1,418 @@
+"""The live page in a real browser: what people do with it, by the keyboard too, and what it does when things go wrong."""
+
+import os
+import shlex
+import subprocess
+import sys
+import zipfile
+
+import numpy as np
+import PIL.Image
+import pytest
+from browsing import AXE, browser, drop, live, missing, shown, until
+from live import png, texture
+
+REQUIRE = "SIMDTEX_REQUIRE_BROWSER"
+TOKEN = "a-token-for-the-browser"
+LACKS = missing()
+if LACKS and os.environ.get(REQUIRE):
+    raise RuntimeError(f"{REQUIRE} is set, and {LACKS}")
+pytestmark = [
+    pytest.mark.skipif(bool(LACKS), reason=f"no test in a browser: {LACKS}"),
+    pytest.mark.xdist_group("browser"),
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),  # Selenium's own connections
+]
+if not LACKS:
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+    from selenium.webdriver.support.ui import Select
+
+
+@pytest.fixture(scope="module")
+def served():
+    with live(SIMDTEX_LIVE_TOKEN=TOKEN) as (_, address):
+        yield address
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("downloads")
+    with browser(folder) as driver:
+        driver.folder = folder
+        yield driver
+
+
+class Page:
+    """A page of the browser."""
+
+    def __init__(self, driver, address):
+        self.driver, self.folder = driver, driver.folder
+        driver.switch_to.new_window("tab")
+        self.handle = driver.current_window_handle
+        shown(driver, width=1400)
+        driver.get(address)
+        until(lambda: self.status == "Ready.")
+
+    def all(self, selector):
+        return self.driver.find_elements(By.CSS_SELECTOR, selector)
+
+    def one(self, selector):
+        (found,) = self.all(selector)
+        return found
+
+    def labelled(self, text):
+        """The control that a label of these words is for."""
+        found = self.driver.find_element(By.XPATH, f"//label[normalize-space()='{text}']")
+        return self.driver.find_element(By.ID, found.get_attribute("for"))
+
+    def button(self, text):
+        return self.driver.find_element(By.XPATH, f"//button[normalize-space()='{text}']")
+
+    def script(self, text, *arguments):
+        return self.driver.execute_script(text, *arguments)
+
+    @property
+    def status(self):
+        found = self.all("[role=status]")
+        return found[0].text if found else ""
+
+    @property
+    def alert(self):
+        return self.one("[role=alert]").text
+
+    @property
+    def results(self):
+        return len(self.all(".strip li"))
+
+    def result(self, number, timeout=60):
+        """Wait until there are so many results."""
+        until(lambda: self.results == number, timeout)
+
+    def put(self, label, value):
+        """Set a control's value as a person does."""
+        field = self.labelled(label)
+        self.script("arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('change'))", field, value)
+
+    def choose(self, label, text):
+        Select(self.labelled(label)).select_by_visible_text(text)
+
+    def open(self, selector):
+        self.script("document.querySelector(arguments[0]).open = true", selector)
+
+    def taken(self, what):
+        """Take something of the result away: the file's bytes."""
+        before = set(self.folder.iterdir())
+        self.script("arguments[0].click()", self.one(f".result [data-what='{what}']"))
+
+        def arrived():
+            new = [path for path in set(self.folder.iterdir()) - before if not path.name.endswith(".crdownload")]
+            return [path for path in new if not path.name.startswith(".")]
+
+        (path,) = until(arrived)
+        data = path.read_bytes()
+        path.unlink()
+        return path.name, data
+
+    def canvas(self):
+        """What the view shows, (rows, cols, 4)."""
+        size, data = self.script(
+            "const c = document.querySelector('canvas.view'); const d = c.getContext('2d').getImageData(0, 0, c.width, "
+            "c.height).data; return [[c.height, c.width], Array.from(d)]"
+        )
+        return np.array(data, np.uint8).reshape(*size, 4)
+
+    def faults(self):
+        """What axe-core finds, in words."""
+        self.script(AXE.read_text(encoding="utf-8"))
+        found = self.driver.execute_async_script("const done = arguments[0]; axe.run(document).then(done)")
+        return [f"{one['id']}: {node['html'][:150]}" for one in found["violations"] for node in one["nodes"]]
+
+
+@pytest.fixture
+def page(chromium, served):
+    first = chromium.current_window_handle
+    found = Page(chromium, served)
+    yield found
+    for handle in set(chromium.window_handles) - {first}:
+        chromium.switch_to.window(handle)
+        chromium.close()
+    chromium.switch_to.window(first)
+
+
+@pytest.fixture
+def wall(tmp_path):
+    path = tmp_path / "wall.png"
+    path.write_bytes(png(texture(64, 72)))
+    return path
+
+
+def test_a_dropped_picture_gives_the_bytes_of_the_command_line(page, wall):
+    drop(page.driver, wall)
+    page.result(1)
+    assert page.labelled("Width").get_attribute("value") == "144"
+    name, data = page.taken("picture")
+    words = shlex.split(page.one("[aria-label='Command line']").get_attribute("textContent"))
+    assert words[:5] == ["simdtex", "synth", "wall.png", "-o", "texture.png"] and name == "texture.png"
+    subprocess.run([sys.executable, "-m", *words, "--quiet"], cwd=wall.parent, check=True, timeout=120)
+    assert (wall.parent / name).read_bytes() == data
+    assert "144 \u00d7 128 in " in page.one(".doing").text
+    assert page.script("return page.frames") >= 1
+    seen = page.canvas()
+    made = np.array(PIL.Image.open(wall.parent / name))
+    zoom = page.script("return page.view.scale")
+    rows, cols = 128 * zoom, 144 * zoom
+    top, left = (seen.shape[0] - rows) // 2, (seen.shape[1] - cols) // 2
+    shown_there = seen[top - zoom : top + rows + zoom, left - zoom : left + cols + zoom, :3]
+    wanted = made.repeat(zoom, 0).repeat(zoom, 1)
+    windows = np.lib.stride_tricks.sliding_window_view(shown_there, wanted.shape)
+    assert (windows == wanted).all((-3, -2, -1)).any(), "the pixels are seen as they are"
+
+
+def test_a_part_options_a_seed_and_an_earlier_result(page, wall):
+    drop(page.driver, wall)
+    page.result(1)
+    page.script("page.setPart([8, 4, 50, 60])")
+    page.result(2)
+    assert page.labelled("Left").get_attribute("value") == "8"
+    page.put("Keep pieces together", 1.5)
+    page.result(3)
+    page.button("Another seed").click()
+    page.result(4)
+    command = page.one("[aria-label='Command line']").get_attribute("textContent")
+    assert "--coherence 1.5" in command
+    page.all(".strip button")[0].click()
+    until(lambda: page.labelled("Keep pieces together").get_attribute("value") == "0.5")
+    assert page.labelled("Seed").get_attribute("value") == "1"
+    assert page.all(".strip button")[0].get_attribute("aria-current") == "true"
+    assert page.results == 4, "to look back makes nothing"
+    page.button("All options as by default").click()
+    page.result(5)
+
+
+def test_it_stops_and_goes_on_to_the_same_bytes(page, wall):
+    page.script("page.auto.checked = false")
+    drop(page.driver, wall)
+    page.result(1)
+    page.put("Width", 700)
+    page.put("Height", 700)
+    page.button("Make it").click()
+    until(lambda: page.script("return page.running"))
+    page.button("Stop").click()
+    until(lambda: page.status == "It is stopped.")
+    until(lambda: page.script("return page.view.frame.paused"))
+    before = page.script("return page.frames")
+    doing = page.one(".doing").text
+    page.script("return new Promise((done) => setTimeout(done, 700))")
+    assert (page.script("return page.frames"), page.one(".doing").text, page.results) == (before, doing, 1)
+    Select(page.labelled("Look at")).select_by_value("temperature")
+    until(lambda: page.script("return page.seen") == "temperature")
+    page.button("Go on").click()
+    page.result(2)
+    name, data = page.taken("picture")
+    words = shlex.split(page.one("[aria-label='Command line']").get_attribute("textContent"))
+    subprocess.run([sys.executable, "-m", *words, "--quiet"], cwd=wall.parent, check=True, timeout=120)
+    assert (wall.parent / name).read_bytes() == data
+
+
+def test_a_run_is_given_up(page, wall):
+    drop(page.driver, wall)
+    page.result(1)
+    page.put("Height", 4000)
+    until(lambda: page.script("return page.running"))
+    page.button("Give up").click()
+    until(lambda: page.status == "It was given up.")
+    assert page.results == 1
+
+
+def test_a_painted_hole_is_filled_and_nothing_else_changes(page, wall, tmp_path):
+    drop(page.driver, wall)
+    page.result(1)
+    page.choose("What is made", "A hole that is filled")
+    until(lambda: page.one(".paint").get_attribute("open"))
+    canvas = page.one("canvas.view")
+    ActionChains(page.driver).move_to_element(canvas).click_and_hold().move_by_offset(30, 20).release().perform()
+    page.button("Fill the hole").click()
+    page.result(2)
+    _, data = page.taken("all")
+    (tmp_path / "all.zip").write_bytes(data)
+    with zipfile.ZipFile(tmp_path / "all.zip") as archive:
+        archive.extractall(tmp_path / "all")
+    for line in (tmp_path / "all" / "again.txt").read_text().splitlines()[:1]:
+        subprocess.run([sys.executable, "-m", *shlex.split(line), "--quiet"], cwd=tmp_path / "all", check=True)
+    hole, before, after = (
+        np.array(PIL.Image.open(tmp_path / "all" / name)) for name in ("hole-2.png", "texture.png", "texture-2.png")
+    )
+    assert 0 < (hole > 0).mean() < 0.2
+    assert (before[hole == 0] == after[hole == 0]).all()
+    assert (before[hole > 0] != after[hole > 0]).any()
+
+
+def test_labels_say_where_what_is_to_be(page, wall):
+    drop(page.driver, wall)
+    page.result(1)
+    page.open(".paint")
+    canvas = page.one("canvas.view")
+    for layer in ("Sample", "Picture"):
+        page.choose("Look at", layer)
+        until(lambda layer=layer: page.script("return page.seen") == layer.lower())
+        page.choose("Paint", "Label 2")
+        ActionChains(page.driver).move_to_element(canvas).click_and_hold().move_by_offset(40, 0).release().perform()
+    page.result(2)
+    command = page.one("[aria-label='Command line']").get_attribute("textContent")
+    assert "--guide guide-sample.png=guide-texture.png" in command
+    page.choose("Paint", "Nothing: look around")
+
+
+def test_maps_are_carried_along(page, wall, tmp_path):
+    (tmp_path / "normal.png").write_bytes(png(texture(64, 72, seed=5)))
+    drop(page.driver, wall)
+    page.result(1)
+    page.open(".maps")
+    drop(page.driver, tmp_path / "normal.png", ".maps")
+    page.result(2)
+    until(lambda: page.all("[data-what='map normal']"))
+    name, data = page.taken("map normal")
+    assert name == "texture-normal.png" and data.startswith(b"\x89PNG")
+    page.choose("Look at", "Map: normal")
+    until(lambda: page.script("return page.seen") == "map normal")
+
+
+def test_everything_is_done_by_the_keyboard_alone(page):
+    def keys(*what):
+        ActionChains(page.driver).send_keys(*what).perform()
+
+    def focused():
+        return page.driver.switch_to.active_element
+
+    def tab_to(found, most=80):
+        for _ in range(most):
+            keys(Keys.TAB)
+            if found(focused()):
+                return
+        raise AssertionError("the keyboard does not get there")
+
+    tab_to(lambda one: one.text == "brick")
+    keys(Keys.ENTER)
+    page.result(1)
+    tab_to(lambda one: one.get_attribute("aria-label") == "Zoom in")
+    scale = page.script("return page.view.scale")
+    keys(Keys.ENTER)
+    assert page.script("return page.view.scale") == scale + 1
+    tab_to(lambda one: one.tag_name == "canvas")
+    left = page.script("return page.view.left")
+    keys(Keys.ARROW_RIGHT)
+    assert page.script("return page.view.left") > left
+    keys("0")
+    assert page.script("return page.view.scale") == scale
+    tab_to(lambda one: one.text.startswith("Paint a hole"))
+    keys(Keys.ENTER)
+    tab_to(lambda one: one.tag_name == "select")
+    keys("A hole")
+    until(lambda: page.button("Fill the hole"))
+    ActionChains(page.driver).key_down(Keys.SHIFT).send_keys(Keys.TAB, Keys.TAB, Keys.TAB).key_up(Keys.SHIFT).perform()
+    for _ in range(5):
+        if focused().tag_name == "canvas":
+            break
+        ActionChains(page.driver).key_down(Keys.SHIFT).send_keys(Keys.TAB).key_up(Keys.SHIFT).perform()
+    keys(" ", Keys.ARROW_RIGHT, Keys.ARROW_RIGHT, Keys.ARROW_DOWN, " ")
+    assert len(page.script("return page.hole[0].points")) == 4
+    tab_to(lambda one: one.text == "Fill the hole")
+    keys(Keys.ENTER)
+    page.result(2)
+    tab_to(lambda one: one.get_attribute("data-what") == "picture")
+    keys(Keys.ENTER)
+    until(lambda: list(page.folder.glob("texture*.png"))).pop().unlink()
+
+
+def test_two_pages_at_once(page, wall, served, tmp_path):
+    other_wall = tmp_path / "other.png"
+    other_wall.write_bytes(png(texture(64, 72, seed=9)))
+    other = Page(page.driver, served)
+    for one, path in ((page, wall), (other, other_wall)):
+        page.driver.switch_to.window(one.handle)
+        drop(page.driver, path)
+    for one, path in ((page, wall), (other, other_wall)):
+        page.driver.switch_to.window(one.handle)
+        one.result(1)
+        assert path.name in one.one("[aria-label='Command line']").get_attribute("textContent")
+
+
+def test_a_page_that_is_loaded_again_has_its_results(page, wall):
+    drop(page.driver, wall)
+    page.result(1)
+    page.driver.refresh()
+    page.result(1)
+    assert "wall.png" in page.one(".named").text
+
+
+def test_a_killed_server_is_told_and_a_new_one_found(chromium, wall):
+    with live("--device", "reference", SIMDTEX_LIVE_TOKEN=TOKEN) as (process, address):
+        page = Page(chromium, address)
+        port = address.split(":")[2].split("/")[0]
+        page.script("page.auto.checked = false")
+        page.put("Reach", 4)
+        drop(page.driver, wall)
+        until(lambda: page.script("return page.running"))
+        process.kill()
+        until(lambda: page.alert.startswith("The connection to simdtex is lost."))
+        assert page.status == "Not connected."
+    with live("--device", "reference", "--port", port, SIMDTEX_LIVE_TOKEN=TOKEN):
+        page.result(1)  # the page has given the picture again, and asked for the same
+        assert not page.all("[role=alert]:not([hidden])")
+    chromium.close()
+    chromium.switch_to.window(chromium.window_handles[0])
+
+
+def test_a_wrong_token_is_told(chromium, served):
+    chromium.get(served.replace(TOKEN, "another-token-than-that"))
+    assert "lacks the right token" in chromium.find_element(By.TAG_NAME, "body").text
+
+
+def test_another_site_reaches_nothing(chromium, served):
+    """A page of another origin opens no connection, although it knows the address."""
+    chromium.get("data:text/html,<title>elsewhere</title>")
+    opened = chromium.execute_async_script(
+        "const done = arguments[1]; const s = new WebSocket(arguments[0]);"
+        "s.onopen = () => done('open'); s.onerror = () => done('refused')",
+        served.replace("http", "ws") + "socket",
+    )
+    assert opened == "refused"
+
+
+def test_what_is_wrong_is_said(page, tmp_path):
+    (tmp_path / "text.png").write_text("this is no picture")
+    drop(page.driver, tmp_path / "text.png")
+    until(lambda: "text.png is not an image" in page.alert)
+    page.button("Make it").click()
+    until(lambda: "There is no picture yet" in page.alert)
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_nothing_keeps_people_out(page, wall, dark):
+    shown(page.driver, width=1400, dark=dark)
+    assert page.faults() == []
+    drop(page.driver, wall)
+    page.result(1)
+    page.script("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+    until(lambda: page.all(".figures dt"))
+    assert page.faults() == []
+
+
+@pytest.mark.parametrize("width", [320, 390, 820, 1400])
+def test_it_fits_a_phone(page, wall, width):
+    shown(page.driver, width=width)
+    drop(page.driver, wall)
+    page.result(1)
+    page.script("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+    assert page.script("return document.documentElement.scrollWidth") <= width
+    assert page.script("return document.querySelector('canvas.view').clientWidth") > 0.4 * min(width, 800)
+
+
+def test_nothing_is_loaded_from_elsewhere_and_nothing_is_complained_of(page, wall, served):
+    page.driver.get_log("browser")
+    drop(page.driver, wall)
+    page.result(1)
+    loaded = page.script("return performance.getEntriesByType('resource').map((one) => one.name)")
+    assert {name.rsplit("/", 1)[0] for name in loaded} == {served.rstrip("/")}
+    assert page.driver.get_log("browser") == []
