@@ -51,8 +51,8 @@ PREVIEW = 512
 LARGE = 1024
 """A picture with a longer side is too much to begin with: its middle is the sample until the page says otherwise."""
 
-SHARE = 24
-"""Time between two frames in units of what the last one took: watching takes less than 1 / 24 of a run."""
+SHARE = 20
+"""Time between two frames in units of what the last one took here: watching takes about 1 / 20 of a run."""
 
 RATE = 30
 """Frames a second, at most."""
@@ -99,7 +99,7 @@ class Session:
         self._results = Results()
         self._shown: int | None = None  # the result that is looked at; None: the picture
         self._levels: Levels | None = None
-        self._frame = self._next = 0.0
+        self._next = 0.0  # when a frame may be shown
         self._thread: threading.Thread | None = None
         self._kinds: dict[str, Callable[[Message, Sequence[bytes]], None]] = {
             **{"hello": self._hello, "open": self._open, "example": self._example, "map": self._map},
@@ -364,6 +364,7 @@ class Session:
         return not self._paused or self._wish != wish or self._look != shown
 
     def _show(self, progress: Any, sample: NDArray[Any], shape: tuple[int, int]) -> None:
+        self._machine().sync()  # what the run has asked for is no part of what a frame takes
         began = time.perf_counter()
         told = {"fraction": progress.fraction, "doing": progress.doing, "level": progress.level}
         told |= {"levels": progress.levels, "paused": self._paused}
@@ -379,8 +380,8 @@ class Session:
         if plane is None:
             layer, plane = "picture", planes.picture(progress.picture(), sample, shape)
         self._push(plane, layer, told, smooth=False)
-        self._frame = time.perf_counter() - began
-        self._next = began + max(1 / RATE, SHARE * self._frame)
+        took = time.perf_counter() - began
+        self._next = began + max(1 / RATE, SHARE * took)
 
     def _refresh(self) -> None:
         """Show what is looked at while nothing is being made."""

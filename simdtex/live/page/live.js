@@ -9,7 +9,7 @@ const LABELS = [
   { name: "4", colour: "#f0e442" },
   { name: "5", colour: "#cc79a7" },
 ]; // of Okabe and Ito, told apart by most eyes
-const HOLE = "#d55e00";
+const HOLE = "#ff1e9b";
 const LAYERS = {
   picture: "Picture",
   sample: "Sample",
@@ -805,7 +805,7 @@ class Page {
       "details",
       { class: "paint" },
       make("summary", {}, "Paint a hole, or where what is to be"),
-      make("div", { class: "bar" }, labelled("Paint", this.tool), labelled("Width, pixels", this.brushWidth), undo, clear),
+      make("div", { class: "bar" }, labelled("Paint", this.tool), labelled("Brush, pixels", this.brushWidth), undo, clear),
       make("p", {}, hint),
     );
   }
@@ -880,7 +880,7 @@ class Page {
     this.makeButton = make("button", { type: "submit", class: "first" }, "Make it");
     const another = make("button", { type: "button", onclick: () => this.another() }, "Another seed");
     const reset = make("button", { type: "button", onclick: () => this.reset() }, "All options as by default");
-    this.size = make("div", { class: "bar" }, labelled("Width", this.width), labelled("Height", this.height));
+    this.size = make("div", { class: "bar" }, labelled("Result width", this.width), labelled("Result height", this.height));
     this.methodField = labelled("Method", this.method);
     this.controls = make("div");
     const form = make(

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The pictures of docs/live.rst: `python docs/screenshots.py` writes docs/_static/live-*.png.
+
+It needs what the browser tests need: Chromium, its driver and Selenium.
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+import PIL.Image
+from skimage import data
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tests"))
+
+from browsing import browser, drop, live, shown, until  # noqa: E402  # they are beside the tests
+
+OUT = ROOT / "docs" / "_static"
+COLOURS = 128
+"""Of a screenshot, so that it is small."""
+
+
+def keep(driver, name):
+    """Write what the browser shows."""
+    driver.execute_script("return new Promise((done) => setTimeout(done, 400))")
+    path = OUT / f"live-{name}.png"
+    driver.save_screenshot(str(path))
+    with PIL.Image.open(path) as picture:
+        picture.convert("RGB").quantize(COLOURS).save(path, optimize=True)
+    print(f"{path.relative_to(ROOT)}: {path.stat().st_size // 1024} KiB")
+
+
+def main():
+    with tempfile.TemporaryDirectory() as folder, live() as (_, address), browser(folder, height=900) as driver:
+        script = driver.execute_script
+        sample = Path(folder) / "tissue.png"
+        PIL.Image.fromarray(data.immunohistochemistry()[150:350, 100:300]).save(sample)
+        driver.get(address)
+        until(lambda: script("return page.status.textContent") == "Ready.")
+
+        def made(count):
+            until(lambda: script("return page.strip.children.length") == count, 120)
+            until(lambda: script("return page.figures.children.length") >= 8, 60)
+
+        drop(driver, sample)
+        made(1)
+        keep(driver, "result")
+        script("page.seed.value = 3; page.make()")
+        made(2)
+        script("page.look('arrangement')")
+        keep(driver, "arrangement")
+        script(
+            "page.look('picture'); page.job.value = 'fill'; page.settle(); page.toFill(); page.brushWidth.value = 40;"
+        )
+        script("page.brush.begin([90, 100]); page.hole[0].points.push([150, 120], [260, 110]); page.view.draw()")
+        keep(driver, "hole")
+        shown(driver, width=390, height=844, dark=True)
+        script("page.job.value = 'synth'; page.settle(); page.view.fit(); scrollTo(0, 560)")
+        keep(driver, "phone")
+
+
+if __name__ == "__main__":
+    main()
