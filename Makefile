@@ -6,12 +6,13 @@ VENV ?= .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check -qq
 
-.PHONY: help demo test slow lint docs links mutants fuzz cpu clean
+.PHONY: help demo test slow browser lint docs links mutants fuzz cpu clean
 
 help:
 	@echo "make demo    textures from real samples, into ./demo"
 	@echo "make test    the tests"
 	@echo "make slow    the tests that take long or need the package index"
+	@echo "make browser what tests in a browser need of npm; Chromium and its driver are the system's"
 	@echo "make lint    ruff and mypy"
 	@echo "make docs    the documentation, into docs/_build/html, and whether its links and pages are sound"
 	@echo "make links   whether the links of the documentation to other sites still lead there; needs the network"
@@ -62,6 +63,9 @@ slow:
 	$(call install,slow,[test$(comma)release])
 	$(device)
 	@$(PY) -m pytest -m slow
+
+browser:
+	npm ci --prefix tests/browser --no-audit --no-fund --silent
 
 lint:
 	$(call install,dev,[dev])

@@ -50,7 +50,7 @@ def cost(machine, sizes, runs):
     session.AFTER = 1e6  # no figures of quality meanwhile
     page = Fake(machine=machine)
     page.session.use(Picture("sample.png", SAMPLE, -1))
-    page.wait("picture")
+    page.ask("picture", kind="hello")
     for size in sizes:
         page.ask("frame", kind="look", left=0, top=0, width=size, height=size)
         alone, seen, frames = [], [], []

@@ -36,7 +36,8 @@ def missing():
 
 def chromium():
     """The path of Chromium, None where there is none."""
-    return shutil.which("chromium") or shutil.which("chromium-browser")
+    found = (shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome"))
+    return next(filter(None, found), None)
 
 
 @contextmanager

@@ -169,6 +169,7 @@ def test_a_dropped_picture_gives_the_bytes_of_the_command_line(page, wall):
     assert (windows == wanted).all((-3, -2, -1)).any(), "the pixels are seen as they are"
 
 
+@pytest.mark.slow
 def test_a_part_options_a_seed_and_an_earlier_result(page, wall):
     drop(page.driver, wall)
     page.result(1)
@@ -190,6 +191,7 @@ def test_a_part_options_a_seed_and_an_earlier_result(page, wall):
     page.result(5)
 
 
+@pytest.mark.slow
 def test_it_stops_and_goes_on_to_the_same_bytes(page, wall):
     page.script("page.auto.checked = false")
     drop(page.driver, wall)
@@ -215,6 +217,7 @@ def test_it_stops_and_goes_on_to_the_same_bytes(page, wall):
     assert (wall.parent / name).read_bytes() == data
 
 
+@pytest.mark.slow
 def test_a_run_is_given_up(page, wall):
     drop(page.driver, wall)
     page.result(1)
@@ -248,6 +251,7 @@ def test_a_painted_hole_is_filled_and_nothing_else_changes(page, wall, tmp_path)
     assert (before[hole > 0] != after[hole > 0]).any()
 
 
+@pytest.mark.slow
 def test_labels_say_where_what_is_to_be(page, wall):
     drop(page.driver, wall)
     page.result(1)
@@ -264,6 +268,7 @@ def test_labels_say_where_what_is_to_be(page, wall):
     page.choose("Paint", "Nothing: look around")
 
 
+@pytest.mark.slow
 def test_maps_are_carried_along(page, wall, tmp_path):
     (tmp_path / "normal.png").write_bytes(png(texture(64, 72, seed=5)))
     drop(page.driver, wall)
@@ -278,6 +283,7 @@ def test_maps_are_carried_along(page, wall, tmp_path):
     until(lambda: page.script("return page.seen") == "map normal")
 
 
+@pytest.mark.slow
 def test_everything_is_done_by_the_keyboard_alone(page):
     def keys(*what):
         ActionChains(page.driver).send_keys(*what).perform()
@@ -321,6 +327,17 @@ def test_everything_is_done_by_the_keyboard_alone(page):
     until(lambda: list(page.folder.glob("texture*.png"))).pop().unlink()
 
 
+@pytest.mark.slow
+def test_a_picture_of_the_command_line_is_made_at_once(chromium, wall):
+    with live(str(wall)) as (_, address):
+        page = Page(chromium, address)
+        page.result(1)
+        assert "wall.png" in page.one(".named").text
+        chromium.close()
+        chromium.switch_to.window(chromium.window_handles[0])
+
+
+@pytest.mark.slow
 def test_two_pages_at_once(page, wall, served, tmp_path):
     other_wall = tmp_path / "other.png"
     other_wall.write_bytes(png(texture(64, 72, seed=9)))
@@ -334,6 +351,7 @@ def test_two_pages_at_once(page, wall, served, tmp_path):
         assert path.name in one.one("[aria-label='Command line']").get_attribute("textContent")
 
 
+@pytest.mark.slow
 def test_a_page_that_is_loaded_again_has_its_results(page, wall):
     drop(page.driver, wall)
     page.result(1)
@@ -342,6 +360,7 @@ def test_a_page_that_is_loaded_again_has_its_results(page, wall):
     assert "wall.png" in page.one(".named").text
 
 
+@pytest.mark.slow
 def test_a_killed_server_is_told_and_a_new_one_found(chromium, wall):
     with live("--device", "reference", SIMDTEX_LIVE_TOKEN=TOKEN) as (process, address):
         page = Page(chromium, address)
@@ -376,6 +395,7 @@ def test_another_site_reaches_nothing(chromium, served):
     assert opened == "refused"
 
 
+@pytest.mark.slow
 def test_what_is_wrong_is_said(page, tmp_path):
     (tmp_path / "text.png").write_text("this is no picture")
     drop(page.driver, tmp_path / "text.png")
@@ -384,7 +404,7 @@ def test_what_is_wrong_is_said(page, tmp_path):
     until(lambda: "There is no picture yet" in page.alert)
 
 
-@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+@pytest.mark.parametrize("dark", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["light", "dark"])
 def test_nothing_keeps_people_out(page, wall, dark):
     shown(page.driver, width=1400, dark=dark)
     assert page.faults() == []
@@ -395,7 +415,7 @@ def test_nothing_keeps_people_out(page, wall, dark):
     assert page.faults() == []
 
 
-@pytest.mark.parametrize("width", [320, 390, 820, 1400])
+@pytest.mark.parametrize("width", [*(pytest.param(width, marks=pytest.mark.slow) for width in (320, 820, 1400)), 390])
 def test_it_fits_a_phone(page, wall, width):
     shown(page.driver, width=width)
     drop(page.driver, wall)
@@ -405,6 +425,7 @@ def test_it_fits_a_phone(page, wall, width):
     assert page.script("return document.querySelector('canvas.view').clientWidth") > 0.4 * min(width, 800)
 
 
+@pytest.mark.slow
 def test_nothing_is_loaded_from_elsewhere_and_nothing_is_complained_of(page, wall, served):
     page.driver.get_log("browser")
     drop(page.driver, wall)

@@ -320,6 +320,15 @@ def test_a_page_that_comes_back_is_told_all_again(opened):
     assert [one["result"] for one in results] == [1, 2]
 
 
+def test_a_picture_that_is_there_from_the_beginning_is_new_to_the_first_page(page):
+    page.session.use(sessions.Picture("a.png", texture(), -1))
+    message, _ = page.ask("picture", kind="hello")
+    assert page.kinds()[:2] == ["hello", "picture"], "what the page is made of comes first"
+    assert (message["name"], message["new"]) == ("a.png", True)
+    page.result()
+    assert page.ask("picture", kind="hello")[0]["new"] is False
+
+
 def test_maps_are_of_the_pictures_size_and_have_names_of_their_own(opened):
     assert opened.error(png(texture(9, 9)), kind="map", name="n.png") == (
         "n.png is 9x9 and the picture 48x40; give a map of the picture's size"

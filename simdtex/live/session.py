@@ -95,6 +95,7 @@ class Session:
         self._unseen = 0  # frames that the page has not seen yet
         self._picture: Picture | None = None
         self._pictures = 0
+        self._made_any = False
         self._maps: dict[str, NDArray[Any]] = {}
         self._results = Results()
         self._shown: int | None = None  # the result that is looked at; None: the picture
@@ -153,7 +154,7 @@ class Session:
         hello |= {"methods": {name: label for name, (label, _) in METHODS.items()}, "examples": list(EXAMPLES)}
         self._send({"kind": "hello", **hello, "fresh": self._picture is None}, [])
         if self._picture is not None:
-            self._show_picture()
+            self._show_picture(new=not self._made_any)
             for result in self._results:
                 self._tell(result)
             if self._shown is not None:
@@ -171,12 +172,15 @@ class Session:
         self._do(lambda: self._opened(_example(str(name))), wish=True)
 
     def use(self, picture: Picture) -> None:
-        """Take a picture as if a page had given it."""
-        self._do(lambda: self._opened(picture), wish=True)
+        """Begin with a picture: the page is told of it when it says hello."""
+        self._do(lambda: self._begun_with(picture))
 
-    def _opened(self, picture: Picture) -> None:
+    def _begun_with(self, picture: Picture) -> None:
         self._picture, self._maps, self._shown = picture, {}, None
         self._pictures += 1
+
+    def _opened(self, picture: Picture) -> None:
+        self._begun_with(picture)
         self._show_picture(new=True)
         self._refresh()
 
@@ -241,7 +245,7 @@ class Session:
             self._look = look
             self._next = 0.0
             self._changed.notify_all()
-        self._do(self._refresh)
+        self._do(partial(self._look_at, look))
 
     def _saw(self, message: Message, buffers: Sequence[Any]) -> None:
         with self._changed:
@@ -315,7 +319,7 @@ class Session:
             raise ValueError("there is no picture yet; give one first")
         if wish != self._wish:  # another came after it
             return
-        settings = parsed(message, self._picture)
+        settings, self._made_any = parsed(message, self._picture), True
         earlier = None
         if settings.of is not None:
             before = self._results.get(settings.of)
@@ -382,6 +386,11 @@ class Session:
         self._push(plane, layer, told, smooth=False)
         took = time.perf_counter() - began
         self._next = began + max(1 / RATE, SHARE * took)
+
+    def _look_at(self, look: Look) -> None:
+        """Show what was asked for, unless something else has been since."""
+        if look == self._look:
+            self._refresh()
 
     def _refresh(self) -> None:
         """Show what is looked at while nothing is being made."""

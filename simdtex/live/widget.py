@@ -85,6 +85,8 @@ class Live(AnyWidget):
     _esm = (PAGE / "live.js").read_text(encoding="utf-8")
     _css = (PAGE / "live.css").read_text(encoding="utf-8")
 
+    _session: Session | None = None  # until there is a sample that will do
+
     def __init__(
         self,
         sample: ArrayLike | None = None,
@@ -100,14 +102,15 @@ class Live(AnyWidget):
             picture = Picture(name, np.array(pixels[..., 0] if grey else pixels), None if grey else -1)
         super().__init__()
         machine = open_machine(device)
-        self._session = Session(self.send, lambda: machine)
-        self.on_msg(lambda _, message, buffers: self._session.receive(message, buffers))
+        session = Session(self.send, lambda: machine)
+        self.on_msg(lambda _, message, buffers: session.receive(message, buffers))
         if picture is not None:
-            self._session.use(picture)
+            session.use(picture)
+        self._session = session
 
     @property
     def _latest(self) -> Result | None:
-        return self._session.latest
+        return self._session.latest if self._session else None
 
     @property
     def image(self) -> NDArray[Any] | None:  # noqa: D102
@@ -131,5 +134,6 @@ class Live(AnyWidget):
 
     def close(self) -> None:
         """End what is being made, and take the widget away."""
-        self._session.close()
+        if self._session:
+            self._session.close()
         super().close()
