@@ -49,15 +49,6 @@ def mosaic(side=120, period=20):
     return (np.where(joint, 60, tone[row // period, col // period]) + grain).astype(np.uint8)
 
 
-def front():
-    """The front page."""
-    samples = {name: getattr(data, name)()[:128, :128] for name in ("brick", "grass", "gravel")}
-    wide = {name: np.pad(one, ((0, 0), (0, 128)), constant_values=255) for name, one in samples.items()}
-    above = contact_sheet([(f"{name}, the sample", one) for name, one in wide.items()], columns=3, one_to_one=True)
-    made = [(f"more {name}", simdtex.synthesize(one, SHAPE, rng=1)) for name, one in samples.items()]
-    return np.vstack([above, contact_sheet(made, columns=3, one_to_one=True)])
-
-
 # ---------------------------------------------------------------- wishes: before and after
 
 
@@ -238,9 +229,7 @@ READERS = (materials, maps, geoscience)
 
 def main():
     known = {
-        make.__name__: (folder, make)
-        for folder, some in (("_static", (front,)), ("wishes", WISHES), ("readers", READERS))
-        for make in some
+        make.__name__: (folder, make) for folder, some in (("wishes", WISHES), ("readers", READERS)) for make in some
     }
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join([*known, "research"]))
@@ -252,7 +241,7 @@ def main():
         path = HERE / folder / f"{name}.png"
         pictures = make()
         columns = {"novelty": 2, "methods": 3}.get(name, len(pictures))
-        sheet = pictures if name == "front" else contact_sheet(pictures, columns=columns, one_to_one=True)
+        sheet = contact_sheet(pictures, columns=columns, one_to_one=True)
         write(path, sheet if np.ptp(sheet, axis=2).any() else sheet[..., 0])
         print(f"{path.relative_to(HERE.parent)}: {path.stat().st_size / 1000:.0f} kB")
 
