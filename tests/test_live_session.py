@@ -274,6 +274,9 @@ def test_it_stops_and_goes_on_and_shows_what_is_asked_for_meanwhile(opened):
         message = opened.wait("frame", after=len(opened.got) - 1)[0]
     message = opened.ask("frame", kind="look", layer="picture", **where)[0]
     assert (message["paused"], message["width"]) == (True, 9)
+    after = len(opened.got)
+    opened.say(kind="hello")  # of a page that comes back meanwhile
+    assert [one["kind"] for one, _ in opened.got[after:]] == ["hello", "picture", "begun"]
     assert "result" not in opened.kinds()
     opened.ask("result", kind="go")
     whole = simdtex.synthesize(texture(), (40, 56), channel_axis=-1, rng=7, device="reference", order=4)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Iterator
+from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -204,7 +205,9 @@ class Result:
         shown, sample = (self.image, self.sample) if whole else (_middle(self.image), _middle(self.sample))
         found = measure(sample, shown, self.source if name == "effective_use" else None, figures=(name,))
         for key, (label, hint) in FIGURES[name].items():
-            self.figures.append({"label": label, "hint": hint, "value": getattr(found, key)})
+            value = getattr(found, key)
+            known = value is not None and isfinite(value)
+            self.figures.append({"label": label, "hint": hint, "value": float(value) if known else None})
 
 
 class Results:
@@ -216,7 +219,7 @@ class Results:
         self.gone: list[int] = []
 
     def __iter__(self) -> Iterator[Result]:
-        return iter(self._all.values())
+        return iter(list(self._all.values()))  # others may be added meanwhile
 
     @property
     def latest(self) -> Result | None:

@@ -60,6 +60,9 @@ PAGES = 8
 WAITED = 600.0
 """Seconds that the work of a page is kept after its connection is lost."""
 
+ENDING = 2.0
+"""Seconds that the end of the server waits for a session's thread, at most."""
+
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 
 GOING_AWAY, REFUSING, TOO_MANY = 1001, 1008, 1013
@@ -139,6 +142,8 @@ class Pages:
         """End all that is being made."""
         for session in self._sessions.values():
             session.close()
+        for session in self._sessions.values():
+            session.close(ENDING)
 
     def _tidy(self) -> None:
         for key in [key for key, since in self._left.items() if time.monotonic() - since > WAITED]:

@@ -8,7 +8,6 @@ import secrets
 import socket
 import threading
 from collections.abc import Callable
-from functools import cache
 
 import numpy as np
 import uvicorn
@@ -95,7 +94,6 @@ def _listen(address: str, port: int) -> socket.socket:
     return found
 
 
-@cache
 def warm(machine: Machine) -> None:
     """Have the kernels built that a first run needs, for grey and colour."""
     rng = np.random.default_rng(0)

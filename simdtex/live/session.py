@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextvars import copy_context
 from functools import partial
+from importlib.metadata import version
 from typing import Any
 
 from numpy.typing import NDArray
@@ -96,6 +97,7 @@ class Session:
         self._picture: Picture | None = None
         self._pictures = 0
         self._made_any = False
+        self._running: Message | None = None  # what the page was told when the run began
         self._maps: dict[str, NDArray[Any]] = {}
         self._results = Results()
         self._shown: int | None = None  # the result that is looked at; None: the picture
@@ -127,12 +129,14 @@ class Session:
             self._send, self._unseen = send, 0
             self._changed.notify_all()
 
-    def close(self) -> None:
-        """End what is being made, and the thread."""
+    def close(self, wait: float = 0.0) -> None:
+        """End what is being made, and the thread; wait so many seconds for it at most."""
         with self._changed:
             self._closed, self._wish = True, self._wish + 1
             self._changed.notify_all()
         self._tasks.put(None)
+        if wait and self._thread is not None:
+            self._thread.join(wait)
 
     @property
     def latest(self) -> Result | None:
@@ -143,12 +147,7 @@ class Session:
         self._send({"kind": "error", "text": sentence}, [])
 
     def _hello(self, message: Message, buffers: Sequence[Any]) -> None:
-        """Tell the page all that it shows."""
-        self._do(self._greet)
-
-    def _greet(self) -> None:
-        from importlib.metadata import version
-
+        """Tell the page all that it shows, at once: a run may be going on."""
         tables = {name: controls(name) for name in (*WORDS, *OF_JOBS)}
         hello = {"version": version("simdtex"), "device": self._machine().name, "controls": tables, "bytes": BYTES}
         hello |= {"methods": {name: label for name, (label, _) in METHODS.items()}, "examples": list(EXAMPLES)}
@@ -157,6 +156,9 @@ class Session:
             self._show_picture(new=not self._made_any)
             for result in self._results:
                 self._tell(result)
+            if self._running is not None:
+                self._send(self._running, [])
+                return
             if self._shown is not None:
                 self._send({"kind": "chosen", "result": self._shown}, [])
             self._refresh()
@@ -172,15 +174,12 @@ class Session:
         self._do(lambda: self._opened(_example(str(name))), wish=True)
 
     def use(self, picture: Picture) -> None:
-        """Begin with a picture: the page is told of it when it says hello."""
-        self._do(lambda: self._begun_with(picture))
-
-    def _begun_with(self, picture: Picture) -> None:
+        """Take another picture, while nothing is being made; a page is told of it when it says hello."""
         self._picture, self._maps, self._shown = picture, {}, None
         self._pictures += 1
 
     def _opened(self, picture: Picture) -> None:
-        self._begun_with(picture)
+        self.use(picture)
         self._show_picture(new=True)
         self._refresh()
 
@@ -267,11 +266,16 @@ class Session:
     def _take(self, message: Message, buffers: Sequence[Any]) -> None:
         number, what = message.get("result"), message.get("what")
         whole("the result", number, 1)
-        self._do(lambda: self._taken(number, str(what)))
+        result = self._results.get(int(number))  # type: ignore[arg-type]  # checked above
+        threading.Thread(target=self._taken, args=(result, str(what)), daemon=True).start()  # beside what is made
 
-    def _taken(self, number: Any, what: str) -> None:
-        name, data = self._results.get(number).file(what)
-        self._send({"kind": "file", "name": name, "result": number, "what": what}, [data])
+    def _taken(self, result: Result, what: str) -> None:
+        try:
+            name, data = result.file(what)
+        except (ValueError, TypeError, OSError) as error:
+            self._say(str(error))
+        else:
+            self._send({"kind": "file", "name": name, "result": result.number, "what": what}, [data])
 
     # -- the thread -----------------------------------------------------------------------------------------------
 
@@ -330,11 +334,15 @@ class Session:
         levels = Levels(key, options, self._levels)
         self._levels = levels
         rows, cols = asked.shape
-        self._send({"kind": "begun", "width": cols, "height": rows, "from": levels.level}, [])
+        self._running = {"kind": "begun", "width": cols, "height": rows, "from": levels.level}
+        self._send(self._running, [])
         self._shown, self._next, began = None, 0.0, time.perf_counter()
         watch = partial(self._watch, wish, asked.sample, asked.shape)
-        with levels.around():
-            image, output = asked.call(rng=settings.seed, device=self._machine(), callback=watch, full_output=True)
+        try:
+            with levels.around():
+                image, output = asked.call(rng=settings.seed, device=self._machine(), callback=watch, full_output=True)
+        finally:
+            self._running = None
         seconds = time.perf_counter() - began
         steps = (*(earlier.steps if earlier else ()), asked.step)
         result = self._results.add(message, image, output, asked.sample, asked.maps, steps, seconds)

@@ -425,6 +425,7 @@ class View {
     else if (event.key === "0") this.fit();
     else return;
     event.preventDefault();
+    event.stopPropagation(); // a notebook has other plans with keys
   }
 
   close() {
@@ -464,7 +465,7 @@ class Page {
     this.device = make("p", { class: "device" });
     const main = make("div", { class: "columns" }, this.sampleSection(), this.resultSection(), this.optionsSection());
     const header = make("header", {}, make("h1", {}, "simdtex live"), this.device, this.status);
-    this.root = make("main", { class: "simdtex" }, header, this.alert, main);
+    this.root = make("main", { class: "simdtex", "data-lm-suppress-shortcuts": "true" }, header, this.alert, main);
     root.replaceChildren(this.root);
     this.root.addEventListener("dragover", (event) => event.preventDefault());
     this.root.addEventListener("drop", (event) => {
@@ -665,7 +666,6 @@ class Page {
 
   on_frame(message, [bytes]) {
     this.send({ kind: "seen" });
-    if (message.layer !== "picture" || message.result !== undefined) this.told = message.layer;
     this.seen = message.layer;
     this.view.show(message, bytes);
     if (message.fraction === undefined) return;
@@ -788,7 +788,7 @@ class Page {
   showRunning() {
     this.stopping.disabled = this.ending.disabled = !this.running;
     this.stopping.textContent = this.stopped ? "Go on" : "Stop";
-    this.root.classList.toggle("running", this.running && !this.stopped);
+    for (const { button } of this.results.values()) button.disabled = this.running; // a run is looked at
   }
 
   // -- painting
