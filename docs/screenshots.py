@@ -41,7 +41,7 @@ def main():
 
         def made(count):
             until(lambda: script("return page.strip.children.length") == count, 120)
-            until(lambda: script("return page.figures.children.length") >= 8, 60)
+            until(lambda: script("return page.figures.children.length") >= 16, 60)
 
         drop(driver, sample)
         made(1)
@@ -49,10 +49,12 @@ def main():
         script("page.seed.value = 3; page.make()")
         made(2)
         script("page.look('arrangement')")
+        until(lambda: script("return page.seen") == "arrangement")
         keep(driver, "arrangement")
         script(
             "page.look('picture'); page.job.value = 'fill'; page.settle(); page.toFill(); page.brushWidth.value = 40;"
         )
+        until(lambda: script("return page.seen") == "picture")
         script("page.brush.begin([90, 100]); page.hole[0].points.push([150, 120], [260, 110]); page.view.draw()")
         keep(driver, "hole")
         shown(driver, width=390, height=844, dark=True)

@@ -45,7 +45,7 @@ PICTURE_SWEEPS = 50
 @click.option("--start", default="up", show_default=True, help="up (all spins) or random.")
 @click.option("--seed", default=1, show_default=True, help="Same seed, same numbers on every device.")
 @DEVICE
-@click.option("-o", "--output", type=FOLDER, metavar="FOLDER", help="Write a report there.")
+@click.option("-o", "--output", type=FOLDER, metavar="DIR", help="Write a report there.")
 @click.option("-q", "--quiet", is_flag=True, help="No progress and no table.")
 @plainly
 def ising(

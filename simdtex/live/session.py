@@ -104,6 +104,7 @@ class Session:
         self._levels: Levels | None = None
         self._next = 0.0  # when a frame may be shown
         self._thread: threading.Thread | None = None
+        self._measuring: threading.Thread | None = None
         self._kinds: dict[str, Callable[[Message, Sequence[bytes]], None]] = {
             **{"hello": self._hello, "open": self._open, "example": self._example, "map": self._map},
             **{"unmap": self._unmap, "make": self._make, "stop": self._stop, "go": self._go, "end": self._end},
@@ -297,7 +298,8 @@ class Session:
             try:
                 task = self._tasks.get(timeout=AFTER)
             except queue.Empty:
-                task = self._figures() or self._tasks.get()
+                self._figures()
+                task = self._tasks.get()
             if task is None:
                 return
             try:
@@ -421,15 +423,17 @@ class Session:
             self._unseen += 1
         self._send({"kind": "frame", "layer": layer, "rows": rows, "cols": cols, **where, **told}, [seen.pixels])
 
-    def _figures(self) -> Callable[[], None] | None:
-        """What computes figures of quality of the result that is looked at, if that has not been done."""
-        if self._shown is None:
-            return None
+    def _figures(self) -> None:
+        """Have figures of quality computed beside what follows, of the result that is looked at."""
+        if self._shown is None or (self._measuring is not None and self._measuring.is_alive()):
+            return
         result = self._results.get(self._shown)
-        return partial(self._measure, result) if result.unmeasured else None
+        if result.unmeasured:
+            self._measuring = threading.Thread(target=self._measure, args=(result, self._wish), daemon=True)
+            self._measuring.start()
 
-    def _measure(self, result: Result) -> None:
-        while result.unmeasured and self._tasks.empty():
+    def _measure(self, result: Result, wish: int) -> None:
+        while result.unmeasured and self._wish == wish:
             result.measure()
             self._send({"kind": "quality", "result": result.number, "figures": result.figures}, [])
 
