@@ -6,6 +6,8 @@ import shlex
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from live import Fake, asked, png, texture
 
 import simdtex
@@ -13,6 +15,7 @@ from simdtex import cli
 from simdtex.live import session as sessions
 from simdtex.live.levels import Levels
 from simdtex.live.results import Results
+from simdtex.live.settings import parsed
 from simdtex.methods import mrf
 from simdtex.model.source_map import apply_source_map
 
@@ -53,12 +56,12 @@ JOBS = {
 }
 
 
-@pytest.mark.parametrize("settings", JOBS.values(), ids=JOBS)
-def test_what_is_taken_away_makes_the_same_bytes(opened, settings, tmp_path, monkeypatch):
-    made = settings.get("method") != "pyramid"
+@pytest.mark.parametrize("wanted", JOBS.values(), ids=JOBS)
+def test_what_is_taken_away_makes_the_same_bytes(opened, wanted, tmp_path, monkeypatch):
+    made = wanted.get("method") != "pyramid"
     if made:
         opened.ask("maps", png(texture(channels=1, seed=2)), kind="map", name="Height map.png")
-    result = opened.result(**settings)
+    result = opened.result(**wanted)
     assert result["maps"] == (["height-map"] if made else [])
     files = opened.package(result["result"])
     monkeypatch.chdir(tmp_path)
@@ -185,10 +188,10 @@ def test_a_run_that_was_given_up_is_gone_on_from_where_it_was(opened):
 
 def test_another_seed_size_part_or_picture_begins_anew(opened):
     opened.result()
-    for settings in ({"seed": 8}, {"width": 57}, {"part": [0, 0, 40, 40]}, {"guide": GUIDE}):
+    for other in ({"seed": 8}, {"width": 57}, {"part": [0, 0, 40, 40]}, {"guide": GUIDE}):
         after = len(opened.got)
-        opened.result(**settings)
-        assert opened.wait("begun", after=after)[0]["from"] is None, settings
+        opened.result(**other)
+        assert opened.wait("begun", after=after)[0]["from"] is None, other
     opened.ask("picture", png(texture(seed=3)), kind="open", name="other.png")
     after = len(opened.got)
     opened.result()
@@ -473,3 +476,39 @@ def test_a_large_picture_begins_with_its_middle(page, monkeypatch):
     message, (pixels,) = page.ask("picture", png(texture(40, 48)), kind="open", name="a.png")
     assert message["part"] == [8, 4, 32, 32]
     assert len(pixels) == 4 * message["shown"][0] * message["shown"][1]
+
+
+HARDY = Fake()
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers(-5, 5000) | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    max_leaves=6,
+)
+FIELDS = ("name", "result", "what", "layer", "left", "top", "width", "height", "step", "tiled", "job", "method", "seed")
+FIELDS += ("options", "part", "guide", "hole", "of")
+
+
+@given(
+    st.sampled_from(
+        ["hello", "open", "example", "map", "unmap", "stop", "go", "end", "look", "seen", "choose", "take"]
+    ),
+    st.dictionaries(st.sampled_from(FIELDS), JSON, max_size=4),
+    st.lists(st.binary(max_size=30), max_size=2),
+)
+@settings(max_examples=200)
+def test_no_message_does_harm(kind, message, buffers):
+    HARDY.say(*buffers, **message | {"kind": kind})
+    assert "something is wrong in simdtex itself" not in str(HARDY.got)
+    HARDY.got.clear()
+
+
+@given(st.dictionaries(st.sampled_from(FIELDS), JSON, max_size=3), st.sampled_from(["synth", "tile", "fill"]))
+@settings(max_examples=150)
+def test_no_wish_does_harm(message, job):
+    picture = sessions.Picture("a.png", texture(), -1)
+    try:
+        found = parsed(asked(job=job) | message, picture)
+    except (ValueError, TypeError) as error:
+        assert str(error)
+    else:
+        assert found.job in ("synth", "tile", "fill") and min(found.shape) >= 1
