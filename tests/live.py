@@ -32,7 +32,7 @@ def png(pixels):
 def asked(**settings):
     """A wish with few levels, so that it is quick."""
     options = {"order": 4} if settings.get("method", "mrf") == "mrf" else {}
-    wish = {"kind": "make", "job": "synth", "width": 56, "height": 40, "seed": 7}
+    wish = {"kind": "make", "job": "synth", "width": 36, "height": 28, "seed": 7}
     return wish | settings | {"options": options | settings.get("options", {})}
 
 

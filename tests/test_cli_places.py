@@ -16,7 +16,20 @@ COMMANDS = {name: cli.load(name) for name in cli.COMMANDS}
 READ, WRITE = ("read", "enter"), ("write", "folder", "either")
 TEXTS = {
     # options and arguments of text that name no file; those of `mix` repeat the name of a SAMPLE
-    *("device", "size", "method", "preset", "relaxation", "pixel", "phases", "coarsest", "search", "edges", "boundary"),
+    *(
+        "host",
+        "device",
+        "size",
+        "method",
+        "preset",
+        "relaxation",
+        "pixel",
+        "phases",
+        "coarsest",
+        "search",
+        "edges",
+        "boundary",
+    ),
     *("categorical_channels", "weights", "shares", "proportions", "alpha", "features", "phase", "joins", "pyramid"),
     *("match", "color", "schedule", "array", "mapping", "solids", "slices", "average", "blend", "pixels", "names"),
     *("alphas", "betas", "palette", "pattern", "low", "high", "scheduler"),

@@ -379,11 +379,13 @@ def test_a_killed_server_is_told_and_a_new_one_found(chromium, wall):
     chromium.switch_to.window(chromium.window_handles[0])
 
 
+@pytest.mark.slow
 def test_a_wrong_token_is_told(chromium, served):
     chromium.get(served.replace(TOKEN, "another-token-than-that"))
     assert "lacks the right token" in chromium.find_element(By.TAG_NAME, "body").text
 
 
+@pytest.mark.slow
 def test_another_site_reaches_nothing(chromium, served):
     """A page of another origin opens no connection, although it knows the address."""
     chromium.get("data:text/html,<title>elsewhere</title>")
@@ -415,7 +417,8 @@ def test_nothing_keeps_people_out(page, wall, dark):
     assert page.faults() == []
 
 
-@pytest.mark.parametrize("width", [*(pytest.param(width, marks=pytest.mark.slow) for width in (320, 820, 1400)), 390])
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [320, 390, 820, 1400])
 def test_it_fits_a_phone(page, wall, width):
     shown(page.driver, width=width)
     drop(page.driver, wall)

@@ -40,7 +40,7 @@ def test_a_widget_takes_messages_and_gives_results(monkeypatch):
         time.sleep(0.01)
     assert [message["kind"] for message in sent][:2] == ["hello", "picture"]
     options = {"rng": 7, "order": 4, "device": "reference"}
-    whole, output = simdtex.synthesize(texture(), (40, 56), channel_axis=-1, full_output=True, **options)
+    whole, output = simdtex.synthesize(texture(), (28, 36), channel_axis=-1, full_output=True, **options)
     np.testing.assert_array_equal(live.image, whole)
     np.testing.assert_array_equal(live.source, output.source)
     assert live.command.startswith("simdtex synth wall.png ") and "simdtex.synthesize" in live.python
@@ -73,7 +73,7 @@ def test_a_missing_package_is_named():
 def test_a_result_shows_its_picture_and_its_arrangement():
     sample = texture()
     options = {"rng": 1, "order": 4, "device": "reference", "full_output": True}
-    image, output = simdtex.synthesize(sample, (40, 56), channel_axis=-1, **options)
+    image, output = simdtex.synthesize(sample, (28, 36), channel_axis=-1, **options)
     pictures = re.findall(r'src="data:image/png;base64,([^"]+)" alt="([^"]+)"', output._repr_html_())
     assert [alt for _, alt in pictures] == ["the picture", "where from in the sample"]
     shown, arranged = (read_bytes("a", b64decode(data)).pixels for data, _ in pictures)
