@@ -79,6 +79,7 @@ def test_it_does_what_the_page_shows(copy, any_device):
     assert done.stdout == LISTINGS["what look.py prints"], done.stderr
 
 
+@pytest.mark.slow
 def test_its_test_can_fail(copy, any_device):
     """As the page says: the devices fail, the reference does not."""
     kernel = copy / "kernels" / "median.cl"

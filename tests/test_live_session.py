@@ -56,8 +56,17 @@ JOBS = {
 }
 
 
-@pytest.mark.parametrize("wanted", JOBS.values(), ids=JOBS)
-def test_what_is_taken_away_makes_the_same_bytes(opened, wanted, tmp_path, monkeypatch):
+SLOW = ("guide-everywhere", "guide-of-a-part", "tile-a-part", "search", "both", "similar", "a result")
+
+
+def cases(names):
+    """The cases of these names; some are like others, and wait for `make slow`."""
+    return [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in names]
+
+
+@pytest.mark.parametrize("case", cases(JOBS))
+def test_what_is_taken_away_makes_the_same_bytes(opened, case, tmp_path, monkeypatch):
+    wanted = JOBS[case]
     made = wanted.get("method") != "pyramid"
     if made:
         opened.ask("maps", png(texture(channels=1, seed=2)), kind="map", name="Height map.png")
@@ -85,7 +94,7 @@ def test_what_is_taken_away_makes_the_same_bytes(opened, wanted, tmp_path, monke
         assert (tmp_path / name).read_bytes() == files[name], name
 
 
-@pytest.mark.parametrize("of", ["the picture", "a result", "a result of that"])
+@pytest.mark.parametrize("of", cases(["the picture", "a result", "a result of that"]))
 def test_a_hole_is_filled_with_the_same_bytes(opened, of, tmp_path, monkeypatch):
     opened.ask("maps", png(texture(channels=1, seed=2)), kind="map", name="h.png")
     before = None
@@ -151,7 +160,7 @@ CHANGES = {
 }
 
 
-@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("change", cases(CHANGES))
 def test_a_change_restarts_from_the_level_it_affects_and_gives_the_same_bytes(opened, change):
     options, level = CHANGES[change]
     opened.result()

@@ -100,6 +100,7 @@ def test_any_result_shows_itself(kind):
     assert output._repr_html_().count("<img") == 1 + (kind in ("channels first", "floats"))
 
 
+@pytest.mark.slow
 def test_the_notebook_runs():
     notebook = ROOT / "examples" / "live.ipynb"
     found = subprocess.run([sys.executable, "-c", EXECUTE, str(notebook)], capture_output=True, text=True, timeout=500)
