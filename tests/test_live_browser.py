@@ -52,7 +52,7 @@ class Page:
         self.handle = driver.current_window_handle
         shown(driver, width=1400)
         driver.get(address)
-        until(lambda: self.status == "Ready.")
+        until(lambda: self.script("return Boolean(window.page && window.page.options)"))
 
     def all(self, selector):
         return self.driver.find_elements(By.CSS_SELECTOR, selector)
@@ -203,6 +203,7 @@ def test_it_stops_and_goes_on_to_the_same_bytes(page, wall):
     page.button("Stop").click()
     until(lambda: page.status == "It is stopped.")
     until(lambda: page.script("return page.view.frame.paused"))
+    page.script("return new Promise((done) => setTimeout(done, 300))")  # what was on its way arrives
     before = page.script("return page.frames")
     doing = page.one(".doing").text
     page.script("return new Promise((done) => setTimeout(done, 700))")
