@@ -6,6 +6,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Iterator
+from functools import cached_property
 from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -84,6 +85,7 @@ class Result:
     ) -> None:
         self.number, self.image, self.sample, self.steps = number, image, sample, steps
         self.source, self.temperature, self.seconds = output.source, output.temperature, seconds
+        self._carries = self.source is not None and bool((self.source[..., 0] >= 0).all())
         self.maps = {name: apply_source_map(output.source, one) for name, one in maps.items()} if self._carries else {}
         self.figures: list[dict[str, Any]] = []
         self._asked, self._device = asked, output.statistics["device"]
@@ -91,10 +93,6 @@ class Result:
         able = job == "synth" and min(*image.shape[:2], *sample.shape[:2]) >= 48
         skipped = () if self._carries else ("effective_use",)
         self._open = [name for name in FIGURES if able and name not in skipped]
-
-    @property
-    def _carries(self) -> bool:
-        return self.source is not None and bool((self.source[..., 0] >= 0).all())
 
     @property
     def size(self) -> int:
@@ -110,10 +108,14 @@ class Result:
         found += ["temperature"] if self.temperature is not None else []
         return found + [f"map {name}" for name in self.maps]
 
-    @property
+    @cached_property
     def thumbnail(self) -> bytes:
         """A small picture, RGBA; its size is in `told`."""
         return seen(planes.picture(self.image, self.sample), self._small).pixels
+
+    @cached_property
+    def _use(self) -> Plane:
+        return planes.use(self.source, self.sample)
 
     @property
     def _small(self) -> Look:
@@ -123,11 +125,10 @@ class Result:
 
     def told(self) -> dict[str, Any]:
         """What a page is told of it."""
-        small = seen(planes.picture(self.image, self.sample), self._small, smooth=False)
         rows, cols = self.image.shape[:2]
         return {
             **{"result": self.number, "width": cols, "height": rows, "seconds": self.seconds, "device": self._device},
-            **{"layers": self.layers, "maps": list(self.maps), "thumbnail": [small.width, small.height]},
+            **{"layers": self.layers, "maps": list(self.maps), "thumbnail": [self._small.width, self._small.height]},
             **{"asked": self._asked, "command": shell(self.steps), "python": script(self.steps)},
             **{"figures": self.figures, "arrangement": self.source is not None},
         }
@@ -140,7 +141,7 @@ class Result:
             if layer == "arrangement":
                 return layer, planes.arrangement(self.source, self.sample)
             if layer == "use":
-                return layer, planes.use(self.source, self.sample)
+                return layer, self._use
             if layer == "temperature":
                 return layer, planes.temperature(self.temperature)
             if layer.startswith("map "):

@@ -65,7 +65,7 @@ ENDING = 2.0
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 
-GOING_AWAY, REFUSING, TOO_MANY = 1001, 1008, 1013
+REFUSING, TOO_MANY = 1008, 1013
 """Codes with which a WebSocket is closed (RFC 6455, section 7.4.1)."""
 
 

@@ -363,8 +363,6 @@ class Session:
             raise Stopped
         if time.perf_counter() >= self._next and self._unseen < 2:
             self._show(progress, sample, shape)
-        if not self._paused:
-            return
         while self._paused:
             shown = self._look
             self._show(progress, sample, shape)
