@@ -8,12 +8,14 @@ search finds pages, and at the width of a phone no page scrolls sideways.
 
 import argparse
 import re
-import shutil
 import sys
-from contextlib import contextmanager
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+
+from browsing import browser, missing  # they are beside the tests
 
 PHONE = 390
 """Width of a phone in CSS pixels."""
@@ -77,41 +79,6 @@ def elsewhere(folder, found):
     return faults
 
 
-def missing():
-    """Why no browser can be asked, or an empty string."""
-    try:
-        import selenium  # noqa: F401
-    except ImportError:
-        return "Selenium is not installed (pip install 'simdtex[test]')"
-    if not (chromium() and shutil.which("chromedriver")):
-        return "Chromium or its driver is not installed (Debian: apt install chromium chromium-driver)"
-    return ""
-
-
-def chromium():
-    """Where Chromium is, or None."""
-    return shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-
-
-@contextmanager
-def browser(width=1280, height=900):
-    """Chromium that reaches no host, with pages of this width."""
-    from selenium import webdriver
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = chromium()
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    for argument in ("headless=new", "no-sandbox", "host-resolver-rules=MAP * ~NOTFOUND", "disable-dev-shm-usage"):
-        options.add_argument(f"--{argument}")
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(shutil.which("chromedriver")))
-    try:
-        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
-        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-        yield driver
-    finally:
-        driver.quit()
-
-
 WIDER = """
 const room = document.documentElement.clientWidth;
 if (document.documentElement.scrollWidth <= room) return "";
@@ -123,7 +90,7 @@ return `${document.documentElement.scrollWidth} px: ` + wide.slice(-1).map(e => 
 def sideways(folder, width=PHONE):
     """Sentences about pages that scroll sideways at this width."""
     faults = []
-    with browser(width, 844) as driver:
+    with browser(width=width, height=844) as driver:
         for path in pages(folder):
             driver.get(path.as_uri())
             wide = driver.execute_script(WIDER)
@@ -138,7 +105,7 @@ def opened(folder, words=("temperature", "neighbourhood", "seamless")):
     from selenium.webdriver.support.ui import WebDriverWait
 
     faults = []
-    with browser() as driver:
+    with browser(width=1280, height=900) as driver:
         for path in pages(folder):
             driver.get(path.as_uri())
             flat = driver.execute_script(

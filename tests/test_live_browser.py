@@ -14,7 +14,7 @@ from live import png, texture
 
 REQUIRE = "SIMDTEX_REQUIRE_BROWSER"
 TOKEN = "a-token-for-the-browser"
-LACKS = missing()
+LACKS = missing() or ("" if AXE.exists() else "axe-core is not installed (make browser, which needs npm)")
 if LACKS and os.environ.get(REQUIRE):
     raise RuntimeError(f"{REQUIRE} is set, and {LACKS}")
 pytestmark = [
