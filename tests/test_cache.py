@@ -108,6 +108,22 @@ def test_one_broken_file_among_others_is_found(tmp_path, name):
     assert runtimes.broken_file(tmp_path, 0) is None, "when its time is up it looks no further"
 
 
+@pytest.mark.parametrize("name", ["tempfile_CdHn9i.so", "tempfile_CdHn9i.bc", "tempfile_CdHn9i"])
+def test_a_file_that_another_process_writes_just_now_is_not_broken(tmp_path, name):
+    (tmp_path / name).write_bytes(b"\x7fEL")
+    assert runtimes.broken_file(tmp_path, 60) is None
+
+
+def test_a_file_that_is_whole_a_moment_later_is_not_broken(tmp_path, monkeypatch):
+    file = tmp_path / "program.bc"
+    file.write_bytes(b"BC")
+    monkeypatch.setattr(runtimes.time, "sleep", lambda seconds: file.write_bytes(b"BC\xc0\xde" + bytes(60)))
+    assert runtimes.broken_file(tmp_path, 60) is None
+    monkeypatch.setattr(runtimes.time, "sleep", lambda seconds: file.unlink())
+    file.write_bytes(b"BC")
+    assert runtimes.broken_file(tmp_path, 60) is None, "somebody has removed it"
+
+
 def test_where_pocl_keeps_kernels(monkeypatch):
     monkeypatch.setenv("HOME", "/h")
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)

@@ -32,7 +32,9 @@ __all__ = ["DeviceError", "alive", "clean", "failure", "failures", "intel_librar
 _INTEL = "libintelocl.so"
 _MARK = "simdtex-probe:"
 _POCL_CACHE = "POCL_CACHE_DIR"
+_UNFINISHED = "tempfile_"  # PoCL's passing names, which it gives up for the true ones once a file is whole
 _SEARCH = 0.03
+_MOMENT = 0.2  # in which a file of the cache, a megabyte at most, is written by far
 _SECONDS = 60.0  # a first build takes a second or two; a busy machine, several times that
 _FOLDERS = ("OCL_ICD_VENDORS", "OPENCL_VENDOR_PATH")  # how users name a folder to the loader
 
@@ -161,6 +163,9 @@ def cache_trouble() -> str:
 def broken_file(place: Path, seconds: float = _SEARCH) -> Path | None:
     """A file of PoCL's cache that is no kernel or program, or is cut off: PoCL would abort on it.
 
+    What another process is writing just now does not count: PoCL writes kernels under a passing name, and programs
+    in a moment.
+
     Parameters
     ----------
     place : Path
@@ -178,14 +183,24 @@ def broken_file(place: Path, seconds: float = _SEARCH) -> Path | None:
         try:
             with os.scandir(folders.pop()) as entries:
                 for entry in entries:
+                    if entry.name.startswith(_UNFINISHED):
+                        continue
                     if entry.name.endswith((".so", ".bc")):
-                        if not _whole(entry.path):
+                        if _stays_broken(entry.path):
                             return Path(entry.path)
                     elif entry.is_dir(follow_symlinks=False):
                         folders.append(entry.path)
         except OSError:  # somebody else has just removed it
             continue
     return None
+
+
+def _stays_broken(path: str) -> bool:
+    """Whether a file is not whole, and is still not a moment later: another process may just be writing it."""
+    if _whole(path):
+        return False
+    time.sleep(_MOMENT)
+    return not _whole(path)
 
 
 def _whole(path: str) -> bool:
