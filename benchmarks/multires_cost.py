@@ -104,7 +104,7 @@ def jobs(machine, repeats):
 def of_options(machine, repeats):
     """What mending and blending add."""
     for side, output in ((128, 256), (256, 1024), (512, 1024)):
-        for options in ({"edges": "keep", "joins": "cut"}, {"edges": "keep"}, {}):
+        for options in ({"edges": "keep", "seams": "cut"}, {"edges": "keep"}, {}):
             seconds, _ = best_of(repeats, machine, picture("gravel", side), output, **options)
             named = ", ".join(f"{name}={value}" for name, value in options.items()) or "defaults"
             print(f"gravel {side:3} -> {output:4}, {named:21}: {seconds:7.3f} s", flush=True)

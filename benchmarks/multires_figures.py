@@ -38,11 +38,11 @@ ALPHAS = {0: (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, inf), 1: (0.1, 
 OWN, SIMILAR, FAILS, CANDIDATE = "#0072B2", "#8CC9A8", "#E07B4F", "#E69F00"
 SIBLING, OTHER, UNSEEN, THIRD = "#A9D3EE", "#F8E3B5", "#ECECEA", "#CFE8DA"
 PERIODS = (8, 16, 32)  # of the grids whose lines show
-PAPER = {"edges": "keep", "joins": "cut"}
+PAPER = {"edges": "keep", "seams": "cut"}
 SHOWN = {
     "alpha 0.3, keep, cut": {"alpha": 0.3} | PAPER,
     "auto, target 1.1, keep, cut": {"alpha": "auto", "target": 1.1} | PAPER,
-    "alpha 0.3, mend, cut": {"alpha": 0.3, "joins": "cut"},
+    "alpha 0.3, mend, cut": {"alpha": 0.3, "seams": "cut"},
     "alpha 0.3, keep, blend": {"alpha": 0.3, "edges": "keep"},
     "alpha 0.3": {"alpha": 0.3},
     "auto": {"alpha": "auto"},
@@ -75,10 +75,10 @@ def main():
         "sources": partial(sources, machine, gravel),
         "beta-0": partial(series, machine, gravel, 0),
         "beta-1": partial(series, machine, gravel, 1),
-        "phase": partial(phases, machine, gravel),
+        "parity": partial(phases, machine, gravel),
         "colour": partial(colours, machine, tissue),
         "edges": partial(edges, {name: collection[name] for name in ("brick", "gravel", "tissue", "wood")}),
-        "joins": partial(joins, machine, {name: collection[name] for name in ("gravel", "brick", "tissue")}),
+        "seams": partial(seams, machine, {name: collection[name] for name in ("gravel", "brick", "tissue")}),
     }
     for name, figure in made.items():
         path = options.out / f"{name}.png"
@@ -236,7 +236,7 @@ def parents():
         Patch(facecolor=FAILS, label="fails"),
         Patch(facecolor=UNSEEN, label="never looked at"),
         Patch(facecolor=CANDIDATE, label="candidates"),
-        Patch(facecolor=OTHER, label='candidates too with phase="free"'),
+        Patch(facecolor=OTHER, label='candidates too with parity="free"'),
     ]
     figure.legend(handles=keys, loc="outside lower center", ncols=3, frameon=False, fontsize=9, labelcolor=INK)
     return figure_png(figure)
@@ -331,8 +331,8 @@ def series(machine, gravel, beta):
     """One sample under many alphas, as in Figures 11 and 12 of the paper."""
     pictures = [("the sample", gravel)]
     for alpha in ALPHAS[beta]:
-        joins = "cut" if alpha == inf else "blend"  # where all are strangers, a blend leaves no contrast
-        image, output = run(machine, gravel, 2 * len(gravel), alpha=alpha, beta=beta, joins=joins)
+        seams = "cut" if alpha == inf else "blend"  # where all are strangers, a blend leaves no contrast
+        image, output = run(machine, gravel, 2 * len(gravel), alpha=alpha, beta=beta, seams=seams)
         if alpha == 0 and not (image == np.tile(mended(gravel), (2, 2))).all():
             raise AssertionError("alpha = 0 does not tile the sample")
         name = "infinity" if alpha == inf else f"{alpha:g}"
@@ -356,12 +356,12 @@ def edges(collection):
     return png(contact_sheet(pictures, columns=len(collection)))
 
 
-def joins(machine, collection):
+def seams(machine, collection):
     """Textures at the same alpha, of the same places, whose bands are cut where they meet and fade into each other."""
     pictures = []
     for how in ("cut", "blend"):
         for name, one in collection.items():
-            image, _ = run(machine, one, 2 * len(one), alpha=0.3, joins=how)
+            image, _ = run(machine, one, 2 * len(one), alpha=0.3, seams=how)
             pictures.append((f"{name}, {how}: lines {lines(image):.2f}", image))
     return png(contact_sheet(pictures, columns=len(collection)))
 
@@ -395,10 +395,10 @@ def table(machine, collection):
 def phases(machine, gravel):
     """The two phases at the same alphas."""
     pictures = []
-    for phase in ("match", "free"):
+    for parity in ("match", "free"):
         for alpha in (0, 0.05, 0.2, 0.4):
-            image, output = run(machine, gravel, 192, alpha=alpha, phase=phase, joins="cut")
-            pictures.append((f"{phase}, alpha {alpha:g}: {mean_candidates(output):.2f} candidates", image))
+            image, output = run(machine, gravel, 192, alpha=alpha, parity=parity, seams="cut")
+            pictures.append((f"{parity}, alpha {alpha:g}: {mean_candidates(output):.2f} candidates", image))
     return png(contact_sheet(pictures, columns=4))
 
 

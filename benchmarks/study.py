@@ -92,7 +92,7 @@ MULTIRES = {
     "alpha=1, beta=1": {"alpha": 1.0, "beta": 1.0},
     "alpha=4, beta=2": {"alpha": 4.0, "beta": 2.0},
     "alpha=8, beta=3": {"alpha": 8.0, "beta": 3.0},
-    "phase=free": {"phase": "free"},
+    "parity=free": {"parity": "free"},
     "orientations=0": {"orientations": 0},
     "orientations=2": {"orientations": 2},
     "orientations=8": {"orientations": 8},

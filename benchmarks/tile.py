@@ -4,7 +4,7 @@
     python benchmarks/tile.py [--samples DIR] [--only brick,wood] [--seeds N] [--bands 4,8,16,32] [--add 64]
                               [--options NAME=VALUE,NAME=VALUE] [--out DIR] [--csv FILE] [--device TEXT]
 
-Each texture is made seamless by ``simdtex.extend(..., tile=True)`` with bands of these widths, and continued to the
+Each texture is made seamless by ``simdtex.extend(..., seamless=True)`` with bands of these widths, and continued to the
 right and downwards by so many pixels. ``--out`` writes a sheet for each texture, at 1:1, where what is to tile is laid
 out 2 x 2. The figures, of which 1 is that of real texture:
 
@@ -78,14 +78,16 @@ def main():
         channels = {"channel_axis": -1 if picture.ndim == 3 else None}
         cells = [(f"{name}, 2 x 2", twice(picture), f"tiles {simdtex.quality.seam(picture):.2f}")]
         results.append((name, "", "as it is", 1, {"tiles": simdtex.quality.seam(picture)}))
-        jobs = [(f"band {band}", {"tile": True, "band": band}) for band in bands if 3 * band < min(picture.shape[:2])]
+        jobs = [
+            (f"band {band}", {"seamless": True, "band": band}) for band in bands if 3 * band < min(picture.shape[:2])
+        ]
         jobs += [("continued", {"right": options.add, "bottom": options.add})] if options.add else []
         for label, what in jobs:
             for seed in range(1, options.seeds + 1):
                 began = time.perf_counter()
                 made = simdtex.extend(picture, rng=seed, device=machine, **what, **channels, **given)
                 seconds = time.perf_counter() - began
-                tiled = "tile" in what
+                tiled = "seamless" in what
                 figures = seamless(made, what["band"]) if tiled else continued(made, picture.shape[:2])
                 results.append((name, "", label, seed, figures))
                 told = "  ".join(f"{figure} {value:.2f}" for figure, value in figures.items())

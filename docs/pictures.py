@@ -93,7 +93,7 @@ def finish():
 
 def tile():
     photo = data.gravel()[100:228, 100:228]
-    seamless = simdtex.extend(photo, tile=True, rng=1)
+    seamless = simdtex.extend(photo, seamless=True, rng=1)
     return [(label, np.tile(one, (2, 2))) for label, one in (("as it is, 2 x 2", photo), ("--tile, 2 x 2", seamless))]
 
 
@@ -160,7 +160,7 @@ def paper():
 
 def materials():
     photo = data.gravel()[100:228, 100:228]
-    seamless = simdtex.extend(photo, tile=True, rng=1)
+    seamless = simdtex.extend(photo, seamless=True, rng=1)
     more = simdtex.synthesize(photo, SHAPE, rng=1)
     return [("seamless, 3 x 3", np.tile(seamless, (3, 3))), ("more of it", more)]
 
@@ -186,7 +186,7 @@ def geoscience():
     hard = np.ma.masked_all(hidden.shape, np.uint8)
     wells = np.random.default_rng(1).choice(hidden.size, 60, replace=False)
     hard.flat[wells] = hidden.flat[wells]
-    maps = simdtex.simulate(training, 20, hard=hard, categorical=True, rng=1).values
+    maps = simdtex.simulate(training, 20, known=hard, categorical=True, rng=1).values
     return [
         ("what nobody knows", hidden * 255),
         ("realisation 0", maps[0] * 255),

@@ -35,7 +35,7 @@ filled = simdtex.fill(gravel, hole, rng=1)
 assert (filled[~hole] == gravel[~hole]).all()
 wider = simdtex.extend(gravel, right=side // 2, rng=1)
 assert (wider[:, :side] == gravel).all()
-tile = simdtex.extend(gravel, tile=True, rng=1)
+tile = simdtex.extend(gravel, seamless=True, rng=1)
 for label, picture in (("before", gravel), ("after", tile)):
     print(f"seam {label}: {simdtex.quality.seam(picture):.2f} times as strong as the steps between neighbour pixels")
 

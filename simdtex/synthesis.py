@@ -94,8 +94,8 @@ def synthesize(
         ``shares``, ``proportions``, ``data_weight``, ``guide_weight``, ``labels``,
         ``unsure``; see
         `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``strain``, ``target``, ``thresholds``,
-        ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``phase``, ``boundary``, ``edges``,
-        ``joins``; see `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``, ``levels``, ``orientations``,
+        ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``parity``, ``boundary``, ``edges``,
+        ``seams``; see `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``, ``levels``, ``orientations``,
         ``iterations``, ``match``, ``bins``, ``edges``, ``color``, ``start``; see `simdtex.methods.pyramid.Options`.
 
     Returns
@@ -232,7 +232,7 @@ def suggest_alpha(
     device: str | Machine | None = None,
     **options: Any,
 ) -> float:
-    """The threshold of the method ``multires`` that leaves as much choice as joins allow.
+    """The threshold of the method ``multires`` that leaves as much choice as seams allow.
 
     Parameters
     ----------

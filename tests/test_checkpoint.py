@@ -56,7 +56,7 @@ JOBS = {
     "solid": lambda **how: simdtex.synthesize_solid(COLOUR, (8, 9, 8), iterations=2, channel_axis=-1, **how),
     "mix": lambda **how: simdtex.mix([GREY, GREY[::-1]], (16, 16), iterations=2, **how),
     "fill": lambda **how: simdtex.fill(GREY, HOLE, order=1, levels=1, **how),
-    "extend": lambda **how: simdtex.extend(GREY, right=3, tile="y", band=2, order=2, **how),
+    "extend": lambda **how: simdtex.extend(GREY, right=3, seamless="y", band=2, order=2, **how),
     "simulate": simulated,
 }
 QUICK = JOBS["mrf"]

@@ -196,7 +196,13 @@ def test_a_size_adds_at_the_right_and_at_the_bottom(folder, centre, at):
 
 
 @pytest.mark.parametrize(
-    ("flags", "tile"), [(["--tile"], True), (["--tile-x"], "x"), (["--tile-y"], "y"), (["--tile-x", "--tile-y"], True)]
+    ("flags", "tile"),
+    [
+        (["--seamless"], True),
+        (["--seamless-x"], "x"),
+        (["--seamless-y"], "y"),
+        (["--seamless-x", "--seamless-y"], True),
+    ],
 )
 def test_a_material_becomes_seamless(folder, flags, tile):
     args = ["photo.png", "-o", "out.png", *flags, "--band", 3, "--also", "normal.png=normal-out.png", "--finish", 0]
@@ -204,7 +210,9 @@ def test_a_material_becomes_seamless(folder, flags, tile):
     assert result.exit_code == 0, result.output
     photo, source = pixels(folder, "photo.png"), load_source_map(folder / "s.png")
     made = pixels(folder, "out.png")
-    assert np.array_equal(made, simdtex.extend(photo, tile=tile, band=3, channel_axis=-1, rng=5, finish=0.0, **OPTIONS))
+    assert np.array_equal(
+        made, simdtex.extend(photo, seamless=tile, band=3, channel_axis=-1, rng=5, finish=0.0, **OPTIONS)
+    )
     assert np.array_equal(
         pixels(folder, "normal-out.png"), pixels(folder, "normal.png")[source[..., 0], source[..., 1]]
     )
@@ -214,7 +222,7 @@ def test_a_material_becomes_seamless(folder, flags, tile):
 
 
 def test_extend_shows_what_it_did(folder):
-    args = ["--tile", "--band", 3, "--stages", folder / "stages", "--report", folder / "report"]
+    args = ["--seamless", "--band", 3, "--stages", folder / "stages", "--report", folder / "report"]
     result = small(folder, "extend", "photo.png", "-o", "out.png", *args)
     assert result.exit_code == 0, result.output
     assert (folder / "stages" / "sheet.png").is_file()
@@ -223,18 +231,18 @@ def test_extend_shows_what_it_did(folder):
 
 PHOTO = ["photo.png", "-o", "out.png"]
 BAD_EXTEND = {
-    "nothing to add": (PHOTO, "--tile"),
+    "nothing to add": (PHOTO, "--seamless"),
     "fewer than none": ([*PHOTO, "--left", -3], "left is -3"),
     "smaller": ([*PHOTO, "--size", "30x40"], "smaller than the picture of 32x24"),
     "the size it has": ([*PHOTO, "--size", "32x24"], "nothing to add"),
     "a size and sides": ([*PHOTO, "--size", "40x40", "--left", 3], "leave --left"),
     "a centre of nothing": ([*PHOTO, "--left", 3, "--centre"], "--size"),
-    "a band of nothing": ([*PHOTO, "--left", 3, "--band", 3], "--tile"),
-    "a band of everything": ([*PHOTO, "--tile", "--band", 12], "band=12"),
-    "a map of another size": ([*PHOTO, "--tile", "--also", "small.png=n.png"], "32x24"),
+    "a band of nothing": ([*PHOTO, "--left", 3, "--band", 3], "--seamless"),
+    "a band of everything": ([*PHOTO, "--seamless", "--band", 12], "band=12"),
+    "a map of another size": ([*PHOTO, "--seamless", "--also", "small.png=n.png"], "32x24"),
     "NaN": (["holed.tif", "-o", "out.tif", "--left", 3], "fill them first"),
-    "the picture overwritten": (["photo.png", "-o", "photo.png", "--tile"], "would be overwritten"),
-    "the map overwritten": ([*PHOTO, "--tile", "--also", "normal.png=normal.png"], "would be overwritten"),
+    "the picture overwritten": (["photo.png", "-o", "photo.png", "--seamless"], "would be overwritten"),
+    "the map overwritten": ([*PHOTO, "--seamless", "--also", "normal.png=normal.png"], "would be overwritten"),
 }
 
 

@@ -16,6 +16,12 @@ from simdtex.io import image
 OPTIONS = [(name, one) for name in COMMANDS for one in load(name).params if isinstance(one, click.Option)]
 LINES = [words for name in COMMANDS for words, _ in load(name).examples] + [words for words, _ in EXAMPLES]
 
+VERBS = set(
+    """add average be begin blend bring carry check compare continue cool count draw exchange extend fill follow get give
+    go have honour keep launch lay leave let listen look make match measure melt mend open prefer print read relax run
+    say show split start sweep take try use weigh write break""".split()
+)
+
 
 def run(*words):
     return CliRunner().invoke(main, [str(word) for word in words], prog_name="simdtex")
@@ -46,11 +52,16 @@ def test_every_option_is_shown_once(name):
 
 def test_a_group_that_names_a_method_need_not_be_told_it_again():
     said = help_of("synth")
-    assert re.search(r"Method multires:\n  --alpha FLOAT\|auto +Threshold; more is freer", said)
-    assert re.search(r"--search auto\|exact\|coherent +exact \(all candidates\)", said), (
-        "words that are given stay as they are"
-    )
-    assert re.search(r"--known FILE +mrf: what", said), "where options of several methods are together it is told"
+    assert re.search(r"Method multires:\n  --alpha FLOAT\|auto +Exchange places", said)
+    assert re.search(r"--known FILE +mrf: keep what", said), "where options of several methods are together it is told"
+
+
+def test_the_help_of_an_option_begins_with_what_it_does():
+    for command, one in OPTIONS:
+        said = one.get_help_record(click.Context(load(command)))[1]
+        for part in re.split(r"(?:^|\] )(?:(?:mrf|multires|pyramid)(?:, |: ))+", said):
+            first = re.sub("(?i)^in a coherent search, ", "", part).partition(" ")[0].rstrip(":,").lower()
+            assert not part or first in VERBS, f"{command} {one.opts[0]}: {part}"
 
 
 def test_a_short_list_has_no_groups():

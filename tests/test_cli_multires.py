@@ -59,13 +59,13 @@ def test_everything_at_once(folder):
         "--filter-size",
         5,
     ]
-    args += ["--phase", "free", "--levels", 4, "--boundary", "open", "--edges", "keep", "--joins", "cut"]
+    args += ["--parity", "free", "--levels", 4, "--boundary", "open", "--edges", "keep", "--seams", "cut"]
     args += ["--stages", folder / "st"]
     result = synth(folder, *args, "--source-map", folder / "s.npz", "--also", f"{folder}/colour.png={folder}/c.png")
     assert result.exit_code == 0, result.output
     made = image.read(folder / "out.png").pixels
     options = {"alpha": 0.6, "beta": 0.5, "orientations": 3, "sigma": 0.8, "filter_size": 5}
-    options |= {"phase": "free", "levels": 4, "boundary": "open", "edges": "keep", "joins": "cut"}
+    options |= {"parity": "free", "levels": 4, "boundary": "open", "edges": "keep", "seams": "cut"}
     options |= {"rng": 5, "device": "reference"}
     expected = simdtex.synthesize(texture((16, 12)), (26, 30), method="multires", **options)
     np.testing.assert_array_equal(made, expected)
@@ -110,9 +110,9 @@ BAD = {
     "target": (["--alpha", "auto", "--target", 0], "target is 0.0; give a number of at least 1"),
     "filter size": (["--filter-size", 4], "give an odd number"),
     "features": (["--features", "hue"], "choose one of: luminance, channels"),
-    "phase": (["--phase", "any"], "choose one of: match, free"),
+    "parity": (["--parity", "any"], "choose one of: match, free"),
     "edges": (["--edges", "reflect"], "choose one of: mend, keep"),
-    "joins": (["--joins", "glue"], "choose one of: blend, cut"),
+    "seams": (["--seams", "glue"], "choose one of: blend, cut"),
     "levels": (["--levels", 9], "levels=9 is too many for this sample; give at most 5"),
     "an option of mrf": (["--order", 8], "choose from: alpha, beta"),
     "accounting": (["--accounting"], "--accounting is of the method mrf"),
@@ -167,7 +167,7 @@ def test_a_sheet_of_colour_says_the_seed(folder):
         (["--alphas", ""], "must be numbers"),
         (["--alphas", "-0.1"], "alpha is -0.1"),
         (["--betas", "-1"], "beta is -1.0"),
-        (["--alphas", "0.1", "--phase", "any"], "choose one of: match, free"),
+        (["--alphas", "0.1", "--parity", "any"], "choose one of: match, free"),
         (["--size", "0x1"], "size"),
         (["-o", "sheet.xyz"], "end its name in"),
         (["-o", "sample.png"], "is an input and would be overwritten"),

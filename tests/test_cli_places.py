@@ -30,7 +30,7 @@ TEXTS = {
         "edges",
         "boundary",
     ),
-    *("categorical_channels", "weights", "shares", "proportions", "alpha", "features", "phase", "joins", "pyramid"),
+    *("categorical_channels", "weights", "shares", "proportions", "alpha", "features", "parity", "seams", "pyramid"),
     *("match", "color", "schedule", "array", "mapping", "solids", "slices", "average", "blend", "pixels", "names"),
     *("alphas", "betas", "palette", "pattern", "low", "high", "scheduler"),
 }

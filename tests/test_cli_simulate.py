@@ -156,29 +156,29 @@ def test_a_training_image_may_be_unknown_in_parts(folder):
 
 
 def test_a_table_of_hard_data(folder):
-    found = made(folder, "grey.png", "-n", 2, "--hard", "wells.csv", "--size", "14x12")
+    found = made(folder, "grey.png", "-n", 2, "--known", "wells.csv", "--size", "14x12")
     assert (found.values[:, 4, 3] == 200).all() and (found.values[:, 7, 10] == 17).all()
     table = read_hard_data(folder / "wells.csv")
-    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 2, shape=(12, 14), hard=table, **OPTIONS))
+    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 2, shape=(12, 14), known=table, **OPTIONS))
 
 
 def test_a_table_leaves_the_size_to_the_training_image(folder):
-    assert made(folder, "grey.png", "--hard", "wells.csv").shape == (1, 16, 20)
+    assert made(folder, "grey.png", "--known", "wells.csv").shape == (1, 16, 20)
 
 
 @pytest.mark.parametrize("name", ["known.png", "known.tif"])
 def test_a_picture_of_hard_data(folder, name):
-    found = made(folder, "grey.png", "-n", 2, "--hard", name)
+    found = made(folder, "grey.png", "-n", 2, "--known", name)
     known = pixels(folder, "known.tif")
     there = ~np.isnan(known)
     assert found.shape == (2, 12, 14)
     for one in found.values:
         assert np.array_equal(one[there], known[there])
-    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 2, hard=known, **OPTIONS))
+    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 2, known=known, **OPTIONS))
 
 
 def test_categories(folder):
-    found = made(folder, "facies.png", "-n", 2, "--hard", "facies.csv", "--size", "14x12", "--categorical")
+    found = made(folder, "facies.png", "-n", 2, "--known", "facies.csv", "--size", "14x12", "--categorical")
     assert set(np.unique(found)) == {0, 3}
     assert (found.values[:, 4, 3] == 3).all() and (found.values[:, 7, 10] == 0).all()
 
@@ -193,7 +193,7 @@ def test_an_existing_file_is_replaced(folder):
 
 def test_a_report_is_a_page_and_numbers(folder):
     pytest.importorskip("gstools")
-    args = ("--hard", "facies.csv", "--size", "14x12", "--categorical", "--report", "report")
+    args = ("--known", "facies.csv", "--size", "14x12", "--categorical", "--report", "report")
     made(folder, "facies.png", "-n", 2, *args)
     page = (folder / "report" / "index.html").read_text(encoding="utf-8")
     assert "simdtex simulate" in page and "facies.csv" in page
@@ -206,16 +206,16 @@ def test_a_report_is_a_page_and_numbers(folder):
 GREY = ["grey.png", "-o", "out.npz", "--size", "14x12"]
 FACIES = ["facies.png", "-o", "out.npz", "--size", "14x12", "--categorical"]
 BAD = {
-    "data outside": ([*GREY, "--hard", "outside.csv"], "line 3 of the hard data is at x 40"),
-    "data that disagree": ([*GREY, "--hard", "disagree.csv"], "keep one of them"),
-    "data beyond the type": ([*GREY, "--hard", "beyond.csv"], "uint8 cannot hold"),
-    "data of two variables": ([*GREY, "--hard", "two.csv"], "has 2 values to a datum"),
-    "data in words": ([*GREY, "--hard", "words.csv"], "'sand' in column 3"),
-    "no such data": ([*GREY, "--hard", "none.csv"], "does not exist"),
-    "data everywhere": (["float.tif", "-o", "out.npz", "--hard", "full.tif"], "known everywhere"),
-    "data of another size": (["grey.png", "-o", "out.npz", "--hard", "known.tif", "--size", "9x9"], "14x12"),
-    "a colour picture of data": ([*GREY, "--hard", "colour.png"], "convert them to one type"),
-    "an unknown category": ([*FACIES, "--hard", "strange.csv"], "the category 1 and the sample has 0, 3"),
+    "data outside": ([*GREY, "--known", "outside.csv"], "line 3 of the hard data is at x 40"),
+    "data that disagree": ([*GREY, "--known", "disagree.csv"], "keep one of them"),
+    "data beyond the type": ([*GREY, "--known", "beyond.csv"], "uint8 cannot hold"),
+    "data of two variables": ([*GREY, "--known", "two.csv"], "has 2 values to a datum"),
+    "data in words": ([*GREY, "--known", "words.csv"], "'sand' in column 3"),
+    "no such data": ([*GREY, "--known", "none.csv"], "does not exist"),
+    "data everywhere": (["float.tif", "-o", "out.npz", "--known", "full.tif"], "known everywhere"),
+    "data of another size": (["grey.png", "-o", "out.npz", "--known", "known.tif", "--size", "9x9"], "14x12"),
+    "a colour picture of data": ([*GREY, "--known", "colour.png"], "convert them to one type"),
+    "an unknown category": ([*FACIES, "--known", "strange.csv"], "the category 1 and the sample has 0, 3"),
     "an unknown suffix": (["grey.png", "-o", "out.xyz"], "names no format of realisations"),
     "a picture as output": (["grey.png", "-o", "out.png"], "names no format of realisations"),
     "the training image overwritten": (["grey.png", "-o", "grey.png"], "grey.png"),

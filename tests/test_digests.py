@@ -19,7 +19,7 @@ import simdtex
 
 PINNED = Path(__file__).with_name("digests.json")
 
-PAPER = {"edges": "keep", "joins": "cut"}
+PAPER = {"edges": "keep", "seams": "cut"}
 """What the paper says of ``multires``, with the bytes of the versions before these options."""
 
 # sample, output shape, options: larger than the runs of test_bits, on the device that is preferred here.

@@ -403,7 +403,7 @@ def test_on_a_torus_a_hole_at_an_edge_sees_the_other_side():
 
 def test_the_same_bytes_on_every_device(machine):
     colour = texture(SHAPE, 3)
-    sides = {"tile": True, "band": 3, "channel_axis": -1}
+    sides = {"seamless": True, "band": 3, "channel_axis": -1}
     for make in (
         lambda m: fill(colour, MIDDLE, channel_axis=-1, device=m),
         lambda m: extend(colour, device=m, **sides),
@@ -455,7 +455,7 @@ def test_each_side_alone(side):
 @pytest.mark.parametrize("axis", [None, 0])
 def test_a_tile_keeps_all_but_its_bands(tile, inner, axis):
     image = with_axis(axis)
-    found, output = extend(image, tile=tile, band=3, channel_axis=axis, finish=0.0, full_output=True)
+    found, output = extend(image, seamless=tile, band=3, channel_axis=axis, finish=0.0, full_output=True)
     ours, theirs = planes(axis, found), planes(axis, image)
     assert ours.shape == theirs.shape
     assert_same_bits(ours[inner].copy(), theirs[inner].copy())
@@ -469,7 +469,7 @@ def test_a_tile_keeps_all_but_its_bands(tile, inner, axis):
 
 def test_a_tile_that_grows_in_one_direction_has_a_band_in_the_other_alone():
     image = texture(SHAPE)
-    found = extend(image, tile=True, right=5, band=3)
+    found = extend(image, seamless=True, right=5, band=3)
     assert found.shape == (16, 25)
     assert_same_bits(found[3:-3, :20].copy(), image[3:-3])
     assert (found[:3, :20] != image[:3]).any()
@@ -478,7 +478,7 @@ def test_a_tile_that_grows_in_one_direction_has_a_band_in_the_other_alone():
 def test_the_default_band_is_an_eighth_of_the_shorter_side_and_8_at_least():
     for shape, width in (((24, 30), 8), ((72, 80), 9)):
         image = texture(shape)
-        found = extend(image, tile="x", finish=0.0)
+        found = extend(image, seamless="x", finish=0.0)
         assert_same_bits(found[:, width:-width].copy(), image[:, width:-width].copy())
         assert (found[:, :width] != image[:, :width]).mean() > 0.5
 
@@ -494,13 +494,13 @@ def test_a_tile_wraps(finish, most):
     """Of stripes that do not fit their picture the step across the seam is 93; a tile has 58, and finished 34."""
     for axis in (0, 1):
         images = [texture((32, 40), seed=seed) for seed in range(2)]
-        tiles = [extend(image, tile=True, band=5, finish=finish, rng=seed) for seed, image in enumerate(images)]
+        tiles = [extend(image, seamless=True, band=5, finish=finish, rng=seed) for seed, image in enumerate(images)]
         assert np.mean([step(tile, axis) for tile in tiles]) < most * np.mean([step(image, axis) for image in images])
 
 
 def test_a_tile_along_x_wraps_along_x_alone():
     image = texture((32, 40))
-    found = extend(image, tile="x", band=5)
+    found = extend(image, seamless="x", band=5)
     assert step(found, 1) < 0.55 * step(image, 1)
     assert np.array_equal(found[[0, -1], 5:-5], image[[0, -1], 5:-5])
 
@@ -562,20 +562,28 @@ def test_bad_input_to_fill_is_refused_with_a_remedy(case):
 
 
 BAD_EXTEND = {
-    "nothing to add": ({}, ValueError, "nothing to add; give top, bottom, left or right, or tile=True"),
+    "nothing to add": ({}, ValueError, "nothing to add; give top, bottom, left or right, or seamless=True"),
     **{side: ({side: -3}, ValueError, f"{side} is -3; give 0 or more") for side in ("top", "bottom", "left", "right")},
     "half a pixel": ({"left": 0.5}, TypeError, "left must be an integer"),
-    "a tile in z": ({"tile": "z"}, ValueError, "tile is 'z'; give True, False"),
-    "no tile": ({"tile": None}, ValueError, "tile is None; give True, False"),
-    "no band": ({"tile": True, "band": 0}, ValueError, "band is 0; give 1 or more"),
-    "half a band": ({"tile": True, "band": 2.5}, TypeError, "band must be an integer"),
-    "all a band": ({"tile": True, "band": 8}, ValueError, "band=8 leaves nothing of a picture of 16x20 .* narrower"),
-    "all a band by default": ({"tile": "y"}, ValueError, "band=8 leaves nothing"),
+    "a tile in z": ({"seamless": "z"}, ValueError, "seamless is 'z'; give True, False"),
+    "no tile": ({"seamless": None}, ValueError, "seamless is None; give True, False"),
+    "no band": ({"seamless": True, "band": 0}, ValueError, "band is 0; give 1 or more"),
+    "half a band": ({"seamless": True, "band": 2.5}, TypeError, "band must be an integer"),
+    "all a band": (
+        {"seamless": True, "band": 8},
+        ValueError,
+        "band=8 leaves nothing of a picture of 16x20 .* narrower",
+    ),
+    "all a band by default": ({"seamless": "y"}, ValueError, "band=8 leaves nothing"),
     "NaN": ({"image": holding(np.nan), "left": 2}, ValueError, "NaN or infinite, the first at row 3.*: fill them"),
     "infinite": ({"image": holding(np.inf), "left": 2}, ValueError, "fill them first"),
     "text": ({"image": IMAGE.astype(str), "left": 2}, TypeError, "convert it"),
     "colour": ({"image": texture(SHAPE, 3), "left": 2}, ValueError, "or channel_axis=-1"),
-    "a boundary": ({"tile": True, "band": 3, "boundary": "open"}, ValueError, "follows from tile; leave boundary out"),
+    "a boundary": (
+        {"seamless": True, "band": 3, "boundary": "open"},
+        ValueError,
+        "follows from seamless; leave boundary out",
+    ),
     "an unknown option": ({"left": 2, "reach": 3}, TypeError, "unknown option 'reach'"),
     "an order": ({"left": 2, "order": 200}, ValueError, "largest order that fits"),
     "a seed": ({"left": 2, "rng": "x"}, TypeError, "an integer or a numpy.random.Generator"),
@@ -592,7 +600,7 @@ def test_bad_input_to_extend_is_refused_with_a_remedy(case):
 
 
 def test_a_band_as_wide_as_fits_is_taken():
-    found = extend(IMAGE, tile=True, band=7)
+    found = extend(IMAGE, seamless=True, band=7)
     assert_same_bits(found[7:9, 7:13].copy(), IMAGE[7:9, 7:13].copy())
 
 

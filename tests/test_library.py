@@ -110,11 +110,11 @@ class Beside(Library):
         return found
 
 
-@pytest.mark.parametrize("phase", ["match", "free"])
+@pytest.mark.parametrize("parity", ["match", "free"])
 @pytest.mark.parametrize("shape", [(32, 32), (24, 40)])
-def test_pixels_have_as_many_candidates(phase, shape):
+def test_pixels_have_as_many_candidates(parity, shape):
     machine, pixels = Beside(), texture((32, 32))[..., None]
-    options = multires.make_options(phase=phase, alpha=0.6, edges="keep")
+    options = multires.make_options(parity=parity, alpha=0.6, edges="keep")
     _, run = multires.resample(machine, analyse(machine, pixels, **options.analysis), shape, options, 1)
     assert machine.used["candidates"] >= 4
     assert run.stages[-1].candidates.max() > 1

@@ -76,7 +76,7 @@ def test_alpha_0_tiles_the_source_map_of_an_output_of_any_size(shape):
 
 
 def test_alpha_0_without_phase_keeps_to_one_parent_and_scrambles_its_children():
-    _, output = run(texture((13, 7)), (39, 28), alpha=0, phase="free")
+    _, output = run(texture((13, 7)), (39, 28), alpha=0, parity="free")
     above, fine = output.stages[-2:]
     assert np.array_equal(fine.source // 2, above.source[ancestors(fine, (13, 7), 1)])
     inside = (fine.source < [12, 6]).all(-1)  # of parents with four children
@@ -107,8 +107,8 @@ def test_alpha_0_tiles_the_sample_on_a_device(any_device):
 @pytest.mark.parametrize("size", [(8, 8), (13, 7)], ids=str)
 @pytest.mark.parametrize("beta", [0, 1])
 def test_infinite_alpha_leaves_nothing_out(size, beta):
-    for phase in ("match", "free"):
-        _, output = run(texture(size), (17, 11), alpha=INF, beta=beta, phase=phase)
+    for parity in ("match", "free"):
+        _, output = run(texture(size), (17, 11), alpha=INF, beta=beta, parity=parity)
         assert (output.stages[0].candidates == 1).all()
         for stage in output.stages[1:]:
             own = sizes(size)[stage.level]
@@ -116,7 +116,7 @@ def test_infinite_alpha_leaves_nothing_out(size, beta):
                 stage.candidates.ravel(), tiling(stage.candidates.shape, own).reshape(-1, 2), strict=True
             ):
                 of = [sum(as_large(n, stage.level, k)) for n, k in zip(size, place, strict=True)]
-                assert count == math.prod(of if phase == "match" else own)
+                assert count == math.prod(of if parity == "match" else own)
 
 
 def test_infinite_alpha_draws_each_band_evenly_and_on_its_own():
@@ -132,7 +132,7 @@ def test_infinite_alpha_draws_each_band_evenly_and_on_its_own():
 
 
 def test_infinite_alpha_without_phase_draws_from_every_pixel():
-    _, output = run(texture((7, 5)), (35, 40), alpha=INF, phase="free")
+    _, output = run(texture((7, 5)), (35, 40), alpha=INF, parity="free")
     for stage, (rows, cols) in zip(output.stages[1:], reversed(sizes((7, 5))[:-1]), strict=True):
         drawn = np.bincount((stage.source @ [cols, 1]).ravel(), minlength=rows * cols)
         assert chisquare(drawn).pvalue > SIGNIFICANCE
@@ -207,12 +207,12 @@ def reconstructions(sample, output, torus, blend=True):
 
 @pytest.mark.parametrize("boundary", ["torus", "open"])
 @pytest.mark.parametrize(("size", "shape"), [((16, 16), (40, 32)), ((13, 7), (20, 24)), ((9, 22), (4, 30))], ids=str)
-@pytest.mark.parametrize("joins", ["blend", "cut"])
-def test_every_level_is_its_copied_bands_added_up(size, shape, boundary, joins):
+@pytest.mark.parametrize("seams", ["blend", "cut"])
+def test_every_level_is_its_copied_bands_added_up(size, shape, boundary, seams):
     sample = texture(size, 3)
-    for options in ({}, {"alpha": INF, "phase": "free"}, {"alpha": 1.0, "features": "channels"}):
-        _, output = run(sample, shape, boundary=boundary, edges="keep", joins=joins, **options)
-        pictures = reconstructions(sample, output, boundary == "torus", joins == "blend")
+    for options in ({}, {"alpha": INF, "parity": "free"}, {"alpha": 1.0, "features": "channels"}):
+        _, output = run(sample, shape, boundary=boundary, edges="keep", seams=seams, **options)
+        pictures = reconstructions(sample, output, boundary == "torus", seams == "blend")
         for stage, expected in zip(output.stages, pictures, strict=True):
             # Half a grey level is the last rounding; those of the levels are 2**-20 of the range each, a few dozen.
             assert abs(stage.image - np.clip(expected, 0, 255)).max() < 1
@@ -220,7 +220,7 @@ def test_every_level_is_its_copied_bands_added_up(size, shape, boundary, joins):
 
 def test_float_pixels_stay_in_the_samples_range():
     sample = texture((13, 7), dtype=np.float32)
-    image, output = run(sample, (20, 24), alpha=INF, joins="cut")
+    image, output = run(sample, (20, 24), alpha=INF, seams="cut")
     assert image.dtype == np.float32
     assert all(sample.min() <= s.image.min() <= s.image.max() <= sample.max() for s in output.stages)
     [*_, expected] = reconstructions(sample[..., None], output, torus=True, blend=False)
@@ -262,7 +262,7 @@ def passing(similar, output, size, level):
 def check_candidates(sample, shape, table, **options):
     """Every pixel was drawn from its candidates, and they were counted, as the equations have it."""
     _, output = run(sample, shape, **options)
-    size, phase = sample.shape[:2], options.pop("phase", "match")
+    size, parity = sample.shape[:2], options.pop("parity", "match")
     bearing = {name: value for name, value in options.items() if name not in ("alpha", "beta", "thresholds")}
     found = analyse(REFERENCE, sample.reshape(*size, -1), **bearing)
     similar = alike(found, 1 + 2 * options.get("orientations", 4), table)
@@ -271,7 +271,7 @@ def check_candidates(sample, shape, table, **options):
         passed = passing(similar, output, size, stage.level)
         children = [np.minimum(2, n - 2 * i) for n, i in zip(own, np.indices(above), strict=True)]
         each = (children[0] * children[1]).ravel()
-        if phase == "match":
+        if parity == "match":
             mine = (tiling(stage.candidates.shape, own)[..., axis] for axis in (0, 1))
             rows, cols = (
                 np.array([as_large(n, stage.level, k) for k in range(m)])[places]
@@ -283,7 +283,7 @@ def check_candidates(sample, shape, table, **options):
         parent = stage.source // 2 @ [above[1], 1]
         assert np.take_along_axis(passed, parent[..., None], -1).all(), "the parent is similar to the pixel's own"
         assert (stage.source < own).all() and (stage.source >= 0).all()
-        if phase == "match":
+        if parity == "match":
             assert np.array_equal(stage.source % 2, tiling(stage.candidates.shape, own) % 2), "its parity"
 
 
@@ -296,7 +296,7 @@ def check_candidates(sample, shape, table, **options):
     st.fixed_dictionaries(
         {},
         optional={
-            "phase": st.just("free"),
+            "parity": st.just("free"),
             "boundary": st.just("open"),
             "features": st.just("channels"),
             "orientations": st.sampled_from([1, 3]),
@@ -313,12 +313,12 @@ def test_candidates_are_those_of_the_equations(size, shape, channels, alpha, bet
     check_candidates(texture(size, channels), shape, table, alpha=alpha, beta=beta, **options)
 
 
-@pytest.mark.parametrize("phase", ["match", "free"])
-def test_candidates_are_those_of_a_table_of_thresholds(phase):
+@pytest.mark.parametrize("parity", ["match", "free"])
+def test_candidates_are_those_of_a_table_of_thresholds(parity):
     rng = np.random.default_rng(5)
     for columns in (1, 9):
         table = rng.choice([0.1, 0.5, 2.0, 3.0, INF], (4, columns))
-        check_candidates(texture((13, 12)), (20, 17), table, thresholds=table, phase=phase)
+        check_candidates(texture((13, 12)), (20, 17), table, thresholds=table, parity=parity)
 
 
 def test_without_orientations_bands_are_compared_alone():
@@ -327,7 +327,7 @@ def test_without_orientations_bands_are_compared_alone():
     check_candidates(texture((13, 7), 3), (20, 17), table, alpha=0.5, orientations=0, features="channels")
 
 
-@pytest.mark.parametrize("options", [{}, {"phase": "free", "boundary": "open", "features": "channels"}], ids=str)
+@pytest.mark.parametrize("options", [{}, {"parity": "free", "boundary": "open", "features": "channels"}], ids=str)
 def test_a_device_gives_the_same_bits(any_device, options):
     sample = texture((13, 7), 3)
     given = {"alpha": 0.6, "beta": 0.5} | options
@@ -341,7 +341,7 @@ def test_a_device_gives_the_same_bits(any_device, options):
 
 def test_without_phase_is_another_picture():
     sample = texture((16, 16))
-    match, free = (run(sample, (20, 24), phase=phase)[0] for phase in ("match", "free"))
+    match, free = (run(sample, (20, 24), parity=parity)[0] for parity in ("match", "free"))
     assert (match != free).mean() > 0.1
 
 
@@ -359,8 +359,8 @@ def test_candidates_grow_with_alpha():
     assert counts[0].mean() < counts[5].mean() < counts[-1].mean()
 
 
-@pytest.mark.parametrize("phase", ["match", "free"])
-def test_candidates_grow_with_alpha_at_every_level(phase):
+@pytest.mark.parametrize("parity", ["match", "free"])
+def test_candidates_grow_with_alpha_at_every_level(parity):
     sample = texture((12, 14))
     found = analyse(REFERENCE, sample[..., None])
     begins = np.cumsum([0, *(math.prod(size) for size in found.shapes)])
@@ -374,7 +374,7 @@ def test_candidates_grow_with_alpha_at_every_level(phase):
         for level, size in enumerate(found.shapes[:-1]):  # all of it is the sample itself
             source = np.concatenate([np.arange(math.prod(size), dtype=np.int32) for size in found.shapes])
             sampled = Sampled(source, counts, lattice)
-            candidates(REFERENCE, structure, sampled, level, 0, math.prod(size), phase == "match", 1)
+            candidates(REFERENCE, structure, sampled, level, 0, math.prod(size), parity == "match", 1)
         assert (counts[:, 0] >= before).all()
         before = counts[:, 0]
 
@@ -439,7 +439,7 @@ SCALED = {
 
 @pytest.mark.parametrize("name", SCALED)
 def test_neither_contrast_nor_a_constant_changes_an_arrangement(name):
-    for options in ({}, {"alpha": 0.8, "beta": 1}, {"phase": "free", "boundary": "open", "alpha": "auto"}):
+    for options in ({}, {"alpha": 0.8, "beta": 1}, {"parity": "free", "boundary": "open", "alpha": "auto"}):
         _, output = run(DARK, (20, 22), **options)
         image, other = run(SCALED[name], (20, 22), **options)
         assert image.dtype == SCALED[name].dtype

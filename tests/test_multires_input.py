@@ -68,8 +68,8 @@ def test_the_channel_axis_is_kept(axis):
 @pytest.mark.parametrize("shape", [(1, 1), (1, 40), (40, 1), (3, 2), (70, 45), (np.int64(4), 4)], ids=str)
 @pytest.mark.parametrize("boundary", ["torus", "open"])
 def test_any_size(shape, boundary):
-    for phase in ("match", "free"):
-        image, output = run(texture((13, 7)), shape, boundary=boundary, phase=phase)
+    for parity in ("match", "free"):
+        image, output = run(texture((13, 7)), shape, boundary=boundary, parity=parity)
         assert image.shape == shape
         assert output.source.shape == (*shape, 2)
         assert (output.source < [13, 7]).all()
@@ -78,7 +78,7 @@ def test_any_size(shape, boundary):
 @pytest.mark.parametrize("size", [(1, 1), (1, 5), (5, 1), (2, 2), (3, 3), (4, 4)], ids=str)
 def test_a_sample_too_small_for_the_filters_works_and_says_so(size, caplog):
     sample = texture(size, 3)
-    for options in ({"alpha": 0}, {}, {"alpha": "auto", "phase": "free"}, {"boundary": "open", "alpha": INF}):
+    for options in ({"alpha": 0}, {}, {"alpha": "auto", "parity": "free"}, {"boundary": "open", "alpha": INF}):
         caplog.clear()
         image, output = run(sample, (10, 15), **options)
         assert image.shape == (10, 15, 3)
@@ -303,7 +303,7 @@ class Asked(Reference):
 def test_memory_grows_with_the_output_and_with_nothing_else(channels):
     sample, asked = texture((13, 7), channels), {}
     for cols in (14, 28, 42, 70):  # whole tiles
-        for options in ({"alpha": 0}, {"alpha": INF}, {"alpha": INF, "phase": "free"}):
+        for options in ({"alpha": 0}, {"alpha": INF}, {"alpha": INF, "parity": "free"}):
             machine = Asked()
             synthesize(sample, (40, cols), device=machine, **options)
             asked.setdefault(cols, set()).add(tuple(machine.sizes))
@@ -403,7 +403,7 @@ def test_a_strain_is_what_neighbours_differ_by_from_what_the_other_goes_on_with(
 def test_strangers_strain_by_1():
     noise = np.random.default_rng(1).integers(0, 256, (128, 128, 1)).astype(np.uint8)
     analysis = analyse(REFERENCE, noise, edges="keep", levels=3)
-    free = multires.strain(REFERENCE, analysis, multires.make_options(phase="free"), INF)
+    free = multires.strain(REFERENCE, analysis, multires.make_options(parity="free"), INF)
     assert free == pytest.approx(1, abs=0.05)
 
 
@@ -433,7 +433,7 @@ SAMPLE = texture((13, 7))
 FLOAT = texture((13, 7), dtype=np.float64)
 UNKNOWN = (
     "unknown option '{}' of the method 'multires'; choose from: alpha, beta, strain, target, thresholds, orientations, "
-    "sigma, filter_size, features, levels, phase, boundary, edges, joins"
+    "sigma, filter_size, features, levels, parity, boundary, edges, seams"
 )
 
 
@@ -473,7 +473,7 @@ BAD = [
     ({"strain": -0.1}, ValueError, "strain is -0.1; give a number of at least 0"),
     ({"strain": "low"}, TypeError, "strain must be a number, not 'low'"),
     ({"edges": "reflect"}, ValueError, "unknown edges 'reflect'; choose one of: mend, keep"),
-    ({"joins": "fade"}, ValueError, "unknown joins 'fade'; choose one of: blend, cut"),
+    ({"seams": "fade"}, ValueError, "unknown seams 'fade'; choose one of: blend, cut"),
     ({"orientations": -1}, ValueError, "orientations is -1; give 0 or more"),
     ({"orientations": 2.5}, TypeError, "orientations must be an integer, not 2.5"),
     ({"sigma": 0}, ValueError, "sigma is 0; give a number of at least 0.2"),
@@ -484,7 +484,7 @@ BAD = [
     ({"filter_size": 4}, ValueError, "filter_size is 4; give an odd number, 3 or 5"),
     ({"filter_size": 1}, ValueError, "filter_size is 1; give 3 or more"),
     ({"filter_size": 2.0}, TypeError, "filter_size must be an integer, not 2.0"),
-    ({"phase": "both"}, ValueError, "unknown phase 'both'; choose one of: match, free"),
+    ({"parity": "both"}, ValueError, "unknown parity 'both'; choose one of: match, free"),
     ({"features": "hue"}, ValueError, "unknown features 'hue'; choose one of: luminance, channels"),
     ({"boundary": "mirror"}, ValueError, "unknown boundary 'mirror'; choose one of: torus, open"),
     ({"levels": 0}, ValueError, "levels is 0; give 1 or more"),

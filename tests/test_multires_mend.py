@@ -137,7 +137,7 @@ def test_the_strip_is_the_one_that_fits_best_and_ends_where_it_differs_least():
     rows, cost = range(12), costs[start]
     first, last = inside.argmax(1), 15 - inside[:, ::-1].argmax(1)
     assert (inside == (col >= first[:, None]) & (col <= last[:, None])).all(), (
-        "the join is covered, and no hole is left"
+        "the seam is covered, and no hole is left"
     )
     for cut, half in ((first - 1, cost[:, :7]), (last - 8, cost[:, 8:])):
         assert half[rows, cut].sum() == half[rows, _path(half, closed=False)].sum()
@@ -160,7 +160,7 @@ def test_the_source_map_is_of_the_sample_as_given(boundary):
 @pytest.mark.parametrize("alpha", [0.3, "auto"])
 def test_a_texture_tiles_and_shows_no_lines(alpha):
     names = ("gravel", "grass", "coffee")
-    plain = {"edges": "keep", "joins": "cut"}
+    plain = {"edges": "keep", "seams": "cut"}
     pictures = {n: run(PHOTOGRAPHS[n], 2 * len(PHOTOGRAPHS[n]), alpha=alpha) for n in names}
     before = {n: run(PHOTOGRAPHS[n], 2 * len(PHOTOGRAPHS[n]), alpha=alpha, **plain) for n in names}
     assert np.median([seam(picture) for picture in before.values()]) > 1.3
@@ -172,7 +172,7 @@ def test_a_texture_tiles_and_shows_no_lines(alpha):
 def test_blending_takes_nothing_from_elsewhere():
     """What is drawn is the same; only bands where pieces meet differ."""
     sample = PHOTOGRAPHS["gravel"]
-    (cut, one), (blend, two) = (run(sample, 192, joins=joins, full_output=True) for joins in ("cut", "blend"))
+    (cut, one), (blend, two) = (run(sample, 192, seams=seams, full_output=True) for seams in ("cut", "blend"))
     assert_same_bits(one.source, two.source)
     assert (cut != blend).any()
     assert max(lines(blend, 8), lines(blend, 16)) < max(lines(cut, 8), lines(cut, 16))

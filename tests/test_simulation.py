@@ -56,7 +56,7 @@ def test_a_realisation_is_what_synthesize_gives_with_its_seed():
     assert DEFAULTS == {"boundary": "open", "novelty": 0.25}
     data = holed()
     options = {"order": 2, "device": "reference"}
-    found = simulate(texture((16, 20), dtype=np.float32), hard=data)
+    found = simulate(texture((16, 20), dtype=np.float32), known=data)
     for seed, values in zip(found.seed.values, found.values, strict=True):
         own = simdtex.synthesize(
             texture((16, 20), dtype=np.float32), SHAPE, rng=int(seed), known=data, **DEFAULTS, **options
@@ -106,7 +106,7 @@ def test_several_training_images():
 def test_data_are_kept_to_the_bit_in_every_realisation(dtype):
     data = holed(dtype)
     known = ~np.isnan(data)
-    found = simulate(texture((16, 20), dtype=dtype), n=3, hard=data)
+    found = simulate(texture((16, 20), dtype=dtype), n=3, known=data)
     assert found.dtype == dtype
     for one in found.values:
         assert_same_bits(one[known], data[known].astype(dtype))
@@ -121,10 +121,10 @@ def test_all_forms_of_data_give_the_same(tmp_path):
     path = tmp_path / "wells.csv"
     path.write_text("x,y,value\n" + "\n".join(lines) + "\n")
     training = texture((16, 20), dtype=np.float32)
-    expected = simulate(training, hard=data)
+    expected = simulate(training, known=data)
     masked = np.ma.MaskedArray(np.nan_to_num(data, nan=7.0), ~known)
     for hard in (masked, read_hard_data(path), path, str(path), np.ma.MaskedArray(data, np.zeros(SHAPE, bool))):
-        found = simulate(training, hard=hard)
+        found = simulate(training, known=hard)
         assert_same_bits(found.values, expected.values)
         assert found.attrs == expected.attrs
 
@@ -132,14 +132,14 @@ def test_all_forms_of_data_give_the_same(tmp_path):
 def test_a_masked_array_of_whole_numbers():
     known = np.random.default_rng(4).random(SHAPE) < 0.1
     data = np.ma.MaskedArray(CATEGORIES[: SHAPE[0], : SHAPE[1]], ~known)
-    found = simulate(CATEGORIES, hard=data, categorical=True)
+    found = simulate(CATEGORIES, known=data, categorical=True)
     for one in found.values:
         assert_same_bits(one[known], data.data[known])
 
 
 def test_the_size_is_that_of_the_data_or_of_the_training_image():
     training = texture((16, 20), dtype=np.float32)
-    assert simulate(training, n=1, shape=None, hard=holed()).shape == (1, *SHAPE)
+    assert simulate(training, n=1, shape=None, known=holed()).shape == (1, *SHAPE)
     assert simulate(training, n=1, shape=None).shape == (1, 16, 20)
     assert simulate(n=1, shape=(np.int64(7), 9)).shape == (1, 7, 9)
 
@@ -149,14 +149,14 @@ def test_a_table_of_several_variables(tmp_path, axis):
     path = tmp_path / "wells.csv"
     path.write_text("x,y,a,b\n3,4,0.5,0.25\n7,2,,0.75\n")
     training = np.moveaxis(texture((16, 20), 2, np.float32), -1, axis)
-    found = simulate(training, n=2, hard=path, channel_axis=axis)
+    found = simulate(training, n=2, known=path, channel_axis=axis)
     placed = place_hard_data(read_hard_data(path), SHAPE, np.float32)
     for one in found.values:
         assert_same_bits(one[~placed.mask], placed.data[~placed.mask])
-    same = simulate(training, n=2, hard=np.ma.MaskedArray(np.moveaxis(placed, -1, axis)), channel_axis=axis)
+    same = simulate(training, n=2, known=np.ma.MaskedArray(np.moveaxis(placed, -1, axis)), channel_axis=axis)
     assert_same_bits(found.values, same.values)
     assert (
-        simulate(training, n=1, hard=np.moveaxis(placed, -1, axis), channel_axis=axis, shape=None).shape[1:3] == SHAPE
+        simulate(training, n=1, known=np.moveaxis(placed, -1, axis), channel_axis=axis, shape=None).shape[1:3] == SHAPE
     )
 
 
@@ -379,4 +379,4 @@ def test_bad_tables_are_refused_with_their_line(tmp_path, case):
     path = tmp_path / "wells.csv"
     path.write_text(text)
     with pytest.raises(ValueError, match=words):
-        simulate(hard=path)
+        simulate(known=path)

@@ -80,7 +80,7 @@ def test_alpha_of_a_sample_too_large_to_count_whole(any_device):
     assert suggest_alpha(REFERENCE, found, Options(alpha="auto", target=6, levels=2)) > alpha
 
 
-def mean_candidates(found, alpha, beta, phase):
+def mean_candidates(found, alpha, beta, parity):
     """Candidates of the sample's own pixels: the mean over the means of the coarser half of the levels sampled."""
     table = [[alpha / k**beta] for k in range(1, found.levels)]
     similar, means = alike(found, 9, table), []
@@ -94,8 +94,8 @@ def mean_candidates(found, alpha, beta, phase):
             together = similar[level + 1]
         row, col = np.indices(found.shapes[level]).reshape(2, -1)
         parent = row // 2 * found.shapes[level + 1][1] + col // 2
-        allowed = together[parent][:, parent if phase == "free" else slice(None)]
-        if phase == "match":
+        allowed = together[parent][:, parent if parity == "free" else slice(None)]
+        if parity == "match":
             size = found.shapes[0]
             large = [np.array([as_large(n, level, k) for k in x]) for n, x in zip(size, (row, col), strict=True)]
             allowed = allowed & large[0][:, above[0]] & large[1][:, above[1]]
@@ -108,7 +108,7 @@ def mean_candidates(found, alpha, beta, phase):
     [
         ((12, 11), {"target": 1.2}),
         ((16, 16), {"target": 1.3, "beta": 1}),
-        ((16, 16), {"target": 5.5, "phase": "free"}),
+        ((16, 16), {"target": 5.5, "parity": "free"}),
         ((24, 20), {"target": 1.4, "boundary": "open"}),
         ((24, 20), {"target": 1.5, "levels": 4, "beta": 1}),
         ((9, 5), {"target": 2.5, "levels": 3}),
@@ -123,6 +123,6 @@ def test_a_suggested_alpha_is_the_least_that_reaches_the_target(size, options):
     assert 0.01 < alpha < 4
     bearing = {name: value for name, value in options.items() if name in ("boundary", "levels")}
     found = analyse(REFERENCE, sample[..., None], **bearing)
-    rest = options.get("beta", 0), options.get("phase", "match")
+    rest = options.get("beta", 0), options.get("parity", "match")
     less = round(alpha * 100 - 1) / 100
     assert mean_candidates(found, less, *rest) < options["target"] <= mean_candidates(found, alpha, *rest)

@@ -44,7 +44,7 @@ COMMANDS = {name: sentence for group in GROUPS.values() for name, sentence in gr
 
 EXAMPLES = (
     ("synth gravel.png -o more.png", "More of a texture; it tiles."),
-    ("extend photo.png -o seamless.png --tile", "A photo that tiles."),
+    ("extend photo.png -o tile.png --seamless", "A photo that tiles."),
     ("fill photo.png -o whole.png --mask hole.png", "A hole that is filled."),
 )
 

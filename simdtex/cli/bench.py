@@ -20,12 +20,13 @@ from simdtex.cli.places import FOLDER, WRITE
 @click.option(
     "--device",
     metavar="TEXT",
-    help="Measure this device alone: part of its name or platform, or an index of `simdtex devices`.  [all usable]",
+    help="Measure that device alone whose name or platform has this in it, or a number of `simdtex devices`.  "
+    "[all usable]",
 )
-@click.option("--quick", is_flag=True, help="Small sizes: within a minute instead of some six.")
+@click.option("--quick", is_flag=True, help="Take small sizes: a minute instead of some six.")
 @click.option("--json", "path", type=WRITE, metavar="FILE", help="Write all that was measured.")
 @click.option("--plot", "folder", type=FOLDER, metavar="DIR", help="Draw rooflines and growth.")
-@click.option("-q", "--quiet", is_flag=True, help="No word on what is being measured, and no tables.")
+@click.option("-q", "--quiet", is_flag=True, help="Say nothing on what is being measured, and show no tables.")
 @plainly
 def bench(device: str | None, quick: bool, path: Path | None, folder: Path | None, quiet: bool) -> None:
     """Measure what devices can do at most, and what the methods take.

@@ -17,9 +17,11 @@ from simdtex.cli.places import FOLDER
 @command(
     ("demo", "Three textures, and a sheet of them, in the folder demo."),
 )
-@click.option("-o", "--output", default="demo", show_default=True, type=FOLDER, help="Folder to write.")
-@click.option("--size", default="256x256", show_default=True, metavar="WIDTHxHEIGHT", help="Of each output.")
-@click.option("--seed", type=int, default=1, show_default=True)
+@click.option("-o", "--output", default="demo", show_default=True, type=FOLDER, help="Write into this folder.")
+@click.option(
+    "--size", default="256x256", show_default=True, metavar="WIDTHxHEIGHT", help="Make outputs of this size, in pixels."
+)
+@click.option("--seed", type=int, default=1, show_default=True, help="Make the pictures from this seed.")
 @DEVICE
 @plainly
 def demo(output: Path, size: str, seed: int, device: str | None) -> None:

@@ -20,34 +20,36 @@ SIDES = ("top", "bottom", "left", "right")
 
 
 @command(
-    ("extend photo.png -o seamless.png --tile", "Make a photo tile."),
+    ("extend photo.png -o tile.png --seamless", "Make a photo tile."),
     ("extend photo.png -o wide.png --left 200 --right 200", "Continue it at both sides."),
-    ("extend photo.png -o seamless.png --tile --also normal.png=seamless-normal.png", "And its normal map with it."),
+    (
+        "extend photo.png -o seamless.png --seamless --also normal.png=seamless-normal.png",
+        "And its normal map with it.",
+    ),
 )
 @click.argument("picture", type=READ)
-@click.option("-o", "--output", required=True, type=WRITE, help="Picture to write.")
-@click.option("--left", type=int, default=0, help="Pixels to add at the left.")
-@click.option("--right", type=int, default=0, help="Pixels to add at the right.")
-@click.option("--top", type=int, default=0, help="Pixels to add at the top.")
-@click.option("--bottom", type=int, default=0, help="Pixels to add at the bottom.")
+@click.option("-o", "--output", required=True, type=WRITE, help="Write this picture.")
+@click.option("--left", type=int, default=0, help="Add this many pixels at the left.")
+@click.option("--right", type=int, default=0, help="Add this many pixels at the right.")
+@click.option("--top", type=int, default=0, help="Add this many pixels at the top.")
+@click.option("--bottom", type=int, default=0, help="Add this many pixels at the bottom.")
 @click.option(
     "--size",
     metavar="WIDTHxHEIGHT",
-    help="Of the output, in pixels, in place of the above: the rest is added at the right and at the bottom.",
+    help="Make an output of this size, in pixels, instead: add at the right and at the bottom.",
 )
-@click.option("--centre", is_flag=True, help="With --size: add on all sides alike.")
+@click.option("--centre", is_flag=True, help="Add on all sides alike, with --size.")
 @click.option(
-    "--tile",
+    "--seamless",
     is_flag=True,
-    help="Make it seamless: the output tiles. In a direction in which nothing is added, a band along the edges is made "
-    "anew.",
+    help="Make the output tile: in a direction in which nothing is added, make a band along the edges anew.",
 )
-@click.option("--tile-x", is_flag=True, help="The same for left and right alone.")
-@click.option("--tile-y", is_flag=True, help="The same for top and bottom alone.")
+@click.option("--seamless-x", is_flag=True, help="Make it tile to the left and right alone.")
+@click.option("--seamless-y", is_flag=True, help="Make it tile to the top and bottom alone.")
 @click.option(
     "--band",
     type=int,
-    help="Pixels that --tile makes anew along each edge.  [an eighth of the shorter side, 8 to 64]",
+    help="Make this many pixels anew along each edge, with --seamless.  [an eighth of the shorter side, 8 to 64]",
 )
 @click.option(
     "--also",
@@ -56,7 +58,12 @@ SIDES = ("top", "bottom", "left", "right")
     metavar="MAP=OUT",
     help="Extend another map of the material (normal, height) in the same arrangement; may be repeated.",
 )
-@click.option("--source-map", type=WRITE, metavar="FILE", help="Write it: .npz, .npy, .png.")
+@click.option(
+    "--source-map",
+    type=WRITE,
+    metavar="FILE",
+    help="Write from where in the picture each pixel is: .npz, .npy or .png.",
+)
 @stages_option("every level and sweep")
 @click.option(
     "--report",
@@ -76,9 +83,9 @@ def extend(
     output: Path,
     size: str | None,
     centre: bool,
-    tile: bool,
-    tile_x: bool,
-    tile_y: bool,
+    seamless: bool,
+    seamless_x: bool,
+    seamless_y: bool,
     band: int | None,
     also: tuple[str, ...],
     source_map: Path | None,
@@ -91,7 +98,7 @@ def extend(
 ) -> None:
     """Continue PICTURE beyond its edges, or make it seamless.
 
-    `simdtex extend photo.png -o seamless.png --tile` makes of a photo a texture that tiles.
+    `simdtex extend photo.png -o tile.png --seamless` makes of a photo a texture that tiles.
     """
     from simdtex import extend as make
     from simdtex.io import image
@@ -103,11 +110,13 @@ def extend(
         sides = _sides(size, centre, sides, whole.sizes[0])
     elif centre:
         raise ValueError("--centre says where the picture lies in --size; give that too")
-    tiling: bool | str = tile or (tile_x and tile_y) or ("x" if tile_x else "y" if tile_y else False)
+    tiling: bool | str = (
+        seamless or (seamless_x and seamless_y) or ("x" if seamless_x else "y" if seamless_y else False)
+    )
     if not (tiling or any(sides.values())):
-        raise ValueError("there is nothing to add; give --left, --right, --top, --bottom or --size, or --tile")
+        raise ValueError("there is nothing to add; give --left, --right, --top, --bottom or --size, or --seamless")
     if band is not None and not tiling:
-        raise ValueError("--band is what --tile makes anew; leave it out, or give --tile")
+        raise ValueError("--band is what --seamless makes anew; leave it out, or give --seamless")
     others = read_also(also, whole)
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, whole)
@@ -121,7 +130,7 @@ def extend(
         extended: Any = make(
             pixels,
             **sides,
-            tile=tiling,
+            seamless=tiling,
             band=band,
             channel_axis=whole.channel_axis,
             rng=seed,

@@ -36,13 +36,13 @@ from simdtex.cli.places import READ, WRITE, WRITE_PAIR
     ),
 )
 @click.argument("picture", type=READ)
-@click.option("-o", "--output", required=True, type=WRITE, help="Picture to write.")
+@click.option("-o", "--output", required=True, type=WRITE, help="Write this picture.")
 @click.option(
     "--mask",
     type=READ,
     metavar="FILE",
-    help="A picture of the same size, white where there is to be something new. Default: what is transparent or NaN in "
-    "PICTURE, and the output has no alpha.",
+    help="Fill where this picture, of the same size, is white.  [where PICTURE is transparent or NaN; "
+    "the output has no alpha then]",
 )
 @click.option(
     "--sample",
@@ -53,7 +53,9 @@ from simdtex.cli.places import READ, WRITE, WRITE_PAIR
     help="Fill with this texture, not with what is around; may be repeated.",
 )
 @click.option(
-    "--reach", type=int, help="How far around a hole it is made from, in pixels.  [128, or twice its longer side]"
+    "--reach",
+    type=int,
+    help="Fill a hole from what is this near, in pixels.  [128, or twice its longer side]",
 )
 @click.option(
     "--also",
@@ -62,7 +64,12 @@ from simdtex.cli.places import READ, WRITE, WRITE_PAIR
     metavar="MAP=OUT",
     help="Fill another map of the material (normal, height) in the same arrangement; may be repeated.",
 )
-@click.option("--source-map", type=WRITE, metavar="FILE", help="Write it: .npz, .npy, .png.")
+@click.option(
+    "--source-map",
+    type=WRITE,
+    metavar="FILE",
+    help="Write from where in the picture each pixel is: .npz, .npy or .png.",
+)
 @SEED
 @DEVICE
 @fill_options

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -15,12 +14,24 @@ Examples = Sequence[tuple[str, str]]
 SECTIONS = {
     "The job": (
         *("output", "outputs", "size", "number", "first", "method", "seed", "mask", "samples", "reach"),
-        *("left", "right", "top", "bottom", "centre", "tile", "tile_x", "tile_y", "band", "solids", "slices"),
+        *(
+            "left",
+            "right",
+            "top",
+            "bottom",
+            "centre",
+            "seamless",
+            "seamless_x",
+            "seamless_y",
+            "band",
+            "solids",
+            "slices",
+        ),
         *("names", "temperatures", "seeds", "sweeps", "burn_in", "alphas", "betas", "quick", "path", "folder"),
         *("palette", "pattern", "average", "low", "high", "split", "blend", "pixels"),
     ),
     "What is given, and what is wanted": (
-        *("known", "hard", "sample_mask", "guide", "guide_weight", "labels", "proportions", "shares", "weights"),
+        *("known", "sample_mask", "guide", "guide_weight", "labels", "proportions", "shares", "weights"),
         *("categorical", "categorical_channels", "data_weight", "unsure"),
     ),
     "What is written besides": ("also", "source_map", "picture", "stages", "report"),
@@ -35,20 +46,17 @@ SECTIONS = {
         *("schedule", "check_schedule", "array", "mapping", "emulate", "accounting"),
     ),
     "Method multires": (
-        *("alpha", "beta", "strain", "target", "thresholds", "sigma", "filter_size", "features", "phase", "joins"),
+        *("alpha", "beta", "strain", "target", "thresholds", "sigma", "filter_size", "features", "parity", "seams"),
     ),
     "Method pyramid": ("pyramid", "iterations", "match", "bins", "color", "start"),
     "Levels and edges, of several methods": ("levels", "boundary", "edges", "orientations"),
-    "Large outputs, and runs that stop and go on": ("tiles", "workers", "scheduler", "dry_run", "checkpoint"),
+    "Large outputs, and runs that stop and go on": ("tiles", "workers", "cluster", "dry_run", "checkpoint"),
     "This machine, and what is told": ("device", "jobs", "port", "host", "browser", "profile", "quiet"),
 }
 """Titles, and the parameters under each."""
 
 OF_COMMANDS = {"ising": {"start": "The job"}}
 """What a name means where it means something else."""
-
-WORDS = re.compile(r"[\w-]+(,| or | \(|:)")
-"""Help that begins with words which an option takes, as they are."""
 
 FEW = 14
 """Options that are listed without groups, at most."""
@@ -107,7 +115,7 @@ def _within(title: str | None, text: str) -> str:
     method, _, rest = text.partition(": ")
     if not (title and rest and title.split(":")[0] == f"Method {method}"):
         return text
-    return rest if WORDS.match(rest) else rest[:1].upper() + rest[1:]
+    return rest[:1].upper() + rest[1:]
 
 
 def command(*examples: tuple[str, str]) -> Callable[[Callable[..., None]], click.Command]:

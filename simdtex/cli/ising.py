@@ -28,7 +28,7 @@ PICTURE_SWEEPS = 50
     ("ising -o page", "All schedules, and a report."),
     ("ising --schedules coloring,synchronous --temperature 2.3", "Two schedules at one temperature."),
 )
-@click.option("--schedules", "names", default=SCHEDULES, metavar="A,B,...", help="Which to try.  [all kinds there are]")
+@click.option("--schedules", "names", default=SCHEDULES, metavar="A,B,...", help="Try these.  [all kinds there are]")
 @click.option(
     "--temperature",
     "temperatures",
@@ -36,17 +36,21 @@ PICTURE_SWEEPS = 50
     multiple=True,
     default=TEMPERATURES,
     metavar="T",
-    help="In units of J / k_B, T_c is 2.269; may be repeated.  [2.0, 2.3 and 2.6]",
+    help="Relax at this temperature, in units of J / k_B, where T_c is 2.269; may be repeated.  [2.0, 2.3 and 2.6]",
 )
-@click.option("--size", default="24", show_default=True, metavar="WIDTHxHEIGHT", help="Of the lattice, a torus.")
-@click.option("--seeds", default=32, show_default=True, help="Independent chains at each temperature, 2 or more.")
-@click.option("--sweeps", default=300, show_default=True, help="Sweeps to measure, 2 or more.")
-@click.option("--burn-in", default=600, show_default=True, help="Sweeps before them.")
-@click.option("--start", default="up", show_default=True, help="up (all spins) or random.")
-@click.option("--seed", default=1, show_default=True, help="Same seed, same numbers on every device.")
+@click.option(
+    "--size", default="24", show_default=True, metavar="WIDTHxHEIGHT", help="Use a lattice of this size, a torus."
+)
+@click.option(
+    "--seeds", default=32, show_default=True, help="Run this many independent chains at each temperature, 2 or more."
+)
+@click.option("--sweeps", default=300, show_default=True, help="Measure this many sweeps, 2 or more.")
+@click.option("--burn-in", default=600, show_default=True, help="Leave out this many sweeps before them.")
+@click.option("--start", default="up", show_default=True, help="Begin with all spins up, or random.")
+@click.option("--seed", default=1, show_default=True, help="Get the same numbers from the same seed, on every device.")
 @DEVICE
 @click.option("-o", "--output", type=FOLDER, metavar="DIR", help="Write a report there.")
-@click.option("-q", "--quiet", is_flag=True, help="No progress and no table.")
+@click.option("-q", "--quiet", is_flag=True, help="Show no progress and no table.")
 @plainly
 def ising(
     names: str,

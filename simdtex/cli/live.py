@@ -24,12 +24,12 @@ EXTRA = "simdtex live needs packages of its own ({}); install them with: pip ins
     ("live --no-browser --port 8080", "It prints its address alone, for a browser of your choice."),
 )
 @click.argument("picture", required=False, type=READ)
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="To listen to.  [a free one]")
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Listen to this port.  [a free one]")
 @click.option(
     "--host",
     default="127.0.0.1",
     show_default=True,
-    help="To listen to. With another one, whoever reaches this machine and knows the page's address can use it.",
+    help="Listen to this address. With another one, whoever can reach it and knows the page's address can use it.",
 )
 @click.option("--browser/--no-browser", default=True, help="Open the page, or print its address alone.")
 @DEVICE

@@ -34,21 +34,29 @@ CHOSEN = ("palette", "pattern", "low", "high")
     ("mix wood.png stone.png -o both.png --palette wood.png --pattern stone.png", "Stone in the colours of wood."),
 )
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
-@click.option("-o", "--output", required=True, type=WRITE, help="Picture to write.")
+@click.option("-o", "--output", required=True, type=WRITE, help="Write this picture.")
 @click.option(
     "--size",
     metavar="WIDTHxHEIGHT",
-    help="Of the output, in pixels. Default: that of --start, else twice the first sample.",
+    help="Make an output of this size, in pixels.  [that of --start, else twice the first sample]",
 )
 @click.option("--palette", metavar="SAMPLE", help="Take the colours of this sample.  [those of the pattern]")
 @click.option("--pattern", metavar="SAMPLE", help="Take the pattern of this sample.  [the average of all]")
 @click.option("--average", metavar="W,W,...", help="Take the average of the patterns, a weight for each sample.")
 @click.option("--low", metavar="SAMPLE", help="Take the low frequencies of this sample, with --high.")
 @click.option("--high", metavar="SAMPLE", help="Take the high frequencies of this sample, with --low.")
-@click.option("--split", type=int, help="Levels that are high frequencies, with --low and --high.  [half of them]")
-@click.option("--blend", help="histograms or quantiles: what is averaged.  [histograms]")
-@click.option("--pixels", help="palette or pattern: whose pixels are matched under --palette.  [palette]")
-@pyramid_options("IMAGE: A picture")
+@click.option(
+    "--split",
+    type=int,
+    help="Count this many levels among the high frequencies, with --low and --high.  [half of them]",
+)
+@click.option("--blend", metavar="histograms|quantiles", help="Average histograms, or quantiles.  [histograms]")
+@click.option(
+    "--pixels",
+    metavar="palette|pattern",
+    help="Match pixels of the palette, or of the pattern, under --palette.  [palette]",
+)
+@pyramid_options("PICTURE: picture")
 @SEED
 @DEVICE
 @stages_option("every iteration")

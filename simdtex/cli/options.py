@@ -65,30 +65,38 @@ option = functools.partial(click.option, cls=Option)
 DEVICE = option(
     "--device",
     metavar="TEXT",
-    help="Part of a device's name or platform, an index of `simdtex devices`, or `reference`. "
-    "Default: SIMDTEX_DEVICE, else a GPU, else a CPU.",
+    help="Run on the device whose name or platform has this in it, on that of a number of `simdtex devices`, or on "
+    "`reference`.  [SIMDTEX_DEVICE, else a GPU, else a CPU]",
 )
 
-SEED = option("--seed", type=int, help="Same seed, same picture on every device.  [a fresh one, printed]")
-PROFILE = option("--profile", is_flag=True, help="Print what each kernel took, and what was left to the host.")
+SEED = option(
+    "--seed", type=int, help="Make the same picture from the same seed, on every device.  [a fresh one, printed]"
+)
+PROFILE = option("--profile", is_flag=True, help="Print what each kernel takes, and what is left to the host.")
 CHECKPOINT = option(
     "--checkpoint",
     type=FOLDER,
     metavar="DIR",
     help="Keep the state of the run there; `simdtex resume DIR` goes on with it.",
 )
-QUIET = option("-q", "--quiet", is_flag=True, help="No progress bar and no summary.")
-LEVELS = option("--levels", type=int, help="Of the multigrid, or of the pyramid.  [as many as the sample feeds]")
-BOUNDARY = option("--boundary", help="mrf, multires: torus (the result tiles) or open.  [{mrf.boundary}]")
+QUIET = option("-q", "--quiet", is_flag=True, help="Show no progress bar and no summary.")
+LEVELS = option(
+    "--levels", type=int, help="Go through this many levels, from coarse to fine.  [as many as the sample feeds]"
+)
+BOUNDARY = option(
+    "--boundary",
+    help="mrf, multires: let the output wrap around, so that it tiles (torus), or not (open).  [{mrf.boundary}]",
+)
 
 _EDGES = {
-    "multires": "mend (make the sample wrap around) or keep.  [{multires.edges}]",
-    "mrf": "auto, reflect or whole: candidates at the sample's edge.  [{mrf.edges}]",
-    "pyramid": "reflect or wrap: how the sample goes on beyond its edge.  [{pyramid.edges}]",
+    "multires": "mend the sample's edges, so that it wraps around, or keep them.  [{multires.edges}]",
+    "mrf": "let the sample go on as in a mirror (reflect), take nothing near its edge (whole), or do as it suits "
+    "(auto).  [{mrf.edges}]",
+    "pyramid": "let the sample go on as in a mirror (reflect), or wrap around (wrap).  [{pyramid.edges}]",
 }
 _ORIENTATIONS = {
-    "multires": "of edge and line filters.  [{multires.orientations}]",
-    "pyramid": "1, 2, 4 or 6, of the steerable pyramid.  [{pyramid.orientations}]",
+    "multires": "look for edges and lines in this many directions.  [{multires.orientations}]",
+    "pyramid": "split pictures into 1, 2, 4 or 6 directions.  [{pyramid.orientations}]",
 }
 
 
@@ -103,46 +111,69 @@ def _shared(name: str, texts: dict[str, str], *methods: str, **kinds: Any) -> Ca
 
 
 _MRF: dict[str, tuple[Any, str]] = {
-    "--preset": (str, "default, or paper: the 1998 rules to the letter."),
-    "--order": (int, "Neighbours within sqrt(order): 8 has 24, 18 has 60.  [{mrf.order}]"),
-    "--relaxation": (str, "icm (the mode) or gibbs (a draw).  [{mrf.relaxation}]"),
-    "--bandwidth": (float, "Of the Parzen kernel, in units of h_opt.  [{mrf.bandwidth}]"),
-    "--coherence": (float, "Preference for continuing a neighbour's source.  [{mrf.coherence}]"),
-    "--balance": (float, "The higher, the more evenly the sample is used.  [{mrf.balance}]"),
-    "--structure": (float, "Weight of the distance to the sample's edges.  [{mrf.structure}]"),
-    "--novelty": (float, "The higher, the less of the sample's layout is kept.  [{mrf.novelty}]"),
-    "--overview": (int, "Candidates at the coarsest level, at least.  [{mrf.overview}]"),
-    "--finish": (float, "Pixels over which seams melt; 0: none.  [1.5; of categories 0]"),
-    "--xi": (float, "Cooling, below 0; further down is faster.  [{mrf.xi}]"),
-    "--free-sweeps": (int, "Sweeps over all sites after a level's equilibrium.  [{mrf.free_sweeps}]"),
-    "--pixel": (str, "source (pixels of the sample) or density (grey levels).  [{mrf.pixel}]"),
-    "--phases": (str, "decimated or all: candidates at coarse levels.  [{mrf.phases}]"),
-    "--coarsest": (str, "gibbs or same: how the coarsest level relaxes.  [{mrf.coarsest}]"),
-    "--search": (str, "exact (all candidates), coherent (a few, much faster) or auto.  [{mrf.search}]"),
-    "--suggesting": (int, "coherent: nearest neighbours that suggest one.  [{mrf.suggesting}]"),
-    "--similar": (int, "coherent: candidates like each of these.  [{mrf.similar}]"),
-    "--chance": (int, "coherent: candidates at random.  [{mrf.chance}]"),
-    "--exhaustive": (int, "coherent: levels of so few candidates weigh all.  [{mrf.exhaustive}]"),
+    "--preset": (str, "Begin with the method's own defaults, or with the 1998 rules to the letter (paper).  [default]"),
+    "--order": (
+        int,
+        "Compare neighbours within sqrt(order) pixels: 8 has 24 of them, 18 has 60. More keep larger shapes, and are "
+        "slower.  [{mrf.order}]",
+    ),
+    "--relaxation": (str, "Take the most likely pixel (icm), or draw one (gibbs).  [{mrf.relaxation}]"),
+    "--bandwidth": (float, "Give the Parzen kernel this width, in units of h_opt; wider is freer.  [{mrf.bandwidth}]"),
+    "--coherence": (float, "Prefer to continue a neighbour's source: more keeps pieces together.  [{mrf.coherence}]"),
+    "--balance": (float, "Use the sample evenly: more repeats its pieces less.  [{mrf.balance}]"),
+    "--structure": (float, "Follow the sample's outlines: more keeps joints and contours whole.  [{mrf.structure}]"),
+    "--novelty": (float, "Break up the sample's layout: more keeps less of it.  [{mrf.novelty}]"),
+    "--overview": (int, "Keep this many candidates at the coarsest level; fewer keep more layout.  [{mrf.overview}]"),
+    "--finish": (float, "Melt seams over this many pixels; 0 leaves them as they are.  [1.5; of categories 0]"),
+    "--xi": (float, "Cool by xi of equation (13), below 0; further down is faster.  [{mrf.xi}]"),
+    "--free-sweeps": (int, "Sweep over all sites this many times after a level's equilibrium.  [{mrf.free_sweeps}]"),
+    "--pixel": (str, "Take pixels of the sample (source), or grey levels of the density (density).  [{mrf.pixel}]"),
+    "--phases": (
+        str,
+        "Take candidates at coarse levels from the decimated sample, or from all of its positions.  [{mrf.phases}]",
+    ),
+    "--coarsest": (str, "Let the coarsest level draw (gibbs), or relax as the others (same).  [{mrf.coarsest}]"),
+    "--search": (
+        str,
+        "Weigh a few candidates, which is much faster (coherent), or all (exact), or as it suits (auto).  "
+        "[{mrf.search}]",
+    ),
+    "--suggesting": (
+        int,
+        "In a coherent search, let this many nearest neighbours suggest a candidate.  [{mrf.suggesting}]",
+    ),
+    "--similar": (
+        int,
+        "In a coherent search, weigh this many more candidates that are like each of these.  [{mrf.similar}]",
+    ),
+    "--chance": (int, "In a coherent search, weigh this many more candidates at random.  [{mrf.chance}]"),
+    "--exhaustive": (int, "In a coherent search, weigh all candidates at levels with this few.  [{mrf.exhaustive}]"),
 }
 """Those of ``mrf`` that no other method has."""
 
 _KINDS: dict[str, tuple[Any, str]] = {
-    "--categorical": (None, "Values name categories: they differ or not, and are never mixed."),
-    "--categorical-channels": ("N,N,...", "The only channels that are categorical, counted from 0."),
-    "--weights": ("W,W,...", "One for each channel, all brought to one spread.  [one scale, as of colours]"),
-    "--shares": ("S,S,...", "One for each of several samples: how much it is used.  [all pixels count alike]"),
-    "--unsure": (float, "Share of a pixel's neighbours in the sample that may be unknown.  [{mrf.unsure}]"),
+    "--categorical": (None, "Take values for names of categories, which differ or not, and are never mixed."),
+    "--categorical-channels": ("N,N,...", "Take these channels alone for categories; the first is 0."),
+    "--weights": ("W,W,...", "Bring all channels to one spread, times these weights.  [one scale, as of colours]"),
+    "--shares": ("S,S,...", "Use each of several samples this much.  [all pixels count alike]"),
+    "--unsure": (float, "Let this share of a pixel's neighbours in the sample be unknown.  [{mrf.unsure}]"),
     "--data-weight": (
         float,
-        "Neighbours that a known pixel counts for if it is from no sample.  [{mrf.data_weight:g}]",
+        "Let a known pixel that is from no sample count for this many neighbours.  [{mrf.data_weight:g}]",
     ),
 }
 """What the values of a sample are and count for."""
 
 _WANTED: dict[str, tuple[Any, str]] = {
-    "--proportions": ("P,P,...", "How much of the output each category is to be, in ascending order."),
-    "--guide-weight": (float, "Variance of the guide, in units of the sample's.  [{mrf.guide_weight:g}]"),
-    "--labels/--no-labels": (None, "What guides hold.  [labels, if they have 16 whole numbers or colours or fewer]"),
+    "--proportions": ("P,P,...", "Make this much of the output of each category, in ascending order."),
+    "--guide-weight": (
+        float,
+        "Give the guide this variance, in units of the sample's; more follows it more closely.  [{mrf.guide_weight:g}]",
+    ),
+    "--labels/--no-labels": (
+        None,
+        "Take the guides' values for names, or for numbers.  [names, of 16 whole numbers or colours or fewer]",
+    ),
 }
 """What is wanted of an output as a whole."""
 
@@ -168,45 +199,64 @@ def _worded(
 
 
 _MULTIRES_OPTIONS = (
-    option("--sigma", type=float, help="multires: of the filters, in pixels.  [{multires.sigma}]"),
-    option("--filter-size", type=int, help="multires: rows of a filter, odd.  [{multires.filter_size}]"),
-    option("--features", help="multires: of the luminance or of all channels.  [{multires.features}]"),
-    option("--phase", help="multires: match or free: candidates among siblings.  [{multires.phase}]"),
-    option("--joins", help="multires: blend or cut: where pieces meet.  [{multires.joins}]"),
+    option("--sigma", type=float, help="multires: make the filters this wide, in pixels.  [{multires.sigma}]"),
+    option(
+        "--filter-size",
+        type=int,
+        help="multires: give filters this many rows, an odd number.  [{multires.filter_size}]",
+    ),
+    option("--features", help="multires: compare the luminance, or all channels.  [{multires.features}]"),
+    option(
+        "--parity",
+        help="multires: take a candidate from even or odd places, as the pixel's is (match), or from any (free).  "
+        "[{multires.parity}]",
+    ),
+    option("--seams", help="multires: blend pieces where they meet, or cut them there.  [{multires.seams}]"),
 )
 
 
 _THRESHOLD_OPTIONS = (
     option(
-        "--alpha", metavar="FLOAT|auto", help="multires: threshold; more is freer, auto finds one.  [{multires.alpha}]"
+        "--alpha",
+        metavar="FLOAT|auto",
+        help="multires: exchange places that differ by no more than this: 0 tiles the sample, more is freer, auto "
+        "finds one.  [{multires.alpha}]",
     ),
-    option("--beta", type=float, help="multires: stricter at high frequencies, alpha / k^beta.  [{multires.beta:g}]"),
-    option("--strain", type=float, help="multires: of joins, at most, for --alpha auto.  [{multires.strain}]"),
-    option("--target", type=float, help="multires: mean candidates for --alpha auto, in place of --strain."),
+    option(
+        "--beta",
+        type=float,
+        help="multires: be stricter at high frequencies, by alpha / k^beta.  [{multires.beta:g}]",
+    ),
+    option(
+        "--strain", type=float, help="multires: let --alpha auto strain seams no more than this.  [{multires.strain}]"
+    ),
+    option("--target", type=float, help="multires: let --alpha auto find this many candidates a pixel instead."),
     option(
         "--thresholds",
         type=READ,
         metavar="FILE",
-        help="multires: a table of thresholds, a line of numbers for each level.",
+        help="multires: read a table of thresholds, a line of numbers for each level.",
     ),
 )
 
 
 def _pyramid_options(start: str, prefix: str = "") -> list[Callable[[Command], Command]]:
-    """Those of ``pyramid`` that no other method has; `start` is ``"METAVAR: What to begin with"``."""
+    """Those of ``pyramid`` that no other method has; `start` is ``"METAVAR: what to begin with"``."""
     metavar, begin = start.split(": ")
 
     def named(name: str, text: str, **kinds: Any) -> Callable[[Command], Command]:
         return option(name, help=prefix + text[0].lower() + text[1:] if prefix else text, **kinds)
 
     return [
-        named("--pyramid", "steerable or laplacian: whose histograms are matched.  [{pyramid.pyramid}]"),
-        named("--iterations", "Times that all are matched, 0 or more.  [{pyramid.iterations}]", type=int),
-        named("--match", "rank (exact) or lookup (the paper's tables).  [{pyramid.match}]"),
-        named("--bins", "Of these tables, 2 to 4096.  [{pyramid.bins}]", type=int),
-        named("--color", "decorrelate or channels: the colours that are matched.  [{pyramid.color}]"),
         named(
-            "--start", f"{begin} to begin with.  [noise]", type=ENTER if metavar == "VOLUME" else READ, metavar=metavar
+            "--pyramid", "Match every scale and direction (steerable), or every scale (laplacian).  [{pyramid.pyramid}]"
+        ),
+        named("--iterations", "Match all histograms this many times.  [{pyramid.iterations}]", type=int),
+        named("--match", "Match histograms exactly (rank), or by the paper's tables (lookup).  [{pyramid.match}]"),
+        named("--bins", "Give these tables this many bins, 2 to 4096.  [{pyramid.bins}]", type=int),
+        named("--color", "Match colours that are decorrelated first, or the channels.  [{pyramid.color}]"),
+        named(
+            "--start", f"Begin with this {begin}.  [noise]", type=ENTER if metavar == "BLOCK" else READ, metavar=metavar
         ),
     ]
 
@@ -220,13 +270,11 @@ def _with(*options: Callable[[Command], Command]) -> Callable[[Command], Command
     return decorate
 
 
-_DEPTH = "Of the multigrid.  [as many as the sample feeds]"
-
 mrf_options = _with(
     *_worded(_MRF),
     option("--edges", help=_EDGES["mrf"]),
-    option("--levels", type=int, help=_DEPTH),
-    option("--boundary", help="torus (the result tiles) or open.  [{mrf.boundary}]"),
+    LEVELS,
+    option("--boundary", help="Let the output wrap around, so that it tiles (torus), or not (open).  [{mrf.boundary}]"),
 )
 """The options of the method ``mrf`` that any command takes which makes a whole picture with it."""
 
@@ -237,8 +285,10 @@ fill_options = _with(
     *_worded(_KINDS, defaults=_HOLES),
     *_worded(_MRF, without=("--overview",), defaults=_HOLES),
     option("--edges", help=_EDGES["mrf"]),
-    option("--levels", type=int, help="Of the multigrid.  [as many as it takes to see across the hole]"),
-    option("--boundary", help="open, or torus: the picture tiles, and its holes go on beyond its edges.  [open]"),
+    option(
+        "--levels", type=int, help="Go through this many levels, from coarse to fine.  [as many as see across the hole]"
+    ),
+    option("--boundary", help="Take the picture for one that tiles (torus), or not (open).  [open]"),
 )
 """Those of ``simdtex fill``."""
 
@@ -247,8 +297,8 @@ simulate_options = _with(
     *_worded(_WANTED),
     *_worded(_MRF, defaults={"--novelty": "0.25"}),
     option("--edges", help=_EDGES["mrf"]),
-    option("--levels", type=int, help=_DEPTH),
-    option("--boundary", help="open, or torus: realisations tile.  [open]"),
+    LEVELS,
+    option("--boundary", help="Let realisations wrap around, so that they tile (torus), or not (open).  [open]"),
 )
 """Those of ``simdtex simulate``."""
 
@@ -256,7 +306,7 @@ extend_options = _with(
     *_worded(_KINDS, without=("--shares", "--unsure"), defaults=_EDGE),
     *_worded(_MRF, defaults=_EDGE),
     option("--edges", help=_EDGES["mrf"]),
-    option("--levels", type=int, help=_DEPTH),
+    LEVELS,
 )
 """Those of ``simdtex extend``."""
 
@@ -279,16 +329,20 @@ method_options = _with(
     *_worded(_WANTED, "mrf: "),
     *_THRESHOLD_OPTIONS,
     *_MULTIRES_OPTIONS,
-    *_pyramid_options("IMAGE: A picture", "pyramid: "),
+    *_pyramid_options("PICTURE: picture", "pyramid: "),
 )
 """Those of every method."""
 
 
 def pyramid_options(start: str) -> Callable[[Command], Command]:
-    """Those of a command that runs nothing but ``pyramid``; `start` is ``"METAVAR: What to begin with"``."""
+    """Those of a command that runs nothing but ``pyramid``; `start` is ``"METAVAR: what to begin with"``."""
     return _with(
         *_pyramid_options(start),
-        option("--levels", type=int, help="Of the pyramids.  [as many as leave 8 pixels a side]"),
+        option(
+            "--levels",
+            type=int,
+            help="Go through this many levels, from coarse to fine.  [as many as leave 8 pixels a side]",
+        ),
         option("--orientations", type=int, help=_ORIENTATIONS["pyramid"]),
         option("--edges", help=_EDGES["pyramid"]),
     )

@@ -29,24 +29,38 @@ from simdtex.schedules import TOGETHER
     default="schedules-report",
     show_default=True,
     type=FOLDER,
-    help="Folder for the report.",
+    help="Write the report into this folder.",
 )
 @click.option(
     "--schedules",
     "names",
     default=",".join(TOGETHER),
     metavar="A,B,...",
-    help="Which to compare.  [those of many sites a step]",
+    help="Compare these.  [those of many sites a step]",
 )
-@click.option("--seeds", default=3, show_default=True, help="Runs of each schedule, with seeds one after another.")
-@click.option("--seed", default=1, show_default=True, help="The first of them.")
-@click.option("--size", default="96x96", show_default=True, metavar="WIDTHxHEIGHT", help="Of each output.")
+@click.option(
+    "--seeds",
+    default=3,
+    show_default=True,
+    help="Run each schedule this many times, with seeds one after another.",
+)
+@click.option("--seed", default=1, show_default=True, help="Begin with this seed.")
+@click.option(
+    "--size", default="96x96", show_default=True, metavar="WIDTHxHEIGHT", help="Make outputs of this size, in pixels."
+)
 @mrf_options
-@click.option("--array", default="maspar-mp1-16k", show_default=True, help="Processor array to count on, or ROWSxCOLS.")
-@click.option("--mapping", default=Options.mapping, show_default=True, help="Or hierarchical: pixels onto the array.")
+@click.option(
+    "--array", default="maspar-mp1-16k", show_default=True, help="Count on this processor array, or one of ROWSxCOLS."
+)
+@click.option(
+    "--mapping",
+    default=Options.mapping,
+    show_default=True,
+    help="Lay pixels onto the array in this way, or hierarchical.",
+)
 @click.option("--emulate", is_flag=True, help="Run as on the array too, which takes longer.")
 @DEVICE
-@click.option("-q", "--quiet", is_flag=True, help="No progress and no table.")
+@click.option("-q", "--quiet", is_flag=True, help="Show no progress and no table.")
 @plainly
 def schedules(
     sample: Path | None,

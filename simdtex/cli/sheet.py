@@ -19,20 +19,22 @@ from simdtex.cli.places import READ, WRITE
     ("sheet gravel.png -o sheet.png --alphas 0.1,0.2,0.4", "Three thresholds."),
 )
 @click.argument("sample", type=READ)
-@click.option("-o", "--output", required=True, type=WRITE, help="Sheet to write.")
+@click.option("-o", "--output", required=True, type=WRITE, help="Write this sheet.")
 @click.option(
     "--alphas",
     default="0.05,0.10,...,0.30",
     show_default=True,
     metavar="A,B,...",
-    help="Thresholds, one picture each; auto is not among them.",
+    help="Make a picture for each of these thresholds; auto is not among them.",
 )
-@click.option("--betas", default="0,1", show_default=True, metavar="A,B,...", help="One row of pictures each.")
-@click.option("--size", metavar="WIDTHxHEIGHT", help="Of each picture, in pixels. Default: twice the sample.")
+@click.option(
+    "--betas", default="0,1", show_default=True, metavar="A,B,...", help="Make a row of pictures for each of these."
+)
+@click.option("--size", metavar="WIDTHxHEIGHT", help="Make pictures of this size, in pixels.  [twice the sample]")
 @multires_options
-@click.option("--seed", type=int, help="Of every picture.  [a fresh one, printed]")
+@click.option("--seed", type=int, help="Make every picture from this seed.  [a fresh one, printed]")
 @DEVICE
-@click.option("-q", "--quiet", is_flag=True, help="No progress bar and no numbers.")
+@click.option("-q", "--quiet", is_flag=True, help="Show no progress bar and no numbers.")
 @plainly
 def sheet(
     sample: Path,

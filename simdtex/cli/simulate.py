@@ -22,7 +22,7 @@ from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
 
 @command(
     (
-        "simulate facies.png -o many.nc --number 50 --categorical --hard wells.csv",
+        "simulate facies.png -o many.nc --number 50 --categorical --known wells.csv",
         "50 that honour the data of wells.",
     ),
     ("simulate facies.png -o many.zarr --number 10 --size 500x500 --report page", "A size, and a page of statistics."),
@@ -33,36 +33,38 @@ from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
     "--output",
     required=True,
     type=EITHER,
-    help="Where the realisations go: .zarr, .zarr.zip, .nc or .npz.",
+    help="Write the realisations here: .zarr, .zarr.zip, .nc or .npz.",
 )
-@click.option("-n", "--number", default=1, show_default=True, type=int, help="How many realisations.")
-@click.option("--first", default=0, show_default=True, type=int, help="Number of the first one.")
+@click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
+@click.option("--first", default=0, show_default=True, type=int, help="Begin with the realisation of this number.")
 @click.option(
     "--size",
     metavar="WIDTHxHEIGHT",
-    help="Of a realisation, pixels. Default: that of --hard, else of TRAINING_IMAGE.",
+    help="Make realisations of this size, in pixels.  [that of --known, else of TRAINING_IMAGE]",
 )
 @click.option(
-    "--hard",
+    "--known",
     type=READ,
     metavar="FILE",
-    help="Hard data, the same in every realisation: a table x,y,value (.csv), or a picture, NaN or transparent where "
-    "nothing is known.",
+    help="Honour these hard data in every realisation: a table x,y,value (.csv), or a picture that is NaN or "
+    "transparent where nothing is known.",
 )
 @click.option(
     "--sample-mask",
     multiple=True,
     type=READ,
     metavar="FILE",
-    help="White where the training image may be used; once for each of several.",
+    help="Use the training image only where this picture is white; once for each of several.",
 )
 @click.option(
     "--guide",
     type=READ_PAIR,
     metavar="A[,B...]=OUT",
-    help="Secondary data: of each training image, and of realisations.",
+    help="Follow secondary data: of each training image, and of the realisations.",
 )
-@click.option("--jobs", type=int, help="Realisations at a time.  [one for each core, at most 4; on a GPU 1]")
+@click.option(
+    "--jobs", type=int, help="Make this many realisations at a time.  [one for each core, at most 4; on a GPU 1]"
+)
 @click.option(
     "--report",
     type=FOLDER,
@@ -82,7 +84,7 @@ def simulate(
     number: int,
     first: int,
     size: str | None,
-    hard: Path | None,
+    known: Path | None,
     sample_mask: tuple[Path, ...],
     guide: str | None,
     jobs: int | None,
@@ -101,10 +103,10 @@ def simulate(
 
     material = read_material(training_image, unknown=True)
     masks = read_masks(sample_mask, material)
-    table = read_known(hard) if hard else None
+    table = read_known(known) if known else None
     guides = read_guides(guide, material, options["labels"]) if guide is not None else None
     shape = output_shape(size, material.pixels[0], known_size(table), material.pixels[0])
-    known = known_values(table, hard, shape, material) if table is not None and hard else None
+    values = known_values(table, known, shape, material) if table is not None and known else None
     check_realisations_path(output, material.pixels[0].dtype)
     if report:
         _check_report(report, material.pixels, shape)
@@ -117,7 +119,7 @@ def simulate(
             material.array,
             number,
             shape=shape,
-            hard=known,
+            known=values,
             guide=guides and guides.pair,
             mask=None if masks is None else (masks if material.several else masks[0]),
             first=first,

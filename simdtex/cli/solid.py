@@ -38,13 +38,13 @@ SIDE = 128
     multiple=True,
     required=True,
     type=EITHER,
-    help="Block to write: .npz, .npy, .nrrd, .tif, or without suffix a folder of slices; may be repeated.",
+    help="Write this block: .npz, .npy, .nrrd, .tif, or without suffix a folder of slices; may be repeated.",
 )
 @click.option(
     "--size",
     metavar="DEPTHxHEIGHTxWIDTH",
-    help="Slices x rows x columns of the block, the depth first; one number is a cube. "
-    f"Default: that of --start, else {SIDE}.",
+    help="Make a block of this many slices, rows and columns, the depth first, or a cube of one number.  "
+    f"[that of --start, else {SIDE}]",
 )
 @click.option(
     "--view",
@@ -53,9 +53,9 @@ SIDE = 128
     metavar="PNG",
     help="Write a picture of it: a cube, a sphere and three slices.",
 )
-@option("--solids", help=f"turns or average: families of slices one after another, or a mean.  [{DEFAULTS.solids}]")
-@option("--slices", help=f"together or each: whose histogram is matched.  [{DEFAULTS.slices}]")
-@pyramid_options("VOLUME: A block")
+@option("--solids", help=f"Match the three families of slices in turns, or take their average.  [{DEFAULTS.solids}]")
+@option("--slices", help=f"Match the slices of a family together, or each alone.  [{DEFAULTS.slices}]")
+@pyramid_options("BLOCK: block")
 @SEED
 @DEVICE
 @stages_option("the middle slice of every iteration")

@@ -50,51 +50,58 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
     ("synth gravel.png -o more.zarr --size 32768x32768 --tiles 2048", "More than the memory holds."),
 )
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
-@click.option("-o", "--output", required=True, type=EITHER, help="Picture to write; with --tiles a .zarr store.")
+@click.option("-o", "--output", required=True, type=EITHER, help="Write this picture; with --tiles a .zarr store.")
 @click.option(
     "--size",
     metavar="WIDTHxHEIGHT",
-    help="Of the output, in pixels. Default: that of the picture of --known, of the output's guide, or of --start, "
-    "else twice the first sample.",
+    help="Make an output of this size, in pixels.  [that of the picture of --known, of the output's guide, or of "
+    "--start, else twice the first sample]",
 )
 @option(
     "--method",
     default="mrf",
     show_default=True,
-    help="mrf: Paget and Longstaff 1998. multires: De Bonet 1997. pyramid: Heeger and Bergen 1995.",
+    help="Use Paget and Longstaff's method (mrf), De Bonet's (multires), or Heeger and Bergen's (pyramid).",
 )
 @click.option(
     "--sample-mask",
     multiple=True,
     type=READ,
     metavar="FILE",
-    help="mrf: a picture of the sample's size, white where pixels may be taken from; once for each sample.",
+    help="mrf: take pixels only where this picture of the sample's size is white; once for each sample.",
 )
 @click.option(
     "--known",
     type=READ,
     metavar="FILE",
-    help="mrf: what of the output is known and stays: a table of x, y and values (.csv, .tsv, .txt, .dat), or a "
-    "picture that is transparent or NaN where it is not known.",
+    help="mrf: keep what is known of the output: a table of x, y and values (.csv, .tsv, .txt, .dat), or a picture "
+    "that is transparent or NaN where it is not known.",
 )
 @click.option(
     "--guide",
     type=READ_PAIR,
     metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
-    help="mrf: two pictures of labels or numbers; a place of the output comes from where the first has what the second "
-    "has there. Of several samples: GUIDE0,GUIDE1=OUTPUT-GUIDE.",
+    help="mrf: take each place of the output from where the first of these two pictures, of labels or numbers, has "
+    "what the second has there. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples.",
 )
 @method_options
 @option(
     "--schedule",
-    help="mrf: which sites relax together: coloring, coloring-fixed, luby, checkerboard, synchronous, "
+    help="mrf: relax sites together by coloring, coloring-fixed, luby, checkerboard, synchronous, "
     "random-subset[:P], raster, random-scan or block[:ROWSxCOLS].  [{mrf.schedule}]",
 )
-@click.option("--check-schedule", is_flag=True, default=None, help="mrf: check equation (14) at every step.")
 @click.option(
-    "--array", metavar="ROWSxCOLS", help="mrf: run on a processor array, or maspar-mp1-1k to -16k.  [sites are packed]"
+    "--check-schedule",
+    is_flag=True,
+    default=None,
+    help="mrf: check at every step that sites are independent, equation (14).",
 )
-@option("--mapping", help="mrf: cut-and-stack or hierarchical: how pixels lie on the array.  [{mrf.mapping}]")
+@click.option(
+    "--array",
+    metavar="ROWSxCOLS",
+    help="mrf: run on a processor array of this size, or on maspar-mp1-1k to -16k.  [sites are packed]",
+)
+@option("--mapping", help="mrf: lay pixels onto the array in this way.  [{mrf.mapping}]")
 @click.option(
     "--emulate/--no-emulate", default=None, help="mrf: launch one work-item per PE, or only account for the array."
 )
@@ -102,14 +109,16 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 @SEED
 @DEVICE
 @stages_option("every level, sweep or iteration")
-@click.option("--source-map", type=WRITE, metavar="FILE", help="Write it: .npz, .npy, .png.")
+@click.option(
+    "--source-map", type=WRITE, metavar="FILE", help="Write from where in the sample each pixel is: .npz, .npy or .png."
+)
 @click.option(
     "--also",
     multiple=True,
     type=WRITE_PAIR,
     metavar="MAP=OUT",
-    help="Carry the arrangement over to another map of the material (normal, height); may be repeated. Of several "
-    "samples: MAP0,MAP1=OUT.",
+    help="Carry the arrangement over to another map of the material (normal, height); may be repeated. Give "
+    "MAP0,MAP1=OUT for several samples.",
 )
 @click.option(
     "--report",
@@ -141,7 +150,7 @@ def synth(
     accounting: bool,
     tiles: int | None,
     workers: int | None,
-    scheduler: str | None,
+    cluster: str | None,
     dry_run: bool,
     profile: bool,
     quiet: bool,

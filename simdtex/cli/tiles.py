@@ -21,14 +21,14 @@ ALONE = ("stages", "source_map", "also", "report", "start", "accounting", "profi
 def tiles_options(command: Callable[..., None]) -> Callable[..., None]:
     """``--tiles`` and what goes with it."""
     for one in (
-        click.option("--dry-run", is_flag=True, help="With --tiles: print the plan, and do nothing."),
-        scheduler_option,
+        click.option("--dry-run", is_flag=True, help="Print the plan of --tiles, and do nothing."),
+        cluster_option,
         workers_option,
         click.option(
             "--tiles",
             type=int,
             metavar="SIDE",
-            help="mrf: make the output in tiles of so many pixels to the side, into a .zarr store: for sizes beyond "
+            help="mrf: make the output in tiles of this many pixels to the side, into a .zarr store: for sizes beyond "
             "one machine. The pixels are the same.",
         ),
     ):
@@ -37,10 +37,10 @@ def tiles_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 workers_option = click.option(
-    "--workers", type=int, metavar="N", help="With --tiles: start N processes on this machine to do them."
+    "--workers", type=int, metavar="N", help="Start N processes on this machine to do the tiles."
 )
-scheduler_option = click.option(
-    "--scheduler", metavar="ADDRESS", help="With --tiles: the workers of a Dask scheduler do them: tcp://HOST:8786."
+cluster_option = click.option(
+    "--cluster", metavar="ADDRESS", help="Have the tiles done by the workers of a Dask scheduler: tcp://HOST:8786."
 )
 
 
@@ -48,7 +48,7 @@ def check_tiles(context: click.Context) -> None:
     """Raise where options are given that do not go with one another."""
     given = context.params
     if given["tiles"] is None:
-        for name in ("workers", "scheduler", "dry_run"):
+        for name in ("workers", "cluster", "dry_run"):
             if given[name]:
                 raise ValueError(f"--{name.replace('_', '-')} goes with --tiles; give the side of a tile, as 2048")
         return
@@ -59,8 +59,8 @@ def check_tiles(context: click.Context) -> None:
             raise ValueError(f"--{name.replace('_', '-')} is of an output at once; leave it out, or --tiles")
     if given["output"].suffix.lower() != ".zarr":
         raise ValueError(f"{given['output']} is no .zarr store, which tiles are written to; end its name in .zarr")
-    if given["workers"] is not None and given["scheduler"] is not None:
-        raise ValueError("a scheduler has its own workers; give --workers or --scheduler, not both")
+    if given["workers"] is not None and given["cluster"] is not None:
+        raise ValueError("a scheduler has its own workers; give --workers or --cluster, not both")
     if given.get("checkpoint"):
         raise ValueError("the store of --tiles is a checkpoint itself; leave --checkpoint out")
 
@@ -80,12 +80,12 @@ def synthesize_in_tiles(context: click.Context, sample: Any, shape: tuple[int, i
             click.echo(line, err=not given["dry_run"])
     if given["dry_run"]:
         return
-    with _crew(given["workers"], given["scheduler"]) as crew, _shown(output, given["quiet"]) as callback:
+    with _crew(given["workers"], given["cluster"]) as crew, _shown(output, given["quiet"]) as callback:
         distributed.synthesize(sample, shape, output, tiles=given["tiles"], callback=callback, **crew, **options)
     _done(output, given["quiet"], began)
 
 
-def resume_tiles(store: Path, workers: int | None, scheduler: str | None, device: str | None, quiet: bool) -> None:
+def resume_tiles(store: Path, workers: int | None, cluster: str | None, device: str | None, quiet: bool) -> None:
     """Go on with an output in tiles."""
     from simdtex import distributed
 
@@ -93,17 +93,17 @@ def resume_tiles(store: Path, workers: int | None, scheduler: str | None, device
     if distributed.finished(store):
         click.echo(f"{store} is finished; there is nothing to go on with")
         return
-    with _crew(workers, scheduler) as crew, _shown(store, quiet) as callback:
+    with _crew(workers, cluster) as crew, _shown(store, quiet) as callback:
         distributed.resume(store, device=device, callback=callback, **crew)
     _done(store, quiet, began)
 
 
 @contextmanager
-def _crew(workers: int | None, scheduler: str | None) -> Iterator[dict[str, Any]]:
+def _crew(workers: int | None, cluster: str | None) -> Iterator[dict[str, Any]]:
     """Who does the tiles, as keywords."""
     from simdtex.distributed.cluster import connected
 
-    with connected(workers, scheduler) as client:
+    with connected(workers, cluster) as client:
         if client is not None and not client.scheduler_info(n_workers=-1)["workers"]:
             click.echo("the scheduler has no workers yet; start some with: dask worker ADDRESS", err=True)
         yield {} if client is None else {"client": client}

@@ -69,17 +69,17 @@ def across(client: Client, store: Store, device: str | None) -> Execute:
 
 
 @contextmanager
-def connected(workers: int | None, scheduler: str | None) -> Iterator[Client | None]:
+def connected(workers: int | None, cluster: str | None) -> Iterator[Client | None]:
     """A client of the cluster that is asked for: of one's own on this machine, of a scheduler's, or none."""
-    if workers is None and scheduler is None:
+    if workers is None and cluster is None:
         yield None
         return
     Client, LocalCluster = _libraries()
-    if scheduler is not None:
+    if cluster is not None:
         try:
-            client = Client(scheduler, timeout=10)
+            client = Client(cluster, timeout=10)
         except (OSError, ValueError) as error:
-            raise ValueError(f"no scheduler answers at {scheduler}; start one with: dask scheduler") from error
+            raise ValueError(f"no scheduler answers at {cluster}; start one with: dask scheduler") from error
         with client:
             yield client
         return

@@ -199,7 +199,7 @@ def extend(
     bottom: int = 0,
     left: int = 0,
     right: int = 0,
-    tile: bool | str = False,
+    seamless: bool | str = False,
     band: int | None = None,
     channel_axis: int | None = None,
     rng: int | np.random.Generator | None = None,
@@ -216,7 +216,7 @@ def extend(
         The picture, which is also the sample; any real type.
     top, bottom, left, right : int
         Pixels to add on each side.
-    tile : bool or {"x", "y"}
+    seamless : bool or {"x", "y"}
         Whether the result wraps around: in both directions, or along the columns (x) or rows (y) alone. Where nothing
         is added in such a direction, a band along its edges is made anew.
     band : int, optional
@@ -224,7 +224,8 @@ def extend(
     channel_axis : int, optional
         The axis of the image that holds channels; None for a grey one.
     rng, device, callback, full_output, **options
-        As in `fill`; but ``balance`` and ``novelty`` are those of a texture, and ``boundary`` follows from ``tile``.
+        As in `fill`; but ``balance`` and ``novelty`` are those of a texture, and ``boundary`` follows from
+        ``seamless``.
 
     Returns
     -------
@@ -250,11 +251,11 @@ def extend(
     rows, cols = pixels.shape[:2]
     for name, value in {"top": top, "bottom": bottom, "left": left, "right": right}.items():
         whole(name, value, 0)
-    if tile not in (True, False, "x", "y"):
-        raise ValueError(f'tile is {tile!r}; give True, False, "x" or "y"')
-    tall, wide = tile in (True, "y"), tile in (True, "x")
-    if not (tile or top or bottom or left or right):
-        raise ValueError("there is nothing to add; give top, bottom, left or right, or tile=True")
+    if seamless not in (True, False, "x", "y"):
+        raise ValueError(f'seamless is {seamless!r}; give True, False, "x" or "y"')
+    tall, wide = seamless in (True, "y"), seamless in (True, "x")
+    if not (seamless or top or bottom or left or right):
+        raise ValueError("there is nothing to add; give top, bottom, left or right, or seamless=True")
     width = min(64, max(8, min(rows, cols) // 8)) if band is None else band
     whole("band", width, 1)
     shape = (top + rows + bottom, left + cols + right, pixels.shape[2])
@@ -270,14 +271,14 @@ def extend(
         )
     hole[top + along : top + rows - along, left + across : left + cols - across] = False
     if "boundary" in options:
-        raise ValueError("the boundary of what is extended follows from tile; leave boundary out")
-    chosen = mrf.make_options(**{"boundary": "torus" if tile else "open"} | OF_EDGES | options)
-    sides = {"top": top, "bottom": bottom, "left": left, "right": right, "tile": tile, "band": width}
+        raise ValueError("the boundary of what is extended follows from seamless; leave boundary out")
+    chosen = mrf.make_options(**{"boundary": "torus" if seamless else "open"} | OF_EDGES | options)
+    sides = {"top": top, "bottom": bottom, "left": left, "right": right, "seamless": seamless, "band": width}
     begun = begin("extend", rng, lambda: {"options": chosen, "image": pixels, **sides})
     place = np.full((*hole.shape, 2), -1, np.int32)
     place[top : top + rows, left : left + cols] = np.moveaxis(np.indices((rows, cols)), 0, -1)
     place[hole] = -1
-    given = Given(canvas, np.repeat(~hole[..., None], canvas.shape[2], -1), place, suggests=bool(tile))
+    given = Given(canvas, np.repeat(~hole[..., None], canvas.shape[2], -1), place, suggests=bool(seamless))
 
     def run(machine: Machine, seen: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
         what = (Pictures((pixels,)), hole.shape, chosen, begun.seed)

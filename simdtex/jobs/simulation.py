@@ -42,7 +42,7 @@ def simulate(
     n: int,
     *,
     shape: tuple[int, int] | None = None,
-    hard: ArrayLike | HardData | str | os.PathLike[str] | None = None,
+    known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
     guide: tuple[Any, Any] | None = None,
     mask: ArrayLike | None = None,
     first: int = 0,
@@ -62,8 +62,8 @@ def simulate(
     n : int
         How many realisations, 1 or more.
     shape : (int, int), optional
-        Rows and columns of each. None: those of `hard`, where that is an array, else of the training image.
-    hard : array, HardData or path, optional
+        Rows and columns of each. None: those of `known`, where that is an array, else of the training image.
+    known : array, HardData or path, optional
         What is known: a masked array, or floats with NaN where nothing is known, of `shape`; or a table ``x,y,value``
         (`simdtex.read_hard_data`) or its file. Every realisation has these values, to the bit.
     guide, mask
@@ -118,7 +118,7 @@ def simulate(
         whole("jobs", jobs, 1)
     if shape is not None:
         within_32_bits(check_shape(shape), 1)
-    data, size = _hard(hard, shape, check_samples(training, channel_axis, mask).pixels[0], channel_axis)
+    data, size = _known(known, shape, check_samples(training, channel_axis, mask).pixels[0], channel_axis)
     inputs = check_inputs(training, size, channel_axis, mask, data, None, guide)
     chosen = mrf.make_options(**DEFAULTS | options)
     begun = begin("simulate", rng, lambda: {"shape": size, "n": n, "first": first, "options": chosen, **inputs.told()})
@@ -237,24 +237,24 @@ def _in_turn(one: Callable[[int, Machine], None], numbers: list[int], machines: 
             raise
 
 
-def _hard(
-    hard: Any, shape: tuple[int, int] | None, training: NDArray[Any], channel_axis: int | None
+def _known(
+    known: Any, shape: tuple[int, int] | None, training: NDArray[Any], channel_axis: int | None
 ) -> tuple[NDArray[Any] | None, tuple[int, int]]:
     """Hard data as an array, and the size of a realisation."""
-    if isinstance(hard, (str, Path, os.PathLike)):
-        hard = read_hard_data(hard)
-    if hard is None or isinstance(hard, HardData):
+    if isinstance(known, (str, Path, os.PathLike)):
+        known = read_hard_data(known)
+    if known is None or isinstance(known, HardData):
         size = check_shape(training.shape[:2] if shape is None else shape)
-        placed = None if hard is None else place_hard_data(hard, size, training.dtype)
+        placed = None if known is None else place_hard_data(known, size, training.dtype)
         variables = 1 if channel_axis is None else training.shape[2]
-        if hard is not None and len(hard.names) != variables:
+        if known is not None and len(known.names) != variables:
             raise ValueError(
-                f"a datum has {len(hard.names)} values and a pixel of the training image {variables}; give as many"
+                f"a datum has {len(known.names)} values and a pixel of the training image {variables}; give as many"
             )
         if placed is not None and channel_axis is not None:
             placed = np.moveaxis(placed[..., None] if placed.ndim == 2 else placed, -1, channel_axis)
         return placed, size
-    array = hard if isinstance(hard, np.ma.MaskedArray) else check_array("hard", hard)
+    array = known if isinstance(known, np.ma.MaskedArray) else check_array("known", known)
     if shape is None and array.ndim == (2 if channel_axis is None else 3):
         shape = array.shape if channel_axis is None else np.moveaxis(array, channel_axis, -1).shape[:2]
     return array, check_shape(training.shape[:2] if shape is None else shape)

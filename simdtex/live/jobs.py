@@ -81,7 +81,7 @@ def job(
         return Job(call, pixels, carried, settings.shape, key, step)
     rows, cols = pixels.shape[:2]
     if settings.job == "tile":
-        call = partial(extend, pixels, tile=True, **given)
+        call = partial(extend, pixels, seamless=True, **given)
         return Job(call, pixels, carried, (rows, cols), key, recipe(settings, names, pixels, carried))
     hole = painted(settings.hole, (rows, cols)) > 0
     if not hole.any():

@@ -112,8 +112,8 @@ def recipe(
         words += ["--method", settings.method] if settings.method != "mrf" else []
         arguments += [f"({rows}, {cols})"] + ([f"method={settings.method!r}"] if settings.method != "mrf" else [])
     if settings.job == "tile":
-        words += ["--tile"]
-        arguments += ["tile=True"]
+        words += ["--seamless"]
+        arguments += ["seamless=True"]
     if guide:
         of_own, of_output = names.painted("guide-sample"), names.painted("guide-texture")
         files |= {of_own: guide[0], of_output: _open(guide[1])}

@@ -47,7 +47,7 @@ def source_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
     """Colour each output pixel by the sample position it was taken from.
 
     Neighbours in the sample have neighbouring colours of one lightness, so a patch copied whole
-    shows as a smooth area and a join as an edge.
+    shows as a smooth area and a seam as an edge.
 
     Parameters
     ----------

@@ -154,7 +154,7 @@ laplacian_collapse = Operation("laplacian", _collapse, _launch_collapse)
 """
 
 laplacian_blend = Operation("laplacian", _blend, _launch_blend)
-"""``laplacian_blend(machine, band, source, coarse, torus)``: as `laplacian_collapse`, without hard joins.
+"""``laplacian_blend(machine, band, source, coarse, torus)``: as `laplacian_collapse`, without hard seams.
 
 Where neighbours are not neighbours in the band, a pixel of L_i is the mean, by (1, 2, 1) / 4 in each direction, of what
 the band has there if each neighbour's piece goes on; elsewhere it is the band's own pixel, to the bit.

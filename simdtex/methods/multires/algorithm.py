@@ -87,7 +87,7 @@ class Options:
         Whether features are made of the luminance or of every channel. Bands are copied with all their channels.
     levels : int, optional
         Of the pyramids. None: down to a single pixel.
-    phase : {"match", "free"}
+    parity : {"match", "free"}
         Whether a candidate must stand in an even or odd row and column as the pixel does. ``"free"`` is the paper's
         text.
     boundary : {"torus", "open"}
@@ -95,7 +95,7 @@ class Options:
     edges : {"mend", "keep"}
         Whether the edges of a sample that does not wrap around are first covered with a piece of itself, so that it
         does; see `simdtex.methods.multires.mend.mend`.
-    joins : {"blend", "cut"}
+    seams : {"blend", "cut"}
         Whether the bands of pieces that meet fade into each other, over a pixel of each level, or end where they meet.
         ``"cut"`` is the paper's text.
     """
@@ -110,10 +110,10 @@ class Options:
     filter_size: int = integer(3, 3, FILTER)
     features: str = words("luminance", "luminance", "channels")
     levels: int | None = integer(None, 1)
-    phase: str = words("match", "match", "free")
+    parity: str = words("match", "match", "free")
     boundary: str = words("torus", "torus", "open")
     edges: str = words("mend", "mend", "keep")
-    joins: str = words("blend", "blend", "cut")
+    seams: str = words("blend", "blend", "cut")
 
     def __post_init__(self) -> None:
         """Check every value."""
@@ -179,14 +179,14 @@ def differences(analysis: Analysis, table: NDArray[np.float64]) -> NDArray[np.ui
 
 
 def suggest_alpha(machine: Machine, analysis: Analysis, options: Options) -> float:
-    """The freest alpha at which joins do not show, or that at which pixels have `Options.target` candidates.
+    """The freest alpha at which seams do not show, or that at which pixels have `Options.target` candidates.
 
     Parameters
     ----------
     machine : Machine
     analysis : Analysis
     options : Options
-        Of which ``strain``, ``target``, ``beta`` and ``phase`` matter, beside those of the analysis.
+        Of which ``strain``, ``target``, ``beta`` and ``parity`` matter, beside those of the analysis.
 
     Returns
     -------
@@ -247,7 +247,7 @@ def strain(machine: Machine, analysis: Analysis, options: Options, alpha: float)
     strains = []
     for level in reversed(range(top)):
         for first, end in paced(pixels([shapes[level]]), _first_launch(analysis, level)):
-            sampled = candidates(machine, structure, sampled, level, first, end, options.phase == "match", 0)
+            sampled = candidates(machine, structure, sampled, level, first, end, options.parity == "match", 0)
             machine.sync()
         if level < max(1, top // 2):
             band = np.moveaxis(machine.get(analysis.bands[level]) >> COARSENED, 0, -1).astype(np.int64)
@@ -293,7 +293,7 @@ def _mean_candidates(machine: Machine, analysis: Analysis, itself: Sampled, opti
         counts = []
         for first in [0] if few else [i * n // STRETCHES for i in range(STRETCHES)]:
             end = n if few else first + STRETCH
-            candidates(machine, structure, itself, level, first, end, options.phase == "match", 0, draw=False)
+            candidates(machine, structure, itself, level, first, end, options.parity == "match", 0, draw=False)
             counts.append(machine.get(itself.counts[begin + first : begin + end])[:, 0])
         means.append(float(np.concatenate(counts).mean()))
     return float(np.mean(means)) if means else inf
@@ -380,13 +380,13 @@ def resample(
         if level < top:
             done = _done(kept, level, shapes)
             for first, end in paced(pixels([shapes[level]]), _first_launch(analysis, level), done):  # Loop x', y'
-                match = options.phase == "match"
+                match = options.parity == "match"
                 sampled = candidates(machine, structure, sampled, level, first, end, match, seed)  # (9) to (12)
                 machine.sync()
                 record.tell(level, end)
                 keep.offer(partial(_kept, machine, sampled, shapes, level, end, alpha, record))
         source, counts = _read(machine, sampled, shapes, level)
-        picture = _collapsed(machine, analysis, level, source, picture, options.joins == "blend")  # CollapsePyramid
+        picture = _collapsed(machine, analysis, level, source, picture, options.seams == "blend")  # CollapsePyramid
         image = analysis.sample.picture(machine.get(picture), source if level == 0 else None)
         given = analysis.place.ravel()[source].astype(np.int32) if level == 0 else source
         place, nodes = _place(given, analysis.shapes[level][1]), pixels(analysis.shapes[level + 1 :])

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SHARE = 8
-"""The strip reaches an eighth of the side to either side of the join."""
+"""The strip reaches an eighth of the side to either side of the seam."""
 
 WIDEST = 64
 """Pixels that the strip reaches at most: a wider one costs more and hides no more."""
@@ -28,8 +28,8 @@ _FAR = np.int64(2**62)
 def mend(planes: NDArray[np.int32]) -> NDArray[np.intp]:
     """Where each pixel of a picture that wraps around comes from in one that does not.
 
-    Columns first: the picture is turned by half its width, so that the join of its left and right edges stands in the
-    middle; a strip of the picture, of the place where it fits best, is laid over the join; on either side of the join
+    Columns first: the picture is turned by half its width, so that the seam of its left and right edges stands in the
+    middle; a strip of the picture, of the place where it fits best, is laid over the seam; on either side of the seam
     the strip ends at the path from top to bottom along which the squared differences of the two add up to least. Then
     the same for rows, with paths that end where they begin.
 
@@ -66,16 +66,16 @@ def _fits(values: NDArray[np.int64]) -> bool:
 
 
 def _covered(values: NDArray[np.int64], place: NDArray[np.intp], closed: bool) -> NDArray[np.intp]:
-    """``place`` with a strip over the join of the last column with the first."""
+    """``place`` with a strip over the seam of the last column with the first."""
     cols = values.shape[1]
     reach, turn = min(cols // SHARE, WIDEST), cols // 2
-    left = turn - reach  # of the strip, where the join is before column `turn`
+    left = turn - reach  # of the strip, where the seam is before column `turn`
     there = np.roll(values, turn, 1)[:, left : left + 2 * reach]
     starts = range(0, cols - 2 * reach + 1, -(-cols // PLACES))
     # the least that any two paths cost ranks the places well enough
-    least = [sum(int(c.min(1).sum()) for c in _joins(there, values[:, x : x + 2 * reach])) for x in starts]
+    least = [sum(int(c.min(1).sum()) for c in _seams(there, values[:, x : x + 2 * reach])) for x in starts]
     best = starts[int(np.argmin(least))]
-    first, last = (_path(c, closed)[:, None] for c in _joins(there, values[:, best : best + 2 * reach]))
+    first, last = (_path(c, closed)[:, None] for c in _seams(there, values[:, best : best + 2 * reach]))
     col = np.arange(2 * reach)
     own = np.roll(place, turn, 1)
     covered = own[:, left : left + 2 * reach]
@@ -84,7 +84,7 @@ def _covered(values: NDArray[np.int64], place: NDArray[np.intp], closed: bool) -
     return np.roll(own, -turn, 1)
 
 
-def _joins(there: NDArray[np.int64], strip: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _seams(there: NDArray[np.int64], strip: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """What it costs to cut right of each column of either half, (rows, reach - 1) each."""
     square = ((there - strip) ** 2).sum(-1)
     cost = square[:, :-1] + square[:, 1:]
