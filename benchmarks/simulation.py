@@ -79,7 +79,7 @@ def main():
     truth = hidden_map(side, 1)
     for count in options.data:
         known = hard_data(side, count, 1)
-        job = {"hard": known, "categorical": True, "rng": 1, "device": options.device, "jobs": options.jobs}
+        job = {"known": known, "categorical": True, "rng": 1, "device": options.device, "jobs": options.jobs}
         job["data_weight"] = options.data_weight
         simdtex.simulate(image, 2, shape=(side, side), **job)
         began = time.perf_counter()

@@ -99,7 +99,7 @@ EDGES = {"multires": ("mend", "keep"), "pyramid": ("reflect", "wrap"), "mrf": ("
 LONG = ("free_sweeps", "iterations", "sweeps", "burn_in", "number", "seeds")
 """Counts of what is done one after another: whoever asks for a milliard is served, so no try does."""
 
-OTHERS = ("workers", "scheduler")
+OTHERS = ("workers", "cluster")
 """Options that start processes or ask the network."""
 
 DEEP = {"synth": 0.6, "sheet": 0.8, "schedules": 0.7, "demo": 0.2, "bench": 0.0}
@@ -325,7 +325,6 @@ class _Maker:
         roles = {
             "sample_mask": "mask",
             "known": "table",
-            "hard": "table",
             "thresholds": "thresholds",
             "start": "picture",
         }

@@ -16,10 +16,12 @@ from simdtex.io import image
 OPTIONS = [(name, one) for name in COMMANDS for one in load(name).params if isinstance(one, click.Option)]
 LINES = [words for name in COMMANDS for words, _ in load(name).examples] + [words for words, _ in EXAMPLES]
 
-VERBS = set(
-    """add average be begin blend bring carry check compare continue cool count draw exchange extend fill follow get give
-    go have honour keep launch lay leave let listen look make match measure melt mend open prefer print read relax run
-    say show split start sweep take try use weigh write break""".split()
+
+VERBS = re.findall(
+    r"\w+",
+    """add average be begin blend break bring carry check compare continue cool count draw exchange extend fill follow get
+    give go have honour keep launch lay leave let listen look make match measure melt mend open prefer print read relax
+    run say show split start sweep take try use weigh write""",
 )
 
 

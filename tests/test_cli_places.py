@@ -32,7 +32,7 @@ TEXTS = {
     ),
     *("categorical_channels", "weights", "shares", "proportions", "alpha", "features", "parity", "seams", "pyramid"),
     *("match", "color", "schedule", "array", "mapping", "solids", "slices", "average", "blend", "pixels", "names"),
-    *("alphas", "betas", "palette", "pattern", "low", "high", "scheduler"),
+    *("alphas", "betas", "palette", "pattern", "low", "high", "cluster"),
 }
 PICTURES = ("synth", "fill", "extend", "mix", "sheet")
 ISING_START = ("ising", "start")  # up or random

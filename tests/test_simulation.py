@@ -209,7 +209,7 @@ FLOATS = texture((16, 20), dtype=np.float32)
 def digests(**change):
     arguments = {
         "training": FLOATS,
-        "hard": holed(),
+        "known": holed(),
         "guide": (texture((16, 20), seed=7), texture(SHAPE, seed=8)),
         "mask": np.arange(20) < np.full((16, 1), 14),
     } | change
@@ -229,7 +229,7 @@ CHANGES = {
         {"training": with_value(FLOATS, np.nan)},
         {"training": FLOATS.astype(np.float64)},
     ],
-    "hard_data": [{"hard": with_value(holed(), 0.5)}, {"hard": None}],
+    "hard_data": [{"known": with_value(holed(), 0.5)}, {"known": None}],
     "guide": [{"guide": (texture((16, 20), seed=7), texture(SHAPE, seed=9))}, {"guide": None}],
     "mask": [{"mask": np.arange(20) < np.full((16, 1), 15)}, {"mask": None}],
 }
@@ -336,16 +336,16 @@ BAD = {
     "colour": ({"training": texture((9, 9), 3)}, ValueError, "or channel_axis=-1"),
     "infinite": ({"training": np.full((9, 9), np.inf)}, ValueError, "infinite"),
     "nothing known": ({"training": np.full((9, 9), np.nan)}, ValueError, "no known pixel"),
-    "data of another size": ({"hard": holed(shape=(12, 13))}, ValueError, "known is 12x13 .* the output 12x14"),
-    "data of no value": ({"hard": NOTHING}, ValueError, "known has no value"),
-    "data everywhere": ({"hard": TRAINING[:12, :14]}, ValueError, "known leaves nothing to do"),
-    "ragged data": ({"hard": [[1, 2], [3]]}, ValueError, "hard is ragged; give rows of equal length"),
-    "data in words": ({"hard": np.full(SHAPE, "x")}, TypeError, "known holds .* give integers or real floats"),
-    "data with an axis too many": ({"hard": NOTHING[..., None]}, ValueError, "known is 3-dimensional"),
-    "data that the type does not hold": ({"hard": with_value(NOTHING, 1.5)}, ValueError, "known holds 1.5, which"),
+    "data of another size": ({"known": holed(shape=(12, 13))}, ValueError, "known is 12x13 .* the output 12x14"),
+    "data of no value": ({"known": NOTHING}, ValueError, "known has no value"),
+    "data everywhere": ({"known": TRAINING[:12, :14]}, ValueError, "known leaves nothing to do"),
+    "ragged data": ({"known": [[1, 2], [3]]}, ValueError, "known is ragged; give rows of equal length"),
+    "data in words": ({"known": np.full(SHAPE, "x")}, TypeError, "known holds .* give integers or real floats"),
+    "data with an axis too many": ({"known": NOTHING[..., None]}, ValueError, "known is 3-dimensional"),
+    "data that the type does not hold": ({"known": with_value(NOTHING, 1.5)}, ValueError, "known holds 1.5, which"),
     "an unknown category": (
-        {"training": CATEGORIES, "categorical": True, "hard": with_value(NOTHING, 1.0)}, ValueError, "1"),
-    "no such table": ({"hard": "nowhere.csv"}, ValueError, "nowhere.csv does not exist"),
+        {"training": CATEGORIES, "categorical": True, "known": with_value(NOTHING, 1.0)}, ValueError, "1"),
+    "no such table": ({"known": "nowhere.csv"}, ValueError, "nowhere.csv does not exist"),
     "a mask of nothing": ({"mask": np.zeros((16, 20), bool)}, ValueError, "the mask leaves nothing of the sample"),
     "no pair of guides": ({"guide": TRAINING}, TypeError, "guide is no pair"),
     "an unknown option": ({"preset": "default", "reach": 3}, TypeError, "unknown option 'reach'"),

@@ -141,7 +141,7 @@ def simulate(
                 report,
                 material.pixels[0],
                 made.values,
-                data=None if known is None else _rows(known),
+                data=None if values is None else _rows(values),
                 categories=None if categorical else [],
                 command=command_line(click.get_current_context()),
             )
