@@ -19,9 +19,9 @@ LINES = [words for name in COMMANDS for words, _ in load(name).examples] + [word
 
 VERBS = re.findall(
     r"\w+",
-    """add average be begin blend break bring carry check compare continue cool count draw exchange extend fill follow get
-    give go have honour keep launch lay leave let listen look make match measure melt mend open prefer print read relax
-    run say show split start sweep take try use weigh write""",
+    """add average be begin blend break bring carry check compare continue cool count draw exchange extend fill
+    follow get give go have honour keep launch lay leave let listen look make match measure melt mend open
+    prefer print read relax run say show split start sweep take try use weigh write""",
 )
 
 
