@@ -75,7 +75,7 @@ def main():
         "sources": partial(sources, machine, gravel),
         "beta-0": partial(series, machine, gravel, 0),
         "beta-1": partial(series, machine, gravel, 1),
-        "parity": partial(phases, machine, gravel),
+        "parity": partial(parities, machine, gravel),
         "colour": partial(colours, machine, tissue),
         "edges": partial(edges, {name: collection[name] for name in ("brick", "gravel", "tissue", "wood")}),
         "seams": partial(seams, machine, {name: collection[name] for name in ("gravel", "brick", "tissue")}),
@@ -392,8 +392,8 @@ def table(machine, collection):
             print(f"    {name:<9} alpha {alpha:<4g} seam {seams[name]:.2f}, lines {shown[name]:.2f}", flush=True)
 
 
-def phases(machine, gravel):
-    """The two phases at the same alphas."""
+def parities(machine, gravel):
+    """The two parities at the same alphas."""
     pictures = []
     for parity in ("match", "free"):
         for alpha in (0, 0.05, 0.2, 0.4):

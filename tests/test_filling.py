@@ -336,28 +336,33 @@ def test_categories_are_filled_with_categories():
 
 
 @pytest.mark.parametrize("axis", [None, 0])
-def test_a_callback_sees_the_whole_picture_and_a_fraction_that_never_falls(axis):
+@pytest.mark.parametrize("sample", [None, (17, 19)])
+def test_a_callback_sees_the_whole_picture_and_a_fraction_that_never_falls(axis, sample):
     image = with_axis(axis, shape=FAR.shape)
+    other = sample and with_axis(axis, shape=sample)
     seen = []
 
     def look(progress):
-        seen.append((progress.fraction, progress.image()))
+        seen.append((progress.fraction, progress.image(), progress.temperature(), progress.source()))
 
-    found = fill(image, FAR, channel_axis=axis, callback=look)
-    fractions = [fraction for fraction, _ in seen]
+    found, output = fill(image, FAR, sample=other, reach=4, channel_axis=axis, callback=look, full_output=True)
+    fractions = [one[0] for one in seen]
     assert fractions == sorted(fractions)
     assert 0 < fractions[0] < 0.34 and 0.95 < fractions[-1] <= 1
-    assert all((one.shape, one.dtype) == (image.shape, image.dtype) for _, one in seen)
-    untouched = np.ones(FAR.shape, bool)
-    for rows, cols, _ in windows(FAR, 1, None):
-        untouched[rows, cols] = False
-    for _, one in seen:
-        assert_same_bits(planes(axis, one)[untouched], planes(axis, image)[untouched])
-    last, known = planes(axis, seen[-1][1]), ~FAR
-    assert_same_bits(last[known], planes(axis, image)[known])
-    first = hole_at(np.s_[2:6, 3:7], shape=FAR.shape)  # windows that are finished are in the picture
-    assert_same_bits(last[first], planes(axis, found)[first])
-    assert_same_bits(fill(image, FAR, channel_axis=axis), found)
+    known, first = ~FAR, hole_at(np.s_[2:6, 3:7], shape=FAR.shape)
+    at_home = np.full((*FAR.shape, 2), -1) if sample else np.moveaxis(np.indices(FAR.shape), 0, -1)
+    for _, picture, temperature, source in seen:
+        assert (picture.shape, picture.dtype) == (image.shape, image.dtype)
+        assert_same_bits(planes(axis, picture)[known], planes(axis, image)[known])
+        assert temperature.shape == FAR.shape and (temperature[known] == 0).all() and temperature.max() <= 1
+        assert np.array_equal(source[known], at_home[known])
+        assert source.shape == (*FAR.shape, 2) and (source < (sample or FAR.shape)).all()
+    assert max(one[2].max() for one in seen) > 0.5, "what is relaxed is warm"
+    _, picture, _, source = seen[-1]  # windows that are finished are in the picture
+    assert_same_bits(planes(axis, picture)[first], planes(axis, found)[first])
+    assert np.array_equal(source[first], output.source[first])
+    assert np.array_equal(source[FAR], output.source[FAR]), "and the last sweep has found where all is from"
+    assert_same_bits(fill(image, FAR, sample=other, reach=4, channel_axis=axis), found)
 
 
 def test_an_error_of_a_callback_comes_out():

@@ -307,11 +307,10 @@ def filled(
 ) -> tuple[NDArray[Any], Output]:
     """Make one window of a picture after the other; the arguments are those of `fill`."""
     began, shape = time.perf_counter(), job.hole.shape
-    image, temperature = job.pixels.copy(), np.zeros(shape)
     several = job.sample is not None and len(job.sample.pixels) > 1
-    place = np.full((*shape, 3 if several else 2), -1, np.int32)
+    whole = Whole(job.pixels.copy(), np.zeros(shape), np.full((*shape, 3 if several else 2), -1, np.int32))
     if job.sample is None:
-        place[:] = np.moveaxis(np.indices(shape), 0, -1)
+        whole.source[:] = np.moveaxis(np.indices(shape), 0, -1)
     radius = int(neighbourhood_offsets(options.order).max())
     everything = [Window(slice(0, shape[0]), slice(0, shape[1]), options.levels or 0)]
     parts = everything if options.boundary == "torus" else windows(job.hole, radius, options.levels)
@@ -321,51 +320,83 @@ def filled(
         at = (window.rows, window.cols)
         hole = job.hole[at]
         if number == len(finished):
-            seen = callback and _pasting(callback, image, window, number, len(parts))
+            around = _around(job, window)
+            seen = callback and _pasting(callback, whole, at, hole, around.corner, number, len(parts))
             within = keep.within(finished.copy, inside)
-            corner, made, output = _window(machine, job, window, options, seed, seen, within)
+            made, output = _window(machine, job, window, around, options, seed, seen, within)
             assert output.source is not None and output.temperature is not None
             told = output.statistics | {"window": [s for part in at for s in (part.start, part.stop)]}
-            finished.append(Made(corner, made[hole], output.temperature[hole], output.source[hole], told))
+            finished.append(Made(around.corner, made[hole], output.temperature[hole], output.source[hole], told))
             inside = None
             keep.offer(lambda: (finished, None))
         found = finished[number]
-        image[at][hole], temperature[at][hole] = found.values, found.temperature
-        place[at][hole] = found.source + (np.array(found.corner, np.int32) if job.sample is None else 0)
+        whole.image[at][hole], whole.temperature[at][hole] = found.values, found.temperature
+        whole.source[at][hole] = found.source + (np.array(found.corner, np.int32) if job.sample is None else 0)
     runs = [found.statistics for found in finished]
     statistics = {
         **{name: runs[0][name] for name in ("device", "seed", "options")},
         **{"seconds": time.perf_counter() - began, "windows": runs, "levels": runs[0]["levels"]},
         "device_seconds": sum(run["device_seconds"] for run in runs) if runs[0]["device_seconds"] is not None else None,
     }
-    return image, Output(place, temperature, [], statistics)
+    return whole.image, Output(whole.source, whole.temperature, [], statistics)
+
+
+class Whole(NamedTuple):
+    """The whole picture, (rows, cols, channels), its temperatures and its source map, as far as they are made."""
+
+    image: NDArray[Any]
+    temperature: NDArray[np.float64]
+    source: NDArray[np.int32]
+
+
+class Around(NamedTuple):
+    """What a window is filled from.
+
+    ``corner`` is where this begins in the picture, ``place`` where the window's pixels are in it; None where it is a
+    texture of its own.
+    """
+
+    pictures: Pictures
+    corner: tuple[int, int]
+    place: NDArray[np.int32] | None
+
+
+def _around(job: Job, window: Window) -> Around:
+    """The sample of a window: its surroundings, or that of the job."""
+    if job.sample is not None:
+        return Around(job.sample, (0, 0), None)
+    hole, (rows, cols) = job.hole[window.rows, window.cols], job.hole.shape
+    lines, columns = (np.flatnonzero(hole.any(axis)) for axis in (1, 0))
+    sides = lines[-1] - lines[0] + 1, columns[-1] - columns[0] + 1
+    reach = job.reach or max(REACH, 2 * max(sides))
+    top, left = max(0, window.rows.start - reach), max(0, window.cols.start - reach)
+    near = (slice(top, min(rows, window.rows.stop + reach)), slice(left, min(cols, window.cols.stop + reach)))
+    inside = np.indices(hole.shape) + np.array([window.rows.start - top, window.cols.start - left])[:, None, None]
+    place = np.moveaxis(inside, 0, -1).astype(np.int32)
+    return Around(Pictures((job.pixels[near],), unknown=(job.hole[near],)), (top, left), place)
 
 
 def _window(
-    machine: Machine, job: Job, window: Window, options: Options, seed: int, callback: Callback | None, keep: Keep
-) -> tuple[tuple[int, int], NDArray[Any], Output]:
-    """Fill one window: where its sample begins in the picture, and what `simdtex.methods.mrf.synthesize` returns."""
-    at, (rows, cols) = (window.rows, window.cols), job.hole.shape
+    machine: Machine,
+    job: Job,
+    window: Window,
+    around: Around,
+    options: Options,
+    seed: int,
+    callback: Callback | None,
+    keep: Keep,
+) -> tuple[NDArray[Any], Output]:
+    """Fill one window: what `simdtex.methods.mrf.synthesize` returns."""
+    at, pictures = (window.rows, window.cols), around.pictures
     hole = job.hole[at]
     known = np.repeat(~hole[..., None], job.pixels.shape[2], -1)
-    if job.sample is not None:
-        pictures, corner, place = job.sample, (0, 0), None
-    else:
-        lines, columns = (np.flatnonzero(hole.any(axis)) for axis in (1, 0))
-        sides = lines[-1] - lines[0] + 1, columns[-1] - columns[0] + 1
-        reach = job.reach or max(REACH, 2 * max(sides))
-        top, left = max(0, window.rows.start - reach), max(0, window.cols.start - reach)
-        around = (slice(top, min(rows, window.rows.stop + reach)), slice(left, min(cols, window.cols.stop + reach)))
-        pictures, corner = Pictures((job.pixels[around],), unknown=(job.hole[around],)), (top, left)
-        inside = np.indices(hole.shape) + np.array([window.rows.start - top, window.cols.start - left])[:, None, None]
-        place = np.moveaxis(inside, 0, -1).astype(np.int32)
     asked = options.levels is not None
     if not asked and window.levels:
         sizes = [picture.shape[:2] for picture in pictures.pixels]
         offsets = neighbourhood_offsets(options.order)
         most = mrf.number_of_levels(sizes, offsets, hole.shape, replace(options, overview=LEAST))
         options = replace(options, levels=min(window.levels, most))
-    given = Given(np.where(known, job.pixels[at], 0).astype(job.pixels.dtype), known, place, suggests=False)
+    given = Given(np.where(known, job.pixels[at], 0).astype(job.pixels.dtype), known, around.place, suggests=False)
     for levels in range(options.levels or 0, -1, -1):
         try:
             made, output = mrf.synthesize(machine, pictures, hole.shape, options, seed, callback, given, keep=keep)
@@ -375,22 +406,46 @@ def _window(
             options = replace(options, levels=levels - 1)
             continue
         break
-    return corner, made, output
+    return made, output
 
 
-def _pasting(callback: Callback, image: NDArray[Any], window: Window, number: int, count: int) -> Callback:
-    """A callback that sees the whole picture, and the work on all its windows."""
+def _pasting(
+    callback: Callback,
+    whole: Whole,
+    at: tuple[slice, slice],
+    hole: NDArray[np.bool_],
+    corner: tuple[int, int],
+    number: int,
+    count: int,
+) -> Callback:
+    """A callback that sees the whole picture with what is made of the hole at a place, and the work on all windows.
+
+    ``corner`` where the sources of the hole count from.
+    """
 
     def seen(progress: Any) -> Any:
-        def pasted() -> NDArray[Any]:
-            picture = image.copy()
-            made, step = progress.image(), 2**progress.level
-            picture[window.rows, window.cols] = np.kron(made, np.ones((step, step, 1), made.dtype))[
-                : window.rows.stop - window.rows.start, : window.cols.stop - window.cols.start
-            ]
-            return picture
+        def pasted(below: NDArray[Any], values: NDArray[Any]) -> NDArray[Any]:
+            above, step = below.copy(), 2**progress.level
+            fine = values.repeat(step, 0).repeat(step, 1)[: hole.shape[0], : hole.shape[1]]
+            above[at][hole] = fine[hole]
+            return above
 
-        return callback(replace(progress, image=pasted, fraction=(number + progress.fraction) / count))
+        def source() -> NDArray[np.int32]:
+            place = progress.source()
+            known = place[..., :1] >= 0
+            return pasted(
+                whole.source, np.concatenate([place[..., :2] + known * np.array(corner, np.int32), place[..., 2:]], -1)
+            )
+
+        return callback(
+            replace(
+                progress,
+                image=lambda: pasted(whole.image, progress.image()),
+                temperature=lambda: pasted(whole.temperature, progress.temperature()),
+                source=source,
+                fraction=(number + progress.fraction) / count,
+            )
+        )
 
     return seen
 
