@@ -73,6 +73,7 @@ def small(code):
         .replace("(192, 192)", "(40, 40)")
         .replace("256x256", "40x40")
         .replace("512x512", "40x40")
+        .replace("400x300", "40x30")
     )
 
 

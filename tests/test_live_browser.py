@@ -83,7 +83,7 @@ class Page:
 
     @property
     def results(self):
-        return len(self.all(".strip li"))
+        return len(self.all(".strip li:not(.current)"))
 
     def result(self, number, timeout=60):
         """Wait until there are so many results."""
@@ -216,6 +216,35 @@ def test_it_stops_and_goes_on_to_the_same_bytes(page, wall):
     words = shlex.split(page.one("[aria-label='Command line']").get_attribute("textContent"))
     subprocess.run([sys.executable, "-m", *words, "--quiet"], cwd=wall.parent, check=True, timeout=120)
     assert (wall.parent / name).read_bytes() == data
+
+
+@pytest.mark.slow
+def test_an_earlier_result_is_looked_at_while_a_run_goes_on(page, wall):
+    page.script("page.auto.checked = false")
+    drop(page.driver, wall)
+    page.result(1)
+    assert not page.one(".strip .current").is_displayed()
+    page.put("Result width", 2000)
+    page.put("Result height", 1500)
+    page.button("Make it").click()
+    until(lambda: page.script("return page.running"))
+    until(lambda: page.one(".strip .current button").get_attribute("aria-current") == "true")
+    page.all(".strip button")[0].click()
+    until(lambda: page.script("return page.view.frame.result") == 1)
+    assert page.script("return page.running && page.view.frame.rows") == 128, "the run goes on"
+    assert page.labelled("Result width").get_attribute("value") == "144"
+    before = page.script("return page.progress.value")
+    until(lambda: page.script("return page.progress.value") > before)
+    page.button("What is being made").click()
+    until(lambda: page.script("return page.view.frame.rows") == 1500)
+    assert not page.all("[data-what='picture']")[0].is_displayed()
+    page.all(".strip button")[0].click()
+    until(lambda: page.script("return page.view.frame.result") == 1)
+    page.result(2)
+    assert page.script("return page.shown") == 1, "it is not taken away from whoever looks at it"
+    assert not page.one(".strip .current").is_displayed()
+    page.all(".strip button")[1].click()
+    until(lambda: page.script("return page.view.frame.rows") == 1500)
 
 
 @pytest.mark.slow

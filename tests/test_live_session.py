@@ -12,6 +12,7 @@ from live import Fake, asked, png, texture
 
 import simdtex
 from simdtex import cli
+from simdtex.live import results
 from simdtex.live import session as sessions
 from simdtex.live.levels import Levels
 from simdtex.live.results import Results
@@ -267,19 +268,68 @@ def test_no_more_frames_come_than_are_seen():
     page.session.close()
 
 
-def test_it_stops_and_goes_on_and_shows_what_is_asked_for_meanwhile(opened):
-    send, stopped = opened.session._send, []
+def frame_of(page, found, **message):
+    """The first frame of this kind after something was said."""
+    after = len(page.got)
+    page.say(**message)
+    while not found(one := page.wait("frame", after=after)[0]):
+        after += 1
+    return one
+
+
+def begin_and_stop(page, **settings):
+    """Have something made, and stop it at its first frame."""
+    send, stopped = page.session._send, []
 
     def stopping(message, buffers):
         if message["kind"] == "frame" and "fraction" in message and not stopped:
             stopped.append(message)
-            opened.session.receive({"kind": "stop"})
+            page.session.receive({"kind": "stop"})
         send(message, buffers)
 
-    opened.session.attach(stopping)
+    page.session.attach(stopping)
+    frame_of(page, lambda one: one.get("paused"), **asked(**settings))
+
+
+def test_an_earlier_result_is_looked_at_while_a_run_goes_on(opened, monkeypatch):
+    opened.result()
+    begin_and_stop(opened, seed=8, width=50)
+    frame = frame_of(opened, lambda one: one.get("result") == 1, kind="choose", result=1)
+    assert (frame["cols"], frame["layer"], "fraction" in frame) == (36, "picture", False)
+    assert opened.wait("progress")[0]["paused"]
+    where = {"left": 0, "top": 0, "width": 9, "height": 9, "step": 1, "tiled": False}
+    frame = frame_of(opened, lambda one: one["width"] == 9, kind="look", layer="use", **where)
+    assert (frame["result"], frame["layer"], frame["cols"]) == (1, "use", 48)
+    frame = frame_of(opened, lambda one: "fraction" in one, kind="choose", result=None)
+    assert (frame["cols"], frame["layer"]) == (48, "use"), "what is being made is looked at again"
+    assert opened.error(kind="choose", result=2) == "result 2 is no longer there; make it again with its command line"
+    frame_of(opened, lambda one: one.get("result") == 1, kind="choose", result=1)
+    result, _ = opened.ask("result", kind="go")
+    assert (result["result"], result["width"], result["chosen"]) == (2, 50, False)
+    assert opened.ask("chosen", kind="hello")[0]["result"] == 1
+    whole = simdtex.synthesize(texture(), (28, 50), channel_axis=-1, rng=8, device="reference", order=4)
+    np.testing.assert_array_equal(opened.session.latest.image, whole)
+    monkeypatch.setattr(results, "KEPT", 2)
+    begin_and_stop(opened)
+    frame_of(opened, lambda one: one.get("result") == 1, kind="choose", result=1)
+    result, _ = opened.ask("result", kind="go")
+    assert (result["gone"], result["chosen"]) == ([1], True), "what is let go is looked at no longer"
+
+
+def test_a_page_that_comes_back_looks_at_what_is_being_made(opened):
+    opened.result()
+    begin_and_stop(opened, seed=8)
+    frame_of(opened, lambda one: one.get("result") == 1, kind="choose", result=1)
     after = len(opened.got)
-    opened.say(**asked())
-    opened.wait("frame", after=after)
+    opened.say(kind="hello")
+    told = [one for one, _ in opened.got[after:] if one["kind"] not in ("frame", "progress")]
+    assert [one["kind"] for one in told] == ["hello", "picture", "result", "begun"]
+    assert told[-1]["layers"] == ["picture", "arrangement", "use", "temperature"] and not told[2]["chosen"]
+    assert opened.ask("result", kind="go")[0]["chosen"]
+
+
+def test_it_stops_and_goes_on_and_shows_what_is_asked_for_meanwhile(opened):
+    begin_and_stop(opened)
     where = {"left": 0, "top": 0, "width": 9, "height": 9, "step": 1, "tiled": False}
     message = opened.ask("frame", kind="look", layer="temperature", **where)[0]
     while not message.get("paused"):

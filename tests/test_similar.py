@@ -51,13 +51,13 @@ def test_where_there_are_too_few_it_is_the_candidate_itself(machine):
             assert row[others:].tolist() == [n] * (4 - others)
 
 
-LARGE = {"order": 8, "sample_shape": (48, 44), "edges": "reflect", "phases": "decimated"}
+LARGE = {"order": 8, "sample_shape": (40, 36), "edges": "reflect", "phases": "decimated"}
 
 
 def excess(p, found):
     """By how much the mean distance of what was found exceeds that of the nearest."""
     d = plainly(p)
-    least = np.sort(d, 1)[:, : found.shape[1]]
+    least = np.partition(d, found.shape[1], 1)[:, : found.shape[1]]
     return np.take_along_axis(d, found, 1).mean() / least.mean() - 1
 
 

@@ -58,8 +58,14 @@ SHARE = 20
 RATE = 30
 """Frames a second, at most."""
 
+BESIDE = 0.1
+"""Seconds between two words on a run while something else is looked at."""
+
 AFTER = 0.5
 """Seconds without a wish before a result's figures of quality are computed."""
+
+LAYERS = ("picture", "arrangement", "use", "temperature")
+"""What can be looked at while a run of ``mrf`` goes on; of other methods, the first alone."""
 
 EXAMPLES = ("brick", "grass", "gravel")
 """Pictures of scikit-image that a page can begin with."""
@@ -100,7 +106,8 @@ class Session:
         self._running: Message | None = None  # what the page was told when the run began
         self._maps: dict[str, NDArray[Any]] = {}
         self._results = Results()
-        self._shown: int | None = None  # the result that is looked at; None: the picture
+        self._shown: int | None = None  # the result that is looked at; None: what is being made, else the picture
+        self._unshown = False  # whether it is to be shown, beside a run
         self._levels: Levels | None = None
         self._next = 0.0  # when a frame may be shown
         self._thread: threading.Thread | None = None
@@ -156,9 +163,12 @@ class Session:
         if self._picture is not None:
             self._show_picture(new=not self._made_any)
             for result in self._results:
-                self._tell(result)
-            if self._running is not None:
-                self._send(self._running, [])
+                self._tell(result, chosen=False)
+            with self._changed:
+                running = self._running
+                self._shown = self._shown if running is None else None
+            if running is not None:
+                self._send(running, [])
                 return
             if self._shown is not None:
                 self._send({"kind": "chosen", "result": self._shown}, [])
@@ -243,7 +253,7 @@ class Session:
         look = looking.parse(message)
         with self._changed:
             self._look = look
-            self._next = 0.0
+            self._next, self._unshown = 0.0, True
             self._changed.notify_all()
         self._do(partial(self._look_at, look))
 
@@ -255,11 +265,18 @@ class Session:
         number = message.get("result")
         if number is not None:
             whole("the result", number, 1)
-        self._do(lambda: self._chosen(number))
+            self._results.get(number)
+        with self._changed:
+            beside = self._running is not None
+            if beside:
+                self._shown, self._next, self._unshown = number, 0.0, True
+                self._changed.notify_all()
+        if beside:  # the run shows it
+            self._send({"kind": "chosen", "result": number}, [])
+        else:
+            self._do(lambda: self._chosen(number))
 
     def _chosen(self, number: int | None) -> None:
-        if number is not None:
-            self._results.get(number)
         self._shown = number
         self._send({"kind": "chosen", "result": number}, [])
         self._refresh()
@@ -336,62 +353,78 @@ class Session:
         levels = Levels(key, options, self._levels)
         self._levels = levels
         rows, cols = asked.shape
-        self._running = {"kind": "begun", "width": cols, "height": rows, "from": levels.level}
-        self._send(self._running, [])
-        self._shown, self._next, began = None, 0.0, time.perf_counter()
+        begun = {"kind": "begun", "width": cols, "height": rows, "from": levels.level}
+        begun["layers"] = list(LAYERS) if settings.method == "mrf" else [LAYERS[0]]
+        with self._changed:
+            self._running, self._shown = begun, None
+        self._send(begun, [])
+        self._next, began = 0.0, time.perf_counter()
         watch = partial(self._watch, wish, asked.sample, asked.shape)
         try:
             with levels.around():
                 image, output = asked.call(rng=settings.seed, device=self._machine(), callback=watch, full_output=True)
         finally:
-            self._running = None
+            with self._changed:
+                self._running = None
         seconds = time.perf_counter() - began
         steps = (*(earlier.steps if earlier else ()), asked.step)
         result = self._results.add(message, image, output, asked.sample, asked.maps, steps, seconds)
-        self._shown = result.number
-        self._tell(result)
+        if self._shown is None or self._shown in self._results.gone:  # else another one is looked at
+            self._shown = result.number
+        self._tell(result, chosen=self._shown == result.number)
         self._refresh()
 
-    def _tell(self, result: Result) -> None:
-        self._send({"kind": "result", **result.told(), "gone": self._results.gone}, [result.thumbnail])
+    def _tell(self, result: Result, *, chosen: bool) -> None:
+        told = {"kind": "result", **result.told(), "gone": self._results.gone, "chosen": chosen}
+        self._send(told, [result.thumbnail])
 
     # -- what is seen ---------------------------------------------------------------------------------------------
 
     def _watch(self, wish: int, sample: NDArray[Any], shape: tuple[int, int], progress: Any) -> None:
-        """Show a run while it goes on; wait while it is stopped."""
+        """Show a run while it goes on, or a result that is looked at beside it; wait while it is stopped."""
         if self._wish != wish:
             raise Stopped
         if time.perf_counter() >= self._next and self._unseen < 2:
-            self._show(progress, sample, shape)
+            self._see(progress, sample, shape)
         while self._paused:
-            shown = self._look
-            self._show(progress, sample, shape)
+            seen = self._look, self._shown
+            self._see(progress, sample, shape)
             with self._changed:
-                self._changed.wait_for(partial(self._awake, wish, shown))
+                self._changed.wait_for(partial(self._awake, wish, seen))
             if self._wish != wish:
                 raise Stopped
 
-    def _awake(self, wish: int, shown: Look) -> bool:
+    def _awake(self, wish: int, seen: tuple[Look, int | None]) -> bool:
         """Whether a stopped run has something to do: to go on, to end, or to show something else."""
-        return not self._paused or self._wish != wish or self._look != shown
+        return not self._paused or self._wish != wish or (self._look, self._shown) != seen
 
-    def _show(self, progress: Any, sample: NDArray[Any], shape: tuple[int, int]) -> None:
-        self._machine().sync()  # what the run has asked for is no part of what a frame takes
-        began = time.perf_counter()
+    def _see(self, progress: Any, sample: NDArray[Any], shape: tuple[int, int]) -> None:
+        """Show the run, or what is looked at beside it."""
         told = {"fraction": progress.fraction, "doing": progress.doing, "level": progress.level}
         told |= {"levels": progress.levels, "paused": self._paused}
         told |= {name: getattr(progress, name) for name in ("sweep", "temperature_left") if hasattr(progress, name)}
+        if (number := self._shown) is None:
+            self._show(progress, sample, shape, told)
+            return
+        if self._unshown:
+            self._unshown = False
+            self._show_result(number)
+        self._send({"kind": "progress", **told}, [])
+        self._next = time.perf_counter() + BESIDE
+
+    def _show(self, progress: Any, sample: NDArray[Any], shape: tuple[int, int], told: Message) -> None:
+        self._machine().sync()  # what the run has asked for is no part of what a frame takes
+        began = time.perf_counter()
         layer = self._look.layer
-        plane = None
-        if layer == "temperature" and hasattr(progress, "temperature"):
-            plane = planes.temperature(progress.temperature(), shape)
-        elif layer == "arrangement" and hasattr(progress, "source"):
-            plane = planes.arrangement(progress.source(), sample, shape)
-        elif layer == "use" and hasattr(progress, "source"):
-            plane = planes.use(progress.source(), sample)
-        if plane is None:
-            layer, plane = "picture", planes.picture(progress.picture(), sample, shape)
-        self._push(plane, layer, told, smooth=False)
+        if not hasattr(progress, "source") or layer not in LAYERS:
+            layer = "picture"
+        made = {
+            "picture": lambda: planes.picture(progress.picture(), sample, shape),
+            "arrangement": lambda: planes.arrangement(progress.source(), sample, shape),
+            "use": lambda: planes.use(progress.source(), sample),
+            "temperature": lambda: planes.temperature(progress.temperature(), shape),
+        }
+        self._push(made[layer](), layer, told, smooth=False)
         took = time.perf_counter() - began
         self._next = began + max(1 / RATE, SHARE * took)
 
@@ -402,14 +435,15 @@ class Session:
 
     def _refresh(self) -> None:
         """Show what is looked at while nothing is being made."""
-        layer = self._look.layer
-        if self._shown is None:
-            if self._picture is not None:
-                plane = planes.picture(self._picture.pixels, self._picture.pixels)
-                self._push(plane, "sample", {"result": None}, smooth=True)
-            return
-        result = self._results.get(self._shown)
-        layer, plane = result.plane(layer, self._picture.pixels if self._picture else None)
+        if self._shown is not None:
+            self._show_result(self._shown)
+        elif self._picture is not None:
+            plane = planes.picture(self._picture.pixels, self._picture.pixels)
+            self._push(plane, "sample", {"result": None}, smooth=True)
+
+    def _show_result(self, number: int) -> None:
+        result = self._results.get(number)
+        layer, plane = result.plane(self._look.layer, self._picture.pixels if self._picture else None)
         self._push(plane, layer, {"result": result.number}, smooth=True)
 
     def _push(self, plane: Plane, layer: str, told: Message, *, smooth: bool) -> None:

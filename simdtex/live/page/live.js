@@ -631,7 +631,9 @@ class Page {
     this.stopping = make("button", { type: "button", disabled: true, onclick: () => this.stop() }, "Stop");
     this.ending = make("button", { type: "button", disabled: true, onclick: () => this.send({ kind: "end" }) }, "Give up");
     const running = make("div", { class: "bar" }, this.stopping, this.ending, this.progress);
-    this.strip = make("ol", { class: "strip", "aria-label": "Earlier results" });
+    this.current = make("button", { type: "button", onclick: () => this.send({ kind: "choose", result: null }) }, "What is being made");
+    this.currentItem = make("li", { class: "current", hidden: true }, this.current);
+    this.strip = make("ol", { class: "strip", "aria-label": "Results" }, this.currentItem);
     this.takes = make("div", { class: "bar" });
     this.command = make("pre", { tabindex: 0, "aria-label": "Command line" });
     this.python = make("pre", { tabindex: 0, "aria-label": "Python" });
@@ -670,21 +672,32 @@ class Page {
     this.view.show(message, bytes);
     if (message.fraction === undefined) return;
     this.progress.value = message.fraction;
-    this.doing.textContent = message.doing;
+    if (this.watching) this.doing.textContent = message.doing;
     this.frames = (this.frames ?? 0) + 1;
+  }
+
+  on_progress({ fraction }) {
+    this.progress.value = fraction;
+  }
+
+  /** Offer these to be looked at. */
+  offer(layers) {
+    const text = (name) => LAYERS[name] ?? name.replace(/^map /, "Map: ");
+    this.layerChoice.replaceChildren(...layers.map((name) => make("option", { value: name }, text(name))));
+    if (!layers.includes(this.layer)) this.look("picture");
+    this.layerChoice.value = this.layer;
   }
 
   on_begun(message) {
     this.running = true;
+    this.offered = message.layers;
     this.stopped = false;
     this.frames = 0;
     this.say(message.from === null ? "It is being made." : `It goes on after level ${message.from}, where it begins to differ.`);
     this.progress.value = 0;
-    if (this.shown !== null) this.mark(this.shown, false);
-    this.shown = null;
-    if (this.layer === "sample") this.look("picture");
     this.alert.hidden = true;
     this.showRunning();
+    this.on_chosen({ result: null });
   }
 
   on_ended() {
@@ -696,21 +709,21 @@ class Page {
   on_result(message, [bytes]) {
     this.running = this.stopped = false;
     this.results.set(message.result, message);
+    const button = make("button", { type: "button", onclick: () => this.send({ kind: "choose", result: message.result }) });
     for (const number of message.gone) {
       this.results.get(number)?.item?.remove();
       this.results.delete(number);
     }
-    const button = make("button", { type: "button", onclick: () => this.send({ kind: "choose", result: message.result }) });
     const small = bitmap(bytes, ...message.thumbnail);
     const text = `Result ${message.result}, ${message.width} × ${message.height}, seed ${message.asked.seed}`;
     small.setAttribute("aria-hidden", "true");
     button.append(small, make("span", {}, text));
     message.item = make("li", {}, button);
     message.button = button;
-    this.strip.append(message.item);
+    this.currentItem.before(message.item);
     this.strip.scrollLeft = this.strip.scrollWidth;
-    if (message.asked.job === "fill") this.hole = [];
-    this.on_chosen({ result: message.result }, false);
+    if (message.chosen && message.asked.job === "fill") this.hole = [];
+    if (message.chosen) this.on_chosen({ result: message.result }, false);
     this.say(`Result ${message.result} is made: ${this.summary(message)}.`);
     this.progress.value = 1;
     this.showRunning();
@@ -721,18 +734,15 @@ class Page {
   }
 
   on_chosen({ result }, restore = true) {
-    if (this.shown !== null) this.mark(this.shown, false);
+    this.mark(this.shown, false);
     this.shown = result;
     const found = this.results.get(result);
     this.away.hidden = this.quality.hidden = !found;
-    if (!found) return;
     this.mark(result, true);
+    if (!found && this.running) this.offer(this.offered);
+    if (!found) return;
     this.doing.textContent = this.summary(found);
-    const layers = found.layers.map((name) => [name, LAYERS[name] ?? name.replace(/^map /, "Map: ")]);
-    const names = new Set(found.layers);
-    this.layerChoice.replaceChildren(...layers.map(([value, text]) => make("option", { value }, text)));
-    if (!names.has(this.layer)) this.look("picture");
-    this.layerChoice.value = this.layer;
+    this.offer(found.layers);
     this.view.canvas.setAttribute("aria-label", `Result ${result}: ${this.summary(found)}. Arrow keys move, plus and minus zoom, 0 fits.`);
     this.command.textContent = found.command;
     this.python.textContent = found.python;
@@ -746,7 +756,7 @@ class Page {
   }
 
   mark(number, current) {
-    const button = this.results.get(number)?.button;
+    const button = number === null ? this.current : this.results.get(number)?.button;
     if (current) button?.setAttribute("aria-current", "true");
     else button?.removeAttribute("aria-current");
   }
@@ -788,7 +798,7 @@ class Page {
   showRunning() {
     this.stopping.disabled = this.ending.disabled = !this.running;
     this.stopping.textContent = this.stopped ? "Go on" : "Stop";
-    for (const { button } of this.results.values()) button.disabled = this.running; // a run is looked at
+    this.currentItem.hidden = !this.running;
   }
 
   // -- painting
@@ -825,9 +835,14 @@ class Page {
     return onSample ? this.guide.sample : this.guide.output;
   }
 
+  /** Whether a run is looked at, on which nobody paints. */
+  get watching() {
+    return this.running && this.shown === null;
+  }
+
   get brush() {
     const tool = this.tool.value;
-    if (!tool || !["sample", "picture"].includes(this.seen) || this.running) return null;
+    if (!tool || !["sample", "picture"].includes(this.seen) || this.watching) return null;
     const width = Math.max(1, Number(this.brushWidth.value) || 16);
     const label = tool === "erase" ? 0 : tool === "hole" ? 1 : Number(tool.slice(6));
     const { surface } = this;
@@ -843,7 +858,7 @@ class Page {
 
   /** What is painted over what is seen. */
   painted() {
-    if (this.running) return [];
+    if (this.watching) return [];
     const label = (number) => LABELS[number - 1]?.colour ?? "#000";
     if (this.job.value === "fill") return ["sample", "picture"].includes(this.seen) ? [{ strokes: this.hole, colour: () => HOLE }] : [];
     if (this.seen === "sample") return [{ strokes: this.guide.sample, colour: label }];
@@ -983,7 +998,7 @@ class Page {
       this.settle();
     }
     this.say("Ready.");
-    this.strip.replaceChildren();
+    this.strip.replaceChildren(this.currentItem);
     this.results.clear();
     this.running = this.stopped = false;
     this.shown = null;
