@@ -1,21 +1,24 @@
 """Which sites relax together, step 6.2.1 of Algorithm 1, as plain loops; and the random words of a whole run.
 
-Nothing here shares code with the package but those words, whose generator is tested against published vectors. A level
-(`plain_mrf.Level`) has ``sites``, (row, column) of its own lattice row by row; ``near``, the neighbours of each, None
-where there is none; ``number``, ``seed``, ``rows``, ``cols``, ``tile`` and the options ``o``.
+Nothing here shares code with the package but the numbers of purposes. A level (`plain_mrf.Level`) has ``sites``, (row,
+column) of its own lattice row by row; ``near``, the neighbours of each, None where there is none; ``number``, ``seed``,
+``rows``, ``cols``, ``tile`` and the options ``o``.
 """
 
 from itertools import count
 from math import isqrt
 
 import plain
+from plain_numbers import philox
 
 from simdtex import random
 
 
 def words(seed, level, turn, index, purpose, attempt=0):
-    """Four random words of 32 bits."""
-    return [int(word) for word in random.draw4(seed, level, turn, index, purpose, attempt)]
+    """Four random words of 32 bits; a place has 48 bits, of which the upper 16 stand with level and purpose."""
+    index = int(index)
+    counter = [index & 0xFFFFFFFF, int(turn), index >> 32 << 16 | level << 8 | purpose, int(attempt)]
+    return philox(counter, (seed & 0xFFFFFFFF, seed >> 32))
 
 
 def below(word, n):
