@@ -140,26 +140,36 @@ def test_story_runs(any_device, page, tmp_path, monkeypatch):
         assert cli.main(words, standalone_mode=False) in (None, 0), text
 
 
-@pytest.mark.parametrize("line", commands(README))
-def test_readme_command_runs(any_device, material, line):
+def quick(line):
+    """The words of a command that makes a small thing soon."""
     words = shlex.split(small(line))
     words += ["--order", "8"] if {"synth", "simulate"} & set(words) and "--method" not in words else []  # quicker
     words += ["--order", "8"] if {"fill", "extend"} & set(words) else []
     words += ["--band", "3"] if "extend" in words else []  # there is not more room on so small a picture
     words += ["--order", "4", "--seeds", "1"] if "schedules" in words else []
-    words += ["--sweeps", "20", "--burn-in", "10"] if "ising" in words[1:2] else []
+    return words + (["--sweeps", "20", "--burn-in", "10"] if "ising" in words[1:2] else [])
+
+
+def check_outputs(words, folder):
+    """What the words say is written is there."""
+    if {"synth", "fill", "extend", "simulate", "solid", "mix"} & set(words):
+        outputs = [words[i + 1] for i, word in enumerate(words) if word in ("-o", "--view")]
+        outputs += [word.partition("=")[2] for word in words if "=" in word]
+        made = "--dry-run" not in words
+        assert outputs and all((folder / name).is_file() == made for name in outputs)
+    if "--stages" in words:
+        assert (folder / "stages" / "sheet.png").is_file()
+
+
+@pytest.mark.parametrize("line", commands(README))
+def test_readme_command_runs(any_device, material, line):
+    words = quick(line)
     environment = os.environ | {"SIMDTEX_DEVICE": str(any_device.index)}
     done = subprocess.run(
         [sys.executable, "-m", *words], env=environment, capture_output=True, text=True, timeout=120, check=False
     )
     assert done.returncode == 0, done.stderr
-    if {"synth", "fill", "extend", "simulate", "solid", "mix"} & set(words):
-        outputs = [words[i + 1] for i, word in enumerate(words) if word in ("-o", "--view")]
-        outputs += [word.partition("=")[2] for word in words if "=" in word]
-        made = "--dry-run" not in words
-        assert outputs and all((material / name).is_file() == made for name in outputs)
-    if "--stages" in words:
-        assert (material / "stages" / "sheet.png").is_file()
+    check_outputs(words, material)
     assert simdtex.__file__.startswith(str(ROOT))
 
 
@@ -197,8 +207,12 @@ TOUR = (ROOT / "docs" / "tour.rst").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("line", [line for line in commands(TOUR) if line not in commands(README)])
-def test_command_of_the_tour_runs(any_device, material, line):
-    test_readme_command_runs(any_device, material, line)
+def test_command_of_the_tour_runs(any_device, material, line, monkeypatch):
+    """In this process, which is quicker than one for each."""
+    monkeypatch.setenv("SIMDTEX_DEVICE", str(any_device.index))
+    words = quick(line)
+    assert cli.main(words[1:], standalone_mode=False) in (None, 0)
+    check_outputs(words, material)
 
 
 # ---------------------------------------------------------------- what is named exists

@@ -57,7 +57,10 @@ JOBS = {
 }
 
 
-SLOW = ("guide-everywhere", "guide-of-a-part", "tile-a-part", "search", "both", "similar", "a result")
+SLOW = (
+    *("guide-everywhere", "guide-of-a-part", "tile-a-part", "multires-auto", "a result"),
+    *("search", "both", "similar", "suggesting", "edges", "levels"),
+)
 
 
 def cases(names):

@@ -106,7 +106,7 @@ def dark(sample):
         (dark, {"histogram_distance"}),
     ],
 )
-@pytest.mark.parametrize("name", SAMPLES)
+@pytest.mark.parametrize("name", [SAMPLES[0], *(pytest.param(name, marks=pytest.mark.slow) for name in SAMPLES[1:])])
 def test_what_is_no_synthesis_falls_below_the_floor(name, made, worse):
     for search in SEARCHES:
         sample = texture(name, search)

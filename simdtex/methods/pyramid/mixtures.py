@@ -17,6 +17,7 @@ from simdtex.io.image import check_sample
 from simdtex.machine import Machine, memory
 from simdtex.methods.pyramid import algorithm as pyramid
 from simdtex.methods.pyramid.histograms import Histograms, Sorted, averaged, histograms, spliced
+from simdtex.methods.pyramid.options import Options, make_options
 from simdtex.methods.pyramid.palette import decorrelated
 from simdtex.methods.pyramid.palette import palette as colours_of
 from simdtex.model.stretched import Stretched
@@ -109,7 +110,7 @@ def mix(
     weights = _weights(len(pictures), pattern, average, low, high, split)
     if palette is not None:
         _check_number("palette", palette, len(pictures))
-    chosen = pyramid.make_options(**with_channels_last(options, channel_axis))
+    chosen = make_options(**with_channels_last(options, channel_axis))
     begun = begin(
         "mix",
         rng,
@@ -149,7 +150,7 @@ class _Blender:
         pictures: list[NDArray[Any]],
         weights: list[float],
         palette: int | None,
-        options: pyramid.Options,
+        options: Options,
         levels: int,
     ) -> None:
         self._weights = weights

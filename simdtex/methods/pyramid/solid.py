@@ -20,11 +20,9 @@ from numpy.typing import NDArray
 from simdtex.checkpoints.keep import NOTHING, Keep
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
-from simdtex.methods.pyramid import algorithm as pyramid
+from simdtex.methods.pyramid import options as pyramid
 from simdtex.methods.pyramid.algorithm import (
     VALUES,
-    Matcher,
-    Wanted,
     analyse,
     check_memory,
     match_subbands,
@@ -32,6 +30,7 @@ from simdtex.methods.pyramid.algorithm import (
     number_of_levels,
     transform,
 )
+from simdtex.methods.pyramid.matcher import Matcher, Wanted
 from simdtex.ops.solid import solid_band, solid_collapse, solid_mean, solid_reduce, solid_turn
 from simdtex.options import build, within_32_bits, words
 from simdtex.run import Callback, Output, device_seconds

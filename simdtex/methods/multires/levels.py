@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Levels while they are sampled: their thresholds, their structure, and where their pixels are from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.machine import Machine
+from simdtex.methods.multires.analysis import Analysis
+from simdtex.methods.multires.options import Options
+from simdtex.ops.candidates import Sampled, Structure
+
+ANY = 2**32 - 1
+"""The threshold that every difference passes."""
+
+LAUNCH = 4e8
+"""Comparisons that the first launch of a level may take if no node fails."""
+
+
+def thresholds(levels: int, options: Options, alpha: float | None) -> NDArray[np.float64]:
+    """T of every level (levels, 1 or M), the finest first: alpha / k**beta (13), or the user's table without alpha."""
+    if alpha is not None:
+        k = np.arange(levels, 0, -1, dtype=np.float64)[:, None]  # 1 at the top
+        with np.errstate(over="ignore"):
+            divisor = (k ** float(options.beta)).astype(np.float32)  # so that the last bit of a libm does not show
+        return np.full_like(k, inf) if alpha == inf else float(alpha) / divisor.astype(np.float64)
+    table = np.asarray(options.thresholds, np.float64)
+    table = table if table.ndim == 2 else table[:, None]
+    if len(table) != levels - 1:
+        fewer = f", or levels={len(table) + 1}" if len(table) < levels - 1 else ""
+        raise ValueError(
+            f"thresholds has {len(table)} rows; give {levels - 1}, one for each level but the finest{fewer}"
+        )
+    return np.concatenate([np.zeros((1, table.shape[1])), table[::-1]])
+
+
+def differences(analysis: Analysis, table: NDArray[np.float64]) -> NDArray[np.uint32]:
+    """The largest difference of each feature (levels, M) whose square, divided by Z, is not above T, (9) to (11)."""
+    if table.shape[1] not in (1, analysis.energy.shape[1]):
+        raise ValueError(
+            f"thresholds has {table.shape[1]} columns; give 1, or {analysis.energy.shape[1]}, one for each feature"
+        )
+    with np.errstate(invalid="ignore", over="ignore"):
+        largest = np.sqrt(table * analysis.energy)
+    return np.where(np.isinf(table), ANY, np.minimum(largest, ANY)).astype(np.uint32)
+
+
+def pixels(shapes: Sequence[tuple[int, int]]) -> int:
+    """Of some levels together."""
+    return sum(rows * cols for rows, cols in shapes)
+
+
+def first_launch(analysis: Analysis, level: int) -> int:
+    """Pixels of a level in its first launch."""
+    return 1 + int(LAUNCH / (pixels(analysis.shapes[level + 1 :]) * analysis.features.shape[1]))
+
+
+def lattice(shapes: Sequence[tuple[int, int]], first: int) -> NDArray[np.int32]:
+    """Lattices as of `Structure` and `Sampled`, where levels stand one after another, from one of them on."""
+    begins = np.cumsum([0, *(rows * cols * (level >= first) for level, (rows, cols) in enumerate(shapes))])
+    ragged = [sum((n % 2**level > 0) << axis for axis, n in enumerate(shapes[0])) for level in range(len(shapes))]
+    return np.array([(*shape, *rest) for shape, *rest in zip(shapes, begins, ragged, strict=False)], np.int32)
+
+
+def structure_of(machine: Machine, analysis: Analysis, table: NDArray[np.float64]) -> Structure:
+    """The parents' features, and what may differ from them by a table of thresholds."""
+    most = differences(analysis, table)
+    return Structure(analysis.features, machine.put(most), machine.put(lattice(analysis.shapes, 1)))
+
+
+def sampled_from(machine: Machine, shapes: Sequence[tuple[int, int]], source: Sequence[NDArray[np.int32]]) -> Sampled:
+    """Levels whose pixels are copied from these places, the finest first."""
+    together = np.concatenate(source)
+    counts = np.zeros((together.size, 2), np.int32)
+    counts[-pixels(shapes[-1:]) :, 0] = 1  # of the top; the others are to be counted
+    return Sampled(machine.put(together), machine.put(counts), machine.put(lattice(shapes, 0)))
+
+
+def copied(machine: Machine, shapes: Sequence[tuple[int, int]], own: tuple[int, int]) -> Sampled:
+    """The top level, copied and repeated to fill; nothing yet below it."""
+    row, col = np.indices(shapes[-1], np.int32)
+    source = row % np.int32(own[0]) * np.int32(own[1]) + col % np.int32(own[1])
+    return sampled_from(machine, shapes, [np.zeros(pixels(shapes[:-1]), np.int32), source.ravel()])
+
+
+def read_sources(
+    machine: Machine, sampled: Sampled, shapes: Sequence[tuple[int, int]], level: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """A level's source (rows, cols) and counts (rows, cols, 2)."""
+    begin, end = pixels(shapes[:level]), pixels(shapes[: level + 1])
+    source, counts = machine.get(sampled.source[begin:end]), machine.get(sampled.counts[begin:end])
+    return source.reshape(shapes[level]), counts.reshape(*shapes[level], 2)
+
+
+def places(source: NDArray[np.int32], cols: int) -> NDArray[np.int32]:
+    """(row, column) of pixels on a last axis."""
+    place = np.empty((*source.shape, 2), np.int32)
+    place[..., 0] = row = source // np.int32(cols)
+    place[..., 1] = source - row * np.int32(cols)  # quicker than divmod
+    return place

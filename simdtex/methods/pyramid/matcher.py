@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Match-Histogram of Heeger and Bergen (1995)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import prod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.machine import Machine
+from simdtex.machine.interface import Array
+from simdtex.methods.pyramid.options import Options
+from simdtex.ops.matching import distance, inverse_cdf, match_lookup
+from simdtex.ops.noise import noise
+from simdtex.ops.ranking import ranking
+from simdtex.ops.sort import sort
+
+MATCHING = 200
+"""What a value's sort and match cost, about, in multiply-adds: when to wait for the device."""
+
+TIES = 2**20
+"""Where a level stands in the counter of random numbers: the order in which equal values come."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Histograms that bands are to have, on a machine.
+
+    Attributes
+    ----------
+    table : (bands, m) or (bands, bins + 1) int32 array of the machine
+        Sorted values, or the inverse of their cumulative distribution.
+    deviations : (bands,) float64 array
+        Standard deviations, 1 where there is none.
+    """
+
+    table: Array
+    deviations: NDArray[np.float64]
+
+
+class Matcher:
+    """Match-Histogram with the options of a run; notes how far histograms were from each other.
+
+    Parameters
+    ----------
+    machine : Machine
+    options : Options
+    seed : int
+        Of the order in which equal values come.
+    """
+
+    def __init__(self, machine: Machine, options: Options, seed: int) -> None:
+        self._machine, self._options, self._seed = machine, options, seed
+        self._first: dict[int, Array] = {}
+        self._moved: list[tuple[str, Array, NDArray[np.float64]]] = []
+
+    def wanted(self, values: NDArray[np.int32]) -> Wanted:
+        """The histogram of sorted values (bands, m), as `match` takes it."""
+        deviations = values.std(1, dtype=np.float64)
+        deviations[deviations == 0] = 1.0
+        if self._options.match == "lookup":
+            values = np.stack([inverse_cdf(band, self._options.bins) for band in values])
+        return Wanted(self._machine.put(values), deviations)
+
+    def match(self, name: str, values: Array, wanted: Wanted, together: bool = False) -> Array:
+        """Values (bands, planes, ...) with each band's wanted histogram, in every plane or in all planes together."""
+        bands, planes, *shape = values.shape
+        if together:
+            planes, shape = 1, [planes, *shape]
+        segments = values.reshape((bands * planes, prod(shape)))
+        if self._options.match == "rank":
+            matched, moved = ranking(self._machine, segments, self._ties(segments.shape[1]), wanted.table)
+        else:
+            matched = match_lookup(self._machine, segments, wanted.table)
+            moved = distance(self._machine, segments, matched)
+        self._machine.sync(MATCHING * bands * planes * prod(shape))
+        self._moved.append((name, moved, wanted.deviations * planes * prod(shape)))
+        return matched.reshape(values.shape)
+
+    def order(self, segments: Array) -> Array:
+        """Indices of each segment's values (segments, n) in ascending order; equal ones come in a random order."""
+        return sort(self._machine, segments, self._ties(segments.shape[1]))
+
+    def _ties(self, n: int) -> Array:
+        """The order in which equal ones of n values come."""
+        if n not in self._first:
+            bits = noise(self._machine, 1, n, self._seed, TIES)
+            itself = self._machine.put(np.arange(n, dtype=np.int32))
+            self._first[n] = sort(self._machine, bits, itself).reshape(n)
+        return self._first[n]
+
+    def kept(self) -> list[tuple[str, NDArray[Any], NDArray[np.float64]]]:
+        """How far values were moved since the last call of `distances`, to be kept."""
+        return [(name, self._machine.get(moved), scale) for name, moved, scale in self._moved]
+
+    def restore(self, kept: list[tuple[str, NDArray[Any], NDArray[np.float64]]]) -> None:
+        """Go on from what `kept` gave."""
+        self._moved = [(name, self._machine.put(moved), scale) for name, moved, scale in kept]
+
+    def distances(self) -> dict[str, float]:
+        """Mean distance that the values of each subband were moved since the last call, in its standard deviations."""
+        found: dict[str, list[float]] = {}
+        for name, moved, scale in self._moved:
+            total = np.asarray(self._machine.get(moved)).reshape(len(scale), -1).sum(1)
+            found.setdefault(name, []).append(float((total / scale).mean()))
+        self._moved.clear()
+        return {name: float(np.mean(several)) for name, several in found.items()}
