@@ -40,7 +40,7 @@ def main():
         until(lambda: script("return page.status.textContent") == "Ready.")
 
         def made(count):
-            until(lambda: script("return page.strip.children.length") == count, 120)
+            until(lambda: script("return page.results.size") == count, 120)
             until(lambda: script("return page.figures.children.length") >= 16, 60)
 
         drop(driver, sample)
