@@ -255,7 +255,7 @@ class Stage:
     candidates: NDArray[Any] | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Output:
     """What ``full_output=True`` returns beside the image.
 
@@ -309,7 +309,16 @@ class Output:
     temperature: NDArray[Any] | None = None
     stages: list[Stage] = field(default_factory=list)
     statistics: dict[str, Any] = field(default_factory=dict)
-    made: NDArray[Any] | None = field(default=None, repr=False)
+    made: NDArray[Any] | None = None
+
+    def __repr__(self) -> str:
+        """What it has, in a line: its arrays and figures fill pages."""
+        rows_cols = "x".join(map(str, self.made.shape[:-1])) if self.made is not None else ""
+        has = [name for name in ("source", "temperature") if getattr(self, name) is not None]
+        has += [f"{len(self.stages)} stages"] if self.stages else []
+        has += [f"{name} {self.statistics[name]}" for name in ("seed", "device") if name in self.statistics]
+        has += [f"{self.statistics['seconds']:.2f} s"] if "seconds" in self.statistics else []
+        return f"Output({', '.join([rows_cols] * bool(rows_cols) + has)})"
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the picture and its arrangement."""

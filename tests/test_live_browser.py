@@ -459,6 +459,18 @@ def test_it_fits_a_phone(page, wall, width):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("width", [300, 620, 850])
+def test_it_fits_a_cell_of_a_notebook(page, wall, width):
+    """Which is narrower than the window."""
+    page.script("document.getElementById('simdtex-live').style.width = arguments[0] + 'px'", width)
+    drop(page.driver, wall)
+    page.result(1)
+    page.script("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+    assert page.script("return document.querySelector('.simdtex').scrollWidth") <= width
+    assert page.script("return document.querySelector('canvas.view').clientWidth") > 0.5 * width
+
+
+@pytest.mark.slow
 def test_nothing_is_loaded_from_elsewhere_and_nothing_is_complained_of(page, wall, served):
     page.driver.get_log("browser")
     drop(page.driver, wall)

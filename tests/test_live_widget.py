@@ -16,6 +16,7 @@ import simdtex
 from simdtex.io.image import read_bytes
 from simdtex.live import widget
 from simdtex.model.colours import source_colours
+from simdtex.run import Output
 
 ROOT = Path(__file__).resolve().parent.parent
 EXECUTE = """
@@ -81,6 +82,12 @@ def test_a_result_shows_its_picture_and_its_arrangement():
     rows, cols = output.source.reshape(-1, 2).max(axis=0) + 1
     np.testing.assert_array_equal(arranged, source_colours(output.source, (rows, cols)))
     assert "seed 1" in output._repr_html_() and "<script" not in output._repr_html_()
+    seconds = f"{output.statistics['seconds']:.2f} s"
+    assert (
+        repr(output)
+        == f"Output(28x36, source, temperature, {len(output.stages)} stages, seed 1, device reference (NumPy), {seconds})"
+    )
+    assert repr(Output(None)) == "Output()"
 
 
 @pytest.mark.parametrize("kind", ["channels first", "solid", "pyramid", "several samples", "floats"])
