@@ -383,6 +383,7 @@ IMAGE, FEW = np.zeros((20, 20), int), np.zeros((2, 20, 20), int)
         (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 2)]), "give rows of x, y and value"),
         (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 20, 0)]), "x 1, y 20 is at no pixel"),
         (lambda: ensemble.summary(FEW, IMAGE[:3]), "a side of 3 pixels"),
+        (lambda: ensemble.summary(FEW, IMAGE - 1e200), "values beyond 1e.100: give them in a larger unit"),
         (lambda: ensemble.channels((20, 99), 1), "the shape is 20 x 99"),
         (lambda: ensemble.channels((99, 99), 1, share=0.9), "share 0.9"),
     ],

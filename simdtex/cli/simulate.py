@@ -109,7 +109,7 @@ def simulate(
     values = known_values(table, known, shape, material) if table is not None and known else None
     check_realisations_path(output, material.pixels[0].dtype)
     if report:
-        _check_report(report, material.pixels, shape)
+        _check_report(report, material.pixels, shape, values)
     if guides:
         options["labels"] = guides.labels
 
@@ -154,9 +154,9 @@ def simulate(
         )
 
 
-def _check_report(folder: Path, pictures: list[Any], shape: tuple[int, int]) -> None:
+def _check_report(folder: Path, pictures: list[Any], shape: tuple[int, int], known: Any) -> None:
     """Raise where a report cannot be made, before anything is simulated."""
-    from simdtex.experiments.ensemble.summary import LEAST
+    from simdtex.experiments.ensemble.summary import LARGEST, LEAST
     from simdtex.report.page import check_folder
 
     if len(pictures) > 1 or pictures[0].ndim > 2:
@@ -165,6 +165,8 @@ def _check_report(folder: Path, pictures: list[Any], shape: tuple[int, int]) -> 
         raise ValueError("--report is of a training image that is known everywhere; leave it out")
     if min(*shape, *pictures[0].shape) < LEAST:
         raise ValueError(f"--report is of {LEAST}x{LEAST} pixels or more; give a larger size, or leave it out")
+    if any(np.abs(one.astype(np.float64)).max() > LARGEST for one in (pictures[0], known) if one is not None):
+        raise ValueError(f"--report is of values up to {LARGEST:g}; give them in a larger unit, or leave it out")
     if find_spec("gstools") is None:
         raise ValueError("gstools is not installed; pip install 'simdtex[simulate]', or leave --report out")
     check_folder(folder)

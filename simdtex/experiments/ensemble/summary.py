@@ -21,6 +21,9 @@ Floats = NDArray[np.float64]
 LEAST = 4
 """Pixels to the side of what figures can be computed of."""
 
+LARGEST = 1e100
+"""Of numbers that figures are computed of: sums of their squares, and axes of plots, stay finite."""
+
 MOST_LAG = 100  # pixels, where none is given
 
 
@@ -97,7 +100,8 @@ def summary(
     Raises
     ------
     ValueError
-        The arrays have other shapes, a value is no category, a datum lies outside, or GSTools is not installed.
+        The arrays have other shapes, a value is no category or beyond 1e100, a datum lies outside, or GSTools is not
+        installed.
 
     Notes
     -----
@@ -109,6 +113,8 @@ def summary(
     shortest = min(*array.shape[1:], *image.shape)
     if shortest < LEAST:
         raise ValueError(f"an image has a side of {shortest} pixels: give at least {LEAST} x {LEAST}")
+    if max(np.abs(one).max() for one in (array, image)) > LARGEST:
+        raise ValueError(f"an image has values beyond {LARGEST:g}: give them in a larger unit")
     lag = min(shortest // 2, MOST_LAG) if max_lag is None else max_lag
     images = [*array, image]
     own = image[np.newaxis]
