@@ -359,6 +359,14 @@ def test_width_and_share_of_channels_are_those_that_were_asked_for():
 
 # ---------------------------------------------------------------- bad input
 
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32, np.float64])
+def test_a_summary_of_any_type_warns_of_nothing(dtype):
+    image = np.random.default_rng(1).integers(0, 200, (3, 20, 20)).astype(dtype)
+    found = ensemble.summary(image[:2], image[2], categories=[])
+    np.testing.assert_allclose(found.maps[0], image[:2].mean(0, dtype=float))
+
+
 IMAGE, FEW = np.zeros((20, 20), int), np.zeros((2, 20, 20), int)
 
 

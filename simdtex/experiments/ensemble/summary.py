@@ -113,7 +113,7 @@ def summary(
     shortest = min(*array.shape[1:], *image.shape)
     if shortest < LEAST:
         raise ValueError(f"an image has a side of {shortest} pixels: give at least {LEAST} x {LEAST}")
-    if max(np.abs(one).max() for one in (array, image)) > LARGEST:
+    if max(float(np.abs(one).max()) for one in (array, image)) > LARGEST:
         raise ValueError(f"an image has values beyond {LARGEST:g}: give them in a larger unit")
     lag = min(shortest // 2, MOST_LAG) if max_lag is None else max_lag
     images = [*array, image]
