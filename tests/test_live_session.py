@@ -244,7 +244,7 @@ def test_frames_go_from_coarse_to_fine_and_end_in_the_result(opened):
     assert (pixels[..., 3] == 255).all()
 
 
-@pytest.mark.parametrize("layer", ["temperature", "arrangement", "use"])
+@pytest.mark.parametrize("layer", ["temperature", "arrangement", "use", "sample"])
 def test_layers_are_seen_while_a_run_goes_on_and_afterwards(opened, layer):
     opened.ask("frame", kind="look", layer=layer, left=0, top=0, width=64, height=64, step=1, tiled=False)
     after = len(opened.got)
@@ -253,7 +253,7 @@ def test_layers_are_seen_while_a_run_goes_on_and_afterwards(opened, layer):
     assert running and all(one["layer"] == layer for one in running)
     message, (pixels,) = opened.wait("frame", after=len(opened.got) - 1)
     assert layer in result["layers"] and message["layer"] == layer
-    shape = (40, 48) if layer == "use" else (28, 36)  # of the sample, and of the output
+    shape = (40, 48) if layer in ("use", "sample") else (28, 36)  # of the sample, and of the output
     assert (message["rows"], message["cols"]) == shape == (message["height"], message["width"])
     assert len(pixels) == 4 * shape[0] * shape[1]
 
@@ -327,7 +327,8 @@ def test_a_page_that_comes_back_looks_at_what_is_being_made(opened):
     opened.say(kind="hello")
     told = [one for one, _ in opened.got[after:] if one["kind"] not in ("frame", "progress")]
     assert [one["kind"] for one in told] == ["hello", "picture", "result", "begun"]
-    assert told[-1]["layers"] == ["picture", "arrangement", "use", "temperature"] and not told[2]["chosen"]
+    assert told[-1]["layers"] == ["picture", "sample", "arrangement", "use", "temperature"]
+    assert not told[2]["chosen"]
     assert opened.ask("result", kind="go")[0]["chosen"]
 
 

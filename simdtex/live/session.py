@@ -64,8 +64,11 @@ BESIDE = 0.1
 AFTER = 0.5
 """Seconds without a wish before a result's figures of quality are computed."""
 
-LAYERS = ("picture", "arrangement", "use", "temperature")
-"""What can be looked at while a run of ``mrf`` goes on; of other methods, the first alone."""
+LAYERS = ("picture", "sample")
+"""What can be looked at while a run goes on."""
+
+OF_MRF = ("arrangement", "use", "temperature")
+"""What there is besides while a run of ``mrf`` goes on."""
 
 EXAMPLES = ("brick", "grass", "gravel")
 """Pictures of scikit-image that a page can begin with."""
@@ -354,7 +357,7 @@ class Session:
         self._levels = levels
         rows, cols = asked.shape
         begun = {"kind": "begun", "width": cols, "height": rows, "from": levels.level}
-        begun["layers"] = list(LAYERS) if settings.method == "mrf" else [LAYERS[0]]
+        begun["layers"] = [*LAYERS, *(OF_MRF if settings.method == "mrf" else ())]
         with self._changed:
             self._running, self._shown = begun, None
         self._send(begun, [])
@@ -416,10 +419,13 @@ class Session:
         self._machine().sync()  # what the run has asked for is no part of what a frame takes
         began = time.perf_counter()
         layer = self._look.layer
-        if not hasattr(progress, "source") or layer not in LAYERS:
-            layer = "picture"
+        if layer not in (*LAYERS, *(OF_MRF if hasattr(progress, "source") else ())):
+            layer = LAYERS[0]
+        assert self._picture is not None
+        given = self._picture.pixels
         made = {
             "picture": lambda: planes.picture(progress.picture(), sample, shape),
+            "sample": lambda: planes.picture(given, given),
             "arrangement": lambda: planes.arrangement(progress.source(), sample, shape),
             "use": lambda: planes.use(progress.source(), sample),
             "temperature": lambda: planes.temperature(progress.temperature(), shape),

@@ -697,7 +697,11 @@ class Page {
     this.progress.value = 0;
     this.alert.hidden = true;
     this.showRunning();
-    this.on_chosen({ result: null });
+    this.mark(this.shown, false);
+    this.shown = null;
+    this.mark(null, true);
+    this.offer(this.offered);
+    if (this.layer === "sample") this.look("picture");
   }
 
   on_ended() {
