@@ -54,27 +54,32 @@ def timed(words: list[str]) -> tuple[float, str]:
     return time.perf_counter() - began, told
 
 
-parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-parser.add_argument("--runs", type=int, default=9)
-parser.add_argument("--device", default="", help="as of the command line")
-arguments = parser.parse_args()
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--runs", type=int, default=9)
+    parser.add_argument("--device", default="", help="as of the command line")
+    arguments = parser.parse_args()
 
-with tempfile.TemporaryDirectory() as folder:
-    sample, output = str(Path(folder, "brick.png")), str(Path(folder, "more.png"))
-    write(sample, data.brick()[:128, :128])
-    command = ["-m", "simdtex", "synth", sample, "-o", output, "--size", SIZE, "--seed", "1"]
-    command += ["--device", arguments.device] if arguments.device else []
-    whole, python, laps = [], [], []
-    for number in range(arguments.runs + 2):
-        seconds, told = timed(command)
-        if number >= 2:
-            whole.append(seconds)
-            python.append(timed(["-c", "pass"])[0])
-            laps.append(json.loads(timed(["-c", PARTS, arguments.device, sample, output])[1]))
+    with tempfile.TemporaryDirectory() as folder:
+        sample, output = str(Path(folder, "brick.png")), str(Path(folder, "more.png"))
+        write(sample, data.brick()[:128, :128])
+        command = ["-m", "simdtex", "synth", sample, "-o", output, "--size", SIZE, "--seed", "1"]
+        command += ["--device", arguments.device] if arguments.device else []
+        whole, python, laps = [], [], []
+        for number in range(arguments.runs + 2):
+            seconds, told = timed(command)
+            if number >= 2:
+                whole.append(seconds)
+                python.append(timed(["-c", "pass"])[0])
+                laps.append(json.loads(timed(["-c", PARTS, arguments.device, sample, output])[1]))
 
-print(told.strip())
-print(f"{'the whole process':28s} {median(whole):6.3f} s, at best {min(whole):.3f}")
-parts = {"python itself": median(python)} | {name: median(lap[name] for lap in laps) for name in laps[0]}
-for name, seconds in parts.items():
-    print(f"  {name:26s} {seconds:6.3f} s")
-print(f"  {'the rest, and the end':26s} {median(whole) - sum(parts.values()):6.3f} s")
+    print(told.strip())
+    print(f"{'the whole process':28s} {median(whole):6.3f} s, at best {min(whole):.3f}")
+    parts = {"python itself": median(python)} | {name: median(lap[name] for lap in laps) for name in laps[0]}
+    for name, seconds in parts.items():
+        print(f"  {name:26s} {seconds:6.3f} s")
+    print(f"  {'the rest, and the end':26s} {median(whole) - sum(parts.values()):6.3f} s")
+
+
+if __name__ == "__main__":
+    main()

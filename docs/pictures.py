@@ -20,8 +20,9 @@ from skimage.transform import downscale_local_mean
 import simdtex
 from simdtex.experiments import ensemble
 from simdtex.io.image import write
+from simdtex.model.colours import heat, source_colours
 from simdtex.model.source_map import apply_source_map
-from simdtex.report.sheet import contact_sheet, heat, source_colours
+from simdtex.report.sheet import contact_sheet
 
 HERE = Path(__file__).resolve().parent
 SHAPE = (256, 256)
@@ -94,7 +95,9 @@ def finish():
 def tile():
     photo = data.gravel()[100:228, 100:228]
     seamless = simdtex.extend(photo, seamless=True, rng=1)
-    return [(label, np.tile(one, (2, 2))) for label, one in (("as it is, 2 x 2", photo), ("--tile, 2 x 2", seamless))]
+    return [
+        (label, np.tile(one, (2, 2))) for label, one in (("as it is, 2 x 2", photo), ("--seamless, 2 x 2", seamless))
+    ]
 
 
 def hole():

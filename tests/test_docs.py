@@ -203,6 +203,20 @@ def test_example_runs(any_device, example, tmp_path, monkeypatch, capsys):
     assert str(tmp_path / "out") in capsys.readouterr().out
 
 
+SCRIPTS = [
+    *sorted((ROOT / "benchmarks").glob("*.py")),
+    *(ROOT / "docs" / f"{n}.py" for n in ("pictures", "screenshots")),
+]
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=page_id)
+def test_what_a_script_needs_is_there(script, monkeypatch):
+    """Its figures are made by hand, so that nothing else would tell."""
+    monkeypatch.setattr(sys, "path", [str(script.parent), *sys.path])
+    found = runpy.run_path(str(script), run_name="imported")
+    assert callable(found.get("main")) or "__main__" not in script.read_text(encoding="utf-8")
+
+
 TOUR = (ROOT / "docs" / "tour.rst").read_text(encoding="utf-8")
 
 
