@@ -22,10 +22,7 @@ SIDES = ("top", "bottom", "left", "right")
 @command(
     ("extend photo.png -o tile.png --seamless", "Make a photo tile."),
     ("extend photo.png -o wide.png --left 200 --right 200", "Continue it at both sides."),
-    (
-        "extend photo.png -o seamless.png --seamless --also normal.png=seamless-normal.png",
-        "And its normal map with it.",
-    ),
+    ("extend photo.png -o tile.png --seamless --also normal.png=tile-normal.png", "And its normal map with it."),
 )
 @click.argument("picture", type=READ)
 @click.option("-o", "--output", required=True, type=WRITE, help="Write this picture.")
