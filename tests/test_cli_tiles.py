@@ -124,6 +124,32 @@ def test_a_run_that_is_stopped_goes_on(folder, how):
     assert "o.zarr is finished; there is nothing to go on with" in again.stdout
 
 
+STOPPED = """
+import os, signal, sys
+from pathlib import Path
+from simdtex import cli, distributed
+
+async def begun_by_zarr():
+    pass
+
+def synthesize(sample, shape, store, **options):
+    Path(store).mkdir()
+    waiting = begun_by_zarr()
+    os.kill(os.getpid(), getattr(signal, sys.argv[1]))
+    signal.pause()
+
+distributed.synthesize = synthesize
+cli.main(["synth", "colour.png", "-o", "o.zarr", "--tiles", "16", "--size", "40x40", "--order", "1", "-q"])
+"""
+
+
+@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
+def test_how_to_go_on_is_the_last_thing_said(folder, name, code):
+    """Whatever Zarr had begun when the signal came."""
+    done = subprocess.run([sys.executable, "-c", STOPPED, name], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (code, "simdtex: stopped; go on with: simdtex resume o.zarr\n")
+
+
 def test_resume_says_what_it_cannot_go_on_with(folder):
     zarr.open_group("other.zarr", mode="w")
     result = run("resume", "other.zarr")

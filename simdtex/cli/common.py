@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn
 
 import click
 from click.core import ParameterSource
@@ -48,12 +48,22 @@ def plainly(command: Callable[..., None]) -> Callable[..., None]:
             click.echo("simdtex: the memory does not suffice for this; give a smaller size", err=True)
             sys.exit(2)
         except (KeyboardInterrupt, Ended) as signalled:
-            warnings.filterwarnings("ignore", "coroutine .* was never awaited")  # which Zarr had begun
-            click.echo("simdtex: stopped; nothing but stages may have been written", err=True)
-            sys.exit(128 + signalled.args[0] if isinstance(signalled, Ended) else 130)
+            give_up("stopped; nothing but stages may have been written", number_of(signalled))
         settle()
 
     return wrapped
+
+
+def number_of(signalled: BaseException) -> int:
+    """The number of the signal that raised this."""
+    return int(signalled.args[0]) if isinstance(signalled, Ended) else signal.SIGINT
+
+
+def give_up(sentence: str, number: int) -> NoReturn:
+    """End because of the signal of this number, with a sentence that is the last one said, and with its exit code."""
+    warnings.filterwarnings("ignore", "coroutine .* was never awaited")  # which Zarr had begun
+    click.echo(f"simdtex: {sentence}", err=True)
+    sys.exit(128 + number)
 
 
 @contextmanager

@@ -6,7 +6,6 @@ from __future__ import annotations
 import functools
 import os
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from simdtex.cli.common import given_words, postponed
+from simdtex.cli.common import give_up, given_words, postponed
 
 if TYPE_CHECKING:
     from simdtex.checkpoints import Keeper
@@ -39,8 +38,7 @@ def kept(command: Callable[..., None]) -> Callable[..., None]:
                 with keeping(keeper):
                     command(*args, **kwargs)
             except KeyboardInterrupt:
-                _say(f"stopped; go on with: simdtex resume {checkpoint}")
-                sys.exit(128 + (caught[0] if caught else signal.SIGINT))
+                give_up(f"stopped; go on with: simdtex resume {checkpoint}", caught[0] if caught else signal.SIGINT)
 
     return wrapped
 

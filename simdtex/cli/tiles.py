@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,7 +11,7 @@ from typing import Any
 
 import click
 
-from simdtex.cli.common import progress_bar
+from simdtex.cli.common import Ended, give_up, number_of, progress_bar
 
 ALONE = ("stages", "source_map", "also", "report", "start", "accounting", "profile", "array", "check_schedule")
 """Options that are of a picture which one process holds."""
@@ -111,15 +110,14 @@ def _crew(workers: int | None, cluster: str | None) -> Iterator[dict[str, Any]]:
 
 @contextmanager
 def _shown(store: Path, quiet: bool) -> Iterator[Callable[[Any], None]]:
-    """A callback that moves a progress bar; Ctrl-C says how to go on."""
+    """A callback that moves a progress bar; a signal says how to go on."""
     try:
         with progress_bar(quiet) as show:
             yield lambda progress: show(progress.fraction, progress.doing, "")
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, Ended) as signalled:
         if not store.exists():
             raise
-        click.echo(f"simdtex: stopped; go on with: simdtex resume {store}", err=True)
-        sys.exit(130)
+        give_up(f"stopped; go on with: simdtex resume {store}", number_of(signalled))
 
 
 def _done(store: Path, quiet: bool, began: float) -> None:
