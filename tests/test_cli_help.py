@@ -61,6 +61,7 @@ def test_a_group_that_names_a_method_need_not_be_told_it_again():
 def test_the_help_of_an_option_begins_with_what_it_does():
     for command, one in OPTIONS:
         said = one.get_help_record(click.Context(load(command)))[1]
+        assert said[0].isupper() or re.match("mrf|multires|pyramid", said), f"{command} {one.opts[0]}: {said}"
         for part in re.split(r"(?:^|\] )(?:(?:mrf|multires|pyramid)(?:, |: ))+", said):
             first = re.sub("(?i)^in a coherent search, ", "", part).partition(" ")[0].rstrip(":,").lower()
             assert not part or first in VERBS, f"{command} {one.opts[0]}: {part}"

@@ -80,9 +80,14 @@ CHECKPOINT = option(
     help="Keep the state of the run there; `simdtex resume DIR` goes on with it.",
 )
 QUIET = option("-q", "--quiet", is_flag=True, help="Show no progress bar and no summary.")
-LEVELS = option(
-    "--levels", type=int, help="Go through this many levels, from coarse to fine.  [as many as the sample feeds]"
-)
+
+
+def levels_option(default: str) -> Callable[[Command], Command]:
+    """``--levels``, which is this by default."""
+    return option("--levels", type=int, help=f"Go through this many levels, from coarse to fine.  [{default}]")
+
+
+LEVELS = levels_option("as many as the sample feeds")
 BOUNDARY = option(
     "--boundary",
     help="mrf, multires: let the output wrap around, so that it tiles (torus), or not (open).  [{mrf.boundary}]",
@@ -108,6 +113,16 @@ def stages_option(what: str) -> Callable[[Command], Command]:
 def _shared(name: str, texts: dict[str, str], *methods: str, **kinds: Any) -> Callable[[Command], Command]:
     """An option that means something to each of these methods."""
     return option(name, help=" ".join(f"{method}: {texts[method]}" for method in methods), **kinds)
+
+
+def _alone(name: str, text: str, **kinds: Any) -> Callable[[Command], Command]:
+    """An option of several methods in a command that has but one of them."""
+    return option(name, help=text[0].upper() + text[1:], **kinds)
+
+
+def _after(prefix: str, text: str) -> str:
+    """A help behind the name of its method, or without one."""
+    return prefix + text[0].lower() + text[1:] if prefix else text
 
 
 _MRF: dict[str, tuple[Any, str]] = {
@@ -194,7 +209,7 @@ def _worded(
         how: dict[str, Any] = {"is_flag": True, "default": None} if kind is None else {"type": kind}
         how = {"metavar": kind} if isinstance(kind, str) else how
         if name not in without:
-            made.append(option(name, help=prefix + text[0].lower() + text[1:] if prefix else text, **how))
+            made.append(option(name, help=_after(prefix, text), **how))
     return made
 
 
@@ -245,7 +260,7 @@ def _pyramid_options(start: str, prefix: str = "") -> list[Callable[[Command], C
     metavar, begin = start.split(": ")
 
     def named(name: str, text: str, **kinds: Any) -> Callable[[Command], Command]:
-        return option(name, help=prefix + text[0].lower() + text[1:] if prefix else text, **kinds)
+        return option(name, help=_after(prefix, text), **kinds)
 
     return [
         named(
@@ -272,7 +287,7 @@ def _with(*options: Callable[[Command], Command]) -> Callable[[Command], Command
 
 mrf_options = _with(
     *_worded(_MRF),
-    option("--edges", help=_EDGES["mrf"]),
+    _alone("--edges", _EDGES["mrf"]),
     LEVELS,
     option("--boundary", help="Let the output wrap around, so that it tiles (torus), or not (open).  [{mrf.boundary}]"),
 )
@@ -284,10 +299,8 @@ _EDGE = {"--chance": "16", "--data-weight": "4"}
 fill_options = _with(
     *_worded(_KINDS, defaults=_HOLES),
     *_worded(_MRF, without=("--overview",), defaults=_HOLES),
-    option("--edges", help=_EDGES["mrf"]),
-    option(
-        "--levels", type=int, help="Go through this many levels, from coarse to fine.  [as many as see across the hole]"
-    ),
+    _alone("--edges", _EDGES["mrf"]),
+    levels_option("as many as see across the hole"),
     option("--boundary", help="Take the picture for one that tiles (torus), or not (open).  [open]"),
 )
 """Those of ``simdtex fill``."""
@@ -296,7 +309,7 @@ simulate_options = _with(
     *_worded(_KINDS),
     *_worded(_WANTED),
     *_worded(_MRF, defaults={"--novelty": "0.25"}),
-    option("--edges", help=_EDGES["mrf"]),
+    _alone("--edges", _EDGES["mrf"]),
     LEVELS,
     option("--boundary", help="Let realisations wrap around, so that they tile (torus), or not (open).  [open]"),
 )
@@ -305,7 +318,7 @@ simulate_options = _with(
 extend_options = _with(
     *_worded(_KINDS, without=("--shares", "--unsure"), defaults=_EDGE),
     *_worded(_MRF, defaults=_EDGE),
-    option("--edges", help=_EDGES["mrf"]),
+    _alone("--edges", _EDGES["mrf"]),
     LEVELS,
 )
 """Those of ``simdtex extend``."""
@@ -338,11 +351,7 @@ def pyramid_options(start: str) -> Callable[[Command], Command]:
     """Those of a command that runs nothing but ``pyramid``; `start` is ``"METAVAR: what to begin with"``."""
     return _with(
         *_pyramid_options(start),
-        option(
-            "--levels",
-            type=int,
-            help="Go through this many levels, from coarse to fine.  [as many as leave 8 pixels a side]",
-        ),
-        option("--orientations", type=int, help=_ORIENTATIONS["pyramid"]),
-        option("--edges", help=_EDGES["pyramid"]),
+        levels_option("as many as leave 8 pixels a side"),
+        _alone("--orientations", _ORIENTATIONS["pyramid"], type=int),
+        _alone("--edges", _EDGES["pyramid"]),
     )

@@ -331,7 +331,7 @@ def filled(
             keep.offer(lambda: (finished, None))
         found = finished[number]
         whole.image[at][hole], whole.temperature[at][hole] = found.values, found.temperature
-        whole.source[at][hole] = found.source + (np.array(found.corner, np.int32) if job.sample is None else 0)
+        whole.source[at][hole] = _moved(found.source, found.corner)
     runs = [found.statistics for found in finished]
     statistics = {
         **{name: runs[0][name] for name in ("device", "seed", "options")},
@@ -409,6 +409,13 @@ def _window(
     return made, output
 
 
+def _moved(source: NDArray[np.int32], corner: tuple[int, int]) -> NDArray[np.int32]:
+    """Sources (..., 2 or 3) that count from a corner, in pixels of the whole; what is from nowhere stays so."""
+    moved = source.copy()
+    moved[..., :2] += np.where(source[..., :1] < 0, 0, np.array(corner, np.int32))
+    return moved
+
+
 def _pasting(
     callback: Callback,
     whole: Whole,
@@ -431,11 +438,7 @@ def _pasting(
             return above
 
         def source() -> NDArray[np.int32]:
-            place = progress.source()
-            known = place[..., :1] >= 0
-            return pasted(
-                whole.source, np.concatenate([place[..., :2] + known * np.array(corner, np.int32), place[..., 2:]], -1)
-            )
+            return pasted(whole.source, _moved(progress.source(), corner))
 
         return callback(
             replace(
