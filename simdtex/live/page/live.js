@@ -713,11 +713,11 @@ class Page {
   on_result(message, [bytes]) {
     this.running = this.stopped = false;
     this.results.set(message.result, message);
-    const button = make("button", { type: "button", onclick: () => this.send({ kind: "choose", result: message.result }) });
     for (const number of message.gone) {
       this.results.get(number)?.item?.remove();
       this.results.delete(number);
     }
+    const button = make("button", { type: "button", onclick: () => this.send({ kind: "choose", result: message.result }) });
     const small = bitmap(bytes, ...message.thumbnail);
     const text = `Result ${message.result}, ${message.width} × ${message.height}, seed ${message.asked.seed}`;
     small.setAttribute("aria-hidden", "true");
