@@ -1,4 +1,4 @@
-"""Every write fails in turn: the old file stays, nothing is left beside it, and the sentence names the final file."""
+"""The atomic writer: each write fails in turn and leaves the old file and nothing else; checksums; killed processes."""
 
 import errno
 import os
@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from simdtex.io import atomic, image, realisations, volume
-from simdtex.io.atomic import atomic_folder, atomic_path
+from simdtex.io.atomic import Damaged, NotWritten, atomic_folder, atomic_path, read_checked, write_checked
 from simdtex.model.source_map import save_source_map
 from simdtex.report.page import Section, Text, write_report
 from simdtex.report.sheet import animation
@@ -269,6 +269,44 @@ def test_a_hidden_name_is_not_too_long(tmp_path):
     with atomic_path(tmp_path / "a.png") as temporary:
         assert temporary.suffix == ".png" and len(temporary.name) < 60
         temporary.write_bytes(b"1")
+
+
+# -- checksums ------------------------------------------------------------------------------------------------
+
+
+def keep(path, array):
+    write_checked(path, lambda file: np.savez(file, array=array))
+
+
+def test_a_checked_file_gives_back_what_was_written_or_says_that_it_is_damaged(tmp_path):
+    path = tmp_path / "state.npz"
+    keep(path, block(1))
+    with read_checked(path) as file, np.load(file) as arrays:
+        assert np.array_equal(arrays["array"], block(1))
+    whole = path.read_bytes()
+    for at in (0, 20, 78, 79, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :])
+        with pytest.raises(Damaged, match=r"state\.npz is damaged: its checksum does not match"):
+            read_checked(path)
+    for short in (b"", whole[:50], whole[:79], whole[:-1], whole + b"0"):
+        path.write_bytes(short)
+        with pytest.raises(Damaged):
+            read_checked(path)
+    with pytest.raises(FileNotFoundError):
+        read_checked(tmp_path / "none")
+
+
+def test_a_checked_file_is_replaced_as_a_whole(tmp_path):
+    path = tmp_path / "state.npz"
+    keep(path, block(1))
+    before = everything(tmp_path)
+    for size in (0, 79, 2000):
+        with full_after(size), pytest.raises(NotWritten, match="could not be written"):
+            keep(path, block(2))
+        assert everything(tmp_path) == before
+    keep(path, block(2))
+    with read_checked(path) as file, np.load(file) as arrays:
+        assert np.array_equal(arrays["array"], block(2))
 
 
 # -- commands -------------------------------------------------------------------------------------------------

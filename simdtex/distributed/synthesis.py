@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from simdtex.distributed.plan import Plan, planned
 from simdtex.envelope import check_shape
-from simdtex.io.atomic import alone, atomic_folder
+from simdtex.io.atomic import atomic_folder, exclusive
 from simdtex.jobs.inputs import Inputs, check_inputs
 from simdtex.machine import Machine, memory
 from simdtex.methods.mrf import make_options
@@ -151,7 +151,7 @@ def resume(
     where = _address(store)
     opened = _opened(where)
     _workers(client, workers)
-    with nullcontext() if "://" in where else alone(where), connected(workers, None) as own:
+    with nullcontext() if "://" in where else exclusive(where), connected(workers, None) as own:
         crew = client or own
         if crew is not None and not (device is None or isinstance(device, (str, int))):
             raise TypeError("each worker opens its own device; give its name, not an open machine")

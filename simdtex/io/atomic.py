@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Files and folders that are written whole or not at all.
+"""The one writer: a file or folder is written completely or not at all, and a checked file carries its SHA-256.
 
-What is being written has a hidden name beside its final one, ``.simdtex-PLACE-PROCESS-TARGET-TOKEN`` and the target's
-suffix. PLACE is of the host and its processes, so that what a killed process has left is told from what a live one
-writes, and is removed when something is written into the same folder again.
+What is being written has a hidden name in the target's folder, ``.simdtex-HOST-PROCESS-TARGET-TOKEN`` with the target's
+suffix, and is renamed at the end. HOST and PROCESS identify the writer: the next write into the folder removes what
+killed processes have left, and spares what other processes are writing.
 """
 
 from __future__ import annotations
@@ -16,27 +16,216 @@ import secrets
 import shutil
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import IO
+from typing import IO, Any, BinaryIO
 
-__all__ = ["alone", "atomic_folder", "atomic_path", "check_place", "left_behind", "lock", "not_written"]
+__all__ = [
+    "Damaged",
+    "NotWritten",
+    "atomic_folder",
+    "atomic_path",
+    "check_target",
+    "exclusive",
+    "is_leftover",
+    "lock",
+    "read_checked",
+    "write_checked",
+]
 
 PathLike = str | os.PathLike[str]
 
 _HEX = "[0-9a-f]{8}"
-_PARTIAL = re.compile(rf"\.simdtex-({_HEX})-([0-9]+)-({_HEX})-{_HEX}(-old)?(\..*)?")
+_HIDDEN = re.compile(rf"\.simdtex-({_HEX})-([0-9]+)-({_HEX})-{_HEX}(-old)?(\..*)?")
+_HEADER = b"simdtex sha256 %s\n"
+_HEADER_SIZE = len(_HEADER % (b"0" * 64))
 
 
-def check_place(target: Path) -> None:
-    """Raise unless a file can be written there."""
+class NotWritten(ValueError):
+    """A file or folder could not be written; the sentence names it and a remedy."""
+
+
+class Damaged(ValueError):
+    """The content of a checked file differs from what was written."""
+
+
+# ---------------------------------------------------------------- writing
+
+
+@contextmanager
+def atomic_path(path: PathLike) -> Iterator[Path]:
+    """Yield a temporary file in the folder of `path`, and rename it to `path` if the block succeeds.
+
+    A reader of `path` sees the old file or the complete new one. If the block fails, also by Ctrl-C, the temporary file
+    is removed and `path` is left as it was.
+
+    Parameters
+    ----------
+    path : path
+        The file to write; a symbolic link is followed.
+
+    Yields
+    ------
+    Path
+        An empty file to overwrite, with the same suffix as `path`.
+
+    Raises
+    ------
+    ValueError
+        The folder is missing or not writable, or `path` is a folder; `NotWritten` if the block or the renaming raises
+        OSError, for example because the disk is full.
+    """
+    check_target(Path(path))
+    target = Path(os.path.realpath(path))
+    temporary = _hidden(target)
+    try:
+        _remove_leftovers(target)
+        # not tempfile, which would leave the finished file readable by its owner alone
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        yield temporary
+        _sync(temporary)
+        os.replace(temporary, target)
+    except OSError as error:
+        raise _not_written(path, error) from None
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_folder(path: PathLike) -> Iterator[Path]:
+    """Yield a temporary folder in the folder of `path`, and rename it to `path` if the block succeeds.
+
+    An existing folder `path` is replaced as a whole at the end; the caller checks whether it may be. If the block
+    fails, also by Ctrl-C, the temporary folder is removed and `path` is left as it was.
+
+    Parameters
+    ----------
+    path : path
+        The folder to write; a symbolic link is followed.
+
+    Yields
+    ------
+    Path
+        An empty folder to fill, with the same suffix as `path`.
+
+    Raises
+    ------
+    NotWritten
+        The block or the renaming raises OSError, for example because the disk is full.
+    """
+    target = Path(os.path.realpath(path))
+    temporary, old = _hidden(target), _hidden(target, old=True)
+    try:
+        _remove_leftovers(target)
+        temporary.mkdir()
+        yield temporary
+        for folder, _, names in os.walk(temporary):
+            for name in names:
+                _sync(Path(folder, name))
+        try:
+            if target.exists():
+                target.rename(old)
+            temporary.rename(target)
+        except BaseException:
+            if old.exists() and not target.exists():
+                old.rename(target)
+            raise
+    except OSError as error:
+        raise _not_written(path, error) from None
+    finally:
+        for _ in range(20):  # threads of a library may write for a while after Ctrl-C, as those of Zarr do
+            if not temporary.exists():
+                break
+            shutil.rmtree(temporary, ignore_errors=True)
+            time.sleep(0.05)
+        if target.exists():
+            shutil.rmtree(old, ignore_errors=True)
+
+
+def write_checked(path: PathLike, write: Callable[[BinaryIO], Any]) -> None:
+    """Write a file atomically, with a line in front that holds the SHA-256 of its content.
+
+    Parameters
+    ----------
+    path : path
+        The file to write.
+    write : callable
+        Writes the content into a binary file that is open for reading and writing, from its current position on.
+
+    Raises
+    ------
+    ValueError
+        As for `atomic_path`.
+    """
+    with atomic_path(path) as temporary, temporary.open("w+b") as file:
+        file.write(_HEADER % (b"0" * 64))
+        write(file)
+        file.seek(_HEADER_SIZE)
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        file.seek(0)
+        file.write(_HEADER % digest.encode())
+    if os.name != "nt":  # Windows cannot open a folder
+        _sync(Path(os.path.realpath(path)).parent, os.O_RDONLY)
+
+
+def read_checked(path: PathLike) -> BinaryIO:
+    """Open a file that `write_checked` has written, after verifying its SHA-256.
+
+    Returns
+    -------
+    binary file
+        Positioned at the beginning of the content; the caller closes it.
+
+    Raises
+    ------
+    Damaged
+        The checksum is missing or is not that of the content.
+    OSError
+        The file does not exist or cannot be read.
+    """
+    file = open(path, "rb")  # noqa: SIM115 - the caller closes it
+    try:
+        header = file.read(_HEADER_SIZE)
+        if header != _HEADER % hashlib.file_digest(file, "sha256").hexdigest().encode():
+            raise Damaged(f"{os.fspath(path)} is damaged: its checksum does not match")
+        file.seek(_HEADER_SIZE)
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+class Unbuffered:
+    """A file without ``fileno``: NumPy writes to a real file past Python, and misses that the disk is full."""
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self.write = file.write
+
+
+def _sync(path: Path, flags: int = os.O_RDWR) -> None:
+    """Flush a file to the disk, which may report only now that it is full."""
+    descriptor = os.open(path, flags)
+    try:
+        os.fsync(descriptor)
+    except OSError as error:
+        if error.errno != errno.EINVAL:  # some file systems have no fsync
+            raise
+    finally:
+        os.close(descriptor)
+
+
+# ---------------------------------------------------------------- checking
+
+
+def check_target(target: Path) -> None:
+    """Raise ValueError unless a file can be written at `target`."""
     folder = target.parent
     try:
         if target.is_dir():
             raise ValueError(f"{target} is a folder: add a file name to it")
-        if os.path.lexists(target) and target.exists() and not target.is_file():
+        if target.exists() and not target.is_file():
             raise ValueError(f"{target} is not a regular file: give another name")
         if not folder.exists():
             raise ValueError(f"the folder {folder} does not exist: create it first")
@@ -46,154 +235,46 @@ def check_place(target: Path) -> None:
     except FileNotFoundError:
         pass
     except OSError as error:
-        raise ValueError(f"{_shortened(target)} cannot be written ({error.strerror}): give another path") from None
+        text = str(target)
+        text = text if len(text) <= 100 else text[:97] + "..."
+        raise ValueError(f"{text} cannot be written ({error.strerror}): give another path") from None
+    check_folder_writable(target)
+
+
+def check_folder_writable(target: Path) -> None:
+    """Raise ValueError unless the folder that holds `target`, a link followed, is writable."""
     if not os.access(os.path.dirname(os.path.realpath(target)), os.W_OK | os.X_OK):
-        raise ValueError(f"the folder {folder} is not writable: choose another folder")
+        raise ValueError(f"the folder {target.parent} is not writable: choose another folder")
 
 
-def _shortened(target: Path) -> str:
-    text = str(target)
-    return text if len(text) <= 100 else text[:97] + "..."
-
-
-def not_written(path: PathLike, error: OSError) -> ValueError:
-    """One sentence on a file or folder that could not be written, with its final name."""
+def _not_written(path: PathLike, error: OSError) -> NotWritten:
     full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-    if error.errno is None:  # NumPy and others tell how much was written, not why no more
+    if error.errno is None:  # NumPy and others report how much was written, and not why writing stopped
         try:
             full = shutil.disk_usage(os.path.dirname(os.path.realpath(path))).free < 2**16
         except OSError:
             full = False
-    if full:
+    if full or error.errno:
         reason = os.strerror(error.errno or errno.ENOSPC)
     else:
-        reason = os.strerror(error.errno) if error.errno else " ".join(str(error).split())[:100] or "unknown reason"
-    return ValueError(
-        f"{os.fspath(path)} could not be written ({reason}): {'free some space' if full else 'choose another path'}"
-    )
+        reason = " ".join(str(error).split())[:100] or "unknown reason"
+    remedy = "free some space" if full else "choose another path"
+    return NotWritten(f"{os.fspath(path)} could not be written ({reason}): {remedy}")
+
+
+# ---------------------------------------------------------------- locks
 
 
 @contextmanager
-def atomic_path(path: PathLike) -> Iterator[Path]:
-    """Give a temporary name beside `path`, and rename it to `path` when the block succeeds.
-
-    A reader of `path` sees the old file or the whole new one, never a part. Whatever ends the
-    block early, Ctrl-C included, removes the temporary file and leaves `path` as it was. What processes that were
-    killed have left in the folder is removed first.
-
-    Parameters
-    ----------
-    path : path
-        The file to write; a link is followed. The temporary name has the same suffix.
-
-    Yields
-    ------
-    Path
-        An empty file to be overwritten.
+def exclusive(folder: PathLike) -> Iterator[None]:
+    """Lock a folder against other processes; the lock ends with the block or the process. No effect on Windows.
 
     Raises
     ------
     ValueError
-        The folder is missing or not writable, or `path` is a folder; or the block, or the renaming, raises an OSError,
-        as for a full disk.
+        Another process holds the lock.
     """
-    check_place(Path(path))
-    target = Path(os.path.realpath(path))
-    temporary = _beside(target)
-    try:
-        _sweep(target)
-        # not tempfile: it would leave the finished file readable by its owner alone
-        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
-        yield temporary
-        _flush(temporary)
-        os.replace(temporary, target)
-    except OSError as error:
-        raise not_written(path, error) from None
-    finally:
-        _remove(temporary)
-
-
-@contextmanager
-def atomic_folder(path: PathLike) -> Iterator[Path]:
-    """Give an empty folder beside `path`, and rename it to `path` when the block succeeds.
-
-    A folder that is at `path` is replaced whole at the end; whether it may be is for the caller to check. Whatever ends
-    the block early, Ctrl-C included, removes the temporary folder and leaves `path` as it was. What processes that were
-    killed have left beside it is removed first; an earlier folder that one had taken away is put back.
-
-    Parameters
-    ----------
-    path : path
-        The folder to write; a link is followed. The temporary name has the same suffix.
-
-    Yields
-    ------
-    Path
-        An empty folder to be filled.
-
-    Raises
-    ------
-    ValueError
-        The block, or the renaming, raises an OSError, as for a full disk.
-    """
-    target = Path(os.path.realpath(path))
-    temporary, old = _beside(target), _beside(target, old=True)
-    try:
-        _sweep(target)
-        temporary.mkdir()
-        yield temporary
-        for folder, _, names in os.walk(temporary):
-            for name in names:
-                _flush(Path(folder, name))
-        try:
-            if target.exists():
-                target.rename(old)
-            temporary.rename(target)
-        except BaseException:
-            if old.exists() and not target.exists():
-                old.rename(target)
-            raise
-    except BaseException as error:
-        _outlast(temporary)
-        if isinstance(error, OSError):
-            raise not_written(path, error) from None
-        raise
-    finally:
-        _remove(temporary)
-        if target.exists():
-            _remove(old)
-
-
-def _outlast(folder: Path) -> None:
-    """Remove a folder in which threads of a library may go on to write for a while, as Zarr's do after Ctrl-C."""
-    for _ in range(20):
-        _remove(folder)
-        time.sleep(0.05)
-        if not folder.exists():
-            return
-
-
-@contextmanager
-def scratch_folder(beside: PathLike) -> Iterator[Path]:
-    """A folder for what is packed into the file `beside`, in the same place; it is gone afterwards."""
-    temporary = _beside(Path(os.path.realpath(beside))).with_suffix("")
-    try:
-        temporary.mkdir()
-        yield temporary
-    finally:
-        _remove(temporary)
-
-
-@contextmanager
-def alone(folder: PathLike) -> Iterator[None]:
-    """Keep other processes off a folder; one that is killed keeps nobody off. Windows has no such thing.
-
-    Raises
-    ------
-    ValueError
-        Another one is at work in it.
-    """
-    if os.name == "nt":  # where a folder cannot be opened
+    if os.name == "nt":  # Windows cannot open a folder
         yield
         return
     descriptor = os.open(folder, os.O_RDONLY)
@@ -210,12 +291,12 @@ def alone(folder: PathLike) -> Iterator[None]:
 
 
 def lock(descriptor: int) -> None:
-    """Take an open file or folder for this process, until it is closed; on Windows nothing is done.
+    """Lock an open file or folder for this process until it is closed; no effect on Windows.
 
     Raises
     ------
     OSError
-        BlockingIOError where another process has it; others where the file system has no locks.
+        BlockingIOError if another process holds the lock; another kind if the file system has no locks.
     """
     try:
         import fcntl
@@ -224,76 +305,52 @@ def lock(descriptor: int) -> None:
     fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-class Unbuffered:
-    """A file for NumPy, which else writes past Python and does not find out that the last of it found no space."""
-
-    def __init__(self, file: IO[bytes]) -> None:
-        self.write = file.write
-
-
-def _flush(file: Path) -> None:
-    """Bring a file to the disk, which may find out only now that there is no space for it."""
-    descriptor = os.open(file, os.O_RDWR)
-    try:
-        os.fsync(descriptor)
-    except OSError as error:
-        if error.errno != errno.EINVAL:  # there are file systems that cannot
-            raise
-    finally:
-        os.close(descriptor)
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        path.unlink(missing_ok=True)
-
-
-# ---------------------------------------------------------------- what is left behind
+# ---------------------------------------------------------------- leftovers
 
 
 @cache
-def _here() -> str:
-    """Eight digits for the host and, in a container, its own numbering of processes."""
+def _host() -> str:
+    """Eight digits for the host and, in a container, its process namespace."""
     try:
-        numbering = os.readlink("/proc/self/ns/pid")
+        namespace = os.readlink("/proc/self/ns/pid")
     except OSError:
-        numbering = ""
-    return _digits(f"{socket.gethostname()} {numbering}")
+        namespace = ""
+    return _digits(f"{socket.gethostname()} {namespace}")
 
 
 def _digits(text: str) -> str:
     return hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()[:8]
 
 
-def _beside(target: Path, old: bool = False) -> Path:
-    name = f".simdtex-{_here()}-{os.getpid()}-{_digits(target.name)}-{secrets.token_hex(4)}"
+def _hidden(target: Path, old: bool = False) -> Path:
+    name = f".simdtex-{_host()}-{os.getpid()}-{_digits(target.name)}-{secrets.token_hex(4)}"
     return target.with_name(f"{name}-old" if old else f"{name}{target.suffix}")
 
 
-def left_behind(name: str) -> re.Match[str] | None:
-    """Whether a name is of something that a dead process of this host has not finished writing."""
-    found = _PARTIAL.fullmatch(name) if name.startswith(".simdtex-") else None
-    return None if found is None or found[1] != _here() or _is_alive(int(found[2])) else found
+def is_leftover(name: str) -> bool:
+    """Whether a file name is that of an unfinished write by a process of this host that has ended."""
+    found = _HIDDEN.fullmatch(name)
+    return found is not None and found[1] == _host() and not _is_alive(int(found[2]))
 
 
-def _sweep(target: Path) -> None:
-    """Remove what dead processes of this host have left in the target's folder."""
+def _remove_leftovers(target: Path) -> None:
+    """Remove the leftovers in the target's folder, and put back the target if a process ended while replacing it."""
     for name in os.listdir(target.parent):
-        if not (found := left_behind(name)):
+        found, entry = _HIDDEN.fullmatch(name), target.with_name(name)
+        if not (found and is_leftover(name)):
             continue
-        if not found[4]:
-            _remove(target.with_name(name))
-        elif found[3] == _digits(target.name):
-            if target.exists():
-                _remove(target.with_name(name))
-            else:  # it was killed between taking the old folder away and putting the new one there
-                target.with_name(name).rename(target)
+        if found[4] and found[3] != _digits(target.name):  # another target, which may have to be put back
+            continue
+        if found[4] and not target.exists():
+            entry.rename(target)
+        elif entry.is_dir() and not entry.is_symlink():
+            shutil.rmtree(entry, ignore_errors=True)
+        else:
+            entry.unlink(missing_ok=True)
 
 
 def _is_alive(process: int) -> bool:
-    if os.name != "posix":  # where there is no way to ask that does no harm
+    if os.name != "posix":  # elsewhere os.kill would end the process
         return True
     try:
         os.kill(process, 0)

@@ -22,7 +22,7 @@ import numpy as np
 import PIL.Image
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from simdtex.io.atomic import Unbuffered, atomic_folder, atomic_path, check_place
+from simdtex.io.atomic import Unbuffered, atomic_folder, atomic_path, check_target
 from simdtex.io.decode import decode, native
 from simdtex.io.limits import TooLarge, check_file, max_pixels_or_default
 from simdtex.options import unmasked
@@ -394,7 +394,7 @@ def check_writable(
     target = Path(path)
     suffix = target.suffix.lower()
     known = _FORMATS if suffixes is None else suffixes
-    check_place(target)
+    check_target(target)
     if suffix not in known:
         what = f"ends in {target.suffix}" if suffix else "has no suffix"
         raise ValueError(f"{target} {what}: end its name in one of {', '.join(sorted(known))}")

@@ -14,13 +14,13 @@ from collections.abc import Callable, Hashable, Mapping
 from importlib import import_module
 from math import prod
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from simdtex.io import image
-from simdtex.io.atomic import scratch_folder
 from simdtex.io.decode import native
 from simdtex.io.limits import (
     TooLarge,
@@ -287,7 +287,8 @@ def _write_zarr(path: Path, dataset: Dataset, name: str) -> None:
 
 def _write_zip(path: Path, dataset: Dataset, name: str) -> None:
     # not Zarr's own store in a zip file, which has every file twice that is written twice
-    with scratch_folder(path) as temporary:
+    with TemporaryDirectory(dir=path.parent, prefix=".simdtex-") as folder:
+        temporary = Path(folder)
         _write_zarr(temporary, dataset, name)
         with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
             for file in sorted(temporary.rglob("*")):

@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Collection
 from pathlib import Path
 
-from simdtex.io.atomic import left_behind
+from simdtex.io.atomic import is_leftover
 
 
 def earlier_files(folder: Path, what: str, own: Callable[[Path], Collection[str]]) -> list[Path]:
@@ -34,7 +34,7 @@ def earlier_files(folder: Path, what: str, own: Callable[[Path], Collection[str]
     """
     try:
         if folder.is_dir():
-            found = sorted(path for path in folder.iterdir() if not left_behind(path.name))
+            found = sorted(path for path in folder.iterdir() if not is_leftover(path.name))
         elif folder.exists() or folder.is_symlink():
             raise ValueError(f"{folder} is a file: give a folder for {what}")
         elif not folder.parent.is_dir():
