@@ -102,9 +102,20 @@ def test_too_large_an_array():
         parse_array("2048x2049")
 
 
-def test_an_unknown_mapping():
+@pytest.mark.parametrize("name", ["4x8", "maspar-mp1-1k"])
+def test_a_text_may_name_the_mapping(name):
+    assert [parse_array(name + end).mapping for end in ("", ":hierarchical", ":cut-and-stack")] == [
+        "cut-and-stack",
+        "hierarchical",
+        "cut-and-stack",
+    ]
+    assert parse_array(name + ":hierarchical").size == parse_array(name).size
+
+
+@pytest.mark.parametrize("text", ["4x4:round-robin", "4x4:"])
+def test_an_unknown_mapping(text):
     with pytest.raises(ValueError, match="choose one of: cut-and-stack, hierarchical"):
-        parse_array("4x4", "round-robin")
+        parse_array(text)
 
 
 # -- accounting -----------------------------------------------------------------------------------------------

@@ -125,28 +125,29 @@ def _moves(
     return moves
 
 
-def parse_array(text: str, mapping: str = "cut-and-stack") -> ProcessorArray:
-    """The array of a text.
+def parse_array(text: str, mapping: str = MAPPINGS[0]) -> ProcessorArray:
+    """Return the processor array that a text names.
 
     Parameters
     ----------
     text : str
-        ``"ROWSxCOLS"``, or a key of `ARRAYS`.
+        ``"ROWSxCOLS"`` or a key of `ARRAYS`, either followed by ``":cut-and-stack"`` or ``":hierarchical"`` if wanted.
     mapping : str
-        As of `ProcessorArray`.
+        The mapping if the text names none.
 
     Raises
     ------
     ValueError
-        The text is neither.
+        The text names no array, or more than `LARGEST` PEs.
     """
-    text = text if isinstance(text, str) else shown(text)
-    sides = re.fullmatch(r"([1-9]\d{0,4})x([1-9]\d{0,4})", str(text))
-    if str(text) not in ARRAYS and not sides:
+    found = re.fullmatch(
+        rf"(?:([1-9]\d{{0,4}})x([1-9]\d{{0,4}})|({'|'.join(ARRAYS)}))(?::(.*))?", text if isinstance(text, str) else ""
+    )
+    if not found:
         raise ValueError(
             f"unknown array {shown(text)}; give rows x columns such as 128x128, or one of: {', '.join(ARRAYS)}"
         )
-    rows, cols = (int(sides[1]), int(sides[2])) if sides else ARRAYS[str(text)]
+    rows, cols = ARRAYS[found[3]] if found[3] else (int(found[1]), int(found[2]))
     if rows * cols > LARGEST:
         raise ValueError(f"an array of {text} PEs is beyond {LARGEST}; give a smaller one, say 128x128")
-    return ProcessorArray(rows, cols, mapping)
+    return ProcessorArray(rows, cols, mapping if found[4] is None else found[4])
