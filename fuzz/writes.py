@@ -27,7 +27,6 @@ COMMANDS = {
     "fill": "fill L.png --mask hole.png -o out.png --order 1 --source-map map.npy",
     "extend": "extend L.png --left 2 -o out.png --order 1",
     "zarr": "simulate L.png -o out.zarr --size 8x8 --order 1 --number 1",
-    "zip": "simulate L.png -o out.zarr.zip --size 8x8 --order 1 --number 1",
     "nc": "simulate L.png -o out.nc --size 8x8 --order 1 --number 1",
     "npz": "simulate L.png -o out.npz --size 8x8 --order 1 --number 1",
     "block npz": "solid L.png -o out.npz --size 12 --iterations 0",

@@ -20,7 +20,7 @@ import tifffile
 from click.testing import CliRunner
 
 from simdtex.cli import main
-from simdtex.io import decode, image, limits, realisations, volume
+from simdtex.io import decode, image, limits, volume
 from simdtex.io.hard_data import read_hard_data
 from simdtex.model.source_map import load_source_map
 
@@ -287,32 +287,7 @@ def test_a_header_reads_no_other_file(tmp_path, field):
             volume.read(tmp_path / "a.nrrd")
 
 
-# -- realisations, source maps, hard data ---------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("suffix", [".zarr", ".zarr.zip", ".nc", ".npz"])
-def test_realisations_that_are_too_large_are_not_loaded(tmp_path, suffix):
-    xarray = pytest.importorskip("xarray")
-    path = tmp_path / f"a{suffix}"
-    array = xarray.DataArray(np.zeros((2, 100, 100), np.uint8), dims=realisations.DIMENSIONS[:3])
-    try:
-        realisations.write_realisations(path, array)
-    except ValueError as error:
-        pytest.skip(str(error))
-    assert realisations.read_realisations(path, max_pixels=20_000).shape == (2, 100, 100)
-    with pytest.raises(ValueError, match=TOO_LARGE):
-        realisations.read_realisations(path, max_pixels=19_999)
-
-
-def test_a_store_that_claims_to_be_huge_is_not_loaded(tmp_path):
-    zarr, xarray = pytest.importorskip("zarr"), pytest.importorskip("xarray")
-    for name, shape, chunks in (("wide", (10**6, 10**6, 10**3), (1, 100, 100)), ("chunk", (1, 9, 9), (2**15,) * 3)):
-        group = zarr.open_group(tmp_path / f"{name}.zarr", mode="w", zarr_format=3)
-        group.create_array(
-            "realisations", shape=shape, chunks=chunks, dtype="u1", dimension_names=realisations.DIMENSIONS[:3]
-        )
-        refused(realisations.read_realisations, tmp_path / f"{name}.zarr", TOO_LARGE, peak=2**25)
-    assert xarray
+# -- source maps, hard data -----------------------------------------------------------------------------------
 
 
 def test_source_maps_and_hard_data(tmp_path):

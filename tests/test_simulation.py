@@ -1,5 +1,6 @@
 """`simdtex.simulate`: every realisation is its own seed's, honours the data, and the array tells what it is of."""
 
+import json
 import sys
 import threading
 
@@ -12,7 +13,7 @@ from simdtex.io.hard_data import place_hard_data, read_hard_data
 from simdtex.jobs import simulation
 from simdtex.jobs.simulation import DEFAULTS, realisation_seed
 
-pytest.importorskip("xarray")
+xarray = pytest.importorskip("xarray")
 
 SHAPE = (12, 14)
 QUICK = {"order": 2, "device": "reference", "rng": 5, "jobs": 1}
@@ -88,7 +89,8 @@ def test_seeds_are_apart_and_stay_what_they_are():
 
 def test_an_option_of_ones_own_goes_before_the_defaults():
     found = simulate(n=1, boundary="torus", novelty=1.0)
-    assert (found.attrs["options"]["boundary"], found.attrs["options"]["novelty"]) == ("torus", 1.0)
+    options = json.loads(found.attrs["options"])
+    assert (options["boundary"], options["novelty"]) == ("torus", 1.0)
     assert (found.values != simulate(n=1).values).any()
 
 
@@ -190,9 +192,20 @@ def test_attributes_tell_how():
     assert set(found.attrs) == {"seed", "version", "device", "options", "training_image"}
     assert (found.attrs["seed"], found.attrs["version"]) == (5, simdtex.__version__)
     assert found.attrs["device"].startswith("reference")
-    options = found.attrs["options"]
+    options = json.loads(found.attrs["options"])
     assert (options["order"], options["levels"], options["novelty"]) == (2, 1, 0.25)
     assert len(found.attrs["training_image"]) == 64
+
+
+@pytest.mark.filterwarnings("ignore:Consolidated metadata")
+def test_what_is_returned_is_written_by_xarray_itself(tmp_path):
+    found = simulate(n=2, rng=2**64 - 1, order=np.int64(2), levels=1)
+    found.to_netcdf(tmp_path / "t.nc")
+    found.to_zarr(tmp_path / "t.zarr")
+    for name in ("t.nc", "t.zarr"):
+        with xarray.open_dataarray(tmp_path / name) as back:
+            xarray.testing.assert_identical(back, found)
+            assert back.dtype == found.dtype and json.loads(back.attrs["options"])["order"] == 2
 
 
 def test_a_generator_is_asked_for_a_seed_that_gives_the_same_again():
@@ -261,7 +274,7 @@ def test_an_unknown_pixel_is_not_what_it_is_completed_with():
 def test_categories_are_those_of_the_training_image():
     found = simulate(CATEGORIES, n=3, categorical=True)
     assert set(np.unique(found)) == {0, 3, 7}
-    assert found.attrs["options"]["categorical"] is True
+    assert json.loads(found.attrs["options"])["categorical"] is True
 
 
 def test_what_is_unknown_of_the_training_image_is_never_shown():

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from importlib.util import find_spec
 from pathlib import Path
@@ -33,7 +34,7 @@ from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
     "--output",
     required=True,
     type=EITHER,
-    help="Write the realisations here: .zarr, .zarr.zip, .nc or .npz.",
+    help="Write the realisations here: .zarr, .nc or .npz.",
 )
 @click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
 @click.option("--first", default=0, show_default=True, type=int, help="Begin with the realisation of this number.")
@@ -107,7 +108,7 @@ def simulate(
     guides = read_guides(guide, material, options["labels"]) if guide is not None else None
     shape = output_shape(size, material.pixels[0], known_size(table), material.pixels[0])
     values = known_values(table, known, shape, material) if table is not None and known else None
-    check_realisations_path(output, material.pixels[0].dtype)
+    check_realisations_path(output)
     if report:
         _check_report(report, material.pixels, shape, values)
     if guides:
@@ -135,7 +136,7 @@ def simulate(
     if report:
         from simdtex.report.ensemble import write_ensemble
 
-        categorical = bool(made.attrs["options"]["categorical"])
+        categorical = bool(json.loads(made.attrs["options"])["categorical"])
         with afterwards():
             write_ensemble(
                 report,

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -90,8 +91,9 @@ def simulate(
     xarray.DataArray
         Dimensions ``realisation``, ``y`` (row 0 at the top), ``x`` and, with `channel_axis`, ``variable``, in the
         training image's type. The coordinate ``seed`` is that of each realisation: `simdtex.synthesize` with it gives
-        the same. Attributes: ``seed``, ``options``, ``version``, ``device``, and SHA-256 digests of the arrays,
-        ``training_image``, ``hard_data``, ``guide`` and ``mask``, of those that are given.
+        the same. Attributes: ``seed``, ``options`` (a JSON text), ``version``, ``device``, and SHA-256 digests of the
+        arrays ``training_image``, ``hard_data``, ``guide`` and ``mask`` that are given. All are texts and numbers, so
+        that ``to_netcdf`` and ``to_zarr`` of xarray write them.
 
     Raises
     ------
@@ -261,7 +263,10 @@ def _known(
 
 
 def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) -> dict[str, Any]:
-    told: dict[str, Any] = {"seed": seed, "version": version("simdtex"), "device": device, "options": vars(options)}
+    text = json.dumps(
+        vars(options), default=lambda value: value.tolist() if isinstance(value, np.generic) else str(value)
+    )
+    told: dict[str, Any] = {"seed": seed, "version": version("simdtex"), "device": device, "options": text}
     pictures = inputs.pictures  # whose pixels are completed where they are unknown
     told["training_image"] = digest(*pictures.pixels, *(pictures.known or ()))
     if inputs.given:
