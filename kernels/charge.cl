@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma OPENCL FP_CONTRACT OFF
-#include "common/lanes.h"
 
 #ifndef BLOCK
 #define BLOCK 64
@@ -13,19 +12,16 @@
 // nearest  (blocks, P)            out: the smallest of each block
 // One work-item per (site, block).
 __kernel void charge(const int S, const int P, const int count, const int blocks, __global const float *restrict price,
-                     __global float *restrict distance, __global float *restrict nearest LANES_ARG)
+                     __global float *restrict distance, __global float *restrict nearest)
 {
-    const int s = LANE;
-    if (IDLE(s))
+    const int s = get_global_id(0), block = get_global_id(1);
+    if (s >= S || block >= blocks)
         return;
-    ALONG(block, blocks)
-    {
-        float least = INFINITY;
-        for (int p = block * BLOCK; p < min((block + 1) * BLOCK, count); ++p) {
-            const float d = fabs(distance[p * P + s]) + price[p];
-            distance[p * P + s] = d;
-            least = fmin(least, d);
-        }
-        nearest[block * P + s] = least;
+    float least = INFINITY;
+    for (int p = block * BLOCK; p < min((block + 1) * BLOCK, count); ++p) {
+        const float d = fabs(distance[p * P + s]) + price[p];
+        distance[p * P + s] = d;
+        least = fmin(least, d);
     }
+    nearest[block * P + s] = least;
 }

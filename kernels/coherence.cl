@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/favour.h"
-#include "common/lanes.h"
 #include "common/lattice.h"
 
 #ifndef BLOCK
@@ -20,10 +19,10 @@ __kernel void coherence(__global const int *restrict sites, const int S, const i
                         __global const int *restrict source, __global const ushort *restrict temperature,
                         __global const int2 *restrict offsets, const int N, const Lattice g, __global const int *restrict reach,
                         __global const int *restrict index_of, const int pixels, const float favour,
-                        __global float *restrict distance, __global float *restrict nearest LANES_ARG)
+                        __global float *restrict distance, __global float *restrict nearest)
 {
-    const int s = LANE;
-    if (IDLE(s))
+    const int s = get_global_id(0);
+    if (s >= S)
         return;
     const int i = ROW_OF(g, sites[s]), j = COL_OF(g, sites[s]);
     for (int k = 0; k < N; ++k) {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "common/lanes.h"
 
 // The end of a step: what the relaxed sites have become goes into the field, all at once.
 //
@@ -9,10 +8,10 @@
 __kernel void commit(__global const int *restrict sites, const int S, const int channels, const int plane,
                      __global const ushort *restrict new_values, __global const int *restrict new_source,
                      __global const ushort *restrict new_temperature, __global ushort *restrict values,
-                     __global int *restrict source, __global ushort *restrict temperature LANES_ARG)
+                     __global int *restrict source, __global ushort *restrict temperature)
 {
-    const int s = LANE;
-    if (IDLE(s))
+    const int s = get_global_id(0);
+    if (s >= S)
         return;
     const int site = sites[s];
     for (int c = 0; c < channels; ++c)

@@ -6,7 +6,6 @@
 //
 // Weights are integers, zero below 2^-40 of the largest: common/parzen.h.
 #pragma OPENCL FP_CONTRACT OFF
-#include "common/lanes.h"
 #include "common/lattice.h"
 #include "common/parzen.h"
 #include "common/philox.h"
@@ -30,26 +29,23 @@ __kernel void lcpdf_distance(__global const float *restrict confidence, __global
                              const int N, const int P, __global const float *restrict sample, const int plane,
                              __global const int *restrict candidates, const int count,
                              __global const int *restrict reach, const int blocks,
-                             __global float *restrict distance, __global float *restrict nearest LANES_ARG)
+                             __global float *restrict distance, __global float *restrict nearest)
 {
-    const int s = LANE * V;
-    if (s < 0 || s >= P)
+    const int s = get_global_id(0) * V, block = get_global_id(1);
+    if (s >= P || block >= blocks)
         return;
-    ALONG(block, blocks)
-    {
-        vec least = INFINITY;
-        for (int p = block * BLOCK; p < (block + 1) * BLOCK; p += STEP) {
-            vec d[STEP];
-            weigh(confidence + s, weighted + s, N, P, sample, plane, candidates + p, reach, d);
+    vec least = INFINITY;
+    for (int p = block * BLOCK; p < (block + 1) * BLOCK; p += STEP) {
+        vec d[STEP];
+        weigh(confidence + s, weighted + s, N, P, sample, plane, candidates + p, reach, d);
 #pragma unroll
-            for (int q = 0; q < STEP; ++q) {
-                const vec dq = p + q < count ? d[q] : (vec)INFINITY;
-                STORE(dq, distance + (p + q) * P + s);
-                least = fmin(least, dq);
-            }
+        for (int q = 0; q < STEP; ++q) {
+            const vec dq = p + q < count ? d[q] : (vec)INFINITY;
+            STORE(dq, distance + (p + q) * P + s);
+            least = fmin(least, dq);
         }
-        STORE(least, nearest + block * P + s);
     }
+    STORE(least, nearest + block * P + s);
 }
 
 // Distances that coherence has divided carry the sign bit as a mark.
@@ -81,10 +77,10 @@ __kernel void lcpdf_draw(__global const float *restrict distance, __global const
                          __global const int *restrict candidates, __global const int *restrict sites,
                          const Lattice g, const ulong seed, const uint level, const uint turn, __global const uint *restrict noise,
                          const int radius, const int top, __global int *restrict choice,
-                         __global ushort *restrict values LANES_ARG)
+                         __global ushort *restrict values)
 {
-    const int s = LANE;
-    if (IDLE(s))
+    const int s = get_global_id(0);
+    if (s >= S)
         return;
     const float smallest = smallest_of(nearest, blocks, P, s);
 #define MASS(p) mass_of(DISTANCE(p), smallest, scale, sample, plane, candidates[p], noise, radius, top)
@@ -120,10 +116,10 @@ __kernel void lcpdf_least(__global const float *restrict distance, __global cons
                           const int blocks, const int S, const int P, const float scale,
                           __global const float *restrict sample, const int plane,
                           __global const int *restrict candidates, __global int *restrict choice,
-                          __global ushort *restrict values LANES_ARG)
+                          __global ushort *restrict values)
 {
-    const int s = LANE;
-    if (IDLE(s))
+    const int s = get_global_id(0);
+    if (s >= S)
         return;
     const float smallest = smallest_of(nearest, blocks, P, s);
     int b = 0;
@@ -159,10 +155,10 @@ __kernel void lcpdf_mode(__global const float *restrict distance, __global const
                          const int blocks, const int S, const int P, const float scale,
                          __global const float *restrict sample, const int plane,
                          __global const int *restrict candidates, __global const float *restrict window,
-                         const int radius, __global int *restrict choice, __global ushort *restrict values LANES_ARG)
+                         const int radius, __global int *restrict choice, __global ushort *restrict values)
 {
-    const int s = LANE;
-    if (IDLE(s))
+    const int s = get_global_id(0);
+    if (s >= S)
         return;
     const float smallest = smallest_of(nearest, blocks, P, s);
     ulong weights[LEVELS];
@@ -215,10 +211,10 @@ __kernel void lcpdf_mode_vector(__global const float *restrict distance, __globa
                                 const int blocks, const int S, const int P, const float scale,
                                 __global const float *restrict sample, const int plane,
                                 __global const int *restrict candidates, __global int *restrict choice,
-                                __global ushort *restrict values LANES_ARG)
+                                __global ushort *restrict values)
 {
-    const int s = LANE;
-    if (IDLE(s))
+    const int s = get_global_id(0);
+    if (s >= S)
         return;
     const float smallest = smallest_of(nearest, blocks, P, s);
     ulong heaviest[HEAVIEST];
@@ -273,10 +269,10 @@ __kernel void lcpdf_density(__global const float *restrict distance, __global co
                           const int blocks, const int S, const int P, const float scale,
                           __global const float *restrict sample, __global const int *restrict candidates,
                           __global const float *restrict window, const int radius, const int levels,
-                          __global ulong *restrict mass, __global float *restrict table LANES_ARG)
+                          __global ulong *restrict mass, __global float *restrict table)
 {
-    const int s = LANE;
-    if (IDLE(s))
+    const int s = get_global_id(0);
+    if (s >= S)
         return;
     const float smallest = smallest_of(nearest, blocks, P, s);
     __global ulong *m = mass + (size_t)s * levels;

@@ -10,7 +10,6 @@
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/distance.h"
 #include "common/favour.h"
-#include "common/lanes.h"
 #include "common/lattice.h"
 #include "common/vector.h"
 
@@ -87,10 +86,10 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
               __global const float *restrict axes, const float middle, __global float *restrict near,
               __global int *restrict terms, __global int *restrict count,
               __global float *restrict features, __global float *restrict least,
-              __global int *restrict where, __global float *restrict certain LANES_ARG)
+              __global int *restrict where, __global float *restrict certain)
 {
-    const int s = LANE;
-    if (IDLE(s))
+    const int s = get_global_id(0);
+    if (s >= S)
         return;
     const int i = ROW_OF(g, sites[s]), j = COL_OF(g, sites[s]);
     __global float *here = near + s * (N * (1 + C));
@@ -184,14 +183,10 @@ nearest_leaves(const int S, const int N, __global const float *restrict near, __
                const float blur, __global const float *restrict sample, const int plane,
                __global const int *restrict positions, __global const int *restrict reach,
                __global const float *restrict price, const int split, __global float *restrict found, __global int *restrict at, __global ulong *restrict work,
-               __global int *restrict open LANES_ARG)
+               __global int *restrict open)
 {
-#ifdef LANES
-    const int s = LANE, turn = 0;
-#else
     const int s = get_global_id(0) / split, turn = get_global_id(0) % split;
-#endif
-    if (IDLE(s))
+    if (s >= S)
         return;
     float best = least[s];
     int best_at = where[s];
@@ -280,14 +275,10 @@ nearest_scan(const int S, const int N, __global const int *restrict terms, __glo
              const int split,
              const int all, __global const int *restrict open, const int row,
              __global float *restrict found, __global int *restrict at,
-             __global ulong *restrict work LANES_ARG)
+             __global ulong *restrict work)
 {
-#ifdef LANES
-    const int s = LANE, turn = 0;
-#else
     const int s = get_global_id(0) / split, turn = get_global_id(0) % split;
-#endif
-    if (IDLE(s))
+    if (s >= S)
         return;
     const int wide = (cols + V * STEP - 1) / (V * STEP), m = count[s];
     __global const int *list = terms + s * (N * WORDS);
@@ -362,30 +353,27 @@ nearest_plain(__global const float *restrict confidence, __global const float *r
               const int N, const int P, __global const float *restrict sample, const int plane,
               __global const int *restrict candidates, const int count,
               __global const int *restrict reach, __global const float *restrict price, const int blocks,
-              const int split, __global float *restrict found, __global int *restrict at LANES_ARG)
+              const int split, __global float *restrict found, __global int *restrict at)
 {
-    const int s = LANE * V;
-    if (s < 0 || s >= P)
+    const int s = get_global_id(0) * V, turn = get_global_id(1);
+    if (s >= P || turn >= split)
         return;
-    ALONG(turn, split)
-    {
-        vec least = INFINITY;
-        ivec where = 0;
-        const int end = (int)((long)blocks * (turn + 1) / split) * BLOCK;
-        for (int p = (int)((long)blocks * turn / split) * BLOCK; p < end; p += STEP) {
-            vec d[STEP];
-            weigh(confidence + s, weighted + s, N, P, sample, plane, candidates + p, reach, d);
+    vec least = INFINITY;
+    ivec where = 0;
+    const int end = (int)((long)blocks * (turn + 1) / split) * BLOCK;
+    for (int p = (int)((long)blocks * turn / split) * BLOCK; p < end; p += STEP) {
+        vec d[STEP];
+        weigh(confidence + s, weighted + s, N, P, sample, plane, candidates + p, reach, d);
 #pragma unroll
-            for (int q = 0; q < STEP; ++q) {
-                d[q] += price[p + q];
-                const ivec nearer = (d[q] < least) & (ivec)(p + q < count ? -1 : 0);
-                least = select(least, d[q], nearer);
-                where = select(where, (ivec)(p + q), nearer);
-            }
+        for (int q = 0; q < STEP; ++q) {
+            d[q] += price[p + q];
+            const ivec nearer = (d[q] < least) & (ivec)(p + q < count ? -1 : 0);
+            least = select(least, d[q], nearer);
+            where = select(where, (ivec)(p + q), nearer);
         }
-        STORE(least, found + turn * P + s);
-        STORE(where, at + turn * P + s);
     }
+    STORE(least, found + turn * P + s);
+    STORE(where, at + turn * P + s);
 }
 
 // The nearest of all: the first bound's, and those of every part.
@@ -399,10 +387,10 @@ __kernel void nearest_end(const int S, const int P, __global const float *restri
                           __global const int *restrict at, const int tallied, __global const ulong *restrict work,
                           __global const float *restrict sample, const int plane,
                           __global const int *restrict positions, __global ulong *restrict tally,
-                          __global int *restrict choice, __global ushort *restrict values LANES_ARG)
+                          __global int *restrict choice, __global ushort *restrict values)
 {
-    const int s = LANE;
-    if (IDLE(s))
+    const int s = get_global_id(0);
+    if (s >= S)
         return;
     float best = least[s];
     int p = where[s];

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/beside.h"
-#include "common/lanes.h"
 #include "common/lattice.h"
 
 // The neighbourhoods of the sites to relax, ready for the distance of equation (12).
@@ -22,30 +21,27 @@ __kernel void neighbourhood(__global const int *restrict sites, const int S, con
                             __global const ushort *restrict values, __global const ushort *restrict temperature,
                             __global const int *restrict source, const float hard, const int channels, const int made, const int plane, __global const int2 *restrict offsets,
                             const int N, const int terms, const float centre, const Lattice g,
-                            __global float *restrict confidence, __global float *restrict weighted LANES_ARG)
+                            __global float *restrict confidence, __global float *restrict weighted)
 {
-    const int s = LANE;
-    if (s < 0 || s >= P)
+    const int s = get_global_id(0), k = get_global_id(1);
+    if (s >= P || k >= terms)
         return;
     const int site = s < S ? sites[s] : 0, i = ROW_OF(g, site), j = COL_OF(g, site);
-    ALONG(k, terms)
-    {
-        const int2 o = k < N ? offsets[k] : (int2)(0, 0);
-        const int r = s >= S ? -1 : k < N ? neighbour(g, i, j, o.x, o.y) : site;
-        const float u = r < 0 || k == N ? 0.0f : (float)(1024 - temperature[r]) * 0x1p-10f;
+    const int2 o = k < N ? offsets[k] : (int2)(0, 0);
+    const int r = s >= S ? -1 : k < N ? neighbour(g, i, j, o.x, o.y) : site;
+    const float u = r < 0 || k == N ? 0.0f : (float)(1024 - temperature[r]) * 0x1p-10f;
 #ifdef OWN
-        const float certain = weighed_as(u, r < 0 ? 0 : source[r], hard);
-        const float guide = r < 0 ? 0.0f : k < N ? 1.0f : centre;
-        for (int c = 0; c < channels; ++c) {
-            const ushort x = r < 0 ? 0 : values[c * plane + r];
-            const float uc = confidence_of(c < made, x, certain, guide);
-            confidence[(k * channels + c) * P + s] = uc;
-            weighted[(k * channels + c) * P + s] = (float)x * uc;
-        }
-#else
-        confidence[k * P + s] = u;
-        for (int c = 0; c < channels; ++c)
-            weighted[(k * channels + c) * P + s] = r < 0 ? 0.0f : (float)values[c * plane + r] * u;
-#endif
+    const float certain = weighed_as(u, r < 0 ? 0 : source[r], hard);
+    const float guide = r < 0 ? 0.0f : k < N ? 1.0f : centre;
+    for (int c = 0; c < channels; ++c) {
+        const ushort x = r < 0 ? 0 : values[c * plane + r];
+        const float uc = confidence_of(c < made, x, certain, guide);
+        confidence[(k * channels + c) * P + s] = uc;
+        weighted[(k * channels + c) * P + s] = (float)x * uc;
     }
+#else
+    confidence[k * P + s] = u;
+    for (int c = 0; c < channels; ++c)
+        weighted[(k * channels + c) * P + s] = r < 0 ? 0.0f : (float)values[c * plane + r] * u;
+#endif
 }

@@ -25,7 +25,6 @@
 #else
 #define LEVEL ushort
 #endif
-#include "common/lanes.h"
 #include "common/beside.h"
 #include "common/vector.h"
 #include "common/choose.h"
@@ -79,10 +78,10 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
                         __global const int *restrict strip_reach, __global const float *restrict price,
                         __global const uint *restrict noise, const uint turn,
                         __global ushort *restrict new_values, __global int *restrict new_source,
-                        __global ushort *restrict new_temperature LANES_ARG)
+                        __global ushort *restrict new_temperature)
 {
-    const int s = LANE;
-    if (IDLE(s))
+    const int s = get_global_id(0);
+    if (s >= S)
         return;
     const int site = sites[s], i = ROW_OF(g.lattice, site), j = COL_OF(g.lattice, site);
     const ulong place = place_of(g.lattice, i, j);
@@ -203,10 +202,10 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
                          __global const int *restrict similar, __global const float *restrict price,
                          __global const uint *restrict noise, __global int *restrict weighed, const uint turn,
                          __global ushort *restrict new_values,
-                         __global int *restrict new_source, __global ushort *restrict new_temperature LANES_ARG)
+                         __global int *restrict new_source, __global ushort *restrict new_temperature)
 {
-    const int s = LANE;
-    if (IDLE(s))
+    const int s = get_global_id(0);
+    if (s >= S)
         return;
     const Lattice h = g.lattice;
     const int site = sites[s], line = site / h.width, i = line / h.spacing, j = (site - line * h.width) / h.spacing;

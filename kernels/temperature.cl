@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "common/cool.h"
-#include "common/lanes.h"
 #include "common/lattice.h"
 
 // Equation (13), by itself: what sites cool to.
@@ -11,10 +10,10 @@
 // One work-item per site.
 __kernel void temperature(__global const int *restrict sites, const int S,
                           __global const ushort *restrict temperature, __global const int2 *restrict offsets,
-                          const int N, const Lattice g, const int xi, __global ushort *restrict cooled LANES_ARG)
+                          const int N, const Lattice g, const int xi, __global ushort *restrict cooled)
 {
-    const int s = LANE;
-    if (IDLE(s))
+    const int s = get_global_id(0);
+    if (s >= S)
         return;
     const int i = ROW_OF(g, sites[s]), j = COL_OF(g, sites[s]);
     int sum = xi, members = 0;

@@ -288,7 +288,7 @@ class Output:
     them that a bound made needless; docs/concepts/skipping.rst), and ``equilibrium``: the
     ``sweeps``, ``steps`` and ``relaxations`` until no temperature was left, free sweeps not counted. Its statistics
     also have ``accounting``, what the run costs on a processor array, or, where none was given, packed on a full MP-1:
-    ``array``, ``mapping``, ``emulated``; ``layers``, virtual layers; ``shifts``, X-Net shifts of a word that bring
+    ``array``, ``mapping``; ``layers``, virtual layers; ``shifts``, X-Net shifts of a word that bring
     every pixel of the finest level all its neighbours, for either mapping; ``steps``; ``passes``, SIMD steps: one for
     each virtual layer of a step that has an active site; ``active``, the mean number of active PEs per pass;
     ``utilisation``, that over all PEs; ``sites``, relaxations; ``moved``, words that each PE shifted; ``routed``,

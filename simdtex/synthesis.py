@@ -90,7 +90,7 @@ def synthesize(
         Of the method. ``mrf``: ``preset``, ``order``, ``levels``, ``overview``, ``relaxation``, ``bandwidth``,
         ``coherence``, ``balance``, ``structure``, ``novelty``, ``finish``, ``xi``, ``free_sweeps``, ``pixel``,
         ``phases``, ``edges``, ``coarsest``, ``schedule``, ``check_schedule``, ``boundary``, ``array``, ``mapping``,
-        ``search``, ``suggesting``, ``similar``, ``chance``, ``exhaustive``, ``emulate``, ``categorical``, ``weights``,
+        ``search``, ``suggesting``, ``similar``, ``chance``, ``exhaustive``, ``categorical``, ``weights``,
         ``shares``, ``proportions``, ``data_weight``, ``guide_weight``, ``labels``,
         ``unsure``; see
         `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``strain``, ``target``, ``thresholds``,

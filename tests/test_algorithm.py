@@ -6,7 +6,7 @@ from dataclasses import fields
 import numpy as np
 import plain_mrf
 import pytest
-from cases import REFERENCE, assert_same_bits, opencl, texture
+from cases import REFERENCE, assert_same_bits, texture
 
 import simdtex
 from simdtex import schedules
@@ -209,7 +209,7 @@ def test_the_cases_give_every_option():
 
 # -- every option matters -------------------------------------------------------------------------------------
 
-NO_BYTE = {"check_schedule": False, "array": None, "mapping": "cut-and-stack", "emulate": True}
+NO_BYTE = {"check_schedule": False, "array": None, "mapping": "cut-and-stack"}
 """Options that change no byte, with their defaults: where a run is accounted for, and what is checked."""
 
 ELSEWHERE = {"categorical", "weights", "shares", "proportions", "data_weight", "guide_weight", "labels", "unsure"}
@@ -314,20 +314,3 @@ def test_an_array_and_its_mapping_change_the_account_alone(others):
         assert each["moved"] > 0 == each["routed"]
     assert tiled["moved"] != layered["moved"]
     assert tiled["passes"] != layered["passes"]
-
-
-@pytest.mark.parametrize("others", [EXACT, FEW], ids=["exact", "few"])
-def test_emulate_says_how_an_array_is_launched_and_changes_no_byte(others):
-    assert account(others, array="4x4")["emulated"] is True
-    assert account(others, array="4x4", emulate=False)["emulated"] is False
-    assert account(others)["emulated"] is False
-
-
-def test_emulation_launches_an_item_for_each_pe(any_device):
-    """Packed, a step is one launch; on 16 PEs it is one for each 16 sites or so."""
-    case = CASES["exact"][:-1]
-    packed, emulated = (
-        run(*case, EXACT | {"array": "4x4", "emulate": emulate}, opencl(any_device)) for emulate in (False, True)
-    )
-    assert_same_bits(packed[0], emulated[0])
-    assert emulated[1]["accounting"]["launches"] > packed[1]["accounting"]["launches"]

@@ -21,7 +21,7 @@ from simdtex.cli.resume import COMMANDS as KEEPING
 from simdtex.io import image
 
 SYNTH = ("synth", "sample.png", "-o", "out.png", "--size", "14x13", "--seed", "5")
-MRF = (*SYNTH, "--order", "2", "--xi", "-2", "--no-emulate", "--array", "4x4", "--source-map", "where.npz")
+MRF = (*SYNTH, "--order", "2", "--xi", "-2", "--no-labels", "--array", "4x4", "--source-map", "where.npz")
 RUNS = {
     "synth-mrf": (*MRF, "--stages", "stages", "--also", "height.png=more.png"),
     "synth-multires": (*SYNTH, "--method", "multires", "--alpha", "auto", "--stages", "stages"),
@@ -168,7 +168,7 @@ def test_the_command_line_is_kept(place, monkeypatch):
         "arguments": ["sample.png"],
         "folder": str(place),
     }
-    assert [word for word in kept["options"] if "emulate" in word] == ["--no-emulate"]
+    assert [word for word in kept["options"] if "labels" in word] == ["--no-labels"]
     assert "--checkpoint" not in kept["options"] and "--quiet" in kept["options"]
     assert kept["options"][kept["options"].index("--xi") + 1] == "-2.0"
 
@@ -198,7 +198,7 @@ def test_another_sample_or_option_is_refused(place, monkeypatch):
         place,
         "another option order (2, not 3); give the same, or an empty folder",
         *("synth", "sample.png", "-o", "out.png", "--size", "14x13", "--seed", "5", "--order", "3"),
-        *("--checkpoint", "kept", "--xi", "-2", "--device", "reference", "--no-emulate", "--array", "4x4"),
+        *("--checkpoint", "kept", "--xi", "-2", "--device", "reference", "--no-labels", "--array", "4x4"),
     )
     picture = image.read("sample.png").pixels.copy()
     picture[3, 3] ^= 1

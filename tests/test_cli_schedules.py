@@ -71,7 +71,7 @@ def test_the_same_command_gives_the_same_pictures(folder):
 
 def test_options_reach_the_runs(folder):
     given = ["--free-sweeps", 3, "--relaxation", "gibbs", "--boundary", "open", "--array", "8x8", "--seed", 7]
-    result = small(folder, *given, "--mapping", "hierarchical", "--emulate", "--coherence", 0, "--levels", 1)
+    result = small(folder, *given, "--mapping", "hierarchical", "--coherence", 0, "--levels", 1)
     assert result.exit_code == 0, result.output
     found = json.loads((folder / "report" / "results.json").read_text(encoding="utf-8"))
     options = found["options"]
@@ -79,7 +79,7 @@ def test_options_reach_the_runs(folder):
     assert (options["coherence"], options["levels"]) == (0, 1)
     assert found["seeds"] == [7, 8]
     accounting = found["schedules"][0]["runs"][0]["accounting"]
-    assert (accounting["array"], accounting["mapping"], accounting["emulated"]) == ("8x8", "hierarchical", True)
+    assert (accounting["array"], accounting["mapping"]) == ("8x8", "hierarchical")
 
 
 def test_without_a_sample_it_is_brick(any_device, tmp_path):

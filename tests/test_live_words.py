@@ -16,7 +16,7 @@ from simdtex.options import Words, kinds
 
 ELSEWHERE = {
     "mrf": {
-        *("schedule", "check_schedule", "array", "mapping", "emulate"),  # studies
+        *("schedule", "check_schedule", "array", "mapping"),  # studies
         *("weights", "shares", "proportions", "data_weight", "guide_weight", "labels", "unsure"),  # of data and guides
     },
     "multires": {"target", "thresholds"},

@@ -9,7 +9,6 @@ import pytest
 from cases import REFERENCE, assert_same_bits, texture
 
 import simdtex
-from simdtex.maspar.array import parse_array
 from simdtex.methods import mrf
 from simdtex.methods.mrf import meter as meter_module
 from simdtex.methods.mrf.algorithm import anneal, begin, enter, sweep
@@ -55,7 +54,6 @@ REFUSED = [
     ("chance", -1, "chance is -1; give 0 or more"),
     ("exhaustive", -1, "exhaustive is -1; give 0 or more"),
     ("check_schedule", 1, "check_schedule must be True or False, not 1"),
-    ("emulate", 0, "emulate must be True or False, not 0"),
     ("anything", 1, "unknown option 'anything' of the method 'mrf'; choose from: preset, order, "),
 ]
 
@@ -251,14 +249,6 @@ def test_grey_levels_are_as_fine_as_the_channels_and_neighbours_allow():
     assert run.sample.top == Sample(pixels, 3 * neighbours, 8).top == 2047 < Sample(pixels, neighbours, 8).top
 
 
-def test_a_machine_emulates_the_array_that_is_given(monkeypatch):
-    asked = []
-    monkeypatch.setattr(type(REFERENCE), "emulate", lambda self, array: asked.append(array) or self)
-    assert prepared(array="4x8", mapping="hierarchical").emulated is True
-    assert prepared(array="4x8", emulate=False).emulated is prepared().emulated is False
-    assert asked == [parse_array("4x8", "hierarchical")]
-
-
 # -- what is counted ------------------------------------------------------------------------------------------------
 
 
@@ -341,7 +331,7 @@ def test_the_work_that_is_expected(given, each, first):
         assert found[level] == pytest.approx(work)
 
 
-@pytest.mark.parametrize("given", [{"search": "exact"}, {"search": "coherent"}, {"array": "4x4", "emulate": False}])
+@pytest.mark.parametrize("given", [{"search": "exact"}, {"search": "coherent"}, {"array": "4x4"}])
 def test_a_run_is_counted(given):
     given = {"order": 2, "levels": 3, "phases": "all", "edges": "reflect", "free_sweeps": 1} | given
     told, seen, parts = [], [], []
@@ -379,7 +369,6 @@ def test_a_run_is_counted(given):
         assert (0 < report["weighed"] <= 13) if few else report["weighed"] == 600
         assert report["fma"] == round(report["weighed"] * report["relaxations"]) * 16 * 2
     assert sum(report["relaxations"] for report in statistics["levels"]) == statistics["accounting"]["sites"]
-    assert statistics["accounting"]["emulated"] is False
     assert statistics["options"]["levels"] == 3
     assert statistics["options"]["schedule"] == "coloring"
     own = {"device", "seed", "options", "seconds", "device_seconds", "accounting", "levels", "use"}

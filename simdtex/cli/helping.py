@@ -42,9 +42,7 @@ SECTIONS = {
     "Method mrf: how it is sampled": (
         *("relaxation", "bandwidth", "xi", "free_sweeps", "pixel", "phases", "coarsest"),
     ),
-    "Method mrf: schedules and processor arrays": (
-        *("schedule", "check_schedule", "array", "mapping", "emulate", "accounting"),
-    ),
+    "Method mrf: schedules and processor arrays": (*("schedule", "check_schedule", "array", "mapping", "accounting"),),
     "Method multires": (
         *("alpha", "beta", "strain", "target", "thresholds", "sigma", "filter_size", "features", "parity", "seams"),
     ),

@@ -58,7 +58,6 @@ from simdtex.schedules import TOGETHER
     show_default=True,
     help="Lay pixels onto the array in this way, or hierarchical.",
 )
-@click.option("--emulate", is_flag=True, help="Run as on the array too, which takes longer.")
 @DEVICE
 @click.option("-q", "--quiet", is_flag=True, help="Show no progress and no table.")
 @plainly

@@ -270,7 +270,6 @@ def compare(
     callback: Callable[[Now], Any] | None = None,
     array: str | None = None,
     mapping: str = "cut-and-stack",
-    emulate: bool = False,
     **options: Any,
 ) -> Comparison:
     """Run the same job under several schedules, and measure each.
@@ -293,8 +292,6 @@ def compare(
         Called with a `Now` several times a second; an exception ends the comparison.
     array, mapping : str, optional
         The processor array that the runs are counted on, see `simdtex.methods.mrf.Options`.
-    emulate : bool
-        Whether they are executed as on that array too, which takes longer and gives the same pictures.
     **options
         Of the method ``mrf``, see `simdtex.methods.mrf.Options`; ``preset`` too. ``search`` is ``"exact"`` unless
         given: a schedule is judged by the model, not by a list of candidates.
@@ -341,7 +338,7 @@ def compare(
     _check_distinct("seed", keys)
     if "schedule" in options:
         raise TypeError("schedule is no option here; give schedules, a sequence of them")
-    options = {"search": "exact"} | options | {"array": array, "mapping": mapping, "emulate": emulate}
+    options = {"search": "exact"} | options | {"array": array, "mapping": mapping}
     make_options(**options)
     pixels = check_sample(sample, channel_axis)
     size = _check_sides(pixels.shape[:2], shape)

@@ -7,7 +7,7 @@ arguments. A launcher sees a `Launcher`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Concatenate, Generic, NamedTuple, ParamSpec, Protocol, TypeVar
 
@@ -15,8 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.devices import DeviceInfo
-from simdtex.maspar.array import ProcessorArray
-from simdtex.model.lattice import Grid
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -109,14 +107,6 @@ class Machine(Protocol):
         """A copy of some elements of an array of this machine that has one axis."""
         ...
 
-    def emulate(self, array: ProcessorArray) -> Machine:
-        """The same machine as a processor array."""
-        ...
-
-    def pieces(self, sites: NDArray[np.int32], grid: Grid, most: int) -> Iterator[tuple[Machine, NDArray[np.int32]]]:
-        """The sites of a step in pieces of `most` or fewer, each with the machine that is to relax it."""
-        ...
-
     def sync(self, work: int = 0) -> None:
         """Wait until everything is done, or, given the fma just asked for, as often as keeps launches answering."""
         ...
@@ -204,18 +194,6 @@ class Launcher(Machine, Protocol):
         work: Work | None = None,
     ) -> None:
         """Enqueue a kernel over a range of work-items, rounded up to whole groups: kernels guard."""
-        ...
-
-    def launch_sites(
-        self,
-        kernel: tuple[str, str],
-        size: tuple[int, ...],
-        *args: Any,
-        local: tuple[int, ...] | None = None,
-        defines: Mapping[str, int] | None = None,
-        work: Work | None = None,
-    ) -> None:
-        """Enqueue a kernel, given as (file, name), over sites that relax together: common/lanes.h."""
         ...
 
     def launch_groups(self, kernel: Any, groups: NDArray[np.int64], *args: Any) -> None:

@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from copy import copy
-from math import gcd, prod
+from math import prod
 from pathlib import Path
 from threading import RLock
 from typing import Any
@@ -24,8 +23,6 @@ from simdtex.machine.forms import Form, default
 from simdtex.machine.interface import Array, Operation, P, R, Work
 from simdtex.machine.log import Log
 from simdtex.machine.tally import Tally
-from simdtex.maspar.array import ProcessorArray
-from simdtex.model.lattice import Grid
 from simdtex.model.sample import BLOCK
 
 LITTLE = 2**16
@@ -115,8 +112,6 @@ class OpenCL:
         self._split = split
         self._crowd = info.compute_units * (2048 if on_gpu else 64)  # work-items that keep the device busy
         self._abreast = 64 if on_gpu else 1  # of a site: neighbours in a row of the sample
-        self.array: ProcessorArray | None = None
-        self._lane: Array | None = None
         self._pool = cl_tools.MemoryPool(cl_tools.ImmediateAllocator(self.queue))
         self._pending, self._burst, self._synced = 0, 1e8, time.perf_counter()
         self._constants: dict[tuple[str, bytes], Array] = {}
@@ -220,30 +215,6 @@ class OpenCL:
             cl.enqueue_copy(self.queue, result.data, array.data, byte_count=size, src_offset=offset)
         return result
 
-    def emulate(self, array: ProcessorArray) -> OpenCL:
-        """The same device as a processor array: every launch has one work-item per PE."""
-        emulated = copy(self)
-        emulated.array, emulated.vector, emulated._split = array, 1, 1
-        return emulated
-
-    def pieces(self, sites: NDArray[np.int32], grid: Grid, most: int) -> Iterator[tuple[OpenCL, NDArray[np.int32]]]:
-        """The sites of a step in pieces that scratch memory holds, each with the machine that relaxes it.
-
-        On an array one virtual layer after another: the machine then masks the PEs without a site.
-        """
-        if not self.array:
-            yield from ((self, sites[i : i + most]) for i in range(0, len(sites), most))
-            return
-        layer, pe = self.array.place(sites, grid)
-        for number in np.unique(layer):
-            here, at = sites[layer == number], pe[layer == number]
-            for i in range(0, len(here), most):
-                lane = np.full(self.array.size, -1, np.int32)
-                lane[at[i : i + most]] = np.arange(len(here[i : i + most]), dtype=np.int32)
-                masked = copy(self)
-                masked._lane = self.put(lane)
-                yield masked, here[i : i + most]
-
     def require(self, size: int) -> None:
         """Raise DeviceError where this many bytes are more than the device has."""
         if size > self.info.memory:
@@ -299,22 +270,6 @@ class OpenCL:
         source = "\n".join((kernel_folder() / f"{file}.cl").read_text(encoding="utf-8") for file in files)
         return programs.compiled(self.context, source, [*options.split(), *self.include])
 
-    def launch_sites(
-        self,
-        kernel: tuple[str, str],
-        size: tuple[int, ...],
-        *args: Any,
-        local: tuple[int, ...] | None = None,
-        defines: Mapping[str, int] | None = None,
-        work: Work | None = None,
-    ) -> None:
-        """Enqueue a kernel, given as (file, name), over sites that relax together: common/lanes.h."""
-        defines = defines or {}
-        if self._lane is None:
-            self.launch(self.kernel(*kernel, **defines), size, *args, local=local, work=work)
-        else:
-            self._enqueue(self.kernel(*kernel, LANES=1, **defines), self._lane.shape, *args, self._lane, work=work)
-
     def launch(
         self,
         kernel: Any,
@@ -325,17 +280,13 @@ class OpenCL:
     ) -> None:
         """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels guard.
 
-        On an array, as many times as it takes with one work-item per PE. `work` is what all of it does, for profiles.
+        `work` is the work of the launch, for profiles.
         """
-        if self.array:
-            for begin in range(0, size[0], self.array.size):
-                self._enqueue(kernel, (self.array.size,), *args, begin=begin, work=work)
-                work = work and Work(0.0, 0.0)  # the first has said it all
-            return
         one_dimensional = (self.group,) + (1,) * (len(size) - 1)
         local = local if local and not self.forced else one_dimensional
         size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
-        self._enqueue(kernel, size, *args, local=local, work=work)
+        data = [a.data if type(a) is DeviceArray else a for a in args]
+        self.log.add(prod(size), kernel(self.queue, size, local, *data), kernel, work)
 
     def launch_groups(self, kernel: Any, groups: NDArray[np.int64], *args: Any) -> None:
         """Enqueue a kernel over groups of work-items one after another, from ``groups[g, 0]`` up to ``groups[g, 1]``.
@@ -351,17 +302,3 @@ class OpenCL:
                 size = -(-min(end - first, LONGEST) // group) * group
                 event = cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (group,), (first,))
                 self.log.add(size, event, kernel)
-
-    def _enqueue(
-        self,
-        kernel: Any,
-        size: tuple[int, ...],
-        *args: Any,
-        local: tuple[int, ...] | None = None,
-        begin: int = 0,
-        work: Work | None = None,
-    ) -> None:
-        data = [a.data if type(a) is DeviceArray else a for a in args]
-        offset = (begin,) if begin else None
-        event = kernel(self.queue, size, local or (gcd(size[0], self.group),), *data, global_offset=offset)
-        self.log.add(prod(size), event, kernel, work)

@@ -3,15 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Operation, P, R
-from simdtex.maspar.array import ProcessorArray
-from simdtex.model.lattice import Grid
 
 
 class Reference:
@@ -47,14 +43,6 @@ class Reference:
     def part(self, array: Array, begin: int, end: int) -> Array:
         """A view."""
         return array[begin:end]
-
-    def emulate(self, array: ProcessorArray) -> Reference:
-        """Nothing changes: there are no work-items here."""
-        return self
-
-    def pieces(self, sites: NDArray[np.int32], grid: Grid, most: int) -> Iterator[tuple[Reference, NDArray[np.int32]]]:
-        """The sites of a step in pieces that scratch memory holds."""
-        yield from ((self, sites[i : i + most]) for i in range(0, len(sites), most))
 
     def sync(self, work: int = 0) -> None:
         """Nothing runs behind one's back here."""

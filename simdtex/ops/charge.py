@@ -17,12 +17,11 @@ def _reference(distances: Distances, candidates: Candidates, price: NDArray[np.f
 
 def _launch(machine: Launcher, distances: Distances, candidates: Candidates, price: Array) -> Distances:
     blocks, padded = distances.nearest.shape
-    machine.launch_sites(
-        ("charge", "charge"),
+    machine.launch(
+        machine.kernel("charge", "charge", BLOCK=BLOCK),
         (distances.sites, blocks),
         *(np.int32(distances.sites), np.int32(padded), np.int32(candidates.size), np.int32(blocks), price),
         *(distances.distance, distances.nearest),
-        defines={"BLOCK": BLOCK},
     )
     return distances
 

@@ -55,14 +55,13 @@ def _launch(
     grid: Grid,
     favour: np.float32,
 ) -> Distances:
-    machine.launch_sites(
-        ("coherence", "coherence"),
+    machine.launch(
+        machine.kernel("coherence", "coherence", BLOCK=BLOCK),
         (sites.size,),
         *(sites, np.int32(sites.size), np.int32(distances.distance.shape[1])),
         *(field.source, field.temperature, offsets, np.int32(offsets.shape[0]), grid.struct),
         *(candidates.reach, candidates.index_of, np.int32(candidates.index_of.size), favour),
         *(distances.distance, distances.nearest),
-        defines={"BLOCK": BLOCK},
     )
     return distances
 

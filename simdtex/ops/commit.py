@@ -21,8 +21,8 @@ def _reference(field: Field, sites: NDArray[np.int32], relaxed: Relaxed, cooled:
 
 def _launch(machine: Launcher, field: Field, sites: Array, relaxed: Relaxed, cooled: Array) -> Field:
     (channels, _), (_, height, width) = relaxed.values.shape, field.values.shape
-    machine.launch_sites(
-        ("commit", "commit"),
+    machine.launch(
+        machine.kernel("commit", "commit"),
         (sites.size,),
         *(sites, np.int32(sites.size), np.int32(channels), np.int32(height * width)),
         *(relaxed.values, relaxed.choice, cooled, *field),

@@ -112,14 +112,14 @@ def _distance_launch(machine: Launcher, near: Neighbourhoods, candidates: Candid
     blocks = candidates.positions.size // BLOCK
     distance = machine.empty((blocks * BLOCK, padded), np.float32)
     nearest = machine.empty((blocks, padded), np.float32)
-    machine.launch_sites(
-        ("lcpdf", "lcpdf_distance"),
+    own = {"OWN": 1} if len(near.confidence.shape) > 2 else {}
+    machine.launch(
+        machine.kernel("lcpdf", "lcpdf_distance", **_defines(machine, candidates), **own),
         (padded // machine.vector, blocks),
         *(near.confidence, near.weighted, np.int32(terms), np.int32(padded)),
         *(candidates.pixels, _plane(candidates), candidates.positions, np.int32(candidates.size)),
         *(candidates.reach, np.int32(blocks), distance, nearest),
         local=machine.tile,
-        defines=_defines(machine, candidates) | ({"OWN": 1} if len(near.confidence.shape) > 2 else {}),
         work=touching(*near[:2], distance, fma=2 * near.weighted.size / padded * near.sites * candidates.size),
     )
     return Distances(distance, nearest, near.sites)
@@ -334,13 +334,12 @@ def _densities_reference(distances: Distances, candidates: Candidates, win: Wind
 def _densities_launch(machine: Launcher, distances: Distances, candidates: Candidates, win: Window) -> Array:
     shape = (distances.sites, win.top + 1)
     mass, table = machine.empty(shape, np.uint64), machine.empty(shape, np.float32)
-    machine.launch_sites(
-        ("lcpdf", "lcpdf_density"),
+    machine.launch(
+        machine.kernel("lcpdf", "lcpdf_density", **_defines(machine, candidates)),
         (distances.sites,),
         *_weighing(distances, win),
         *(candidates.pixels, candidates.positions, machine.constant(win.gauss)),
         *(np.int32(win.radius), np.int32(win.top + 1), mass, table),
-        defines=_defines(machine, candidates),
     )
     return table
 
@@ -378,12 +377,11 @@ def _take(
     """Launch a kernel that gives each site a source and a value."""
     sites, made = distances.sites, candidates.made
     out = Relaxed(machine.empty((sites,), np.int32), machine.empty((made, sites), np.uint16))
-    machine.launch_sites(
-        ("lcpdf", f"lcpdf_{name}"),
+    machine.launch(
+        machine.kernel("lcpdf", f"lcpdf_{name}", **_defines(machine, candidates)),
         (distances.sites,),
         *_weighing(distances, win),
         *(candidates.pixels, _plane(candidates), candidates.positions),
         *(*arguments, *out),
-        defines=_defines(machine, candidates),
     )
     return out

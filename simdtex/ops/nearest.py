@@ -129,15 +129,14 @@ def _launch(
     used, where = machine.empty((count,), i), machine.empty((count,), i)
     features = machine.empty((count, FEATURES), f)
     axes = leaves.axes if leaves else machine.constant(np.zeros((neighbours * channels, FEATURES), f))
-    machine.launch_sites(
-        ("nearest", "nearest_begin"),
+    machine.launch(
+        machine.kernel("nearest", "nearest_begin", **defines),
         (count,),
         *(sites, i(count), i(neighbours), *field, i(prod(field.values.shape[1:])), offsets, grid.struct),
         *(candidates.index_of, plane),
         *(candidates.pixels, candidates.positions, candidates.reach, strip.reach),
         *(machine.constant(_spread(strip.offsets)), favour, price, axes, f(leaves.middle if leaves else 0)),
         *(near, terms, used, features, least, where, certain),
-        defines=defines,
     )
     if machine.skip:
         split = machine.split(count, -(-strip.cols // (machine.vector * machine.step)) * strip.rows)
@@ -145,8 +144,8 @@ def _launch(
         parts = row + split
         found, at, work, wanted = (machine.empty((parts, count), t) for t in (f, i, np.uint64, i))
         if leaves:
-            machine.launch_sites(
-                ("nearest", "nearest_leaves"),
+            machine.launch(
+                machine.kernel("nearest", "nearest_leaves", **defines),
                 (count * split,),
                 *(
                     i(count),
@@ -170,16 +169,14 @@ def _launch(
                     price,
                 ),
                 *(i(split), found, at, work, wanted),
-                defines=defines,
             )
         shape = (strip.first, strip.pitch, strip.rows, strip.cols)
-        machine.launch_sites(
-            ("nearest", "nearest_scan"),
+        machine.launch(
+            machine.kernel("nearest", "nearest_scan", **defines),
             (count * split,),
             *(i(count), i(neighbours), terms, used, near, least, where),
             *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach, price),
             *(slack(neighbours * channels), i(split), i(leaves is None), wanted, i(row), found, at, work),
-            defines=defines,
         )
         machine.tally.expect(2 * count * candidates.size * neighbours * channels)
     else:
@@ -189,23 +186,21 @@ def _launch(
         parts = machine.split(pitch // machine.vector, blocks)
         found, at = machine.empty((parts, pitch), f), machine.empty((parts, pitch), i)
         work = where
-        machine.launch_sites(
-            ("nearest", "nearest_plain"),
+        machine.launch(
+            machine.kernel("nearest", "nearest_plain", **defines),
             (pitch // machine.vector, parts),
             *(around.confidence, around.weighted, i(neighbours), i(pitch)),
             *(candidates.pixels, plane, candidates.positions, i(candidates.size)),
             *(candidates.reach, price, i(blocks), i(parts), found, at),
             local=machine.tile,
-            defines=defines,
         )
     tally = machine.tally.slots(count)
     out = Relaxed(machine.empty((count,), np.int32), machine.empty((channels, count), np.uint16))
-    machine.launch_sites(
-        ("nearest", "nearest_end"),
+    machine.launch(
+        machine.kernel("nearest", "nearest_end", **defines),
         (count,),
         *(i(count), i(pitch), least, where, i(parts), found, at),
         *(i(machine.skip), work, candidates.pixels, plane, candidates.positions, tally, *out),
-        defines=defines,
     )
     return out
 

@@ -99,13 +99,12 @@ def _launch(
     padded, terms = -(-count // machine.vector) * machine.vector, neighbours + bool(beside.guides)
     confidence = machine.empty((terms, channels, padded) if beside.own else (terms, padded), np.float32)
     weighted = machine.empty((terms, channels, padded), np.float32)
-    machine.launch_sites(
-        ("neighbourhood", "neighbourhood"),
+    machine.launch(
+        machine.kernel("neighbourhood", "neighbourhood", **({"OWN": 1} if beside.own else {})),
         (padded, terms),
         *(sites, np.int32(count), np.int32(padded), field.values, field.temperature, field.source, beside.hard),
         *(np.int32(channels), np.int32(channels - beside.guides), np.int32(prod(field.values.shape[1:])), offsets),
         *(np.int32(neighbours), np.int32(terms), beside.centre, grid.struct, confidence, weighted),
-        defines={"OWN": 1} if beside.own else {},
         work=touching(sites, confidence, weighted),
     )
     return Neighbourhoods(confidence, weighted, count)

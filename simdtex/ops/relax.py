@@ -290,14 +290,13 @@ def _apart_launch(
     relaxed = Relaxed(machine.empty((sites.size,), np.int32), machine.empty((made, sites.size), np.uint16))
     cooled = machine.empty((sites.size,), np.uint16)
     name, defines, arguments = _fused(machine, sites, field, weighed, relaxation, turn)
-    machine.launch_sites(
-        ("relax", name),
+    machine.launch(
+        machine.kernel("relax", name, **defines, APART=1),
         (sites.size,),
         *arguments,
         relaxed.values,
         relaxed.choice,
         cooled,
-        defines=defines | {"APART": 1},
     )
     return relaxed, cooled
 

@@ -23,8 +23,8 @@ def _reference(
 
 def _launch(machine: Launcher, sites: Array, field: Field, offsets: Array, grid: Grid, xi: int) -> Array:
     cooled = machine.empty((sites.size,), np.uint16)
-    machine.launch_sites(
-        ("temperature", "temperature"),
+    machine.launch(
+        machine.kernel("temperature", "temperature"),
         (sites.size,),
         *(sites, np.int32(sites.size), field.temperature, offsets, np.int32(offsets.shape[0])),
         *(grid.struct, np.int32(xi), cooled),

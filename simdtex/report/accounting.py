@@ -20,8 +20,7 @@ def duration(seconds: float) -> str:
 def render(accounting: dict[str, Any], console: Console) -> None:
     """Print what `simdtex.run.Output` calls ``accounting``."""
     packed = accounting["mapping"] == "packed"
-    how = f"{accounting['mapping']}, {'emulated' if accounting['emulated'] else 'not emulated'}"
-    table = Table(title=f"On an array of {accounting['array']} PEs ({how})", title_justify="left")
+    table = Table(title=f"On an array of {accounting['array']} PEs ({accounting['mapping']})", title_justify="left")
     table.add_column("What")
     table.add_column("How much", justify="right")
     rows = {

@@ -327,8 +327,7 @@ def _few_free(comparison: Comparison) -> str:
 def _array_name(accounting: dict[str, Any]) -> str:
     if accounting["mapping"] == "packed":
         return f"{accounting['array']} PEs of a MasPar MP-1, active sites packed"
-    how = "executed as such" if accounting["emulated"] else "not executed as such"
-    return f"{accounting['array']} PEs of a MasPar MP-1, {accounting['mapping']}, {how}"
+    return f"{accounting['array']} PEs of a MasPar MP-1, {accounting['mapping']}"
 
 
 def _job(comparison: Comparison, command: str) -> list[Text | Table | Figure]:

@@ -205,15 +205,15 @@ def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Rela
         return
     for step in chosen.apart(machine):
         outcomes: list[Any] = []
-        for masked, some in machine.pieces(step.sites, level.grid, level.at_once):  # no site sees another of its step
+        for first in range(0, step.sites.size, level.at_once):  # no site sees another of its step
             if outcomes:
-                yield Part(len(outcomes) == 1, outcomes[-1][1].size, False, field)
-            here = masked.put(some)
-            outcomes.append((masked, here, *relax_apart(masked, here, field, level.weighed, relaxation, chosen.turn)))
-            machine.sync(level.work * some.size)
-        for masked, here, taken, cooled in outcomes:
-            field = commit(masked, field, here, taken, cooled)
-        yield Part(len(outcomes) < 2, outcomes[-1][1].size if outcomes else 0, step.last, field)
+                yield Part(len(outcomes) == 1, outcomes[-1][0].size, False, field)
+            here = machine.put(step.sites[first : first + level.at_once])
+            outcomes.append((here, *relax_apart(machine, here, field, level.weighed, relaxation, chosen.turn)))
+            machine.sync(level.work * here.size)
+        for here, taken, cooled in outcomes:
+            field = commit(machine, field, here, taken, cooled)
+        yield Part(len(outcomes) < 2, outcomes[-1][0].size if outcomes else 0, step.last, field)
 
 
 def exchanged(level: Level, field: Field) -> Field:

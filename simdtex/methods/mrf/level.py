@@ -122,7 +122,6 @@ class Run:
     schedule: schedules.Schedule
     seed: int
     levels: int
-    emulated: bool
     weighed: Array
     holding: Holder = field(repr=False)
     given: Given | None = None
@@ -205,7 +204,7 @@ class Run:
 
     def _in_place(self, grid: Grid) -> bool:
         independent = self.schedule.independent(grid, self.offsets)
-        return independent and not self.schedule.tile and not self.emulated
+        return independent and not self.schedule.tile
 
     @property
     def usual(self) -> float:

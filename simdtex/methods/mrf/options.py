@@ -114,8 +114,8 @@ class Options:
     boundary : {"torus", "open"}
         Whether the output wraps around.
     array : str, optional
-        A processor array to run on: ``"ROWSxCOLS"`` or ``"maspar-mp1-1k"`` to ``"maspar-mp1-16k"``. None packs the
-        active sites instead.
+        A processor array to account for: ``"ROWSxCOLS"`` or ``"maspar-mp1-1k"`` to ``"maspar-mp1-16k"``. None
+        accounts for packed active sites on a full MP-1. No byte of the result depends on it.
     mapping : {"cut-and-stack", "hierarchical"}
         How a picture larger than the array lies on it.
     search : {"auto", "exact", "coherent"}
@@ -131,9 +131,6 @@ class Options:
         ``coherent``: candidates at random, 4096 or fewer.
     exhaustive : int
         ``coherent``: a level with so many candidates or fewer weighs them all.
-    emulate : bool
-        Whether every launch is to have one work-item per PE of the array. False packs all the same, and only
-        accounts for the array.
     categorical : bool or tuple of int
         Whether the sample's numbers name categories: two differ or they do not, and none is ever a mean of others. A
         tuple names the variables (channels) of which that is so.
@@ -187,7 +184,6 @@ class Options:
     similar: int = integer(0, 0, SIMILAR)
     chance: int = integer(4, 0, CHANCE)
     exhaustive: int = integer(64, 0)
-    emulate: bool = switch(True)
     categorical: bool | tuple[int, ...] = False
     weights: tuple[float, ...] | None = None
     shares: tuple[float, ...] | None = None

@@ -91,7 +91,6 @@ class Outline:
             schedule=schedules.Checked(self.schedule) if self.options.check_schedule else self.schedule,
             seed=self.seed,
             levels=self.levels,
-            emulated=False,
             weighed=weighed,
             holding=holding,
         )

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from simdtex.checkpoints.keep import NOTHING, Keep
 from simdtex.machine import memory
 from simdtex.machine.interface import Machine
-from simdtex.maspar.array import parse_array
 from simdtex.methods.mrf.algorithm import anneal
 from simdtex.methods.mrf.keeping import kept, restored
 from simdtex.methods.mrf.level import Run
@@ -112,7 +111,7 @@ def synthesize(
         "options": vars(run.options) | {"levels": run.levels, "schedule": run.schedule.name},
         "seconds": meter.seconds,
         "device_seconds": device_seconds(machine, worked),
-        "accounting": account.report() | {"emulated": run.emulated, "launches": machine.launches - launches},
+        "accounting": account.report() | {"launches": machine.launches - launches},
         "levels": meter.reports,
         "use": used(place, run.sample.pictures),
     }
@@ -139,11 +138,8 @@ def laid_out(
     outline = outlined(pixels, shape, options, seed, given, guide)
     schedule, options = outline.schedule, outline.options
     _check_memory(machine, outline.sample, shape, options.similar, copies=2 if schedule.tile else 1)
-    emulated = bool(options.array) and options.emulate
-    if options.array and emulated:
-        machine = machine.emulate(parse_array(options.array, options.mapping))
     run = outline.run(machine, outline.holding(machine), machine.put(np.zeros(shape, np.int32)))
-    return replace(run, emulated=emulated, given=given)
+    return replace(run, given=given)
 
 
 def finished(
