@@ -99,7 +99,7 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 @click.option(
     "--array",
     metavar="ROWSxCOLS",
-    help="mrf: account for a processor array of this size, or for maspar-mp1-1k to -16k.",
+    help="mrf: count the work on a processor array of this size, or on maspar-mp1-1k to -16k.",
 )
 @option("--mapping", help="mrf: lay pixels onto the array in this way.  [{mrf.mapping}]")
 @click.option("--accounting", is_flag=True, help="mrf: print what the run costs on the array, or on a full MP-1.")
