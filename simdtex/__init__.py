@@ -7,8 +7,8 @@ TYPE_CHECKING = False  # as type checkers know it by this name, without what imp
 if TYPE_CHECKING:
     from typing import Any
 
-    from simdtex import quality
-    from simdtex.checkpoints import checkpoint
+    from simdtex.checkpoint import Checkpoint
+    from simdtex.experiments import quality
     from simdtex.io.hard_data import place_hard_data, read_hard_data
     from simdtex.jobs.filling import extend, fill
     from simdtex.jobs.simulation import simulate
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Checkpoint",
     "DeviceError",
     "Live",
     "Output",
     "Progress",
-    "checkpoint",
     "devices",
     "extend",
     "fill",
@@ -43,11 +43,11 @@ __all__ = [
 ]
 
 _HOMES = {
+    "Checkpoint": "simdtex.checkpoint",
     "DeviceError": "simdtex.machine.devices",
     "Live": "simdtex.live.widget",
     "Output": "simdtex.run",
     "Progress": "simdtex.run",
-    "checkpoint": "simdtex.checkpoints",
     "devices": "simdtex.machine.devices",
     "extend": "simdtex.jobs.filling",
     "fill": "simdtex.jobs.filling",
@@ -63,7 +63,7 @@ _HOMES = {
 }
 """Where the public names live; each is loaded when it is asked for first, so that the command line starts at once."""
 
-_MODULES = {"quality": "simdtex.quality"}
+_MODULES = {"quality": "simdtex.experiments.quality"}
 """The public names that are modules themselves."""
 
 

@@ -327,11 +327,6 @@ class Output:
         return as_html(self.made, self.source, self.statistics)
 
 
-def device_seconds(machine: Any, before: float | None) -> float | None:
-    """What a machine's device has worked since its `seconds` were so many; None where that is not measured."""
-    return None if before is None else (machine.seconds or 0.0) - before
-
-
 def paced(count: int, least: int, first: int = 0) -> Iterator[tuple[int, int]]:
     """Ranges (first, end) that make up first..count, of a size that takes the loop's body about a tenth of a second.
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from importlib import import_module
 from math import isqrt
@@ -11,8 +12,8 @@ from typing import Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.checkpoints.keep import Keep
-from simdtex.envelope import begin, check_shape, executed, with_channels_last
+from simdtex.checkpoint import Checkpoint
+from simdtex.driver import Plan, PlannedJob, check_shape, execute, with_channels_last
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine, open_machine
@@ -49,6 +50,7 @@ def synthesize(
     device: str | Machine | None = None,
     callback: Callback | None = None,
     full_output: bool = False,
+    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
     """Make more of a texture from a sample of it.
@@ -86,6 +88,9 @@ def synthesize(
         Called with a `simdtex.run.Progress` several times a second.
     full_output : bool
         Return statistics, stages, the source map and, of ``mrf``, temperatures too; of ``pyramid`` statistics alone.
+    checkpoint : path or simdtex.Checkpoint, optional
+        A file that keeps the state of the run. If the file is of a run of the same call that was stopped, the run goes
+        on from there, to the same bytes. The file is removed when the function returns.
     **options
         Of the method. ``mrf``: ``preset``, ``order``, ``levels``, ``overview``, ``relaxation``, ``bandwidth``,
         ``coherence``, ``balance``, ``structure``, ``novelty``, ``finish``, ``xi``, ``free_sweeps``, ``pixel``,
@@ -139,18 +144,17 @@ def synthesize(
         )
     package = import_module(f"simdtex.methods.{method}")
     chosen = package.make_options(**with_channels_last(options, channel_axis))
-    begun = begin("synthesize", rng, lambda: {"method": method, "shape": size, "options": chosen, **inputs.told()})
-
-    def run(machine: Machine, seen: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
-        result: tuple[NDArray[Any], Output]
-        if method == "mrf":
-            given = (inputs.given, inputs.guide)
-            result = package.synthesize(machine, inputs.pictures, size, chosen, begun.seed, seen, *given, keep)
-        else:
-            result = package.synthesize(machine, inputs.pictures.pixels[0], size, chosen, begun.seed, seen, keep)
-        return result
-
-    return executed(device, channel_axis, callback, full_output, run, begun)
+    if method == "mrf":
+        plan: Plan = package.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
+    else:
+        plan = package.Plan(inputs.pictures.pixels[0], size, chosen)
+    job = PlannedJob(
+        "synthesize",
+        plan,
+        lambda: {"method": method, "shape": size, "options": chosen, **inputs.identity()},
+        channel_axis,
+    )
+    return execute(job, rng, device, callback, full_output, checkpoint)
 
 
 def synthesize_solid(
@@ -162,6 +166,7 @@ def synthesize_solid(
     device: str | Machine | None = None,
     callback: Callback | None = None,
     full_output: bool = False,
+    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
     """A solid texture: a block whose slices look like a sample (Heeger and Bergen 1995, section 4).
@@ -180,6 +185,8 @@ def synthesize_solid(
         Called with a `simdtex.run.Iterating` after every part of an iteration.
     full_output : bool
         Return statistics too.
+    checkpoint
+        As in `synthesize`.
     **options
         ``pyramid``, ``levels``, ``orientations``, ``iterations``, ``match``, ``bins``, ``edges``, ``color``,
         ``start`` (a block, channels last), ``solids``, ``slices``; see `simdtex.methods.pyramid.solid.Options`. With
@@ -216,12 +223,14 @@ def synthesize_solid(
     pixels = check_sample(sample, channel_axis)
     size = _check_block(shape)
     chosen = solid.make_options(**options)
-    begun = begin("synthesize_solid", rng, lambda: {"shape": size, "options": chosen, "sample": pixels})
-
-    def run(machine: Machine, seen: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
-        return solid.synthesize(machine, pixels, size, chosen, begun.seed, seen, keep)
-
-    return executed(device, None if channel_axis is None else -1, callback, full_output, run, begun)
+    plan = solid.Plan(pixels, size, chosen)
+    job = PlannedJob(
+        "synthesize_solid",
+        plan,
+        lambda: {"shape": size, "options": chosen, "sample": pixels},
+        None if channel_axis is None else -1,
+    )
+    return execute(job, rng, device, callback, full_output, checkpoint)
 
 
 def suggest_alpha(

@@ -7,6 +7,8 @@ import numpy as np
 from hypothesis import strategies as st
 
 from simdtex.machine.reference import Reference
+from simdtex.methods import mrf
+from simdtex.methods.mrf.algorithm import ignore
 from simdtex.model.guide import UNKNOWN, Guide
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Pictures
@@ -253,3 +255,17 @@ def assert_same_bits(ours, theirs):
         f"{ours[tuple(different[0])]} and {theirs[tuple(different[0])]}"
     )
     assert ours.tobytes() == theirs.tobytes()
+
+
+def laid_out(machine, pixels, shape, options, seed):
+    """A run of the method mrf on a machine."""
+    return mrf.plan(Pictures((pixels,)), shape, options).on(machine, seed)
+
+
+def sweeps(run, state=None, watch=ignore):
+    """The level, the state and the info after every sweep of a run, to its end."""
+    state = run.begin() if state is None else state
+    while not run.ended(state):
+        state, info = run.step(state, watch)
+        if info.sweep:
+            yield run.level(info.level), state, info

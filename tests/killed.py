@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import simdtex
-from simdtex.checkpoints import folder as files
+from simdtex.checkpoint import Checkpoint
 
 
 def texture(*shape):
@@ -39,14 +39,16 @@ JOBS = {
     "solid": lambda **how: simdtex.synthesize_solid(GREY, (16, 16, 16), **how),
     "fill": lambda **how: simdtex.fill(GREY, HOLE, order=2, levels=1, **how),
     "simulate": lambda **how: (
-        simdtex.simulate(GREY, 4, shape=(12, 14), order=2, jobs=2, **{k: how[k] for k in ("rng", "device")}).values,
+        simdtex.simulate(
+            GREY, 4, shape=(12, 14), order=2, jobs=2, **{k: how[k] for k in how if k != "full_output"}
+        ).values,
         None,
     ),
 }
 
 
-def digest(job):
-    image, output = job(rng=5, device="reference", full_output=True)
+def digest(job, checkpoint=None):
+    image, output = job(rng=5, device="reference", full_output=True, checkpoint=checkpoint)
     found = hashlib.sha256(image.tobytes())
     if output is not None:
         if output.source is not None:
@@ -60,10 +62,9 @@ def child(job, folder, result):
     """What a forked child does; it never comes back."""
     code = 1
     try:
-        with simdtex.checkpoint(folder, every=0):
-            found = digest(job)
-            result.with_suffix(".new").write_text(found)
-            os.replace(result.with_suffix(".new"), result)
+        found = digest(job, Checkpoint(folder / "state", every=0))
+        result.with_suffix(".new").write_text(found)
+        os.replace(result.with_suffix(".new"), result)
         code = 0
     except BaseException:
         traceback.print_exc()
@@ -76,6 +77,7 @@ def finished(job, longest, rng, left):
     kills = inside = 0
     with tempfile.TemporaryDirectory() as place:
         folder, result = Path(place, "kept"), Path(place, "result")
+        folder.mkdir()
         while True:
             number = os.fork()
             if not number:
@@ -86,8 +88,8 @@ def finished(job, longest, rng, left):
             _, status = os.waitpid(number, 0)
             if os.WIFSIGNALED(status):
                 kills += 1
-                inside += any(folder.glob(f"*{files.NEW}"))
-                if not (files.Folder(folder).job() or {}).get("finished"):
+                inside += any(folder.glob(".simdtex-*"))
+                if not result.exists():
                     continue
                 return result.read_text(), kills, inside  # killed when all was done
             assert os.WEXITSTATUS(status) == 0, "a child failed; its traceback is above"

@@ -1,4 +1,4 @@
-"""`simdtex.checkpoint`: a run that was stopped goes on to the same bytes, and refuses what it cannot go on with."""
+"""Checkpoints: a run that was stopped goes on to the same bytes, and a checkpoint of another run is refused."""
 
 import json
 import os
@@ -12,12 +12,10 @@ import pytest
 from cases import assert_same_bits, texture
 
 import simdtex
+from simdtex import checkpoint as checkpoints
 from simdtex import schedules
-from simdtex.checkpoints import folder as files
-from simdtex.checkpoints import keep as keeps
-from simdtex.checkpoints import keeper as keepers
-from simdtex.checkpoints.folder import JOB, Folder
-from simdtex.checkpoints.tree import identity, like, packed, unpacked
+from simdtex.checkpoint import Checkpoint, identity, like, pack, read, unpack
+from simdtex.io.atomic import write_checked
 from simdtex.methods.mrf import make_options
 
 GREY, COLOUR = texture((14, 15)), texture((16, 18), 3)
@@ -29,7 +27,7 @@ MRF = {"order": 2, "finish": 1.0}
 
 
 class Stop(Exception):
-    """What stops a run."""
+    """Stops a run."""
 
 
 def simulated(**how):
@@ -43,7 +41,6 @@ JOBS = {
     "mrf-exact-colour": lambda **how: simdtex.synthesize(
         COLOUR, (10, 8), order=1, search="exact", relaxation="gibbs", array="4x4", channel_axis=-1, **how
     ),
-    "mrf-similar": lambda **how: simdtex.synthesize(GREY, (12, 13), order=2, similar=2, exhaustive=8, **how),
     "mrf-known-guide": lambda **how: simdtex.synthesize(
         GREY, (12, 13), known=KNOWN, guide=(GREY // 90, texture((12, 13), seed=4) // 90), **MRF, **how
     ),
@@ -103,29 +100,32 @@ def whole():
     return of
 
 
-def stopping_after(monkeypatch, writes):
-    """Raise Stop after every so many writes of states."""
-    left = [writes]
-    write = keeps.Kept._write
+@pytest.fixture
+def file(tmp_path):
+    return tmp_path / "run.checkpoint"
 
-    def stopped(self, *args, **kwargs):
-        wrote = write(self, *args, **kwargs)
+
+def stopping_after(monkeypatch, writes):
+    """Raise Stop after every so many written states."""
+    left, write = [writes], Checkpoint._save
+
+    def stopped(self, tree):
+        wrote = write(self, tree)
         left[0] -= 1
         if not left[0]:
             left[0] = writes
             raise Stop
         return wrote
 
-    monkeypatch.setattr(keeps.Kept, "_write", stopped)
+    monkeypatch.setattr(Checkpoint, "_save", stopped)
 
 
-def gone_on(job, folder, every=0, **how):
-    """Call again until it is done: what came, and how often it was stopped."""
+def resumed(job, file, every=0, **how):
+    """Call again until the run is done: the result, and how often it was stopped."""
     stops = 0
     while True:
         try:
-            with simdtex.checkpoint(folder, every=every):
-                return run(job, **how), stops
+            return run(job, checkpoint=Checkpoint(file, every=every), **how), stops
         except Stop:
             stops += 1
 
@@ -134,18 +134,18 @@ def gone_on(job, folder, every=0, **how):
 
 
 @pytest.mark.parametrize("name", JOBS)
-def test_stopped_after_every_checkpoint(name, whole, tmp_path, monkeypatch):
+def test_stopped_after_every_checkpoint(name, whole, file, monkeypatch):
     stopping_after(monkeypatch, 1)
-    found, stops = gone_on(JOBS[name], tmp_path)
-    assert stops >= (2 if name in ("mix", "extend") else 3)
+    found, stops = resumed(JOBS[name], file)
+    assert stops >= (2 if name in ("mix", "extend", "simulate") else 3)
     assert_same_run(found, whole(name))
 
 
 @pytest.mark.parametrize("name", ["mrf", "multires", "pyramid"])
-def test_stopped_on_a_device(name, whole, any_device, tmp_path, monkeypatch):
+def test_stopped_on_a_device(name, whole, any_device, file, monkeypatch):
     stopping_after(monkeypatch, 2)
     device = str(any_device.index)
-    found, stops = gone_on(JOBS[name], tmp_path, device=device)
+    found, stops = resumed(JOBS[name], file, device=device)
     assert stops
     assert_same_bits(found[0], whole(name)[0])
     statistics = [plainly(one[1].statistics) for one in (found, whole(name, device))]
@@ -153,20 +153,20 @@ def test_stopped_on_a_device(name, whole, any_device, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("schedule", ["luby", "random-scan", "block:4x4", "synchronous", "random-subset:0.5"])
-def test_what_a_schedule_keeps(schedule, tmp_path, monkeypatch):
+def test_what_a_schedule_keeps(schedule, file, monkeypatch):
     def job(**how):
-        return simdtex.synthesize(GREY, (6, 7), order=1, schedule=schedule, check_schedule=True, **how)
+        return simdtex.synthesize(GREY, (6, 7), order=1, schedule=schedule, **how)
 
     expected = run(job)
     stopping_after(monkeypatch, 3)
-    found, stops = gone_on(job, tmp_path)
+    found, stops = resumed(job, file)
     assert stops
     assert_same_run(found, expected)
 
 
 @pytest.mark.parametrize("call", [1, 2, 5, 7])
 @pytest.mark.parametrize("name", ["mrf", "multires", "pyramid", "fill"])
-def test_stopped_by_a_callback(name, call, whole, tmp_path):
+def test_stopped_by_a_callback(name, call, whole, file):
     left = [call if name in ("mrf", "fill") else min(call, 4)]
 
     def callback(progress):
@@ -174,12 +174,12 @@ def test_stopped_by_a_callback(name, call, whole, tmp_path):
         if not left[0]:
             raise Stop
 
-    found, stops = gone_on(JOBS[name], tmp_path, callback=callback)
+    found, stops = resumed(JOBS[name], file, callback=callback)
     assert stops == 1
     assert_same_run(found, whole(name))
 
 
-def test_a_callback_sees_the_share_go_on(tmp_path):
+def test_the_fraction_goes_on(file):
     seen = []
 
     def callback(progress):
@@ -187,39 +187,38 @@ def test_a_callback_sees_the_share_go_on(tmp_path):
         if len(seen) == 5:
             raise Stop
 
-    gone_on(QUICK, tmp_path, callback=callback)
-    assert seen[5] == seen[4] > seen[3]  # the sweep that was interrupted begins anew
+    resumed(QUICK, file, callback=callback)
+    assert seen[5] == seen[4] > seen[3]  # the interrupted sweep begins anew
     assert seen[5:] == sorted(seen[5:])
 
 
-def test_a_drawn_seed_is_gone_on_with(tmp_path, monkeypatch):
+def test_a_drawn_seed_is_kept(file, monkeypatch):
     stopping_after(monkeypatch, 3)
-    (image, output), stops = gone_on(QUICK, tmp_path, rng=None)
+    (image, output), stops = resumed(QUICK, file, rng=None)
     assert stops
     monkeypatch.undo()
     assert_same_bits(run(QUICK, rng=output.statistics["seed"])[0], image)
 
 
-def test_a_generator_is_a_seed_too(tmp_path, monkeypatch):
+def test_a_generator_is_a_seed_too(file, monkeypatch):
     stopping_after(monkeypatch, 3)
-    seeds = iter(np.random.default_rng(8) for _ in range(99))
-    with pytest.raises(Stop), simdtex.checkpoint(tmp_path, every=0):
-        run(QUICK, rng=next(seeds))
+    with pytest.raises(Stop):
+        run(QUICK, rng=np.random.default_rng(8), checkpoint=Checkpoint(file, every=0))
     monkeypatch.undo()
-    with simdtex.checkpoint(tmp_path):
-        image, _ = run(QUICK, rng=next(seeds))
-    assert_same_bits(run(QUICK, rng=next(seeds))[0], image)
+    image, _ = run(QUICK, rng=np.random.default_rng(8), checkpoint=file)
+    assert_same_bits(run(QUICK, rng=np.random.default_rng(8))[0], image)
 
 
-def test_stop_writes_the_state_and_interrupts(whole, tmp_path):
-    with pytest.raises(KeyboardInterrupt), simdtex.checkpoint(tmp_path, every=1e6) as keeper:
-        run(QUICK, callback=lambda progress: keeper.stop())
-    assert [path.name for path in sorted(tmp_path.glob("state*"))] == ["state-000001.json", "state-000001.npz"]
-    with simdtex.checkpoint(tmp_path):
-        assert_same_run(run(QUICK), whole("mrf"))
+def test_stop_writes_the_state_and_interrupts(whole, file):
+    checkpoint = Checkpoint(file, every=1e6)
+    with pytest.raises(KeyboardInterrupt):
+        run(QUICK, callback=lambda progress: checkpoint.stop(), checkpoint=checkpoint)
+    assert read(file)[1] is not None
+    assert_same_run(run(QUICK, checkpoint=file), whole("mrf"))
+    assert not list(file.parent.iterdir())  # a path is removed by the function
 
 
-def test_finished_realisations_are_kept(tmp_path):
+def test_finished_realisations_are_kept(file):
     whole = simulated(rng=5, device="reference", full_output=True)[0]
     made = []
 
@@ -228,10 +227,9 @@ def test_finished_realisations_are_kept(tmp_path):
         if progress.finished == 2:
             raise Stop
 
-    with pytest.raises(Stop), simdtex.checkpoint(tmp_path, every=1e6):  # what waits is written in the end
-        run(simulated, callback=callback)
-    with simdtex.checkpoint(tmp_path):
-        found, _ = run(simulated, callback=callback)
+    with pytest.raises(Stop):  # those that wait are written at the end
+        run(simulated, callback=callback, checkpoint=Checkpoint(file, every=1e6))
+    found, _ = run(simulated, callback=callback, checkpoint=file)
     assert made == [0, 1, 2]
     assert_same_bits(found, whole)
 
@@ -239,150 +237,116 @@ def test_finished_realisations_are_kept(tmp_path):
 # -- what is refused ------------------------------------------------------------------------------------------
 
 
-def stopped(folder, job=QUICK, **how):
-    """A folder with the states of a run that was stopped."""
-    with pytest.raises(KeyboardInterrupt), simdtex.checkpoint(folder, every=0) as keeper:
-        run(job, callback=lambda progress: keeper.stop(), **how)
-    return folder
+def stopped(file, job=QUICK, **how):
+    """The checkpoint of a run that was stopped."""
+    checkpoint = Checkpoint(file, every=0)
+    with pytest.raises(KeyboardInterrupt):
+        run(job, callback=lambda progress: checkpoint.stop(), checkpoint=checkpoint, **how)
+    return file
 
 
-def contents(folder):
-    return {path.name: path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
-
-
-def refused(folder, words, job=QUICK, **how):
-    before = contents(folder)
-    with pytest.raises(ValueError, match=words) as caught, simdtex.checkpoint(folder):
-        run(job, **how)
-    assert contents(folder) == before
+def refused(file, words, job=QUICK, **how):
+    before = file.read_bytes() if file.is_file() else None
+    with pytest.raises(ValueError, match=words) as caught:
+        run(job, checkpoint=file, **how)
+    assert (file.read_bytes() if file.is_file() else None) == before
     assert "\n" not in str(caught.value)
 
 
-def edited(folder, **changes):
-    """Change what the folder says of its run, checksum included."""
-    job = files._read_json(folder / JOB) | changes
-    files._write(folder / JOB, files._json_of(job))
+def edited(file, **changes):
+    """Change the description in a checkpoint, checksum included."""
+    about, tree = read(file)
+    text, arrays = pack(tree)
+    about |= {"tree": text} | changes
+    named = {str(k): array for k, array in enumerate(arrays)}
+    named["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
+    write_checked(file, lambda out: np.savez(out, **named))
 
 
-def test_another_run_is_refused(tmp_path):
-    stopped(tmp_path)
-    again = "give the same, or an empty folder"
-    refused(tmp_path, rf"another seed \(5, not 6\); {again}", rng=6)
+def test_another_run_is_refused(file):
+    stopped(file)
+    again = "give the same, or a new file"
+    refused(file, rf"another seed \(5, not 6\); {again}", rng=6)
     other = GREY.copy()
     other[0, 0] ^= 1
-    refused(tmp_path, f"another sample; {again}", lambda **how: simdtex.synthesize(other, (12, 13), **MRF, **how))
-    refused(tmp_path, "another sample", lambda **how: simdtex.synthesize(GREY.astype("f4"), (12, 13), **MRF, **how))
+    refused(file, f"another sample; {again}", lambda **how: simdtex.synthesize(other, (12, 13), **MRF, **how))
+    refused(file, "another sample", lambda **how: simdtex.synthesize(GREY.astype("f4"), (12, 13), **MRF, **how))
+    refused(file, r"shape of the output \(12x13, not 12x14\)", lambda **how: simdtex.synthesize(GREY, (12, 14), **how))
+    refused(file, r"option order \(2, not 3\)", lambda **how: simdtex.synthesize(GREY, (12, 13), order=3, **how))
+    refused(file, r"another call \(synthesize, not fill\)", JOBS["fill"])
+    pyramid = {"method": "pyramid"}
     refused(
-        tmp_path, r"shape of the output \(12x13, not 12x14\)", lambda **how: simdtex.synthesize(GREY, (12, 14), **how)
-    )
-    refused(tmp_path, r"option order \(2, not 3\)", lambda **how: simdtex.synthesize(GREY, (12, 13), order=3, **how))
-    refused(tmp_path, r"another call \(synthesize, not fill\)", JOBS["fill"])
-    refused(
-        tmp_path,
-        r"another method \(mrf, not pyramid\)",
-        lambda **how: simdtex.synthesize(GREY, (12, 13), method="pyramid", **how),
+        file, r"another method \(mrf, not pyramid\)", lambda **how: simdtex.synthesize(GREY, (12, 13), **pyramid, **how)
     )
     mask = np.ones(GREY.shape, bool)
-    refused(tmp_path, "another mask", lambda **how: simdtex.synthesize(GREY, (12, 13), mask=mask, **MRF, **how))
-    with simdtex.checkpoint(tmp_path):
-        run(QUICK)
+    refused(file, "another mask", lambda **how: simdtex.synthesize(GREY, (12, 13), mask=mask, **MRF, **how))
+    run(QUICK, checkpoint=file)
 
 
-def test_another_version_is_refused(tmp_path):
-    stopped(tmp_path)
-    edited(tmp_path, version="0.0.1")
-    refused(tmp_path, r"is of simdtex 0\.0\.1 and this is .*, whose results may differ; go on with 0\.0\.1, or give")
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"version": "0.0.1"}, r"is of simdtex 0\.0\.1 and this is .*, whose results may differ; resume with 0\.0\.1"),
+        ({"format": 3}, "is of format 3 and this simdtex reads 2; resume with simdtex"),
+    ],
+    ids=["version", "format"],
+)
+def test_another_version_or_format_is_refused(changes, words, file):
+    edited(stopped(file), **{"format": checkpoints.FORMAT} | changes)
+    refused(file, words)
 
 
-def test_another_format_is_refused(tmp_path):
-    stopped(tmp_path)
-    edited(tmp_path, format=files.FORMAT + 1)
-    refused(tmp_path, "is of format 2 and this simdtex reads 1; go on with simdtex")
-
-
-def test_another_device_is_told(whole, tmp_path):
-    stopped(tmp_path)
-    edited(tmp_path, device="Abacus")
-    with (
-        pytest.warns(UserWarning, match=r"begun on Abacus and goes on on reference \(NumPy\); the bytes are the same"),
-        simdtex.checkpoint(tmp_path),
-    ):
-        found = run(QUICK)
+def test_another_device_is_noted(whole, file):
+    edited(stopped(file), format=checkpoints.FORMAT, device="Abacus")
+    with pytest.warns(UserWarning, match=r"begun on Abacus and goes on on reference \(NumPy\); the bytes are the same"):
+        found = run(QUICK, checkpoint=file)
     assert_same_run(found, whole("mrf"))
 
 
-def test_from_a_device_to_the_reference(whole, any_device, tmp_path):
-    stopped(tmp_path, device=str(any_device.index))
-    with pytest.warns(UserWarning, match="the bytes are the same on every device"), simdtex.checkpoint(tmp_path):
-        image, _ = run(QUICK)
+def test_from_a_device_to_the_reference(whole, any_device, file):
+    stopped(file, device=str(any_device.index))
+    with pytest.warns(UserWarning, match="the bytes are the same on every device"):
+        image, _ = run(QUICK, checkpoint=file)
     assert_same_bits(image, whole("mrf")[0])
 
 
-def test_other_folders_are_refused(tmp_path):
-    (tmp_path / "photo.png").write_bytes(b"mine")
-    refused(tmp_path, r"holds other files \(photo.png\) and no checkpoint; give an empty or a new one")
-    with pytest.raises(ValueError, match="is a file; give a folder"), simdtex.checkpoint(tmp_path / "photo.png"):
-        pass
-    with pytest.raises(ValueError, match="does not exist; create it first"), simdtex.checkpoint(tmp_path / "a" / "b"):
-        pass
-    with pytest.raises(ValueError, match="every is -1"), simdtex.checkpoint(tmp_path / "new", every=-1):
-        pass
-    assert not (tmp_path / "new").exists()
+def test_other_paths_are_refused(tmp_path):
+    photo = tmp_path / "photo.png"
+    photo.write_bytes(b"mine")
+    refused(photo, r"photo.png is no checkpoint, or is damaged; remove it")
+    refused(tmp_path, "is a folder: add a file name")
+    refused(tmp_path / "a" / "b", "does not exist: create it first")
+    with pytest.raises(ValueError, match="every is -1"):
+        Checkpoint(tmp_path / "new", every=-1)
+    assert [path.name for path in tmp_path.iterdir()] == ["photo.png"]
 
 
-def test_states_of_nobody_knows_what_are_refused(tmp_path):
-    stopped(tmp_path)
-    (tmp_path / JOB).unlink()
-    refused(tmp_path, r"holds other files \(state-000001.json\) and no checkpoint")
+def test_one_run_to_a_checkpoint(file):
+    checkpoint = Checkpoint(file)
+    run(QUICK, checkpoint=checkpoint)
+    assert file.is_file()  # its owner removes it, once the result is written
+    with pytest.raises(ValueError, match="a checkpoint keeps one run; give each call a checkpoint of its own"):
+        run(QUICK, checkpoint=checkpoint)
+    checkpoint.remove()
+    assert not list(file.parent.iterdir())
 
 
-def test_a_run_that_was_killed_at_its_very_beginning(whole, tmp_path):
-    (tmp_path / "lock").touch()
-    (tmp_path / f"{JOB}.new").write_text("half")
-    with simdtex.checkpoint(tmp_path):
-        assert_same_run(run(QUICK), whole("mrf"))
-    assert sorted(contents(tmp_path)) == [JOB, "lock"]
-
-
-def test_a_finished_run_says_so(tmp_path):
-    folder = tmp_path / "new"
-    with simdtex.checkpoint(folder, every=0):
-        run(QUICK)
-    assert sorted(contents(folder)) == [JOB, "lock"]
-    refused(folder, "is finished; give an empty folder to begin another")
-
-
-def test_one_run_to_a_block(tmp_path):
-    with (
-        pytest.raises(
-            ValueError, match=r"a checkpoint keeps one run; give the next one a simdtex.checkpoint of its own"
-        ),
-        simdtex.checkpoint(tmp_path),
-    ):
-        run(QUICK)
-        run(QUICK)
-
-
-def test_one_process_at_a_time(tmp_path):
+def test_one_process_at_a_time(file):
     pytest.importorskip("fcntl")
-    with simdtex.checkpoint(tmp_path) as outer:
-        outer._folder.take()
-        outer._taken = True
-        with (
-            pytest.raises(ValueError, match=r"another run keeps its state in .*; wait for it"),
-            simdtex.checkpoint(tmp_path),
-        ):
-            run(QUICK)
+    with checkpoints._locked(file), pytest.raises(ValueError, match=r"another run keeps its state in .*; wait for it"):
+        run(QUICK, checkpoint=file)
 
 
-def test_bad_input_leaves_nothing(tmp_path):
-    folder = tmp_path / "new"
-    with pytest.raises(ValueError, match="rows of the output is 0"), simdtex.checkpoint(folder):
-        simdtex.synthesize(GREY, (0, 3))
-    assert not folder.exists()
+@pytest.mark.parametrize("job", [QUICK, JOBS["fill"]], ids=["synthesize", "fill"])
+def test_bad_input_leaves_nothing(job, file):
+    with pytest.raises(ValueError):
+        run(lambda **how: job(**how, levels=9), checkpoint=file) if job is QUICK else run(
+            lambda **how: simdtex.fill(GREY, HOLE, order=300, **how), checkpoint=file
+        )
+    assert not list(file.parent.iterdir())
 
 
-# -- damage ---------------------------------------------------------------------------------------------------
+# -- damage, and faults while it writes -----------------------------------------------------------------------
 
 
 def cut(path):
@@ -395,135 +359,72 @@ def flipped(path):
     path.write_bytes(bytes(data))
 
 
-def nested(path):
-    path.write_text("[" * 100_000)
+def empty(path):
+    path.write_bytes(b"")
 
 
-def several(folder):
-    """Two states of a run."""
-    count = [0]
-
-    def callback(progress):
-        count[0] += progress.end_of_sweep
-        if count[0] == 4:
-            raise Stop
-
-    with pytest.raises(Stop), simdtex.checkpoint(folder, every=0):
-        run(QUICK, callback=callback)
-    stems = sorted({path.stem for path in folder.glob("state*")})
-    assert len(stems) == 2
-    return stems
+@pytest.mark.parametrize("damage", [cut, flipped, empty])
+def test_a_damaged_checkpoint_says_so(damage, file):
+    damage(stopped(file))
+    refused(file, "is no checkpoint, or is damaged; remove it, and run the command again")
 
 
-@pytest.mark.parametrize("damage", [cut, flipped, nested, Path.unlink])
-@pytest.mark.parametrize("suffix", [".npz", ".json"])
-def test_a_damaged_state_falls_back_to_the_one_before(suffix, damage, whole, tmp_path):
-    _, latest = several(tmp_path)
-    damage(tmp_path / f"{latest}{suffix}")
-    if (suffix, damage) == (".json", Path.unlink):  # as if it had not been written
-        with simdtex.checkpoint(tmp_path):
-            assert_same_run(run(QUICK), whole("mrf"))
-        return
-    words = f"the state {latest} in .* is damaged; an earlier one is gone on from"
-    with pytest.warns(UserWarning, match=words), simdtex.checkpoint(tmp_path):
-        assert_same_run(run(QUICK), whole("mrf"))
+def test_nothing_is_unpickled(file):
+    write_checked(file, lambda out: np.savez(out, about=np.array([print])))
+    refused(file, "is no checkpoint, or is damaged")
 
 
-def test_damaged_states_alone_say_so(tmp_path):
-    for stem in several(tmp_path):
-        flipped(tmp_path / f"{stem}.npz")
-    refused(tmp_path, "is damaged and there is no earlier one; remove the folder, and run the command again")
-    flipped(tmp_path / JOB)
-    refused(tmp_path, r"checkpoint\.json is damaged, so nothing says what run this is; remove the folder")
-
-
-def test_damaged_realisations_are_made_anew(tmp_path):
-    def callback(progress):
-        raise Stop
-
-    whole = run(simulated)[0]
-    with pytest.raises(Stop), simdtex.checkpoint(tmp_path, every=0):
-        run(simulated, callback=callback)
-    flipped(tmp_path / "results-000001.npz")
-    with pytest.warns(UserWarning, match="results-000001 in .* is damaged; what was in it is made anew"):  # noqa: SIM117
-        with simdtex.checkpoint(tmp_path):
-            assert_same_bits(run(simulated)[0], whole)
-
-
-# -- faults while it writes -----------------------------------------------------------------------------------
-
-FAULTS = {
-    "replace": (os, "replace"),
-    "fsync": (os, "fsync"),
-    "write": (np, "savez"),
-    "open": (files, "_write"),
-}
-
-
-@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()], ids=["full", "killed"])
 @pytest.mark.parametrize(
-    ("where", "at"),
-    [
-        *(("replace", at) for at in (2, 3, 4, 5)),
-        *(("fsync", at) for at in (2, 3, 4, 5, 6, 8)),
-        ("write", 2),
-        ("open", 3),
-    ],
+    "error", [OSError(28, "No space left on device"), KeyboardInterrupt()], ids=["full", "stopped"]
 )
-def test_a_fault_in_a_write_loses_nothing(where, at, error, whole, tmp_path, monkeypatch):
-    module, name = FAULTS[where]
-    works, calls = getattr(module, name), [0]
+@pytest.mark.parametrize(("module", "name"), [(os, "replace"), (os, "fsync"), (np, "savez")])
+@pytest.mark.parametrize("at", [2, 3, 5])
+def test_a_fault_in_a_write_loses_nothing(module, name, at, error, whole, file, monkeypatch):
+    works, calls, before = getattr(module, name), [0], []
 
     def faulty(*args, **kwargs):
         calls[0] += 1
         if calls[0] == at:
+            before.append(file.read_bytes() if file.exists() else None)
             if name == "savez":
                 args[0].write(b"half of it")
             raise error
         return works(*args, **kwargs)
 
+    def callback(progress):
+        if calls[0] >= at:
+            raise Stop
+
     monkeypatch.setattr(module, name, faulty)
-    if isinstance(error, OSError) and (where, at) != ("fsync", 2):  # that one is of the job's own file
-        with (
-            pytest.warns(UserWarning, match=r"could not be written \(No space left on device\); the run goes on"),
-            pytest.raises(Stop),
-            simdtex.checkpoint(tmp_path, every=0),
-        ):
-            run(QUICK, callback=lambda progress: sweeps_end(calls, at, Stop))
-    else:
-        with pytest.raises((KeyboardInterrupt, ValueError)), simdtex.checkpoint(tmp_path, every=0):
-            run(QUICK)
+    first = Checkpoint(file, every=0, note=lambda sentence: None)
+    with pytest.raises((KeyboardInterrupt, Stop, ValueError)):
+        run(QUICK, callback=callback, checkpoint=first)
     monkeypatch.undo()
-    assert not list(tmp_path.glob("*.new"))
-    with simdtex.checkpoint(tmp_path):
-        assert_same_run(run(QUICK), whole("mrf"))
+    assert len(list(file.parent.iterdir())) == file.is_file()  # nothing is half written
+    assert_same_run(run(QUICK, checkpoint=file), whole("mrf"))
 
 
-def sweeps_end(calls, at, error):
-    if calls[0] >= at:
-        raise error
+def test_a_run_whose_checkpoint_cannot_be_written_ends_all_the_same(whole, file, monkeypatch):
+    write = Checkpoint._write
+
+    def full(self, tree):
+        if tree is not None:
+            raise ValueError("x could not be written (No space left on device)")
+        write(self, tree)
+
+    monkeypatch.setattr(Checkpoint, "_write", full)
+    with pytest.warns(UserWarning, match="could not be written .*; the run goes on, and will try again") as noted:
+        assert_same_run(run(QUICK, checkpoint=Checkpoint(file, every=0)), whole("mrf"))
+    assert len(noted) == 1  # once, and not at every sweep
 
 
-def test_a_run_whose_checkpoint_cannot_be_written_ends_all_the_same(whole, tmp_path, monkeypatch):
-    def full(*args):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Folder, "keep", lambda *args, **kwargs: full())
-    with pytest.warns(UserWarning, match="could not be written") as told, simdtex.checkpoint(tmp_path, every=0):
-        assert_same_run(run(QUICK), whole("mrf"))
-    assert len(told) == 1  # once, and not at every sweep
-
-
-def test_a_folder_that_cannot_be_written_is_refused_before_the_work(tmp_path, monkeypatch):
+def test_a_path_that_cannot_be_written_is_refused_before_the_work(file, monkeypatch):
     def full(*args):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "replace", full)
-    with (
-        pytest.raises(ValueError, match=r"cannot be written \(No space left on device\)"),
-        simdtex.checkpoint(tmp_path),
-    ):
-        run(QUICK, callback=lambda progress: pytest.fail("the work has begun"))
+    with pytest.raises(ValueError, match=r"could not be written \(No space left on device\)"):
+        run(QUICK, callback=lambda progress: pytest.fail("the work has begun"), checkpoint=file)
 
 
 # -- how often, and what --------------------------------------------------------------------------------------
@@ -531,8 +432,8 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_work(tmp_path, mo
 
 def test_a_write_waits_75_times_what_the_last_one_took(monkeypatch):
     now = [100.0]
-    monkeypatch.setattr(keeps.time, "perf_counter", lambda: now[0])
-    pace = keeps.Pace(None)
+    monkeypatch.setattr(checkpoints.time, "perf_counter", lambda: now[0])
+    pace = checkpoints.Pace(None)
     assert not pace.due
     now[0] += 0.99
     assert not pace.due
@@ -552,28 +453,17 @@ def test_a_write_waits_75_times_what_the_last_one_took(monkeypatch):
     now[0] += 0.2
     assert pace.due
     assert pace.early(now[0], 2**40) and not pace.due  # but for far more bytes
-    pace.wrote(now[0] - 10, 2**40, keeps.LONGEST)
-    now[0] += 60.1
-    assert pace.due
     pace.wrote(now[0], 2**40)
     now[0] += 0.9  # a write that took nothing
     assert not pace.due
-    assert keeps.SHARE == 75 and keeps.FIRST == 1
+    assert checkpoints.SHARE == 75 and checkpoints.FIRST == 1
 
 
-def test_a_short_run_writes_no_state(tmp_path, monkeypatch):
-    monkeypatch.setattr(Folder, "keep", lambda *args, **kwargs: pytest.fail("a state was written"))
-    monkeypatch.setattr(keeps, "FIRST", 1e6)
-    with simdtex.checkpoint(tmp_path):
-        run(QUICK)
-
-
-def test_two_states_are_kept(tmp_path):
-    folder = Folder(tmp_path)
-    for number in range(5):
-        folder.keep("state", {"number": number})
-    assert sorted(contents(tmp_path)) == [f"state-00000{n}.{kind}" for n in (4, 5) for kind in ("json", "npz")]
-    assert folder.latest("state") == {"number": 4}
+def test_a_short_run_writes_no_state(file, monkeypatch):
+    monkeypatch.setattr(checkpoints, "FIRST", 1e6)
+    checkpoint = Checkpoint(file)
+    run(QUICK, checkpoint=checkpoint)
+    assert read(file)[1] is None
 
 
 Named = namedtuple("Named", "first second")
@@ -597,8 +487,8 @@ def test_a_tree_comes_back_as_it_was():
         np.uint64(2**63),
     ]
     tree = {"a": arrays, "b": (numbers, [[], (), {}]), "c": Named(1, Named(np.arange(2), "x"))}
-    told, kept = packed(tree)
-    found = unpacked(json.loads(json.dumps(told)), kept)
+    told, kept = pack(tree)
+    found = unpack(json.loads(json.dumps(told)), kept)
     for one, other in zip(arrays, found["a"], strict=True):
         assert type(one) is type(other)
         assert_same_bits(np.asarray(one), np.asarray(other))
@@ -611,17 +501,7 @@ def test_a_tree_comes_back_as_it_was():
 @pytest.mark.parametrize("thing", [object(), {1: 2}, np.array([None]), {1, 2}, 1j])
 def test_what_is_not_plain_is_refused(thing):
     with pytest.raises(TypeError, match=r"a checkpoint cannot keep|cannot be kept in a checkpoint"):
-        packed({"x": [thing]})
-
-
-def test_nothing_is_unpickled(tmp_path):
-    folder = Folder(tmp_path)
-    folder.keep("state", {"x": np.arange(3)})
-    check = files._write(tmp_path / "state-000001.npz", lambda file: np.savez(file, **{"0": np.array([print])}))
-    told = files._read_json(tmp_path / "state-000001.json") | {"arrays": check}
-    files._write(tmp_path / "state-000001.json", files._json_of(told))
-    with pytest.raises(ValueError, match="is damaged"):
-        folder.latest("state")
+        pack({"x": [thing]})
 
 
 def test_identities_tell_inputs_apart():
@@ -631,15 +511,6 @@ def test_identities_tell_inputs_apart():
     assert identity((1, None, "a", True)) == [1.0, None, "a", True]
     assert identity(schedules.get("block:3x4")) == "Block block:3x4"
     assert identity(make_options(xi=-2))["xi"] == -2 and json.dumps(identity(make_options()))
-
-
-def test_the_context_ends_with_its_block(tmp_path):
-    with simdtex.checkpoint(tmp_path):
-        assert keepers.CURRENT.get() is not None
-    assert keepers.CURRENT.get() is None
-    assert not tmp_path.joinpath(JOB).exists()  # no run, no checkpoint
-    run(QUICK)
-    assert not contents(tmp_path)
 
 
 # -- killed ---------------------------------------------------------------------------------------------------

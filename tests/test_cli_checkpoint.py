@@ -1,6 +1,5 @@
 """``--checkpoint`` and ``simdtex resume``: the files of a run that was never stopped."""
 
-import json
 import os
 import signal
 import subprocess
@@ -14,8 +13,8 @@ from cases import texture
 from click.testing import CliRunner
 
 import simdtex
-from simdtex.checkpoints import folder as files
-from simdtex.checkpoints import keep as keeps
+from simdtex import checkpoint as checkpoints
+from simdtex.checkpoint import Checkpoint, read
 from simdtex.cli import COMMANDS, load, main, resume
 from simdtex.cli.resume import COMMANDS as KEEPING
 from simdtex.io import image
@@ -53,8 +52,8 @@ RUNS = {
 @pytest.fixture(autouse=True)
 def often(monkeypatch):
     """States are written wherever they are at hand."""
-    monkeypatch.setattr(keeps, "FIRST", 0.0)
-    monkeypatch.setattr(keeps, "SHARE", 0)
+    monkeypatch.setattr(checkpoints, "FIRST", 0.0)
+    monkeypatch.setattr(checkpoints, "SHARE", 0)
 
 
 @pytest.fixture
@@ -94,17 +93,17 @@ def made(folder):
 
 def stopping(monkeypatch, after, kind=signal.SIGTERM):
     """Send the process a signal after so many writes, which stops it at the next state."""
-    count, write = [0], keeps.Kept._write
+    count, write = [0], Checkpoint._save
 
-    def counted(self, *args, **kwargs):
-        wrote = write(self, *args, **kwargs)
+    def counted(self, tree):
+        wrote = write(self, tree)
         count[0] += 1
         if count[0] % after == 0:
             os.kill(os.getpid(), kind)
             time.sleep(0.001)  # a handler runs between two instructions
         return wrote
 
-    monkeypatch.setattr(keeps.Kept, "_write", counted)
+    monkeypatch.setattr(Checkpoint, "_save", counted)
 
 
 def clear(folder, inputs):
@@ -139,8 +138,8 @@ def test_resume_writes_the_files_of_a_run_that_was_never_stopped(name, place, tm
     assert Path.cwd() == tmp_path
 
     again = run("resume", "begun/kept")
-    assert again.exit_code == 0
-    assert again.output == "begun/kept: the run is finished; there is nothing to go on with\n"
+    assert again.exit_code == 2
+    assert "begun/kept does not exist: the run is finished, or the path is another" in again.output
     assert made(place) == expected
 
 
@@ -161,7 +160,7 @@ def refused(place, words, *command):
 
 def test_the_command_line_is_kept(place, monkeypatch):
     stopped(place, monkeypatch, "-q")
-    kept = files.Folder(place / "kept").job()["command"]
+    kept = read(place / "kept")[0]["command"]
     assert kept == {
         "name": "synth",
         "options": kept["options"],
@@ -196,63 +195,52 @@ def test_another_sample_or_option_is_refused(place, monkeypatch):
     stopped(place, monkeypatch)
     refused(
         place,
-        "another option order (2, not 3); give the same, or an empty folder",
+        "another option order (2, not 3); give the same, or a new file",
         *("synth", "sample.png", "-o", "out.png", "--size", "14x13", "--seed", "5", "--order", "3"),
         *("--checkpoint", "kept", "--xi", "-2", "--device", "reference", "--no-labels", "--array", "4x4"),
     )
     picture = image.read("sample.png").pixels.copy()
     picture[3, 3] ^= 1
     image.write("sample.png", picture)
-    refused(place, "is of another sample; give the same, or an empty folder for this run", "resume", "kept")
+    refused(place, "is of another sample; give the same, or a new file for this run", "resume", "kept")
 
 
 def test_what_is_no_checkpoint(place):
-    refused(place, "nothing does not exist: check the path of the checkpoint", "resume", "nothing")
+    refused(place, "nothing does not exist: the run is finished, or the path is another", "resume", "nothing")
     (place / "other").mkdir()
-    refused(place, "other holds no checkpoint; give the folder of --checkpoint", "resume", "other")
-    refused(place, "sample.png is a file; give the folder of --checkpoint", "resume", "sample.png")
-    (place / "other/mine").touch()
-    refused(place, "other holds other files (mine) and no checkpoint", *SYNTH, "--checkpoint", "other")
-    refused(place, "is an input and lies in ., which is written anew", *SYNTH, "--checkpoint", ".")
-    refused(place, "stages would be written twice", *SYNTH, "--stages", "stages", "--checkpoint", "stages")
-    (place / "other" / files.JOB).write_text("{}")
-    refused(place, "is damaged, so nothing says what run this is; remove the folder", "resume", "other")
-
-
-def test_a_finished_folder_is_no_place_for_another_run(place):
-    assert given(*SYNTH, "--order", "2", "--checkpoint", "kept").exit_code == 0
-    refused(place, "the run in kept is finished; give an empty folder", *SYNTH, "--checkpoint", "kept")
+    refused(place, "other is a folder; give the file of --checkpoint, or the store of --tiles", "resume", "other")
+    refused(place, "sample.png is no checkpoint, or is damaged; remove it", "resume", "sample.png")
+    refused(place, "sample.png is an input and would be overwritten", *SYNTH, "--checkpoint", "sample.png")
+    refused(place, "out.png would be written twice", *SYNTH, "--checkpoint", "out.png")
 
 
 def test_what_was_begun_elsewhere(place, monkeypatch):
     stopped(place, monkeypatch)
-    job = files._read_json(place / "kept" / files.JOB)
+    about, tree = read(place / "kept")
 
-    def edited(**command):
-        kept = job["command"] and job["command"] | command
-        files._write(place / "kept" / files.JOB, files._json_of(job | {"command": kept}))
+    def edited(command):
+        kept = Checkpoint(place / "kept")
+        kept._about = about | {"command": command}
+        kept._write(tree)
 
-    edited(folder="/nowhere")
+    edited(about["command"] | {"folder": "/nowhere"})
     refused(place, "/nowhere, where the run in kept was begun, is not there; put it back", "resume", "kept")
-    edited(name="bench")
-    refused(place, "is of no command that keeps one; remove the folder", "resume", "kept")
-    job["command"] = None
-    edited()
-    refused(place, "was begun in Python; make the same call within simdtex.checkpoint('kept')", "resume", "kept")
+    edited(about["command"] | {"name": "bench"})
+    refused(place, "is of no command that keeps one; remove", "resume", "kept")
+    edited(None)
+    refused(place, "was begun in Python; make the same call with checkpoint='kept'", "resume", "kept")
 
 
-def test_an_output_that_cannot_be_written_leaves_the_run_to_go_on_with(place, monkeypatch):
+def test_an_output_that_cannot_be_written_leaves_the_checkpoint(place, monkeypatch):
     def full(*args, **kwargs):
         raise OSError(28, "No space left on device", "out.png")
 
     with monkeypatch.context() as patch:
         patch.setattr(image, "write", full)
         assert given(*MRF, "--checkpoint", "kept").exit_code == 2
-    began = list((place / "kept").glob("state*.npz"))
-    assert len(began) == 2
+    assert read(place / "kept")[1] is not None
     assert run("resume", "kept").exit_code == 0
-    assert Path("out.png").is_file()
-    assert not list((place / "kept").glob("state*"))
+    assert Path("out.png").is_file() and not Path("kept").exists()
 
 
 def test_another_device_is_told_on_stderr(place, monkeypatch, any_device):
@@ -286,7 +274,7 @@ def test_a_second_ctrl_c_stops_at_once(place, monkeypatch):
 
     with monkeypatch.context() as patch:
         stopping(patch, 1, signal.SIGINT)
-        patch.setattr("simdtex.checkpoints.keeper.Keeper.stop", impatient)
+        patch.setattr(Checkpoint, "stop", impatient)
         assert given(*MRF, "--checkpoint", "kept").exit_code == 130
     assert len(stops) == 1
 
@@ -312,11 +300,11 @@ def test_a_command_that_is_killed(place, tmp_path):
     expected = image.read(place / "out.png").pixels
     (place / "out.png").unlink()
     first = process(*words)
-    while not list(place.glob("kept/state*.json")):
+    while not (place / "kept").exists() or read(place / "kept")[1] is None:
         assert first.poll() is None
         time.sleep(0.05)
     first.kill()
     assert first.wait() == -signal.SIGKILL
     assert process("resume", "kept").wait() == 0
     assert np.array_equal(image.read(place / "out.png").pixels, expected)
-    assert json.loads((place / "kept" / files.JOB).read_text())["content"]["finished"]
+    assert not (place / "kept").exists()

@@ -10,14 +10,17 @@ from cases import REFERENCE, assert_same_bits, opencl, texture
 import simdtex
 from simdtex import distributed
 from simdtex.distributed import store as store_module
-from simdtex.distributed.drive import go_on
-from simdtex.distributed.plan import planned
-from simdtex.distributed.store import Store, above, cut
+from simdtex.distributed.layout import planned
+from simdtex.distributed.store import Store, cut
 from simdtex.distributed.tasks import do, forget
+from simdtex.distributed.tiling import Tiles
+from simdtex.driver import drive
 from simdtex.methods.mrf import make_options
-from simdtex.methods.mrf.outline import outlined
+from simdtex.methods.mrf.algorithm import Run
+from simdtex.methods.mrf.plan import plan as planned_run
 from simdtex.methods.mrf.tiles import Tile, framed
 from simdtex.model.lattice import Grid
+from simdtex.model.pictures import Pictures
 from simdtex.ops.coloring import colors_of
 from simdtex.ops.neighbourhood import Field
 from simdtex.run import Tiling
@@ -162,12 +165,13 @@ def test_categories(tmp_path):
 def test_a_sample_and_options_of_every_kind_come_back_from_a_store(tmp_path):
     """What a worker lays out is what was laid out: see also that all options survive JSON."""
     options = make_options(order=2, weights=(1.0, 0.5, 0.1 + 0.2), xi=-1.7)
-    outline = outlined(COLOUR, (30, 31), options, 2**40 + 1)
-    store = Store.create(str(tmp_path / "s.zarr"), outline, planned(outline, 10, 1), None, True, False, "v")
-    again = store.work().outline
-    assert again.options == outline.options
-    assert (again.seed, again.levels, again.shape, again.kit) == (2**40 + 1, outline.levels, (30, 31), outline.kit)
-    assert_same_bits(again.sample.working, outline.sample.working)
+    plan, seed = planned_run(Pictures((COLOUR,)), (30, 31), options), 2**40 + 1
+    layout = planned(plan, seed, 10, 1)
+    store = Store.create(str(tmp_path / "s.zarr"), plan, seed, layout, channels=True, source=False)
+    work = store.work()
+    assert (work.plan.options, work.seed, work.layout) == (plan.options, seed, layout)
+    assert (work.plan.levels, work.plan.shape) == (plan.levels, (30, 31))
+    assert_same_bits(work.plan.sample.working, plan.sample.working)
     assert json.dumps(store.about)
 
 
@@ -195,9 +199,14 @@ def shuffled(store, seed, stop=None):
 
 
 def created(tmp_path, name="s.zarr", **options):
-    outline = outlined(SAMPLE[..., None], (26, 31), make_options(order=1, levels=2, xi=-8.0, **options), 11)
-    where = str(tmp_path / name)
-    return Store.create(where, outline, planned(outline, 12, 1), None, False, False, "v"), where
+    options = make_options(order=1, levels=2, xi=-8.0, **options)
+    plan, where = planned_run(Pictures((SAMPLE[..., None],)), (26, 31), options), str(tmp_path / name)
+    return Store.create(where, plan, 11, planned(plan, 11, 12, 1), channels=False, source=False), where
+
+
+def go_on(store, execute):
+    """Do all turns that are left."""
+    drive(Tiles(store, execute), REFERENCE, 0)
 
 
 def test_tiles_come_in_any_order(tmp_path):
@@ -342,7 +351,7 @@ def test_progress_tells_every_tile(tmp_path):
 
 
 def test_a_picture_of_a_large_level_is_every_nth_site(tmp_path, monkeypatch):
-    monkeypatch.setattr("simdtex.distributed.drive.SHOWN", 8)
+    monkeypatch.setattr("simdtex.distributed.tiling.SHOWN", 8)
     shapes = set()
     distributed.synthesize(
         SAMPLE, (30, 31), tmp_path / "o.zarr", tiles=16, order=1, xi=-8.0, rng=1, device=REFERENCE,
@@ -382,19 +391,19 @@ def test_more_workers_cut_coarse_levels_smaller():
 
 def test_redundant_work_is_what_the_schedule_does(tmp_path):
     """Counted: the sites of all steps of a free sweep, over those of the lattice."""
-    from simdtex.methods.mrf.algorithm import Warm
+    from simdtex.methods.mrf.level import Active
     from simdtex.schedules.trimmed import Trimmed
 
-    outline = outlined(SAMPLE[..., None], (60, 64), make_options(order=2, levels=1), 1)
-    level = planned(outline, 20, 1).levels[0]
-    run = outline.run(REFERENCE, outline.holding(REFERENCE), np.zeros((60, 64), np.int32))
+    plan = planned_run(Pictures((SAMPLE[..., None],)), (60, 64), make_options(order=2, levels=1))
+    level = planned(plan, 1, 20, 1).levels[0]
+    run = Run(plan, REFERENCE, 1)
     sites = 0
     for tile in level.tiles():
         frame = framed(level.lattice, tile, level.halo)
         window = run.level(0, frame.window)
         schedule = Trimmed(window.schedule, frame.rows.start, frame.rows.stop)
-        warm = Warm(window, np.zeros((1, 1)), True)
-        _, info = schedule.step(window.setting, schedule.init(window.setting), warm)
+        active = Active(window, np.zeros((1, 1)), True)
+        _, info = schedule.step(window.setting, schedule.init(window.setting), active)
         sites += int((info.ranges[:, 1] - info.ranges[:, 0]).sum())
     assert sites / (60 * 64) - 1 == pytest.approx(level.redundant, rel=0.1)
 
@@ -420,8 +429,8 @@ def test_a_tile_lies_in_its_window(tile, halo, torus, window, where):
 
 @pytest.mark.parametrize("tile", [Tile(0, 0, 4, 4), Tile(3, 2, 5, 1), Tile(1, 1, 1, 1), Tile(5, 0, 1, 3)], ids=str)
 def test_the_sites_above_lie_in_the_tile(tile):
-    there = above(tile)
-    rows = [2 * row for row in range(there.top, there.top + there.rows)]
+    (top, count), _ = Grid(8, 8).window(*tile).above
+    rows = [2 * row for row in range(top, top + count)]
     assert rows == [row for row in range(tile.top, tile.top + tile.rows) if row % 2 == 0]
 
 
@@ -476,12 +485,14 @@ def test_only_stores_of_ones_own_are_gone_on_with(tmp_path, monkeypatch):
     zarr.open_group(tmp_path / "b.zarr", mode="w")
     with pytest.raises(ValueError, match="is no output in tiles"):
         distributed.resume(tmp_path / "b.zarr")
-    store, where = created(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(store_module, "version", lambda name: "v")
+        store, where = created(tmp_path)
     with pytest.raises(
         ValueError, match=r"was begun by simdtex v and this is .*; go on with that version, or begin anew"
     ):
         distributed.resume(where)
-    monkeypatch.setattr(store_module, "FORMAT", 2)
+    monkeypatch.setattr(store_module, "FORMAT", 3)
     with pytest.raises(ValueError, match="go on with that version"):
         distributed.resume(where)
     assert store.turn.number == 1

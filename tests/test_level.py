@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pyopencl as cl
 import pytest
-from cases import REFERENCE, assert_same_bits, opencl, texture
+from cases import REFERENCE, assert_same_bits, laid_out, opencl, sweeps, texture
 
 import simdtex
 from simdtex.methods import mrf
-from simdtex.methods.mrf.algorithm import anneal, begin, enter, sweep
+from simdtex.methods.mrf.algorithm import opened, sweep
 from simdtex.methods.mrf.level import parts
-from simdtex.methods.mrf.synthesis import laid_out
 from simdtex.model.lattice import LATTICE, Grid
 from simdtex.ops.level import LEVEL, constants
+from simdtex.ops.neighbourhood import Field
 
 FOLDER = Path(simdtex.__file__).parent / "methods" / "mrf"
 
@@ -90,8 +90,8 @@ def prepared(machine, shape=(20, 23), sample_shape=(24, 25), **options):
 
 def plain(value):
     """Whether a value is made of arrays of NumPy and numbers alone."""
-    if isinstance(value, tuple):
-        return all(map(plain, value))
+    if isinstance(value, (tuple, dict)):
+        return all(map(plain, value.values() if isinstance(value, dict) else value))
     return value is None or isinstance(value, (np.ndarray, int))
 
 
@@ -100,59 +100,57 @@ def plain(value):
 def test_a_run_goes_on_from_any_state_on_another_machine(cl_device, schedule, search):
     machine = opencl(cl_device)
     run = prepared(machine, schedule=schedule, search=search)
-    whole = [state.off(machine) for _, state, _ in anneal(run)]
-    assert len({(state.level, state.cooling, state.free) for state in whole}) == len(whole) > 10
+    whole = [run.save(state) for _, state, _ in sweeps(run)]
+    assert len({(state["level"], state["cooling"], state["free"]) for state in whole}) == len(whole) > 10
     for number in (0, 3, len(whole) // 2, len(whole) - 2):
         assert plain(whole[number])
         kept = pickle.loads(pickle.dumps(whole[number]))
         for other in (opencl(cl_device, work_group=16, vector=4), REFERENCE):
             again = prepared(other, schedule=schedule, search=search)
-            after = [state.off(other) for _, state, _ in anneal(again, kept.on(other))]
+            after = [again.save(state) for _, state, _ in sweeps(again, again.load(kept))]
             for mine, theirs in zip(after, whole[number + 1 :], strict=True):
-                assert mine[5:] == theirs[5:]
-                assert_same_bits(mine.price, theirs.price)
-            assert_same_bits(after[-1].field, whole[-1].field)
+                assert list(mine.values())[5:] == list(theirs.values())[5:]
+                assert_same_bits(mine["price"], theirs["price"])
+            for name in ("values", "source", "temperature"):
+                assert_same_bits(after[-1][name], whole[-1][name])
 
 
 def test_a_state_tells_what_is_left():
     run = prepared(REFERENCE)
-    for level, state, info in anneal(run):
+    for level, state, info in sweeps(run):
         t = level.grid.view(state.temperature)
-        assert (state.warm, state.heat) == ((t > 0).sum(), t.sum(dtype=int))
-        assert info.phase == "relax" or not state.warm
-        assert info.number == state.cooling + state.free
-        assert info.ended == (not state.warm and state.free == run.options.free_sweeps)
+        assert (state.active, state.heat) == ((t > 0).sum(), t.sum(dtype=int))
+        assert info.sweep == state.cooling + state.free
+        assert info.ended == (not state.active and state.free == run.options.free_sweeps)
 
 
 def test_a_sweep_says_where_it_stands():
     run = prepared(REFERENCE, search="exact")
-    level, told = run.level(2), []
-    state, info = sweep(level, enter(level, begin(run)), watch=lambda level, state, free, part: told.append(part))
-    assert [part.last for part in told] == [False] * (len(told) - 1) + [True]
-    assert sum(part.steps for part in told) == sum(len(chosen.ranges) for chosen in info.chosen)
-    assert sum(part.sites for part in told) == level.grid.rows * level.grid.cols
-    assert info[:3] == (2, 1, "relax")
-    assert state.cooling == 1
+    level, seen = run.level(2), []
+    state, info = run.step(run.begin(), lambda level, state, part: seen.append(part))
+    assert [part.last for part in seen] == [False] * (len(seen) - 1) + [True]
+    assert sum(part.steps for part in seen) == sum(len(chosen.ranges) for chosen in info.chosen)
+    assert sum(part.sites for part in seen) == level.grid.rows * level.grid.cols
+    assert (info.level, info.sweep, state.cooling, state.free) == (2, 1, 1, 0)
 
 
 @pytest.mark.parametrize("schedule", ["coloring", "luby", "synchronous", "random-scan"])
 def test_sites_that_may_not_relax_keep_their_values(any_device, schedule):
     for machine in (REFERENCE, opencl(any_device)):
         run = prepared(machine, schedule=schedule)
-        given = np.random.default_rng(2).random(run.shape) < 0.3
-        state = begin(run)._replace(level=0)
-        before = state.off(machine)
-        cold = np.where(given, 0, before.temperature).astype(np.uint16)
+        given = np.random.default_rng(2).random(run.plan.shape) < 0.3
+        before = Field(*(np.array(machine.get(plane)) for plane in run.begin().field))
+        before = before._replace(temperature=np.where(given, 0, before.temperature).astype(np.uint16))
         level = replace(run.level(0), movable=machine.put((~given).astype(np.uint16)))
-        state = enter(level, before._replace(temperature=cold).on(machine))
-        while state.warm:
+        state = opened(level, Field(*map(machine.put, before)))
+        while state.active:
             state, _ = sweep(level, state)
-        state, info = sweep(level, state, free=True)
-        after = state.off(machine)
-        for mine, theirs in zip(after.field, before._replace(temperature=cold).field, strict=True):
+        state, free = sweep(level, state)
+        after = Field(*(machine.get(plane) for plane in state.field))
+        for mine, theirs in zip(after, before, strict=True):
             assert_same_bits(mine[..., given], theirs[..., given])
         assert (after.source != before.source).mean() > 0.5
-        relaxed = np.concatenate([step.sites for chosen in info.chosen for step in chosen.apart(machine)])
+        relaxed = np.concatenate([step.sites for chosen in free for step in chosen.apart(machine)])
         assert not given.ravel()[relaxed].any()
 
 

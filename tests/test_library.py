@@ -11,8 +11,8 @@ import simdtex
 from simdtex.bench import library as module
 from simdtex.bench.cases import Case, searches
 from simdtex.bench.library import Library
+from simdtex.driver import drive
 from simdtex.methods import multires
-from simdtex.methods.multires.analysis import analyse
 from simdtex.methods.pyramid.pyramids import Transform
 from simdtex.ops import lcpdf
 from simdtex.ops.candidates import candidates
@@ -115,7 +115,7 @@ class Beside(Library):
 def test_pixels_have_as_many_candidates(parity, shape):
     machine, pixels = Beside(), texture((32, 32))[..., None]
     options = multires.make_options(parity=parity, alpha=0.6, edges="keep")
-    _, run = multires.resample(machine, analyse(machine, pixels, **options.analysis), shape, options, 1)
+    _, run = drive(multires.Plan(pixels, shape, options), machine, 1)
     assert machine.used["candidates"] >= 4
     assert run.stages[-1].candidates.max() > 1
     assert machine.chosen > 0  # where there is one candidate, both choose it
@@ -125,7 +125,7 @@ def test_candidates_are_drawn_one_like_the_other(monkeypatch):
     monkeypatch.setattr(module, "QUERIES", 100)  # in several turns
     machine, pixels = Library(), texture((32, 32))[..., None]
     options = multires.make_options(alpha=np.inf, edges="keep")  # all are candidates of all
-    _, run = multires.resample(machine, analyse(machine, pixels, **options.analysis), (64, 64), options, 1)
+    _, run = drive(multires.Plan(pixels, (64, 64), options), machine, 1)
     source = run.stages[-1].source
     row, col = np.indices((64, 64))
     assert (source[..., 0] % 2 == row % 2).all() and (source[..., 1] % 2 == col % 2).all()

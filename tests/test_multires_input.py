@@ -10,6 +10,7 @@ import pytest
 from cases import REFERENCE, assert_same_bits, opencl, texture
 
 import simdtex
+from simdtex.driver import drive
 from simdtex.machine.reference import Reference
 from simdtex.methods import multires
 from simdtex.methods.multires.analysis import analyse
@@ -382,7 +383,7 @@ def test_a_strain_is_what_neighbours_differ_by_from_what_the_other_goes_on_with(
     sample, torus = texture((24, 20), 2), boundary == "torus"
     options = multires.make_options(boundary=boundary, alpha=1.0, edges="keep")
     analysis = analyse(REFERENCE, sample, **options.analysis)
-    _, output = multires.resample(REFERENCE, analysis, (24, 20), options, 0)
+    _, output = drive(multires.Plan(sample, (24, 20), options, analysis), REFERENCE, 0)
     levels = []
     for level, source in ((stage.level, stage.source) for stage in output.stages if stage.level < 2):
         band = analysis.bands[level].astype(float)

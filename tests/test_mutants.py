@@ -6,16 +6,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, texture
+from cases import REFERENCE, laid_out, sweeps, texture
 
 import simdtex
 from simdtex.methods import mrf
-from simdtex.methods.mrf import meter as meter_module
-from simdtex.methods.mrf.algorithm import anneal, begin, enter, sweep
-from simdtex.methods.mrf.level import Warm, check_fit, number_of_levels, parts
-from simdtex.methods.mrf.meter import Meter
-from simdtex.methods.mrf.observers import expected_work
-from simdtex.methods.mrf.synthesis import laid_out
+from simdtex.methods.mrf import record as record_module
+from simdtex.methods.mrf.level import Active, check_fit, number_of_levels, parts
+from simdtex.methods.mrf.record import Meter, expected_work
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
@@ -149,13 +146,13 @@ def prepared(machine=REFERENCE, **given):
     return laid_out(machine, texture((24, 25), seed=3)[..., None], (20, 23), mrf.Options(**options), 5)
 
 
-def test_which_sites_are_warm():
+def test_which_sites_are_active():
     level = prepared().level(1)
     temperature = np.zeros((20, 23), np.uint16)
     temperature[2, 4], temperature[18, 22], temperature[1, 1] = 1, 1024, 7  # the last is no site of the level
-    warm, free = Warm(level, temperature, False), Warm(level, temperature, True)
-    assert np.argwhere(warm.mask()).tolist() == [[1, 2], [9, 11]]
-    assert warm.numbers().tolist() == [14, 119]
+    active, free = Active(level, temperature, False), Active(level, temperature, True)
+    assert np.argwhere(active.mask()).tolist() == [[1, 2], [9, 11]]
+    assert active.numbers().tolist() == [14, 119]
     assert free.mask().shape == (10, 12) and free.mask().all() and free.mask().dtype == bool
     assert free.numbers().tolist() == list(range(120))
 
@@ -208,25 +205,20 @@ def test_a_level_with_few_candidates_weighs_them_all():
     assert kinds == [Listed, Everything]
 
 
-def test_a_state_leaves_a_machine_and_comes_back():
+def test_a_saved_state_shares_no_memory_with_the_run():
     run = prepared(free_sweeps=0)
-    _, state, _ = next(anneal(run))
-    away = state.off(REFERENCE)
-    back = away.on(REFERENCE)
-    for kept in (away, back):
-        assert kept[3:] == state[3:]
-        assert_same_bits(kept.field, state.field)
-    assert not any(np.shares_memory(ours, theirs) for ours, theirs in zip(away.field, state.field, strict=True))
+    _, state, _ = next(sweeps(run))
+    saved = run.save(state)
+    assert not any(np.shares_memory(saved[name], plane) for name, plane in state.field._asdict().items())
 
 
 def test_neighbours_that_relax_together_are_counted_once(monkeypatch):
     run, told, work = prepared(schedule="synchronous", search="exact"), [], []
-    level = run.level(2)
+    run.level(2)
     monkeypatch.setattr(type(REFERENCE), "sync", lambda self, more=0: work.append(more))
     for scratch, pieces in ((REFERENCE.scratch, 1), (8 * (600 + 8 * 3) * 7, 5)):  # 7 sites at once
         monkeypatch.setattr(REFERENCE, "scratch", scratch)
-        _, info = sweep(level, enter(level, begin(run)), watch=lambda *seen: told.append(seen[-1]))
-        assert info.ended is False  # only a run knows
+        run.step(run.begin(), lambda *seen: told.append(seen[-1]))
         sites = [30] if pieces == 1 else [7, 7, 7, 7, 2]
         assert [part.sites for part in told] == sites
         assert [part.steps for part in told] == [1] + [0] * (pieces - 1)
@@ -254,7 +246,7 @@ def test_grey_levels_are_as_fine_as_the_channels_and_neighbours_allow():
 
 def test_a_meter(monkeypatch):
     clock = SimpleNamespace(now=100.0)
-    monkeypatch.setattr(meter_module, "time", SimpleNamespace(perf_counter=lambda: clock.now))
+    monkeypatch.setattr(record_module, "time", SimpleNamespace(perf_counter=lambda: clock.now))
     meter = Meter({1: (100.0, 20.0), 0: (300.0, 40.0)})
     assert (meter.fraction, meter.reports) == (0, [])
     clock.now = 102.0
@@ -284,7 +276,6 @@ def test_a_meter(monkeypatch):
     clock.now = 111.0
     meter.end(0)
     assert done == [(1, 1, 135), (2, 2, 180), (3, 3, 180), (4, 4, 430)]
-    assert meter.seconds == 11
     assert meter.reports == [
         {
             "level": 1, "rows": 4, "cols": 3, "candidates": 10, "sweeps": 4, "steps": 9, "relaxations": 31,
@@ -336,10 +327,11 @@ def test_a_run_is_counted(given):
     given = {"order": 2, "levels": 3, "phases": "all", "edges": "reflect", "free_sweeps": 1} | given
     told, seen, parts = [], [], []
     run = prepared(**given)
-    sweeps = {2: [], 1: [], 0: []}
-    for level, _, info in anneal(run, watch=lambda *part: told.append(part)):
-        sweeps[level.number].append((info, [part for *_, part in told[sum(map(len, parts)) :]]))
-        parts.append(sweeps[level.number][-1][1])
+    done = {2: [], 1: [], 0: []}
+    for level, _, _ in sweeps(run, watch=lambda *part: told.append(part)):
+        these = told[sum(map(len, parts)) :]
+        done[level.number].append((these[0][1].active, [part for *_, part in these]))
+        parts.append(these)
     _, output = simdtex.synthesize(
         texture((24, 25), seed=3), (20, 23), rng=5, device=REFERENCE, full_output=True, callback=seen.append, **given
     )
@@ -347,18 +339,18 @@ def test_a_run_is_counted(given):
         (
             level.number,
             state.cooling + state.free + 1,
-            "free" if free else "relax",
-            0.0 if free else state.heat / (1024 * level.grid.rows * level.grid.cols),
+            "relax" if state.active else "free",
+            state.heat / (1024 * level.grid.rows * level.grid.cols),
             part.last,
         )
-        for level, state, free, part in told
+        for level, state, part in told
     ]
     assert {progress.levels for progress in seen} == {3}
     statistics = output.statistics
     assert seen[-1].fraction > 0.9
-    for report, (number, done) in zip(statistics["levels"], sweeps.items(), strict=True):
-        cooled = [those for info, those in done if info.phase == "relax"]
-        every = [those for _, those in done]
+    for report, (number, swept_parts) in zip(statistics["levels"], done.items(), strict=True):
+        cooled = [those for active, those in swept_parts if active]
+        every = [those for _, those in swept_parts]
         for counted, swept in ((report, every), (report["equilibrium"], cooled)):
             assert counted["sweeps"] == len(swept)
             assert counted["steps"] == sum(part.steps for those in swept for part in those)

@@ -4,10 +4,10 @@ import numpy as np
 import plain
 import pytest
 from cases import REFERENCE, assert_same_bits, opencl, problem, texture
+from simdtex.methods.mrf.synthesis import laid_out
 
 import simdtex
 from simdtex.methods.mrf.options import make_options
-from simdtex.methods.mrf.synthesis import laid_out
 from simdtex.ops import similar as module
 from simdtex.ops.similar import most_similar
 

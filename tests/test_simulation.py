@@ -325,7 +325,7 @@ def test_an_error_of_the_method_comes_out_and_leaves_no_thread(monkeypatch):
         raise MemoryError("too large")
 
     before = set(threading.enumerate())
-    monkeypatch.setattr(simulation.mrf, "synthesize", fail)
+    monkeypatch.setattr(simulation, "drive", fail)
     with pytest.raises(MemoryError, match="too large"):
         simulate(n=5, jobs=3)
     assert set(threading.enumerate()) <= before

@@ -36,7 +36,7 @@ PUBLIC = {
         "suggest_alpha",
     ),
     *("place_hard_data", "read_hard_data", "synthesize", "synthesize_solid", "__version__"),
-    *("checkpoint", "extend", "fill", "simulate"),
+    *("Checkpoint", "extend", "fill", "simulate"),
 }
 COMMAND_LINE = """
 from simdtex.cli import main

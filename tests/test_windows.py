@@ -3,14 +3,13 @@ whole."""
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, opencl, texture
+from cases import REFERENCE, assert_same_bits, laid_out, opencl, texture
 
 from simdtex import random
 from simdtex.methods import mrf
-from simdtex.methods.mrf.algorithm import begin, enter, sweep
-from simdtex.methods.mrf.level import State
-from simdtex.methods.mrf.synthesis import laid_out
+from simdtex.methods.mrf.algorithm import opened, sweep
 from simdtex.model.lattice import Grid
+from simdtex.ops.neighbourhood import Field
 from simdtex.ops.start import start
 from simdtex.schedules import SCHEDULES, get
 
@@ -27,9 +26,9 @@ def test_these_schedules_claim_windows():
     assert WINDOWS == ["coloring", "coloring-fixed", "checkerboard", "synchronous"]
 
 
-def cut(state, grid, window):
-    """The part that a window holds of a whole's state, whose arrays are NumPy's."""
-    return [np.ascontiguousarray(window.cut(grid.view(array))) for array in state.field]
+def cut(saved, grid, window):
+    """The part that a window holds of a whole's saved state."""
+    return [np.ascontiguousarray(window.cut(grid.view(saved[name]))) for name in Field._fields]
 
 
 @pytest.mark.parametrize("boundary", ["torus", "open"])
@@ -42,11 +41,11 @@ def test_a_window_relaxes_as_the_whole(any_device, name, how, boundary, number):
     shape = (26 << number, (31 << number) - number)  # the last column of the coarse lattice is a pixel short
     run = laid_out(machine, texture((40, 41), seed=2)[..., None], shape, mrf.Options(**given), 2**40 + 9)
     level = run.level(number)
-    state, compared = enter(level, begin(run)._replace(level=number)), 0
+    state, compared = run.enter(number, run.begin().field), 0
     for done in range(4):
-        before = state.off(machine)
-        state, info = sweep(level, before.on(machine), free=done == 3)
-        (chosen,) = info.chosen
+        state = state._replace(active=0) if done == 3 else state  # a free sweep
+        before = run.save(state)
+        state, (chosen,) = sweep(level, run.load(before))
         halo, grid = len(chosen.ranges) * 1, level.setting.grid
         corners = [(-halo - 3, 20 - halo), (5, 3)] if boundary == "torus" else [(0, 31 - 2 * halo - 5), (3, 1)]
         for top, left in corners:
@@ -55,12 +54,12 @@ def test_a_window_relaxes_as_the_whole(any_device, name, how, boundary, number):
                 top, left = min(top, grid.rows - rows), min(max(0, left), grid.cols - cols)
             small = run.level(number, (top, left, rows, cols))
             window = small.setting.grid
-            inner = State(*cut(before, run.grid(number), window), None, None, number).on(machine)
-            inner = enter(small, inner)._replace(price=before.price)  # that of the whole's use
-            inner = inner._replace(schedule=inner.schedule._replace(sweep=before.schedule.sweep))
-            inner, _ = sweep(small, inner, free=done == 3)
-            ours = inner.off(machine).field
-            theirs = cut(state.off(machine), run.grid(number), window)
+            inner = opened(small, Field(*map(machine.put, cut(before, run.grid(number), window))))
+            inner = inner._replace(price=before["price"], active=before["active"])  # those of the whole
+            inner = inner._replace(schedule=inner.schedule._replace(sweep=before["schedule"].sweep))
+            inner, _ = sweep(small, inner)
+            ours = [np.array(machine.get(plane)) for plane in inner.field]
+            theirs = cut(run.save(state), run.grid(number), window)
             inside = slice(halo, rows - halo), slice(halo, cols - halo)
             for mine, whole in zip(ours, theirs, strict=True):
                 assert_same_bits(mine[..., *inside].copy(), whole[..., *inside].copy())
@@ -73,7 +72,7 @@ def test_a_window_begins_as_the_whole(request, machine_):
     machine = REFERENCE if machine_ == "reference" else opencl(request.getfixturevalue("any_device"))
     run = laid_out(machine, texture((12, 13))[..., None], (22, 27), mrf.Options(order=2, levels=2), 3)
     everywhere = machine.put(run.sample.positions(np.zeros((1, 2), np.int32), 1))
-    whole = begin(run).off(machine).field
+    whole = [np.array(machine.get(plane)) for plane in run.begin().field]
     for number in (0, 1):
         grid = run.grid(number)
         window = grid.window(-3, 5, 8, 6)

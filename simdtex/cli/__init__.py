@@ -24,7 +24,7 @@ GROUPS = {
         "simulate": "Simulate what TRAINING_IMAGE shows: realisations that look like it and honour data.",
     },
     "Runs that were stopped": {
-        "resume": "Go on with the run whose state is in DIR, and write what its command writes.",
+        "resume": "Go on with the run whose state is in FILE, and write what its command writes.",
     },
     "Studies": {
         "schedules": "Run the same job under several schedules and compare them in a report.",

@@ -133,6 +133,7 @@ def extend(
             rng=seed,
             device=device,
             callback=callback,
+            checkpoint=click.get_current_context().obj,
             full_output=True,
             **given(options),
         )

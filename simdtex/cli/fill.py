@@ -119,6 +119,7 @@ def fill(
             rng=seed,
             device=device,
             callback=callback,
+            checkpoint=click.get_current_context().obj,
             full_output=True,
             **given(options),
         )

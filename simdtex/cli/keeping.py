@@ -17,7 +17,7 @@ import click
 from simdtex.cli.common import give_up, given_words, postponed
 
 if TYPE_CHECKING:
-    from simdtex.checkpoints import Keeper
+    from simdtex.checkpoint import Checkpoint
 
 
 def kept(command: Callable[..., None]) -> Callable[..., None]:
@@ -28,15 +28,14 @@ def kept(command: Callable[..., None]) -> Callable[..., None]:
         if checkpoint is None:
             command(*args, **kwargs)
             return
-        from simdtex.checkpoints import Keeper
-        from simdtex.checkpoints.keeper import keeping
+        from simdtex.checkpoint import Checkpoint
 
-        keeper = Keeper(checkpoint, command=_command(click.get_current_context()), note=_say)
+        keeper = Checkpoint(checkpoint, command=_command(click.get_current_context()), note=_say)
         click.get_current_context().obj = keeper
         with _signals(keeper) as caught:
             try:
-                with keeping(keeper):
-                    command(*args, **kwargs)
+                command(*args, **kwargs)
+                keeper.remove()
             except KeyboardInterrupt:
                 give_up(f"stopped; go on with: simdtex resume {checkpoint}", caught[0] if caught else signal.SIGINT)
 
@@ -57,7 +56,7 @@ def _command(context: click.Context) -> dict[str, Any]:
 
 
 @contextmanager
-def _signals(keeper: Keeper) -> Iterator[list[int]]:
+def _signals(keeper: Checkpoint) -> Iterator[list[int]]:
     """Have Ctrl-C and SIGTERM stop a run where its state is at hand, and a second one at once.
 
     Yields the list of the signals that came.

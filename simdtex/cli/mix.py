@@ -106,6 +106,7 @@ def mix(
             rng=seed,
             device=opened(device, profile),
             callback=callback,
+            checkpoint=click.get_current_context().obj,
             full_output=True,
             **given(options | chosen | {"average": weights, "start": begin}),
         )

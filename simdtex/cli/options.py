@@ -11,7 +11,7 @@ import click
 from click.shell_completion import CompletionItem
 from click.types import StringParamType
 
-from simdtex.cli.places import ENTER, FOLDER, READ
+from simdtex.cli.places import ENTER, FOLDER, READ, WRITE
 
 Command = Callable[..., None]
 
@@ -75,9 +75,9 @@ SEED = option(
 PROFILE = option("--profile", is_flag=True, help="Print what each kernel takes, and what is left to the host.")
 CHECKPOINT = option(
     "--checkpoint",
-    type=FOLDER,
-    metavar="DIR",
-    help="Keep the state of the run there; `simdtex resume DIR` goes on with it.",
+    type=WRITE,
+    metavar="FILE",
+    help="Keep the state of the run in this file; `simdtex resume FILE` goes on with it.",
 )
 QUIET = option("-q", "--quiet", is_flag=True, help="Show no progress bar and no summary.")
 

@@ -25,16 +25,16 @@ COMMANDS = ("extend", "fill", "mix", "simulate", "solid", "synth")
     ("resume state", "The run of --checkpoint state."),
     ("resume more.zarr --workers 4", "An output in tiles, with four processes."),
 )
-@click.argument("folder", metavar="DIR", type=ENTER)
+@click.argument("folder", metavar="FILE", type=ENTER)
 @workers_option
 @cluster_option
 @DEVICE
 @QUIET
 @plainly
 def resume(folder: Path, workers: int | None, cluster: str | None, device: str | None, quiet: bool) -> None:
-    """Go on with the run whose state is in DIR, and write what its command writes.
+    """Go on with the run whose state is in FILE, and write what its command writes.
 
-    DIR is the folder of --checkpoint, or the .zarr store of --tiles.
+    FILE is that of --checkpoint, or the .zarr store of --tiles.
     """
     if workers is not None and cluster is not None:
         raise ValueError("a scheduler has its own workers; give --workers or --cluster, not both")
@@ -55,35 +55,23 @@ def is_store(folder: Path) -> bool:
 
 def kind(folder: Path) -> Callable[[Path, list[str]], None]:
     """What goes on with what a folder holds; it is given the folder and more options."""
-    from simdtex.checkpoints.folder import JOB
-
-    if os.path.lexists(folder / JOB):
-        return checkpoint
     if not folder.exists():
-        raise ValueError(f"{folder} does not exist: check the path of the checkpoint")
-    if not folder.is_dir():
-        raise ValueError(f"{folder} is a file; give the folder of --checkpoint, or the store of --tiles")
-    raise ValueError(f"{folder} holds no checkpoint; give the folder of --checkpoint, or the store of --tiles")
+        raise ValueError(f"{folder} does not exist: the run is finished, or the path is another")
+    if folder.is_dir():
+        raise ValueError(f"{folder} is a folder; give the file of --checkpoint, or the store of --tiles")
+    return checkpoint
 
 
 def checkpoint(folder: Path, more: list[str]) -> None:
     """Give the command of a checkpoint again, where it was given."""
-    from simdtex.checkpoints.folder import Folder
+    from simdtex.checkpoint import read
     from simdtex.cli import load
 
-    kept = Folder(folder)
-    job: dict[str, Any] = kept.job() or {}
-    command = job.get("command")
-    if job.get("finished"):
-        kept.forget()  # where the process was killed before it had
-        click.echo(f"{folder}: the run is finished; there is nothing to go on with")
-        return
+    command: dict[str, Any] | None = read(folder)[0]["command"]
     if command is None:
-        raise ValueError(
-            f"the run in {folder} was begun in Python; make the same call within simdtex.checkpoint({str(folder)!r})"
-        )
+        raise ValueError(f"the run in {folder} was begun in Python; make the same call with checkpoint={str(folder)!r}")
     if command["name"] not in COMMANDS:
-        raise ValueError(f"the checkpoint in {folder} is of no command that keeps one; remove the folder")
+        raise ValueError(f"the checkpoint in {folder} is of no command that keeps one; remove it")
     if not os.path.isdir(command["folder"]):
         raise ValueError(f"{command['folder']}, where the run in {folder} was begun, is not there; put it back")
     own = ["--checkpoint", str(folder.resolve())]

@@ -129,6 +129,7 @@ def simulate(
             rng=seed,
             device=device,
             callback=callback,
+            checkpoint=click.get_current_context().obj,
             **given(options),
         )
     with afterwards():

@@ -206,6 +206,7 @@ def synth(
             method=method,
             device=opened(device, profile),
             callback=callback,
+            checkpoint=click.get_current_context().obj,
             full_output=True,
             **inputs,
             **given(options | {"start": begin}),

@@ -4,7 +4,7 @@
 The extra ``distributed`` brings the libraries: ``pip install 'simdtex[distributed]'``.
 """
 
-from simdtex.distributed.plan import Plan
+from simdtex.distributed.layout import Layout
 from simdtex.distributed.synthesis import finished, plan, resume, synthesize
 
-__all__ = ["Plan", "finished", "plan", "resume", "synthesize"]
+__all__ = ["Layout", "finished", "plan", "resume", "synthesize"]

@@ -10,9 +10,9 @@ from importlib import import_module
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from simdtex.distributed.drive import Execute
 from simdtex.distributed.store import Store, Turn
 from simdtex.distributed.tasks import do
+from simdtex.distributed.tiling import Execute
 from simdtex.machine import Machine
 from simdtex.machine.devices import DeviceError
 from simdtex.options import whole

@@ -3,11 +3,11 @@
 
     image, source    the output, written tile by tile at the end
     work/            removed at the end
-        input/       the outline's arrays (`simdtex.distributed.description`)
+        input/       the plan's arrays (`simdtex.distributed.description`)
         given/       values and which are known, of the output; held0, held1, ... what is given of each level
         level0/a, b  values, source, temperature: before a sweep and after it, turn about
         price7       of each candidate during turn 7
-        tally7       a row for each tile that has had its turn 7: 1, warm, heat, and the use of each candidate
+        tally7       a row for each tile that has had its turn 7: 1, active, heat, and the use of each candidate
 
 A turn is one thing done to every tile: a level begun, a sweep, the picture. Whatever is written in a turn goes where
 nobody reads, so a turn that was broken off is done again, or only its tiles that are missing. The attribute ``turn`` of
@@ -18,25 +18,23 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from importlib import import_module
+from importlib.metadata import version
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.distributed.description import described, restored
-from simdtex.distributed.plan import LevelPlan, Plan, laid
-from simdtex.machine.interface import Array, Machine
-from simdtex.machine.reference import Reference
-from simdtex.methods.mrf.holding import FREE, STANDING, Held
-from simdtex.methods.mrf.outline import Outline
+from simdtex.distributed.layout import Layout, LevelLayout, laid
+from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Held
+from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.tiles import Tally, Tile
-from simdtex.model.given import Given
 from simdtex.model.lattice import Grid
-from simdtex.ops.neighbourhood import UNTOUCHED, Beside, Field
+from simdtex.ops.neighbourhood import Beside, Field
 
-FORMAT = 1
+FORMAT = 2
 """Of the store; another one is not gone on with."""
 
 KIND = "simdtex tiles"
@@ -52,7 +50,7 @@ class Turn(NamedTuple):
 
     ``number`` from 1; ``phase`` ``"begin"``, ``"whole"`` (a level of one tile), ``"sweep"``, ``"show"`` or ``"done"``;
     ``level``; ``read``, ``write`` 0 or 1, the state before and the one after; ``cooling``, ``free`` sweeps of the level
-    done; ``warm``, ``heat`` of all its sites now.
+    done; ``active`` sites of the level now, and their ``heat``.
     """
 
     number: int
@@ -62,26 +60,20 @@ class Turn(NamedTuple):
     write: int = 0
     cooling: int = 0
     free: int = 0
-    warm: int = 0
+    active: int = 0
     heat: int = 0
 
 
-@dataclass(frozen=True)
-class Work:
-    """What a store is about.
+class Work(NamedTuple):
+    """What a store makes: the ``plan``, without conditioning data; the ``seed``; the tiles' ``layout``.
 
-    Attributes
-    ----------
-    outline : Outline
-        Without what is given of the output.
-    plan : Plan
-    beside : Beside
-    held, given : bool
-        Whether something is given of the output, and whether that is values.
+    ``beside`` which channels are guides; ``held``, ``given`` whether there are conditioning data or guides, and whether
+    there are data.
     """
 
-    outline: Outline
     plan: Plan
+    seed: int
+    layout: Layout
     beside: Beside
     held: bool
     given: bool
@@ -102,24 +94,35 @@ class Store:
         self._arrays: dict[str, Any] = {}
 
     @staticmethod
-    def create(
-        where: str, outline: Outline, plan: Plan, given: Given | None, channels: bool, source: bool, version: str
-    ) -> Store:
-        """A new store, ready for its first turn; whether its image has a channel axis, and whether it has a source."""
-        root = _zarr().open_group(where, mode="w")
+    def create(where: str, plan: Plan, seed: int, layout: Layout, *, channels: bool, source: bool) -> Store:
+        """Make a store, ready for its first turn.
+
+        Parameters
+        ----------
+        where : str
+        plan : Plan
+        seed : int
+        layout : Layout
+        channels : bool
+            Whether the image has a channel axis.
+        source : bool
+            Whether the source map is written too.
+        """
+        root, own = _zarr().open_group(where, mode="w"), version("simdtex")
         work = root.create_group("work")
-        text, arrays = described(outline)
+        text, arrays = described(plan)
         for name, array in arrays.items():
             work.create_array(f"input/{name}", data=np.ascontiguousarray(array))
-        holding = outline.holding(Reference())
-        beside = holding.beside(len(outline.offsets), outline.options.data_weight)
+        options, given = plan.options, plan.given
+        conditions = Conditioning(plan.levels, plan.sample.guides, plan.planes, len(plan.offsets), options.data_weight)
         store, held = Store(where), False
-        for level in plan.levels:
-            if (here := holding.held(level.number)) is not None:
+        for level in layout.levels:
+            grid = Grid(*plan.shape, 2**level.number, options.boundary == "torus")
+            if (here := conditions.at(level.number, grid)) is not None:
                 held = True
                 for name, plane in here._asdict().items():
                     store._planes(f"given/held{level.number}/{name}", level, plane.shape[:-2], plane.dtype)[:] = plane
-        sample, finest = outline.sample, plan.levels[0]
+        sample, finest = plan.sample, layout.levels[0]
         if given is not None:
             for name, array in (("values", given.values), ("known", given.known)):
                 store._pixels(f"work/given/{name}", finest, array.shape[2:], array.dtype)[:] = array
@@ -128,12 +131,12 @@ class Store:
             store._pixels("source", finest, (2 + (len(sample.boxes) > 1),), np.dtype(np.int32))
         work.attrs["kind"] = KIND
         work.attrs["about"] = {
-            **{"format": FORMAT, "version": version, "name": secrets.token_hex(8), "run": text},
-            **{"sides": [one.side for one in plan.levels], "workers": plan.workers},
-            **{"beside": [float(one) for one in beside], "held": held, "given": given is not None},
+            **{"format": FORMAT, "version": own, "name": secrets.token_hex(8), "run": text, "seed": seed},
+            **{"sides": [one.side for one in layout.levels], "workers": layout.workers},
+            **{"beside": [float(one) for one in conditions.beside], "held": held, "given": given is not None},
         }
-        store.save(first_turn(plan))
-        root.attrs["simdtex"] = {"version": version, "seed": outline.seed, "options": asdict(outline.options)}
+        store.save(first_turn(layout))
+        root.attrs["simdtex"] = {"version": own, "seed": seed, "options": asdict(options)}
         return store
 
     @property
@@ -151,10 +154,11 @@ class Store:
         about = self.about
         inputs = self.root["work/input"]
         arrays = {name: inputs[name][...] for name in inputs.array_keys()}
-        outline = restored(about["run"], arrays)
+        plan, seed = restored(about["run"], arrays), about["seed"]
         guides, own, centre, hard = about["beside"]
         beside = Beside(int(guides), bool(own), np.float32(centre), np.float32(hard))
-        return Work(outline, laid(outline, about["sides"], about["workers"]), beside, about["held"], about["given"])
+        layout = laid(plan, seed, about["sides"], about["workers"])
+        return Work(plan, seed, layout, beside, about["held"], about["given"])
 
     # -- turns ----------------------------------------------------------------------------------------------------
 
@@ -174,7 +178,7 @@ class Store:
             if name in work:
                 del work[name]
 
-    def prepare(self, turn: Turn, level: LevelPlan, channels: int, candidates: int) -> bool:
+    def prepare(self, turn: Turn, level: LevelLayout, channels: int, candidates: int) -> bool:
         """Make the arrays that a turn writes to, where they are not there; true where the turn is new."""
         work = self.root["work"]
         if turn.phase != "show" and f"level{level.number}/{turn.write}/temperature" not in work:
@@ -204,13 +208,13 @@ class Store:
 
     def told(self, turn: Turn, number: int, tally: Tally) -> None:
         """Note that a tile has had its turn."""
-        row = np.concatenate([np.array([1, tally.warm, tally.heat], np.int64), tally.counts])
+        row = np.concatenate([np.array([1, tally.active, tally.heat], np.int64), tally.counts])
         self._at(f"tally{turn.number}")[number] = row
 
     def tally(self, turn: Turn, number: int) -> Tally | None:
         """What was noted of a tile, if it has had its turn."""
-        there, warm, heat, *_ = row = self._at(f"tally{turn.number}")[number]
-        return Tally(row[3:], int(warm), int(heat)) if there else None
+        there, active, heat, *_ = row = self._at(f"tally{turn.number}")[number]
+        return Tally(row[3:], int(active), int(heat)) if there else None
 
     def done(self, turn: Turn, count: int) -> NDArray[np.bool_]:
         """Which of so many tiles have had their turn."""
@@ -218,8 +222,8 @@ class Store:
 
     def total(self, turn: Turn, count: int) -> Tally:
         """The sum of what was noted of all tiles."""
-        _, warm, heat, *counts = sum(rows.sum(0) for rows in self._rows(turn, count))
-        return Tally(np.array(counts, np.int64), int(warm), int(heat))
+        _, active, heat, *counts = sum(rows.sum(0) for rows in self._rows(turn, count))
+        return Tally(np.array(counts, np.int64), int(active), int(heat))
 
     def _rows(self, turn: Turn, count: int) -> Iterator[NDArray[np.int64]]:
         """What was noted, many tiles at once: one by one they take longer."""
@@ -230,18 +234,18 @@ class Store:
 
     # -- arrays over sites ----------------------------------------------------------------------------------------
 
-    def read(self, level: LevelPlan, which: int, window: Tile) -> Field:
+    def read(self, level: LevelLayout, which: int, window: Tile) -> Field:
         """The state of a level's sites in a window, which may go on across the seam."""
         here = f"level{level.number}/{which}"
         return Field(*(cut(self._at(f"{here}/{name}"), level, window) for name in PLANES))
 
-    def write(self, level: LevelPlan, which: int, tile: Tile, field: Field) -> None:
+    def write(self, level: LevelLayout, which: int, tile: Tile, field: Field) -> None:
         """Write the state of a tile's sites."""
         here = f"level{level.number}/{which}"
         for name, plane in zip(PLANES, field, strict=True):
             self._at(f"{here}/{name}")[..., *spans(tile)] = plane
 
-    def held(self, level: LevelPlan, window: Tile) -> Held:
+    def held(self, level: LevelLayout, window: Tile) -> Held:
         """What is given of a level's sites in a window."""
         here = f"given/held{level.number}"
         return Held(*(cut(self._at(f"{here}/{name}"), level, window) for name in Held._fields))
@@ -266,11 +270,11 @@ class Store:
             self._arrays[name] = self.root[f"work/{name}"]
         return self._arrays[name]
 
-    def _planes(self, name: str, level: LevelPlan, before: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
+    def _planes(self, name: str, level: LevelLayout, before: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
         shape, chunks = (*before, level.rows, level.cols), (*before, level.chunk, level.chunk)
         return self._array(f"work/{name}", shape, chunks, dtype, (*("channel",) * len(before), "y", "x"))
 
-    def _pixels(self, name: str, level: LevelPlan, after: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
+    def _pixels(self, name: str, level: LevelLayout, after: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
         shape, chunks = (level.rows, level.cols, *after), (level.chunk, level.chunk, *after)
         return self._array(name, shape, chunks, dtype, ("y", "x", *("channel",) * len(after)))
 
@@ -284,46 +288,19 @@ class Store:
         )
 
 
-@dataclass(frozen=True)
-class Stored:
-    """What is given of an output, window by window out of a store."""
+class Stored(Conditions):
+    """Conditioning data and guides of an output, window by window out of a store."""
 
-    store: Store
-    work: Work
-    machine: Machine
+    def __init__(self, store: Store, work: Work) -> None:
+        super().__init__(len(work.layout.levels), work.beside)
+        self._store, self._work = store, work
 
-    def beside(self, neighbours: int, data_weight: float) -> Beside:
-        """As the whole output has it."""
-        return self.work.beside
-
-    def begun(self, field: Field) -> Field:
-        """As it is: `entered` lays all."""
-        return field
-
-    def entered(self, number: int, grid: Grid, field: Field) -> Field:
-        """The field of a window where a level begins, with what is given of it."""
-        if not self.work.held:
-            return field
-        levels, tile = self.work.plan.levels, Tile(*grid.within[:2], grid.rows, grid.cols)
-        values, source, temperature = (np.array(self.machine.get(plane)) for plane in field)
-        if number + 1 < len(levels):
-            kind = self.store.held(levels[number + 1], above(tile)).kind
-            temperature[tile.top % 2 :: 2, tile.left % 2 :: 2][kind == STANDING] = UNTOUCHED
-        held, guides = self.store.held(levels[number], tile), self.work.beside.guides
-        matched, given = len(values) - guides, held.kind != FREE
-        if guides:
-            values[matched:] = held.values[-guides:]
-        values[:matched, given] = held.values[:matched, given]
-        source[given], temperature[given] = held.source[given], 0
-        return Field(*(self.machine.put(plane) for plane in (values, source, temperature)))
-
-    def movable(self, number: int, grid: Grid) -> Array | None:
-        """0 at the sites of a window that nothing may relax; None where all may."""
-        if not self.work.held or grid.part is None:
+    def at(self, number: int, grid: Grid) -> Held | None:
+        """Return the data and guides of a level's sites in a window; None if there are none."""
+        if not self._work.held or grid.part is None:
             return None
         window = Tile(*grid.within[:2], grid.rows, grid.cols)
-        kind = self.store.held(self.work.plan.levels[number], window).kind
-        return self.machine.put((kind == FREE).astype(np.uint16))
+        return self._store.held(self._work.layout.levels[number], window)
 
 
 def _zarr() -> Any:
@@ -331,23 +308,14 @@ def _zarr() -> Any:
     return import_module("zarr")
 
 
-def first_turn(plan: Plan) -> Turn:
+def first_turn(layout: Layout) -> Turn:
     """The coarsest level begins."""
-    return Turn(1, phase_of(plan.levels[-1]), len(plan.levels) - 1)
+    return Turn(1, phase_of(layout.levels[-1]), len(layout.levels) - 1)
 
 
-def phase_of(level: LevelPlan) -> str:
+def phase_of(level: LevelLayout) -> str:
     """How a level begins: one that is a single tile goes through all its sweeps at once."""
     return "whole" if level.count == 1 else "begin"
-
-
-def above(tile: Tile) -> Tile:
-    """The sites of the level above that lie in a tile; there may be none."""
-    (top, rows), (left, cols) = (
-        (-(-first // 2), (first + size + 1) // 2 - -(-first // 2))
-        for first, size in ((tile.top, tile.rows), (tile.left, tile.cols))
-    )
-    return Tile(top, left, rows, cols)
 
 
 def spans(tile: Tile) -> tuple[slice, slice]:
@@ -355,7 +323,7 @@ def spans(tile: Tile) -> tuple[slice, slice]:
     return slice(tile.top, tile.top + tile.rows), slice(tile.left, tile.left + tile.cols)
 
 
-def cut(array: Any, level: LevelPlan, window: Tile) -> NDArray[Any]:
+def cut(array: Any, level: LevelLayout, window: Tile) -> NDArray[Any]:
     """A window of a stored array (..., rows, cols), in one piece."""
 
     def parts(first: int, size: int, whole: int) -> Iterator[tuple[slice, slice]]:
@@ -373,4 +341,4 @@ def cut(array: Any, level: LevelPlan, window: Tile) -> NDArray[Any]:
     return found
 
 
-__all__ = ["FORMAT", "KIND", "Store", "Stored", "Turn", "Work", "above", "first_turn", "phase_of"]
+__all__ = ["FORMAT", "KIND", "Store", "Stored", "Turn", "Work", "first_turn", "phase_of"]

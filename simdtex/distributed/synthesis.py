@@ -14,13 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from simdtex.distributed.plan import Plan, planned
-from simdtex.envelope import check_shape
+from simdtex.distributed.layout import Layout, planned
+from simdtex.driver import check_shape, drive
 from simdtex.io.atomic import atomic_folder, exclusive
 from simdtex.jobs.inputs import Inputs, check_inputs
 from simdtex.machine import Machine, memory
+from simdtex.machine.reference import Reference
 from simdtex.methods.mrf import make_options
-from simdtex.methods.mrf.outline import Outline, outlined
+from simdtex.methods.mrf.plan import Plan
+from simdtex.methods.mrf.plan import plan as planned_run
 from simdtex.options import whole
 from simdtex.random import as_seed
 from simdtex.run import Callback
@@ -103,15 +105,15 @@ def synthesize(
     """
     size = check_shape(shape)
     inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
-    outline = _outline(inputs, size, as_seed(rng), options)
+    run, seed = _plan(inputs, size, options), as_seed(rng)
     count = _workers(client, workers)
-    layout, target = planned(outline, tiles, count), _address(store)
+    layout, target = planned(run, seed, tiles, count), _address(store)
     if client is None:
         memory.require_host(layout.memory * count, "give smaller tiles or fewer workers")
     with _made(target) as temporary:
         from simdtex.distributed.store import Store
 
-        Store.create(temporary, outline, layout, inputs.given, channel_axis is not None, source_map, version("simdtex"))
+        Store.create(temporary, run, seed, layout, channels=channel_axis is not None, source=source_map)
     return resume(store, client=client, workers=workers, channel_axis=channel_axis, device=device, callback=callback)
 
 
@@ -146,7 +148,7 @@ def resume(
         There is no such store, or one of another version, or another process is at work in it.
     """
     from simdtex.distributed.cluster import across, connected, here
-    from simdtex.distributed.drive import go_on
+    from simdtex.distributed.tiling import Tiles
 
     where = _address(store)
     opened = _opened(where)
@@ -156,7 +158,11 @@ def resume(
         if crew is not None and not (device is None or isinstance(device, (str, int))):
             raise TypeError("each worker opens its own device; give its name, not an open machine")
         name = None if device is None else str(device)
-        go_on(opened, here(opened, device) if crew is None else across(crew, opened, name), callback)
+        if opened.turn.phase == "done":
+            opened.finish()
+        else:
+            crewed = here(opened, device) if crew is None else across(crew, opened, name)
+            drive(Tiles(opened, crewed), Reference(), 0, callback)
     return _array(where, channel_axis)
 
 
@@ -173,7 +179,7 @@ def plan(
     workers: int = 1,
     channel_axis: int | None = None,
     **options: Any,
-) -> Plan:
+) -> Layout:
     """How an output would be cut into tiles, and what that would need.
 
     Parameters
@@ -185,19 +191,19 @@ def plan(
 
     Returns
     -------
-    simdtex.distributed.Plan
+    simdtex.distributed.Layout
         Tiles, halos and redundant work of each level, and bytes of memory and of disk.
     """
     size = check_shape(shape)
     given = {name: options.pop(name, None) for name in ("mask", "known", "known_source", "guide")}
-    return planned(_outline(check_inputs(sample, size, channel_axis, **given), size, 0, options), tiles, workers)
+    return planned(_plan(check_inputs(sample, size, channel_axis, **given), size, options), 0, tiles, workers)
 
 
-def _outline(inputs: Inputs, size: tuple[int, int], seed: int, options: dict[str, Any]) -> Outline:
+def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any]) -> Plan:
     chosen = make_options(**options)
     if not isinstance(chosen.schedule, str):
         raise TypeError("workers know schedules by their names; give schedule the name of one")
-    return outlined(inputs.pictures, size, chosen, seed, inputs.given, inputs.guide)
+    return planned_run(inputs.pictures, size, chosen, inputs.given, inputs.guide)
 
 
 def _workers(client: Client | None, workers: int | None) -> int:

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from simdtex.distributed.store import Store, Stored, Turn, Work, above
+from simdtex.distributed.store import Store, Stored, Turn, Work
 from simdtex.machine import Machine, open_machine
 from simdtex.methods.mrf import tiles
-from simdtex.methods.mrf.level import Run
-from simdtex.methods.mrf.synthesis import finished
+from simdtex.methods.mrf.algorithm import Run, finished
 from simdtex.methods.mrf.tiles import Tally, Tile, framed
 from simdtex.ops.finish import around
 from simdtex.ops.neighbourhood import Field
@@ -40,7 +39,7 @@ def context(where: str, name: str, device: str | Machine | None) -> Context:
         _contexts.clear()  # one at a time, so that memory has its bound
         store, machine = Store(where), open_machine(device)
         work = store.work()
-        run = work.outline.run(machine, Stored(store, work, machine), machine.put(np.zeros((1, 1), np.int32)))
+        run = Run(work.plan, machine, work.seed, Stored(store, work))
         _contexts[key] = Context(store, work, run)
     return _contexts[key]
 
@@ -67,57 +66,54 @@ def do(where: str, name: str, device: str | Machine | None, turn: Turn, number: 
         here = context(where, name, device)
         if here.store.tally(turn, number) is None:
             here.store.told(
-                turn, number, PHASES[turn.phase](here, turn, here.work.plan.levels[turn.level].tile(number))
+                turn, number, PHASES[turn.phase](here, turn, here.work.layout.levels[turn.level].tile(number))
             )
     return number
 
 
 def _begin(here: Context, turn: Turn, tile: Tile) -> Tally:
-    field, tally = tiles.begun(here.run, turn.level, tile, _above(here, turn, tile))
-    here.store.write(here.work.plan.levels[turn.level], turn.write, tile, field)
+    field, tally = tiles.entered(here.run, turn.level, tile, _above(here, turn, tile))
+    here.store.write(here.work.layout.levels[turn.level], turn.write, tile, field)
     return tally
 
 
 def _whole(here: Context, turn: Turn, tile: Tile) -> Tally:
     field = tiles.whole(here.run, turn.level, _above(here, turn, tile))
-    here.store.write(here.work.plan.levels[turn.level], turn.write, tile, field)
+    here.store.write(here.work.layout.levels[turn.level], turn.write, tile, field)
     return Tally(np.zeros(0, np.int32), 0, 0)
 
 
 def _sweep(here: Context, turn: Turn, tile: Tile) -> Tally:
-    level = here.work.plan.levels[turn.level]
+    level = here.work.layout.levels[turn.level]
     frame = framed(level.lattice, tile, level.halo)
     before, price = here.store.read(level, turn.read, frame.window), here.store.price(turn)
-    done, free = turn.cooling + turn.free, not turn.warm
+    done, free = turn.cooling + turn.free, not turn.active
     field, tally = tiles.relaxed(here.run, turn.level, tile, frame, before, price, done, free)
     here.store.write(level, turn.write, tile, field)
     return tally
 
 
 def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
-    run, work, level = here.run, here.work, here.work.plan.levels[0]
+    run, work, level = here.run, here.work, here.work.layout.levels[0]
     sd = run.options.finish or 0
     frame = framed(level.lattice, tile, int(around(sd)[0].max()) if sd else 0)
     state = here.store.read(level, turn.read, frame.window)
-    source = frame.cut(state.source)
-    if sd:
-        known = here.store.held(level, frame.window).kind > 0 if work.held else None
-        field, grid = Field(*map(run.machine.put, state)), run.grid(0).window(*frame.window)
-        shown = finished(run, grid, field, known, state.source[frame.rows], frame.rows.start)[:, frame.cols]
-    else:
-        shown = run.sample.picture(frame.cut(state.values), source)
+    known = here.store.held(level, frame.window).kind > 0 if work.held else None
+    field, grid = Field(*map(run.machine.put, state)), run.grid(0).window(*frame.window)
+    shown = finished(run, grid, field, known, state.source[frame.rows], frame.rows.start)[:, frame.cols]
     if here.work.given:
-        values, told = here.store.given(tile)
-        shown = np.where(told, values, shown)
-    here.store.show(tile, shown, run.sample.place(source))
+        values, given = here.store.given(tile)
+        shown = np.where(given, values, shown)
+    here.store.show(tile, shown, run.sample.place(frame.cut(state.source)))
     return Tally(np.zeros(0, np.int32), 0, 0)
 
 
 def _above(here: Context, turn: Turn, tile: Tile) -> Field | None:
-    levels = here.work.plan.levels
+    levels = here.work.layout.levels
     if turn.level + 1 == len(levels):
         return None
-    return here.store.read(levels[turn.level + 1], turn.read, above(tile))
+    (top, rows), (left, cols) = here.run.grid(turn.level).window(*tile).above
+    return here.store.read(levels[turn.level + 1], turn.read, Tile(top, left, rows, cols))
 
 
 PHASES = {"begin": _begin, "whole": _whole, "sweep": _sweep, "show": _show}

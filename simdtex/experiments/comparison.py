@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex import schedules as known
-from simdtex.envelope import check_shape
+from simdtex.driver import check_shape
 from simdtex.experiments.quality import COPIED_PATCH, Quality, measure
 from simdtex.experiments.recorder import Noted, Recorder, Sweep
 from simdtex.io.image import check_sample

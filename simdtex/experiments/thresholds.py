@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.envelope import check_shape, restored
+from simdtex.driver import check_shape, drive, restored
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, open_machine
 from simdtex.methods import multires
@@ -90,7 +90,7 @@ def series(
             if callback:
                 callback((number + progress.fraction) / len(chosen), made[-1] if made else None)
 
-        image, output = multires.resample(machine, analysis, size, one, seed, tell)
+        image, output = drive(multires.Plan(pixels, size, one, analysis), machine, seed, tell)
         found = output.statistics
         image = restored(image, channel_axis)
         made.append(Member(found["options"]["alpha"], one.beta, image, found["levels"], found["seconds"]))

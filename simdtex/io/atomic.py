@@ -167,7 +167,10 @@ def write_checked(path: PathLike, write: Callable[[BinaryIO], Any]) -> None:
         file.seek(0)
         file.write(_HEADER % digest.encode())
     if os.name != "nt":  # Windows cannot open a folder
-        _sync(Path(os.path.realpath(path)).parent, os.O_RDONLY)
+        try:
+            _sync(Path(os.path.realpath(path)).parent, os.O_RDONLY)
+        except OSError as error:
+            raise _not_written(path, error) from None
 
 
 def read_checked(path: PathLike) -> BinaryIO:

@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import replace
+import os
+from dataclasses import dataclass, replace
 from math import ceil, log2, prod
 from typing import Any, NamedTuple
 
@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
-from simdtex.checkpoints.keep import Keep
-from simdtex.envelope import begin, executed
+from simdtex.checkpoint import Checkpoint
+from simdtex.driver import NOTHING, Keep, PlannedJob, drive, execute
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_mask, check_samples, masked_in
 from simdtex.machine import Machine, memory
@@ -22,7 +22,6 @@ from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures, unknown_in
-from simdtex.model.sample import NothingUsable
 from simdtex.options import whole, within_32_bits
 from simdtex.run import Callback, Output
 
@@ -85,25 +84,6 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
     return [Window(r, c, wanted) for r, c in found]
 
 
-class Job(NamedTuple):
-    """A picture with holes.
-
-    ``pixels`` (rows, cols, C); ``hole`` (rows, cols) what is to be made; ``sample`` what it is made from, None for what
-    is around; ``reach`` how far around, pixels.
-    """
-
-    pixels: NDArray[Any]
-    hole: Mask
-    sample: Pictures | None
-    reach: int | None
-
-    def told(self) -> dict[str, Any]:
-        """Everything, by the names that users give it, as what identifies a run."""
-        known = np.where(self.hole[..., None], 0, self.pixels)
-        sample = self.sample and (self.sample.pixels, self.sample.known)
-        return {"image": known, "mask": self.hole, "sample": sample, "reach": self.reach}
-
-
 def fill(
     image: ArrayLike,
     mask: ArrayLike | None = None,
@@ -115,6 +95,7 @@ def fill(
     device: str | Machine | None = None,
     callback: Callback | None = None,
     full_output: bool = False,
+    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
     """Fill the holes of a picture with more of what is around them.
@@ -132,7 +113,7 @@ def fill(
         more. It makes no difference where there is a `sample`.
     channel_axis : int, optional
         The axis of the image that holds channels; None for a grey one.
-    rng, device, callback
+    rng, device, callback, checkpoint
         As in `simdtex.synthesize`.
     full_output : bool
         Return the source map, temperatures and statistics too.
@@ -183,13 +164,8 @@ def fill(
         whole("reach", reach, 1)
     given = None if sample is None else _check_sample(sample, channel_axis, pixels)
     chosen = mrf.make_options(**OF_HOLES | options)
-    job = Job(pixels, hole, given, reach)
-    begun = begin("fill", rng, lambda: {"options": chosen, **job.told()})
-
-    def run(machine: Machine, seen: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
-        return filled(machine, job, chosen, begun.seed, seen, keep)
-
-    return executed(device, channel_axis, callback, full_output, run, begun)
+    job = Filling(pixels, hole, given, reach, chosen, channel_axis)
+    return execute(job, rng, device, callback, full_output, checkpoint)
 
 
 def extend(
@@ -206,6 +182,7 @@ def extend(
     device: str | Machine | None = None,
     callback: Callback | None = None,
     full_output: bool = False,
+    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
     """Continue a picture beyond its edges, or make it seamless.
@@ -223,7 +200,7 @@ def extend(
         Width of that band on either side of the seam, pixels. None: an eighth of the shorter side, 8 to 64.
     channel_axis : int, optional
         The axis of the image that holds channels; None for a grey one.
-    rng, device, callback, full_output, **options
+    rng, device, callback, full_output, checkpoint, **options
         As in `fill`; but ``balance`` and ``novelty`` are those of a texture, and ``boundary`` follows from
         ``seamless``.
 
@@ -274,19 +251,14 @@ def extend(
         raise ValueError("the boundary of what is extended follows from seamless; leave boundary out")
     chosen = mrf.make_options(**{"boundary": "torus" if seamless else "open"} | OF_EDGES | options)
     sides = {"top": top, "bottom": bottom, "left": left, "right": right, "seamless": seamless, "band": width}
-    begun = begin("extend", rng, lambda: {"options": chosen, "image": pixels, **sides})
     place = np.full((*hole.shape, 2), -1, np.int32)
     place[top : top + rows, left : left + cols] = np.moveaxis(np.indices((rows, cols)), 0, -1)
     place[hole] = -1
     given = Given(canvas, np.repeat(~hole[..., None], canvas.shape[2], -1), place, suggests=bool(seamless))
 
-    def run(machine: Machine, seen: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
-        what = (Pictures((pixels,)), hole.shape, chosen, begun.seed)
-        made, output = mrf.synthesize(machine, *what, seen, given, keep=keep)
-        assert output.source is not None
-        return made, replace(output, source=np.where(hole[..., None], output.source, place))
-
-    return executed(device, channel_axis, callback, full_output, run, begun)
+    plan = mrf.plan(Pictures((pixels,)), canvas.shape[:2], chosen, given)
+    job = PlannedJob("extend", plan, lambda: {"options": chosen, "image": pixels, **sides}, channel_axis)
+    return execute(job, rng, device, callback, full_output, checkpoint)
 
 
 class Made(NamedTuple):
@@ -300,45 +272,6 @@ class Made(NamedTuple):
     temperature: NDArray[np.float64]
     source: NDArray[np.int32]
     statistics: dict[str, Any]
-
-
-def filled(
-    machine: Machine, job: Job, options: Options, seed: int, callback: Callback | None, keep: Keep
-) -> tuple[NDArray[Any], Output]:
-    """Make one window of a picture after the other; the arguments are those of `fill`."""
-    began, shape = time.perf_counter(), job.hole.shape
-    several = job.sample is not None and len(job.sample.pixels) > 1
-    whole = Whole(job.pixels.copy(), np.zeros(shape), np.full((*shape, 3 if several else 2), -1, np.int32))
-    if job.sample is None:
-        whole.source[:] = np.moveaxis(np.indices(shape), 0, -1)
-    radius = int(neighbourhood_offsets(options.order).max())
-    everything = [Window(slice(0, shape[0]), slice(0, shape[1]), options.levels or 0)]
-    parts = everything if options.boundary == "torus" else windows(job.hole, radius, options.levels)
-    done, inside = keep.found or ([], None)
-    finished = [Made(*made) for made in done]
-    for number, window in enumerate(parts):
-        at = (window.rows, window.cols)
-        hole = job.hole[at]
-        if number == len(finished):
-            around = _around(job, window)
-            seen = callback and _pasting(callback, whole, at, hole, around.corner, number, len(parts))
-            within = keep.within(finished.copy, inside)
-            made, output = _window(machine, job, window, around, options, seed, seen, within)
-            assert output.source is not None and output.temperature is not None
-            told = output.statistics | {"window": [s for part in at for s in (part.start, part.stop)]}
-            finished.append(Made(around.corner, made[hole], output.temperature[hole], output.source[hole], told))
-            inside = None
-            keep.offer(lambda: (finished, None))
-        found = finished[number]
-        whole.image[at][hole], whole.temperature[at][hole] = found.values, found.temperature
-        whole.source[at][hole] = _moved(found.source, found.corner)
-    runs = [found.statistics for found in finished]
-    statistics = {
-        **{name: runs[0][name] for name in ("device", "seed", "options")},
-        **{"seconds": time.perf_counter() - began, "windows": runs, "levels": runs[0]["levels"]},
-        "device_seconds": sum(run["device_seconds"] for run in runs) if runs[0]["device_seconds"] is not None else None,
-    }
-    return whole.image, Output(whole.source, whole.temperature, [], statistics)
 
 
 class Whole(NamedTuple):
@@ -361,7 +294,96 @@ class Around(NamedTuple):
     place: NDArray[np.int32] | None
 
 
-def _around(job: Job, window: Window) -> Around:
+@dataclass(frozen=True)
+class Filling:
+    """The job of `fill`: a sequence of runs, one for each window.
+
+    Attributes
+    ----------
+    pixels : (rows, cols, C) array
+    hole : (rows, cols) bool array
+        The free sites.
+    sample : Pictures or None
+        What the holes are filled with; None: their surroundings.
+    reach : int or None
+        How far around a hole its sample reaches, pixels.
+    options : simdtex.methods.mrf.Options
+    channel_axis : int or None
+    """
+
+    pixels: NDArray[Any]
+    hole: Mask
+    sample: Pictures | None
+    reach: int | None
+    options: Options
+    channel_axis: int | None
+
+    name = "fill"
+
+    def inputs(self) -> dict[str, Any]:
+        """Return all that determines the result but the seed, by the names that users give it."""
+        known = np.where(self.hole[..., None], 0, self.pixels)
+        sample = self.sample and (self.sample.pixels, self.sample.known)
+        return {"options": self.options, "image": known, "mask": self.hole, "sample": sample, "reach": self.reach}
+
+    def run(
+        self, machine: Machine, seed: int, callback: Callback | None, keep: Keep = NOTHING
+    ) -> tuple[NDArray[Any], Output]:
+        """Fill one window after the other; the state is what came of the finished windows, and the present run's."""
+        shape, options = self.hole.shape, self.options
+        several = self.sample is not None and len(self.sample.pixels) > 1
+        whole = Whole(self.pixels.copy(), np.zeros(shape), np.full((*shape, 3 if several else 2), -1, np.int32))
+        if self.sample is None:
+            whole.source[:] = np.moveaxis(np.indices(shape), 0, -1)
+        radius = int(neighbourhood_offsets(options.order).max())
+        everything = [Window(slice(0, shape[0]), slice(0, shape[1]), 0)]
+        parts = everything if options.boundary == "torus" else windows(self.hole, radius, options.levels)
+        done, inside = keep.found or ([], None)
+        finished = [Made(*made) for made in done]
+        for number, window in enumerate(parts):
+            at = (window.rows, window.cols)
+            if number == len(finished):
+                around = _around(self, window)
+                seen = callback and _pasting(callback, whole, at, self.hole[at], around.corner, number, len(parts))
+                now = Keep(inside, lambda info, tree: keep.offer(info, lambda: (finished, tree())))
+                finished.append(self._window(machine, window, around, seed, seen, now))
+                inside = None
+                keep.offer(None, lambda: (finished, None))
+            found = finished[number]
+            hole = self.hole[at]
+            whole.image[at][hole], whole.temperature[at][hole] = found.values, found.temperature
+            whole.source[at][hole] = _moved(found.source, found.corner)
+        runs = [found.statistics for found in finished]
+        seconds = [run["device_seconds"] for run in runs]
+        statistics = {
+            **{name: runs[0][name] for name in ("device", "seed", "options")},
+            **{"seconds": sum(run["seconds"] for run in runs), "windows": runs, "levels": runs[0]["levels"]},
+            "device_seconds": None if None in seconds else sum(seconds),
+        }
+        return whole.image, Output(whole.source, whole.temperature, [], statistics)
+
+    def _window(
+        self, machine: Machine, window: Window, around: Around, seed: int, callback: Callback | None, keep: Keep
+    ) -> Made:
+        """Fill one window."""
+        at, options = (window.rows, window.cols), self.options
+        hole, least = self.hole[at], window.levels and options.levels is None
+        known = np.repeat(~hole[..., None], self.pixels.shape[2], -1)
+        values = np.where(known, self.pixels[at], 0).astype(self.pixels.dtype)
+        plan = mrf.plan(
+            around.pictures,
+            hole.shape,
+            replace(options, overview=LEAST) if least else options,
+            Given(values, known, around.place, suggests=False),
+            most=window.levels or None,
+        )
+        made, output = drive(plan, machine, seed, callback, keep)
+        assert output.source is not None and output.temperature is not None
+        statistics = output.statistics | {"window": [side for part in at for side in (part.start, part.stop)]}
+        return Made(around.corner, made[hole], output.temperature[hole], output.source[hole], statistics)
+
+
+def _around(job: Filling, window: Window) -> Around:
     """The sample of a window: its surroundings, or that of the job."""
     if job.sample is not None:
         return Around(job.sample, (0, 0), None)
@@ -374,39 +396,6 @@ def _around(job: Job, window: Window) -> Around:
     inside = np.indices(hole.shape) + np.array([window.rows.start - top, window.cols.start - left])[:, None, None]
     place = np.moveaxis(inside, 0, -1).astype(np.int32)
     return Around(Pictures((job.pixels[near],), unknown=(job.hole[near],)), (top, left), place)
-
-
-def _window(
-    machine: Machine,
-    job: Job,
-    window: Window,
-    around: Around,
-    options: Options,
-    seed: int,
-    callback: Callback | None,
-    keep: Keep,
-) -> tuple[NDArray[Any], Output]:
-    """Fill one window: what `simdtex.methods.mrf.synthesize` returns."""
-    at, pictures = (window.rows, window.cols), around.pictures
-    hole = job.hole[at]
-    known = np.repeat(~hole[..., None], job.pixels.shape[2], -1)
-    asked = options.levels is not None
-    if not asked and window.levels:
-        sizes = [picture.shape[:2] for picture in pictures.pixels]
-        offsets = neighbourhood_offsets(options.order)
-        most = mrf.number_of_levels(sizes, offsets, hole.shape, replace(options, overview=LEAST))
-        options = replace(options, levels=min(window.levels, most))
-    given = Given(np.where(known, job.pixels[at], 0).astype(job.pixels.dtype), known, around.place, suggests=False)
-    for levels in range(options.levels or 0, -1, -1):
-        try:
-            made, output = mrf.synthesize(machine, pictures, hole.shape, options, seed, callback, given, keep=keep)
-        except NothingUsable:  # found before anything is made
-            if asked or levels < 2:
-                raise
-            options = replace(options, levels=levels - 1)
-            continue
-        break
-    return made, output
 
 
 def _moved(source: NDArray[np.int32], corner: tuple[int, int]) -> NDArray[np.int32]:

@@ -27,8 +27,8 @@ class Inputs(NamedTuple):
         """Whether there is one sample and nothing else."""
         return self.pictures.clean and self.given is None and self.guide is None
 
-    def told(self) -> dict[str, Any]:
-        """Everything, by the names that users give it, as what identifies a run."""
+    def identity(self) -> dict[str, Any]:
+        """Return everything, by the names that users give it, as what identifies a run."""
         given = self.given
         values = given and (np.where(given.known, given.values, 0), given.known)
         return {

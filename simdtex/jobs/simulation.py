@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from importlib.metadata import version
 from math import prod
 from pathlib import Path
@@ -18,9 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.checkpoints.keep import Keep
-from simdtex.checkpoints.tree import digest
-from simdtex.envelope import begin, check_shape, restored
+from simdtex.checkpoint import Checkpoint, digest, opened
+from simdtex.driver import Keep, check_shape, drive, restored
 from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
 from simdtex.jobs.inputs import Inputs, check_array, check_inputs, check_samples
 from simdtex.machine import Machine, memory, open_machine
@@ -52,6 +50,7 @@ def simulate(
     rng: int | np.random.Generator | None = None,
     device: str | None = None,
     callback: Callback | None = None,
+    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> xarray.DataArray:
     """Realisations that look like a training image and honour data: multiple-point simulation.
@@ -82,6 +81,8 @@ def simulate(
         As in `simdtex.synthesize`.
     callback : callable, optional
         Called with a `simdtex.run.Simulating` after every realisation.
+    checkpoint
+        As in `simdtex.synthesize`; it keeps the realisations that are finished.
     **options
         Of the method ``mrf``: see `simdtex.methods.mrf.Options`; by default ``boundary`` is ``"open"`` and ``novelty``
         0.25.
@@ -123,34 +124,48 @@ def simulate(
     data, size = _known(known, shape, check_samples(training, channel_axis, mask).pixels[0], channel_axis)
     inputs = check_inputs(training, size, channel_axis, mask, data, None, guide)
     chosen = mrf.make_options(**DEFAULTS | options)
-    begun = begin("simulate", rng, lambda: {"shape": size, "n": n, "first": first, "options": chosen, **inputs.told()})
-    seed = begun.seed
+    plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
     pixels = inputs.pictures.pixels[0]
     each = 2 * prod((*size, pixels.shape[2])) * pixels.dtype.itemsize  # they are copied once
     memory.require_host(n * (each + 64))
-    seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
     made = np.empty((n, *size, pixels.shape[2]), pixels.dtype)
     machines = _machines(device, jobs, n)
-    shelf, lock = _Shelf(begun.on(machines[0].name), made), Lock()
+    finished: list[int] = []
+    lock = Lock()
 
-    def one(number: int, machine: Machine) -> None:
-        keep = shelf.keep.one(f"realisation{number}")
-        what = (inputs.pictures, size, chosen, int(seeds[number]), None, inputs.given, inputs.guide)
-        picture, _ = mrf.synthesize(machine, *what, keep)
-        with lock:
-            made[number] = picture
-            shelf.add(number, keep)
-            if callback:
-                finished, shown = len(shelf.finished), restored(picture, None if channel_axis is None else -1)
-                told = {"realisation": first + number, "finished": finished, "realisations": n}
-                callback(Simulating(level=0, levels=1, fraction=finished / n, image=lambda: shown, **told))
+    def identity() -> dict[str, Any]:
+        return {"shape": size, "n": n, "first": first, "options": chosen, **inputs.identity()}
 
-    try:
-        _in_turn(one, [number for number in range(n) if number not in shelf.finished], machines)
-    except BaseException:
-        shelf.write(now=True)
-        raise
-    begun.end()
+    def state() -> dict[str, Any]:
+        return {"numbers": list(finished), "pictures": made[finished]}
+
+    with opened(checkpoint, "simulate", rng, identity, machines[0].name) as (seed, found, offer):
+        seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
+        if found is not None:
+            finished += found["numbers"]
+            made[finished] = found["pictures"]
+
+        def keep(info: Any, tree: Callable[[], Any]) -> None:
+            if isinstance(checkpoint, Checkpoint) and checkpoint.stopping:  # a realisation has no state of its own
+                with lock:
+                    offer(info, state)
+
+        def one(number: int, machine: Machine) -> None:
+            picture, _ = drive(plan, machine, int(seeds[number]), None, Keep(None, keep))
+            with lock:
+                made[number] = picture
+                finished.append(number)
+                offer(None, state)
+                if callback:
+                    shown = restored(picture, None if channel_axis is None else -1)
+                    done = {"realisation": first + number, "finished": len(finished), "realisations": n}
+                    callback(Simulating(level=0, levels=1, fraction=len(finished) / n, image=lambda: shown, **done))
+
+        try:
+            _in_turn(one, [number for number in range(n) if number not in finished], machines)
+        except BaseException:
+            offer(None, state, now=True)  # those that wait for their turn
+            raise
     dims, arrays = ["realisation", "y", "x", "variable"], made
     if channel_axis is None:
         dims, arrays = dims[:3], made[..., 0]
@@ -160,9 +175,9 @@ def simulate(
         "x": np.arange(size[1]),
         "seed": ("realisation", seeds),
     }
-    told = _attributes(seed, chosen, machines[0].name, inputs)
-    found: xarray.DataArray = xr.DataArray(arrays, coords=coordinates, dims=dims, name="simulation", attrs=told)
-    return found
+    attributes = _attributes(seed, chosen, machines[0].name, inputs)
+    result: xarray.DataArray = xr.DataArray(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
+    return result
 
 
 def realisation_seed(seed: int, number: int) -> int:
@@ -177,57 +192,18 @@ def _machines(device: str | None, jobs: int | None, n: int) -> list[Machine]:
     return [first, *(open_machine(device) for _ in range(min(jobs, n) - 1))]
 
 
-class _Shelf:
-    """The realisations that are finished, kept some at a time.
-
-    Parameters
-    ----------
-    keep : Keep
-    made : (n, ...) array
-        Where realisations stand; those that are kept already are put there.
-    """
-
-    def __init__(self, keep: Keep, made: NDArray[Any]) -> None:
-        self.keep, self.finished = keep, set[int]()
-        self._made, self._waiting = made, dict[int, Keep]()
-        for numbers, pictures in keep.all():
-            made[numbers] = pictures
-            self.finished.update(numbers.tolist())
-
-    def add(self, number: int, keep: Keep) -> None:
-        """One more is finished; ``keep`` has its states."""
-        self.finished.add(number)
-        self._waiting[number] = keep
-        self.write()
-
-    def write(self, now: bool = False) -> None:
-        """Keep those that are not yet kept, where it is time."""
-        if not self._waiting:
-            return
-        numbers = np.array(list(self._waiting))
-        if self.keep.add(lambda: (numbers, self._made[numbers]), now=now):
-            for keep in self._waiting.values():
-                keep.drop()
-            self._waiting.clear()
-
-
 def _in_turn(one: Callable[[int, Machine], None], numbers: list[int], machines: list[Machine]) -> None:
-    """Each number on a machine that is free; the first error ends it all."""
+    """Simulate each number on a machine that is free; the first error ends it all."""
     free: SimpleQueue[Machine] = SimpleQueue()
     for machine in machines:
         free.put(machine)
 
-    @contextmanager
-    def taken() -> Iterator[Machine]:
+    def job(number: int) -> None:
         machine = free.get()
         try:
-            yield machine
+            one(number, machine)
         finally:
             free.put(machine)
-
-    def job(number: int) -> None:
-        with taken() as machine:
-            one(number, machine)
 
     with ThreadPoolExecutor(len(machines)) as workers:
         futures = [workers.submit(job, number) for number in numbers]

@@ -14,13 +14,13 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from simdtex.experiments.quality import measure
 from simdtex.io import image as pictures
 from simdtex.live import planes
 from simdtex.live.looking import Look, Plane, seen
 from simdtex.live.recipe import Step, script, shell
 from simdtex.model.source_map import apply_source_map, save_source_map
 from simdtex.options import one_of
-from simdtex.quality import measure
 
 KEPT = 24
 """Results that a page goes back to, at most."""

@@ -364,8 +364,8 @@ class Session:
         self._next, began = 0.0, time.perf_counter()
         watch = partial(self._watch, wish, asked.sample, asked.shape)
         try:
-            with levels.around():
-                image, output = asked.call(rng=settings.seed, device=self._machine(), callback=watch, full_output=True)
+            how = {"rng": settings.seed, "device": self._machine(), "checkpoint": levels.keep}
+            image, output = asked.call(callback=watch, full_output=True, **how)
         finally:
             with self._changed:
                 self._running = None

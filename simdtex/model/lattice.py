@@ -191,6 +191,15 @@ class Grid:
         """The same sites as a lattice of their own, numbered 0 .. rows * cols - 1."""
         return Grid(self.rows, self.cols, 1, self.torus)
 
+    @property
+    def above(self) -> tuple[tuple[int, int], tuple[int, int]]:
+        """First row and rows, and first column and columns, of the sites that the level above shares with this grid."""
+        (top, rows), (left, cols) = (
+            (-(-first // 2), (first + size + 1) // 2 - -(-first // 2))
+            for first, size in ((self.within.top, self.rows), (self.within.left, self.cols))
+        )
+        return (top, rows), (left, cols)
+
     def cut(self, whole: NDArray[Any]) -> NDArray[Any]:
         """The window's part of an array (..., rows, cols) over the whole lattice."""
         row = (self.within.top + np.arange(self.rows)) % self.within.rows

@@ -115,6 +115,14 @@ class Sample:
         apart: int = 0,
     ) -> None:
         self.pictures = pixels if isinstance(pixels, Pictures) else Pictures((pixels,))
+        self.layout = {
+            "values": values,
+            "margin": margin,
+            "weight": weight,
+            "step": step,
+            "unsure": unsure,
+            "apart": apart,
+        }
         self.scale, self.unsure = Scale(self.pictures, values), unsure
         self.top, self.unit, self.direct = self.scale.top, self.scale.unit, self.scale.direct
         levels = [self.scale.levels(picture) for picture in self.pictures.pixels]

@@ -1,170 +1,152 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Nonparametric multiscale Markov random field: Algorithm 1 of Paget and Longstaff (1998).
 
-`anneal` is the algorithm, `sweep` the body of its loop, and the numbers in the comments are the algorithm's own. A step
-of 6.2.2 is said first and executed at once (`simdtex.ops.relax`): the sites of a step know nothing of one another, so a
-device relaxes them in one launch. Whatever watches a run stands outside (observers.py).
+`Run.begin`, `Run.step` and `sweep` are the algorithm, and the numbers in the comments are the paper's. A step of 6.2.2
+is decided first and executed at once (`simdtex.ops.relax`): its sites do not depend on one another, so a device relaxes
+them in one launch. Progress, counts and stages are the observer's (record.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import schedules
-from simdtex.methods.mrf.level import Level, Run, State, Warm, parts
+from simdtex.checkpoint import like
+from simdtex.methods.mrf.level import Active, Info, Lattices, Level, Part, State, parts
+from simdtex.methods.mrf.record import Record, output
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import BLOCK
 from simdtex.ops import active
 from simdtex.ops.commit import commit
+from simdtex.ops.finish import around, finish
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import Relaxation, relax, relax_apart
 from simdtex.ops.snapshot import snapshot
 from simdtex.ops.start import start
 from simdtex.ops.use import price, use
+from simdtex.run import Callback, Output
+
+AT_ONCE = 2**20
+"""Sites that are finished together."""
 
 
-class Info(NamedTuple):
-    """What a sweep did.
-
-    ``level`` and ``number``, the sweep within it, from 1; ``phase`` ``"relax"`` while temperatures are above 0, then
-    ``"free"``; ``chosen`` what the schedule decided; ``ended`` whether the level ends with it.
-    """
-
-    level: int
-    number: int
-    phase: str
-    chosen: list[schedules.Info]
-    ended: bool
+Watch = Callable[[Level, State, Part], Any]
+"""Called after every part of a sweep with the state before the sweep."""
 
 
-class Part(NamedTuple):
-    """A part of a sweep: told several times a second.
-
-    ``steps`` that have begun with it; ``sites`` that it has relaxed; ``last`` whether the sweep ends with it; ``field``
-    the arrays over sites.
-    """
-
-    steps: int
-    sites: int
-    last: bool
-    field: Field
+def ignore(level: Level, state: State, part: Part) -> None:
+    """Watch nothing."""
 
 
-Watch = Callable[[Level, State, bool, Part], Any]
-"""Called after every part of a sweep, with the state before the sweep and whether it is a free one."""
+class Run(Lattices):
+    """Algorithm 1 as the driver runs it: a step enters a level or is a sweep."""
 
+    def begin(self) -> State:
+        """Return the state at the beginning of the coarsest level: sample pixels drawn at random, t = 1."""
+        everywhere = self.machine.put(self.sample.positions(np.zeros((1, 2), np.int32), 1))
+        field = start(self.machine, self.planes, everywhere, Grid(*self.plan.shape), self.seed)  # 2, 5
+        return self.enter(self.levels - 1, field)
 
-def anneal(run: Run, state: State | None = None, watch: Watch | None = None) -> Iterator[tuple[Level, State, Info]]:
-    """Algorithm 1, sweep by sweep.
+    def enter(self, number: int, field: Field) -> State:
+        """Return the state at the beginning of a level: sites of the level above have t = 0, all others t = 1."""
+        level = self.level(number)  # 3, 4, 6.1
+        return opened(level, self.conditions.entered(self.machine, number, level.setting.grid, field))
 
-    Parameters
-    ----------
-    run : Run
-        Its ``levels`` are M of step 1.
-    state : State, optional
-        What another run of the same kind has come to, to go on from there.
-    watch : callable, optional
-        Called within sweeps.
+    def step(self, state: State, watch: Watch = ignore) -> tuple[State, Info]:
+        """Run a sweep, or enter the next level if the present one has reached equilibrium."""
+        if self.at_equilibrium(state):  # 6
+            return self.enter(state.level - 1, state.field), Info(state.level - 1)
+        level = self.level(state.level)
+        state, chosen = sweep(level, state, watch)  # 6.2
+        number = state.cooling + state.free
+        return state, Info(level.number, number, tuple(chosen), self.at_equilibrium(state))
 
-    Yields
-    ------
-    level, state, info
-        After every sweep. The next one uses up the state's arrays.
-    """
-    state = begin(run) if state is None else state  # 2, 5
-    for number in reversed(range(state.level + 1)):  # 6
-        level = run.level(number)  # 3, 4, 6.1
-        if state.schedule is None or state.level != number:
-            state = enter(level, state)
-        while state.warm:  # 6.2
-            state, info = sweep(level, state, watch=watch)
-            yield level, state, info._replace(ended=not (state.warm or run.options.free_sweeps))
-        while state.free < run.options.free_sweeps:
-            state, info = sweep(level, state, free=True, watch=watch)
-            yield level, state, info._replace(ended=state.free == run.options.free_sweeps)
+    def at_equilibrium(self, state: State) -> bool:
+        """Return whether all temperatures of the level are 0 and its free sweeps are done."""
+        return not state.active and state.free == self.options.free_sweeps
 
+    def ended(self, state: State) -> bool:
+        """Return whether the finest level has reached equilibrium."""
+        return state.level == 0 and self.at_equilibrium(state)
 
-def begin(run: Run) -> State:
-    """The state before the first level: every site a pixel of the sample at random (2), at temperature 1 (5).
+    def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
+        """Return the picture (rows, cols, channels) in the sample's type, and the rest of the output."""
+        grid, given = self.grid(0), self.plan.given
+        source = grid.view(self.machine.get(state.source))
+        known = given.whole if given and given.whole.any() else None
+        image = finished(self, grid, state.field, known, source)
+        return given.shown(image, grid) if given else image, output(self, state, source, observer)
 
-    Those whose values are given have these, at temperature 0.
-    """
-    everywhere = run.machine.put(run.sample.positions(np.zeros((1, 2), np.int32), 1))
-    field = run.holding.begun(start(run.machine, run.planes, everywhere, Grid(*run.shape), run.seed))
-    return State(*field, price=None, schedule=None, level=run.levels - 1)
+    def save(self, state: State) -> dict[str, Any]:
+        """Return a copy of the state that needs no machine."""
+        planes = (np.array(self.machine.get(plane)) for plane in state.field)
+        return dict(zip(State._fields, (*planes, *state[3:]), strict=True))
 
+    def load(self, saved: dict[str, Any]) -> State:
+        """Return the state that `save` copied, on this machine."""
+        state = State(**saved)
+        level = self.level(state.level)
+        memory = like(level.schedule.init(level.setting), state.schedule)  # its types are the schedule's own
+        values, source, temperature = map(self.machine.put, state.field)
+        return state._replace(values=values, source=source, temperature=temperature, schedule=memory)
 
-def enter(level: Level, state: State) -> State:
-    """The state at the beginning of a level: sites kept from the level above have t = 0, all others t = 1.
-
-    Data between the sites stand for the nearest ones from now on, and no longer for those of the level above.
-    """
-    field = level.holding.entered(level.number, level.setting.grid, state.field)
-    return opened(level, field)
+    def observer(self, callback: Callback | None) -> Record:
+        """Return what watches this run."""
+        return Record(self, callback)
 
 
 def opened(level: Level, field: Field) -> State:
-    """The state of a level whose sites are as they are before its first sweep."""
-    warm, heat = active.survey(level.machine, level.grid, field.temperature)
-    price = priced(level, field, None)
-    return State(*field, price, level.schedule.init(level.setting), level.number, warm=warm, heat=heat)
+    """Return the state of a level before its first sweep."""
+    count, heat = active.survey(level.machine, level.grid, field.temperature)
+    penalty = price(counted(level, field, level.grid), level.market, level.rate, None)
+    return State(*field, penalty, level.schedule.init(level.setting), level.number, active=count, heat=heat)
 
 
-def sweep(level: Level, state: State, *, free: bool = False, watch: Watch | None = None) -> tuple[State, Info]:
-    """Steps 6.2.1 and 6.2.2 until about as many sites have been relaxed as were active: a sweep of the schedule.
+def sweep(level: Level, state: State, watch: Watch = ignore) -> tuple[State, list[schedules.Info]]:
+    """Relax about as many sites as are active, step by step of the schedule: 6.2.1 and 6.2.2.
 
     Parameters
     ----------
     level : Level
     state : State
-        Its arrays are used up.
-    free : bool
-        Whether all sites are active, instead of those that are warmer than 0.
-    watch : callable, optional
+        Its arrays are used up. If no site is active, the sweep is a free one, of all sites that are not known.
+    watch : callable
         Called after every part of the sweep.
 
     Returns
     -------
     state : State
-    info : Info
+    chosen : list of simdtex.schedules.Info
+        What the schedule decided.
     """
-    field, memory, chosen = swept(level, state, free=free, watch=watch)
-    hot, heat = active.survey(level.machine, level.grid, field.temperature)
+    free = not state.active
+    field, memory, chosen = swept(level, state, free, watch)
+    count, heat = active.survey(level.machine, level.grid, field.temperature)
+    penalty = price(counted(level, field, level.grid), level.market, level.rate, state.price)
     cooling, freed = state.cooling + (not free), state.free + free
-    info = Info(level.number, cooling + freed, "free" if free else "relax", chosen, False)
-    price = priced(level, field, state.price)
-    return State(*field, price, memory, level.number, cooling, freed, hot, heat), info
+    return State(*field, penalty, memory, level.number, cooling, freed, count, heat), chosen
 
 
-def swept(
-    level: Level, state: State, *, free: bool = False, watch: Watch | None = None
-) -> tuple[Field, Any, list[schedules.Info]]:
-    """The steps of a sweep: the sites after it, the schedule's state, and what the schedule chose."""
+def swept(level: Level, state: State, free: bool, watch: Watch = ignore) -> tuple[Field, Any, list[schedules.Info]]:
+    """Run the steps of a sweep; return the sites after it, the schedule's state, and what the schedule decided."""
     field, memory = exchanged(level, state.field), state.schedule
     relaxation = rule(level, state.price)
     chosen: list[schedules.Info] = []
     while not (chosen and chosen[-1].last):
-        warm = Warm(level, field.temperature, free)
-        memory, now = level.schedule.step(level.setting, memory, warm)  # 6.2.1
+        memory, now = level.schedule.step(level.setting, memory, Active(level, field.temperature, free))  # 6.2.1
         for part in relaxed(level, field, now, relaxation):  # 6.2.2
             field = part.field
-            if watch:
-                watch(level, state, free, part)
+            watch(level, state, part)
         chosen.append(now)
     return field, memory, chosen
 
 
-def priced(level: Level, field: Field, before: NDArray[np.float32] | None) -> NDArray[np.float32]:
-    """What each candidate costs during the next sweep, from how often it is used now: the same for all sites of it."""
-    return price(counted(level, field, level.grid), level.market, level.rate, before)
-
-
 def counted(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
-    """How often each candidate is used, (n,), where that says what it costs; 0 otherwise."""
+    """Return how often each candidate is used, (n,); zeros if nothing depends on it."""
     candidates = level.proposal.candidates
     if not (level.rate or level.market.kinds is not None):
         return np.zeros(candidates.size, np.int32)
@@ -172,9 +154,8 @@ def counted(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
     return found
 
 
-def rule(level: Level, price: NDArray[np.float32] | None) -> Relaxation:
-    """How a site of the level relaxes: what happens to all sites of a step in parallel."""
-    assert price is not None  # the level has begun
+def rule(level: Level, price: NDArray[np.float32]) -> Relaxation:
+    """Return how a site of the level relaxes: what happens to all sites of a step in parallel."""
     return Relaxation(
         grid=level.grid,
         offsets=level.offsets,
@@ -191,7 +172,7 @@ def rule(level: Level, price: NDArray[np.float32] | None) -> Relaxation:
 
 
 def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Relaxation) -> Iterator[Part]:
-    """Step 6.2.2 for the sites of one step after another, in parts that do not take long."""
+    """Relax the sites of one step after another, in parts that do not take long: 6.2.2."""
     machine = level.machine
     if level.in_place:
         sites, before = chosen.sites, 0
@@ -217,31 +198,43 @@ def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Rela
 
 
 def exchanged(level: Level, field: Field) -> Field:
-    """The field with an older copy below it, which other tiles see until the sweep ends, where there are tiles."""
+    """Return the field with a copy below it that other blocks see until the sweep ends, if the schedule has blocks."""
     if not level.schedule.tile:
         return field
     return Field(*(snapshot(level.machine, plane, level.grid.height) for plane in field))
 
 
-def picture(run: Run, grid: Grid, field: Field) -> NDArray[Any]:
-    """Read the picture of a level back, in the sample's type."""
-    values, source = run.machine.get(field.values), run.machine.get(field.source)
-    found = run.sample.picture(grid.view(values), grid.view(source))
-    return run.given.shown(found, grid) if run.given else found
+def finished(
+    run: Lattices, grid: Grid, field: Field, known: NDArray[np.bool_] | None, seen: NDArray[np.int32], first: int = 0
+) -> NDArray[Any]:
+    """Return the picture in the sample's type, with the finish (`simdtex.ops.finish`) if the options have one.
+
+    Parameters
+    ----------
+    run : Lattices
+    grid : Grid
+        The finest level, or a window of it.
+    field : Field
+        Of that.
+    known : (H, W) bool array, optional
+        The known sites of that.
+    seen : (rows, cols) int32 array
+        Sources on the host: of all rows, or of some.
+    first : int
+        The first of these rows.
+    """
+    sample = run.sample
+    if not run.options.finish:
+        values = grid.view(run.machine.get(field.values))[:, first : first + len(seen)]
+        return sample.picture(values, seen)
+    ring, rows = around(run.options.finish), max(1, AT_ONCE // grid.cols)
+    picture = np.empty((*seen.shape, sample.shown), sample.pixels.dtype)
+    given = run.machine.put((np.zeros((grid.height, grid.width), bool) if known is None else known).view(np.uint8))
+    for top in range(0, len(seen), rows):
+        here = seen[top : top + rows]
+        by = finish(run.machine, field, given, grid, run.planes, sample, *ring, (first + top) * grid.cols, here.size)
+        picture[top : top + rows] = sample.moved(here, by.reshape(-1, *here.shape))
+    return picture
 
 
-def warmth(run: Run, grid: Grid, field: Field) -> NDArray[np.float64]:
-    """Read the temperatures of a level back, 0 to 1."""
-    found: NDArray[np.float64] = np.ascontiguousarray(grid.view(run.machine.get(field.temperature))) / np.float64(1024)
-    return found
-
-
-def origin(run: Run, grid: Grid, field: Field) -> NDArray[np.int32]:
-    """Read back where in the sample each site of a level is from, (rows, cols, 2 or 3)."""
-    return run.sample.place(grid.view(run.machine.get(field.source)))
-
-
-__all__ = [
-    *("Info", "Part", "Watch", "anneal", "begin", "counted", "enter", "opened", "origin", "picture", "priced", "sweep"),
-    *("swept", "warmth"),
-]
+__all__ = ["Info", "Part", "Run", "Watch", "counted", "finished", "opened", "rule", "sweep", "swept"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What Algorithm 1 works on: the run, its levels, and the state that goes from sweep to sweep."""
+"""What Algorithm 1 works on: the lattices of a run, and the state that goes from sweep to sweep."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from simdtex import schedules
 from simdtex.machine.interface import Array, Machine
-from simdtex.methods.mrf.holding import Holder
+from simdtex.methods.mrf.conditioning import Conditioning, Conditions
 from simdtex.methods.mrf.options import Options
-from simdtex.model.given import Given
+from simdtex.model.given import Given, Planes
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates, Sample
 from simdtex.ops import active, lcpdf
@@ -37,8 +37,41 @@ TOGETHER = 2**16
 """Sites that one kernel relaxes between two looks at the clock."""
 
 
+@dataclass(frozen=True)
+class Input:
+    """What a run is made from, validated, on the host.
+
+    Attributes
+    ----------
+    sample : Sample
+        Y, with its structure channel and guides.
+    shape : (int, int)
+        Rows and columns of X, the output.
+    offsets : (N, 2) int32 array
+        The neighbourhood.
+    options : Options
+        As they are executed.
+    schedule : simdtex.schedules.Schedule
+    levels : int
+        M of Algorithm 1.
+    given : Given, optional
+        Conditioning data: sites of X that keep their values.
+    planes : Planes, optional
+        The same in working levels.
+    """
+
+    sample: Sample
+    shape: tuple[int, int]
+    offsets: NDArray[np.int32] = field(repr=False)
+    options: Options
+    schedule: schedules.Schedule
+    levels: int
+    given: Given | None = None
+    planes: Planes | None = None
+
+
 class State(NamedTuple):
-    """Everything that a run needs to go on between two sweeps: plain arrays and numbers.
+    """All that a run needs to go on after a sweep: arrays and numbers.
 
     Attributes
     ----------
@@ -49,32 +82,30 @@ class State(NamedTuple):
     temperature : (H, W) uint16 array
         t in 1/1024.
     price : (n,) float32 array
-        What each candidate of the level costs during the next sweep (`simdtex.ops.use`), on the host; None before the
-        level has begun.
+        Penalty of each candidate of the level during the next sweep (`simdtex.ops.use`), on the host.
     schedule : tuple of arrays and numbers
-        The schedule's own state; None before the level has begun.
+        The schedule's own state.
     level : int
         The present level, 0 the finest.
     cooling, free : int
-        Sweeps of the level done: while it cooled, and after that.
-    warm, heat : int
-        Sites of the level that are warmer than 0, and the sum of their temperatures in 1/1024.
+        Sweeps of the level done: while it cooled, and free ones.
+    active, heat : int
+        Active sites of the level, and the sum of their temperatures in 1/1024.
 
     Notes
     -----
-    During a run the arrays are those of the machine, and a sweep uses up the arrays that it is given; `off` makes a
-    copy that holds no machine, and `on` puts one on a machine.
+    The first three arrays are those of the machine, and a sweep uses up the arrays of the state before it.
     """
 
     values: Array
     source: Array
     temperature: Array
-    price: NDArray[np.float32] | None
+    price: NDArray[np.float32]
     schedule: Any
     level: int
     cooling: int = 0
     free: int = 0
-    warm: int = 0
+    active: int = 0
     heat: int = 0
 
     @property
@@ -82,15 +113,31 @@ class State(NamedTuple):
         """The arrays over sites."""
         return Field(*self[:3])
 
-    def off(self, machine: Machine) -> State:
-        """The same with arrays of NumPy, to be kept."""
-        values, source, temperature = (np.array(machine.get(array)) for array in self.field)
-        return self._replace(values=values, source=source, temperature=temperature)
 
-    def on(self, machine: Machine) -> State:
-        """The same with arrays of a machine, to go on with."""
-        values, source, temperature = (machine.put(array) for array in self.field)
-        return self._replace(values=values, source=source, temperature=temperature)
+class Info(NamedTuple):
+    """What a step did.
+
+    ``level``; ``sweep`` the sweep of the level, from 1, or 0 if the step entered the level; ``chosen`` what the
+    schedule decided; ``ended`` whether the level ends with the step.
+    """
+
+    level: int
+    sweep: int = 0
+    chosen: tuple[schedules.Info, ...] = ()
+    ended: bool = False
+
+
+class Part(NamedTuple):
+    """A part of a sweep.
+
+    ``steps`` of the schedule that have begun with it; ``sites`` that it has relaxed; ``last`` whether the sweep ends
+    with it; ``field`` the arrays over sites.
+    """
+
+    steps: int
+    sites: int
+    last: bool
+    field: Field
 
 
 class Lists:
@@ -109,28 +156,40 @@ class Lists:
         return self._known[id(sites)][1:]
 
 
-@dataclass(frozen=True)
-class Run:
-    """What stays the same throughout a run."""
+class Lattices:
+    """A plan on a machine: what stays the same throughout the run, and its levels.
 
-    machine: Machine
-    sample: Sample
-    planes: Array
-    shape: tuple[int, int]
-    offsets: NDArray[np.int32]
-    options: Options
-    schedule: schedules.Schedule
-    seed: int
-    levels: int
-    weighed: Array
-    holding: Holder = field(repr=False)
-    given: Given | None = None
-    tables: dict[int, Table] = field(default_factory=dict, repr=False)
-    last: dict[int, Level] = field(default_factory=dict, repr=False)
+    Parameters
+    ----------
+    plan : Input
+    machine : Machine
+    seed : int
+        Key of every random number.
+    conditions : Conditions, optional
+        Conditioning data and guides. None: those of the plan.
+
+    Attributes
+    ----------
+    planes : array of the machine
+        Working levels of the sample.
+    weighed : (H, W) int32 array of the machine
+        Counts the candidates that each site of the whole has weighed.
+    """
+
+    def __init__(self, plan: Input, machine: Machine, seed: int, conditions: Conditions | None = None) -> None:
+        self.plan, self.machine, self.seed, self.levels = plan, machine, seed, plan.levels
+        self.sample, self.options, self.offsets = plan.sample, plan.options, plan.offsets
+        self.planes = plan.sample.planes(machine)
+        self.weighed = machine.put(np.zeros(plan.shape if conditions is None else (1, 1), np.int32))
+        self.conditions = conditions or Conditioning(
+            plan.levels, plan.sample.guides, plan.planes, len(plan.offsets), plan.options.data_weight
+        )
+        self._tables: dict[int, Table] = {}
+        self._last: Level | None = None
 
     def grid(self, number: int) -> Grid:
-        """The lattice of a level, equation (10)."""
-        return Grid(*self.shape, 2**number, self.options.boundary == "torus")
+        """Return the lattice of a level, equation (10)."""
+        return Grid(*self.plan.shape, 2**number, self.options.boundary == "torus")
 
     def level(self, number: int, window: tuple[int, int, int, int] | None = None) -> Level:
         """Define the lattice, the neighbourhood, the candidates and the bandwidth of a level: (8), (10) and (11).
@@ -143,21 +202,21 @@ class Run:
             Row and column of the first site, rows and columns of a window of the lattice; the state's arrays then hold
             that alone, site by site. None: the whole lattice, in pictures of the output's size.
         """
-        if number not in self.last:
-            self.last.clear()  # the arrays of one level are enough to keep
-            self.last[number] = self._level(number)
-        level, machine = self.last[number], self.machine
+        if self._last is None or self._last.number != number:
+            self._last = None  # the arrays of one level are enough to keep
+            self._last = self._level(number)
+        level, machine = self._last, self.machine
         if window is None:
             return level
         grid = self.grid(number).window(*window)
         return replace(
             level,
             setting=level.setting._replace(grid=grid),
-            grid=replace(grid, tile=self.schedule.tile),
+            grid=replace(grid, tile=level.schedule.tile),
             in_place=self._in_place(grid),
             weighed=machine.put(np.zeros((grid.height, grid.width), np.int32)),
             lists=Lists(machine),
-            movable=self.holding.movable(number, grid),
+            movable=self.conditions.movable(machine, number, grid),
         )
 
     def _level(self, number: int) -> Level:
@@ -184,27 +243,26 @@ class Run:
         return Level(
             number=number,
             setting=Setting(machine, grid, offsets, options.order, self.seed, number),
-            grid=replace(grid, tile=self.schedule.tile),
+            grid=replace(grid, tile=self.plan.schedule.tile),
             offsets=machine.put(offsets),
-            schedule=self.schedule,
+            schedule=self.plan.schedule,
             proposal=proposal,
             choice=Choice(draws, options.pixel == "density", lcpdf.window(h, sample.top)),
             favour=np.float32(1 / (1 + options.coherence)),
             novelty=np.float32(novelty * sample.channels * variance),
             rate=options.balance * self.usual,
             market=self.market(number),
-            beside=self.holding.beside(len(offsets), options.data_weight),
+            beside=self.conditions.beside,
             xi=min(-1, round(options.xi * 1024)),
             in_place=self._in_place(grid),
             weighed=self.weighed,
             lists=Lists(machine),
-            holding=self.holding,
-            movable=self.holding.movable(number, grid),
+            movable=self.conditions.movable(machine, number, grid),
         )
 
     def _in_place(self, grid: Grid) -> bool:
-        independent = self.schedule.independent(grid, self.offsets)
-        return independent and not self.schedule.tile
+        schedule = self.plan.schedule
+        return schedule.independent(grid, self.offsets) and not schedule.tile
 
     @property
     def usual(self) -> float:
@@ -247,14 +305,14 @@ class Run:
 
         ``candidates`` and ``square`` are those of the level where somebody has them already.
         """
-        if number not in self.tables:
+        if number not in self._tables:
             above = self.similar(number + 1) if number < self.levels - 1 else None
             lattice = lattice_of(self.sample, *self.where(number))
             candidates = candidates or self.candidates(number)
             square = square or square_of(self.machine, self.sample, *self.where(number))
             likes = self.options.similar
-            self.tables[number] = most_similar(self.machine, self.offsets, candidates, square, lattice, likes, above)
-        return self.tables[number]
+            self._tables[number] = most_similar(self.machine, self.offsets, candidates, square, lattice, likes, above)
+        return self._tables[number]
 
 
 @dataclass(frozen=True)
@@ -294,8 +352,6 @@ class Level:
         Counts the candidates that each site has weighed.
     lists : Lists
         The schedule's lists of sites as the machine holds them.
-    holding : Holder
-        What is given.
     movable : (H, W) uint16 array of the machine, optional
         0 at sites whose values are given: free sweeps leave them alone, as all sweeps do that find their temperature 0.
         None: every site may relax.
@@ -317,7 +373,6 @@ class Level:
     in_place: bool
     weighed: Array
     lists: Lists = field(repr=False)
-    holding: Holder = field(repr=False)
     movable: Array | None = None
 
     @property
@@ -340,8 +395,8 @@ class Level:
         return max(most, TOGETHER) if isinstance(self.proposal, Listed) and self.in_place else most
 
 
-class Warm:
-    """The sites that are warmer than 0 now; or, in a free sweep, all that may relax.
+class Active:
+    """The active sites: those warmer than 0 or, in a free sweep, all that are not known.
 
     Parameters
     ----------
@@ -352,7 +407,7 @@ class Warm:
 
     def __init__(self, level: Level, temperature: Array, free: bool) -> None:
         self._level = level
-        self._plane = level.movable if free else temperature  # above 0 where a site is active; None: everywhere
+        self._plane = level.movable if free else temperature  # above 0 at active sites; None: all are active
 
     def mask(self) -> NDArray[np.bool_]:
         """Read back from the machine."""

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A tile of a level: relaxed in a window that is as much larger as a sweep reaches, it has the bits of the whole.
+"""A tile of a level: relaxed in a window that is larger by the reach of a sweep, it has the bits of the whole.
 
-All that goes in and comes out are arrays of NumPy over the sites of a lattice, so tiles may be anybody's to compute.
+Input and output are NumPy arrays over the sites of a lattice, so any process can compute any tile.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Machine
-from simdtex.methods.mrf.algorithm import counted, opened, sweep, swept
-from simdtex.methods.mrf.level import Level, Run, State
+from simdtex.methods.mrf.algorithm import Run, counted, opened, sweep, swept
+from simdtex.methods.mrf.level import Level, State
 from simdtex.model.lattice import Grid
 from simdtex.ops import active
 from simdtex.ops.neighbourhood import Field
@@ -44,14 +44,14 @@ class Framed(NamedTuple):
 
 
 class Tally(NamedTuple):
-    """What is known of a tile's sites: numbers that add up over tiles.
+    """Counts of a tile's sites, which add up over tiles.
 
-    ``counts`` (n,) how often each candidate is used; ``warm`` sites warmer than 0; ``heat`` the sum of temperatures in
+    ``counts`` (n,) how often each candidate is used; ``active`` sites; ``heat`` the sum of their temperatures in
     1/1024.
     """
 
     counts: NDArray[np.int32]
-    warm: int
+    active: int
     heat: int
 
 
@@ -70,8 +70,8 @@ def framed(lattice: Grid, tile: Tile, halo: int) -> Framed:
     return Framed(Tile(top, left, rows, cols), down, right)
 
 
-def begun(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Field, Tally]:
-    """A tile where its level begins: steps 2 and 5 of Algorithm 1, and what is kept from the level above.
+def entered(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Field, Tally]:
+    """Return a tile at the beginning of its level: steps 2 and 5 of Algorithm 1, and the sites of the level above.
 
     Parameters
     ----------
@@ -82,26 +82,24 @@ def begun(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Field
     above : Field, optional
         The sites of the level above that lie in the tile; None at the coarsest level.
     """
-    level, field = _begun(run, number, tile, above)
+    level, field = _entered(run, number, tile, above)
     return _off(run.machine, field), _tally(level, field, level.grid)
 
 
 def whole(run: Run, number: int, above: Field | None) -> Field:
-    """A level that is a single tile, after all its sweeps."""
+    """Return a level that is a single tile, after all its sweeps."""
     grid = run.grid(number)
-    level, field = _begun(run, number, Tile(0, 0, grid.rows, grid.cols), above)
+    level, field = _entered(run, number, Tile(0, 0, grid.rows, grid.cols), above)
     state = opened(level, field)
-    while state.warm:
+    while not run.at_equilibrium(state):
         state, _ = sweep(level, state)
-    while state.free < run.options.free_sweeps:
-        state, _ = sweep(level, state, free=True)
     return _off(run.machine, state.field)
 
 
 def relaxed(
     run: Run, number: int, tile: Tile, frame: Framed, field: Field, price: NDArray[np.float32], done: int, free: bool
 ) -> tuple[Field, Tally]:
-    """A tile after a sweep.
+    """Return a tile after a sweep.
 
     Parameters
     ----------
@@ -125,13 +123,13 @@ def relaxed(
         level = replace(level, schedule=Trimmed(level.schedule, frame.rows.start, frame.rows.stop))
     memory = level.schedule.init(level.setting)._replace(sweep=done)  # all that its state carries over
     state = State(*Field(*map(machine.put, field)), price, memory, number)
-    found, *_ = swept(level, state, free=free)
+    found, *_ = swept(level, state, free)
     inside = Field(*map(frame.cut, _off(machine, found)))
     inner = run.grid(number).window(*tile)
     return inside, _tally(level, Field(*map(machine.put, inside)), inner)
 
 
-def _begun(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Level, Field]:
+def _entered(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Level, Field]:
     machine, level = run.machine, run.level(number, tile)
     grid = level.setting.grid
     everywhere = machine.put(run.sample.positions(np.zeros((1, 2), np.int32), 1))
@@ -141,7 +139,7 @@ def _begun(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Leve
         for plane, kept in zip(planes, above, strict=True):
             plane[..., tile.top % 2 :: 2, tile.left % 2 :: 2] = kept
         field = Field(*map(machine.put, planes))
-    return level, run.holding.entered(number, grid, field)
+    return level, run.conditions.entered(machine, number, grid, field)
 
 
 def _tally(level: Level, field: Field, grid: Grid) -> Tally:
@@ -152,4 +150,4 @@ def _off(machine: Machine, field: Field) -> Field:
     return Field(*(np.array(machine.get(plane)) for plane in field))
 
 
-__all__ = ["Framed", "Tally", "Tile", "begun", "framed", "relaxed", "whole"]
+__all__ = ["Framed", "Tally", "Tile", "entered", "framed", "relaxed", "whole"]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """De Bonet's multiresolution sampling (1997)."""
 
-from simdtex.methods.multires.algorithm import resample, synthesize, tiled
+from simdtex.methods.multires.algorithm import Plan, Run, tiled
 from simdtex.methods.multires.alpha import STRETCH, STRETCHES, strain, suggest_alpha
 from simdtex.methods.multires.levels import differences, thresholds
 from simdtex.methods.multires.options import Options, make_options
@@ -10,12 +10,12 @@ __all__ = [
     "STRETCH",
     "STRETCHES",
     "Options",
+    "Plan",
+    "Run",
     "differences",
     "make_options",
-    "resample",
     "strain",
     "suggest_alpha",
-    "synthesize",
     "thresholds",
     "tiled",
 ]

@@ -1,22 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Multiresolution sampling: the procedure of De Bonet (1997).
 
-`analyse` (analysis.py) is the first phase; `resample` is the second, his SynthesizePyramid and CollapsePyramid level by
-level. Numbers in parentheses are the paper's equations. Level 0 is the finest.
+`analyse` (analysis.py) is the first phase; `Run` is the second, the paper's SynthesizePyramid and CollapsePyramid level
+by level. Numbers in parentheses are the paper's equations. Level 0 is the finest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Iterator
+from dataclasses import dataclass
 from math import prod
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.checkpoints.keep import NOTHING, Keep
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.multires.alpha import alpha_of
@@ -36,46 +35,70 @@ from simdtex.model.use import effective_use
 from simdtex.ops.candidates import Sampled, candidates
 from simdtex.ops.laplacian import laplacian_blend, laplacian_collapse
 from simdtex.options import within_32_bits
-from simdtex.run import Callback, Output, Sampling, Stage, device_seconds, paced
+from simdtex.run import Callback, Output, Sampling, Stage, paced
 
 VALUES = 4
 """Values for each pixel of an output that kernels number: two counts, all levels together."""
 
 
-def synthesize(
-    machine: Machine,
-    sample: NDArray[Any],
-    shape: tuple[int, int],
-    options: Options,
-    seed: int,
-    callback: Callback | None = None,
-    keep: Keep = NOTHING,
-) -> tuple[NDArray[Any], Output]:
-    """Both phases: `analyse`, then `resample`, which says what comes in and out."""
-    began, worked = perf_counter(), machine.seconds
-    within_32_bits(shape, max(VALUES, sample.shape[-1]))  # before any work
-    memory.require_host(_on_host(shape, sample.shape[-1], sample.dtype.itemsize))
-    analysis = analyse(machine, sample, **options.analysis)
-    image, output = resample(machine, analysis, shape, options, seed, callback, keep)
-    output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
-    return image, output
+@dataclass(frozen=True)
+class Plan:
+    """A run of the method ``multires`` before it has a machine and a seed.
+
+    Attributes
+    ----------
+    sample : (rows, cols, channels) array
+    shape : (int, int)
+        Rows and columns of the output.
+    options : Options
+    analysis : Analysis, optional
+        Of the sample, made on the same machine with the same options; None: `on` makes it.
+    """
+
+    sample: NDArray[Any]
+    shape: tuple[int, int]
+    options: Options
+    analysis: Analysis | None = None
+
+    def on(self, machine: Machine, seed: int) -> Run:
+        """Analyse the sample on a machine, the first phase of the paper; raise if the memory does not suffice."""
+        channels, size = self.sample.shape[-1], self.sample.dtype.itemsize
+        within_32_bits(self.shape, max(VALUES, channels))  # before any work
+        memory.require_host(_on_host(self.shape, channels, size))
+        analysis = self.analysis or analyse(machine, self.sample, **self.options.analysis)
+        return Run(machine, analysis, self.shape, self.options, seed)
 
 
-def resample(
-    machine: Machine,
-    analysis: Analysis,
-    shape: tuple[int, int],
-    options: Options,
-    seed: int,
-    callback: Callback | None = None,
-    keep: Keep = NOTHING,
-) -> tuple[NDArray[Any], Output]:
+class State(NamedTuple):
+    """The state between two launches.
+
+    ``alpha`` of (13), None with a table of thresholds; ``level`` that is sampled now, ``done`` pixels of it that are;
+    ``source``, ``counts`` of all levels, as of `simdtex.ops.candidates.Sampled`; ``picture`` G of the level above.
+    """
+
+    alpha: float | None
+    level: int
+    done: int
+    source: Array
+    counts: Array
+    picture: Array | None
+
+
+class Info(NamedTuple):
+    """What a step did: ``done`` pixels of a ``level`` are sampled; at its end, its ``stage`` and ``counts``."""
+
+    level: int
+    done: int
+    stage: Stage | None = None
+    counts: NDArray[np.int32] | None = None
+
+
+class Run:
     """The second phase of the paper: SynthesizePyramid and CollapsePyramid, level by level.
 
     Parameters
     ----------
     machine : Machine
-        What executes the steps.
     analysis : Analysis
         Of the sample, made with the same options.
     shape : (int, int)
@@ -83,147 +106,164 @@ def resample(
     options : Options
     seed : int
         Key of every random number.
-    callback : callable, optional
-        Called with a `simdtex.run.Sampling` after every piece of a level.
-    keep : Keep
-        Keeps the state after every piece of a level.
-
-    Returns
-    -------
-    image : (rows, cols, channels) array
-        In the sample's type.
-    output : simdtex.run.Output
-        Source map, stages with their source maps and candidates, statistics.
 
     Notes
     -----
-    A level is one step: no pixel depends on another of its level. Cost: for every four pixels at most the nodes above
-    them, times the features; some thousandths of that at usual thresholds. Memory on the device, in bytes per output
-    pixel: 20 + 5.3 channels, beside the analysis; on the host, where a CPU's device memory is too, 66 and 4 + n for
-    each channel, n the bytes of a value of the sample (benchmarks/memory.py). Both are asked for first.
-    """
-    began, worked = perf_counter(), machine.seconds
-    channels = len(analysis.sample.planes)
-    within_32_bits(shape, max(VALUES, channels))
-    shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
-    on_device = pixels(shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis)
-    memory.require(machine, on_device, _on_host(shape, channels, analysis.sample.pixels.dtype.itemsize))
-    kept = keep.found
-    alpha = alpha_of(machine, analysis, options) if kept is None else kept["alpha"]
-    structure = structure_of(machine, analysis, thresholds(analysis.levels, options, alpha))
-    record = _Record(shapes, callback, kept and kept["seconds"])
-
-    top = analysis.levels - 1
-    sampled = copied(machine, shapes, analysis.shapes[top]) if kept is None else _restored(machine, shapes, kept)
-    picture = None
-    for level in reversed(range(analysis.levels)):  # Loop i from top level downto 0
-        if level < top:
-            done = _done(kept, level, shapes)
-            for first, end in paced(pixels([shapes[level]]), first_launch(analysis, level), done):  # Loop x', y'
-                match = options.parity == "match"
-                sampled = candidates(machine, structure, sampled, level, first, end, match, seed)  # (9) to (12)
-                machine.sync()
-                record.tell(level, end)
-                keep.offer(partial(_kept, machine, sampled, shapes, level, end, alpha, record))
-        source, counts = read_sources(machine, sampled, shapes, level)
-        picture = _collapsed(machine, analysis, level, source, picture, options.seams == "blend")  # CollapsePyramid
-        image = analysis.sample.picture(machine.get(picture), source if level == 0 else None)
-        given = analysis.place.ravel()[source].astype(np.int32) if level == 0 else source
-        place, nodes = places(given, analysis.shapes[level][1]), pixels(analysis.shapes[level + 1 :])
-        record.end(Stage(level, image, place, np.ascontiguousarray(counts[..., 0])), counts, nodes)
-
-    used: dict[str, Any] = {"alpha": alpha, "levels": analysis.levels}
-    if options.thresholds is not None:
-        used["thresholds"] = np.asarray(options.thresholds).tolist()
-    statistics = {
-        "device": machine.name,
-        "seed": seed,
-        "options": vars(options) | used,
-        "seconds": perf_counter() - began,
-        "device_seconds": device_seconds(machine, worked),
-        "levels": record.reports,
-        "use": effective_use(place, analysis.shapes[0]).as_dict(),
-    }
-    return image, Output(place, None, record.stages, statistics)
-
-
-def _kept(
-    machine: Machine,
-    sampled: Sampled,
-    shapes: list[tuple[int, int]],
-    level: int,
-    end: int,
-    alpha: float | None,
-    record: _Record,
-) -> dict[str, Any]:
-    """The state of a run: what is sampled of this level, as far as it goes, and all of those above."""
-    begin = pixels(shapes[:level])
-    source, counts = machine.get(sampled.source[begin:]), machine.get(sampled.counts[begin:])
-    told = {"alpha": alpha, "seconds": record.seconds}
-    return {"level": level, "end": end, "source": source, "counts": counts, **told}
-
-
-def _restored(machine: Machine, shapes: Sequence[tuple[int, int]], kept: dict[str, Any]) -> Sampled:
-    """What `_kept` gave, on a machine."""
-    more = pixels(shapes[: kept["level"]])
-    source, counts = np.pad(kept["source"], (more, 0)), np.pad(kept["counts"], ((more, 0), (0, 0)))
-    return Sampled(machine.put(source), machine.put(counts), machine.put(lattice(shapes, 0)))
-
-
-def _done(kept: dict[str, Any] | None, level: int, shapes: Sequence[tuple[int, int]]) -> int:
-    """How many pixels of a level a run that is gone on with has sampled."""
-    if kept is None or level < kept["level"]:
-        return 0
-    return int(kept["end"]) if level == kept["level"] else pixels([shapes[level]])
-
-
-class _Record:
-    """The stages and reports of a run as it goes on, and what its callback is told of them.
-
-    ``before`` are the seconds that levels took before the run was gone on with.
+    No pixel depends on another of its level; a step samples some pixels of a level, or collapses the level. Cost: for
+    every four pixels at most the nodes above them, times the features; some thousandths of that at usual thresholds.
+    Memory on the device, in bytes per output pixel: 20 + 5.3 channels, beside the analysis; on the host, which includes
+    a CPU's device memory, 66 and 4 + n for each channel, n the bytes of a value of the sample (benchmarks/memory.py).
     """
 
     def __init__(
-        self, shapes: list[tuple[int, int]], callback: Callback | None, before: list[float] | None = None
+        self, machine: Machine, analysis: Analysis, shape: tuple[int, int], options: Options, seed: int
     ) -> None:
+        channels = len(analysis.sample.planes)
+        within_32_bits(shape, max(VALUES, channels))
+        self.machine, self.analysis, self.options, self.seed = machine, analysis, options, seed
+        self.shapes = [tiled(shape, analysis.shapes[0], own, 2**level) for level, own in enumerate(analysis.shapes)]
+        on_device = pixels(self.shapes) * (12 + 4 * channels) + prod(shape) * 4 + _held(analysis)
+        memory.require(machine, on_device, _on_host(shape, channels, analysis.sample.pixels.dtype.itemsize))
+        self._lattice = machine.put(lattice(self.shapes, 0))
+        self._launches: Iterator[tuple[int, int]] = iter(())
+
+    def begin(self) -> State:
+        """Return the state whose top level is the sample's, copied and repeated."""
+        top = self.analysis.levels - 1
+        sampled = copied(self.machine, self.shapes, self.analysis.shapes[top])
+        alpha = alpha_of(self.machine, self.analysis, self.options)
+        return self._prepared(State(alpha, top, pixels([self.shapes[top]]), sampled.source, sampled.counts, None))
+
+    def _prepared(self, state: State) -> State:
+        """Return the state, once what launches need is ready."""
+        table = thresholds(self.analysis.levels, self.options, state.alpha)
+        self._structure = structure_of(self.machine, self.analysis, table)
+        return self._entered(state)
+
+    def _entered(self, state: State) -> State:
+        """Return the state, once the launches of its level are planned."""
+        if 0 <= state.level < self.analysis.levels - 1:
+            count, least = pixels([self.shapes[state.level]]), first_launch(self.analysis, state.level)
+            self._launches = paced(count, least, state.done)
+        return state
+
+    def step(self, state: State, watch: Any = None) -> tuple[State, Info]:
+        """Sample some pixels of the level, (9) to (12), or collapse it if all are sampled."""
+        level, sampled = state.level, Sampled(state.source, state.counts, self._lattice)
+        if state.done < pixels([self.shapes[level]]):  # Loop x', y'
+            first, end = next(self._launches)
+            match = self.options.parity == "match"
+            sampled = candidates(self.machine, self._structure, sampled, level, first, end, match, self.seed)
+            self.machine.sync()
+            return state._replace(done=end, source=sampled.source, counts=sampled.counts), Info(level, end)
+        analysis = self.analysis
+        source, counts = read_sources(self.machine, sampled, self.shapes, level)
+        picture = self._collapsed(level, source, state.picture)  # CollapsePyramid
+        image = analysis.sample.picture(self.machine.get(picture), source if level == 0 else None)
+        given = analysis.place.ravel()[source].astype(np.int32) if level == 0 else source
+        place = places(given, analysis.shapes[level][1])
+        stage = Stage(level, image, place, np.ascontiguousarray(counts[..., 0]))
+        after = state._replace(level=level - 1, done=0, picture=picture)  # Loop i from top level downto 0
+        return self._entered(after), Info(level, state.done, stage, counts)
+
+    def _collapsed(self, level: int, source: NDArray[np.int32], coarse: Array | None) -> Array:
+        """Return G of a level of the output, from its source map and G of the level above."""
+        band = self.analysis.bands[level]
+        if coarse is None:
+            residue = self.machine.get(band)
+            return self.machine.put(np.ascontiguousarray(residue.reshape(len(residue), -1)[:, source]))
+        collapse = laplacian_blend if self.options.seams == "blend" else laplacian_collapse
+        return collapse(self.machine, band, self.machine.put(source), coarse, self.analysis.torus)
+
+    def ended(self, state: State) -> bool:
+        """Return whether all levels are collapsed."""
+        return state.level < 0
+
+    def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
+        """Return the finest level's picture, with its source map, stages and statistics."""
+        finest = observer.stages[-1]
+        assert finest.source is not None
+        used: dict[str, Any] = {"alpha": state.alpha, "levels": self.analysis.levels}
+        if self.options.thresholds is not None:
+            used["thresholds"] = np.asarray(self.options.thresholds).tolist()
+        statistics = {
+            "options": vars(self.options) | used,
+            "levels": observer.reports,
+            "use": effective_use(finest.source, self.analysis.shapes[0]).as_dict(),
+        }
+        return finest.image, Output(finest.source, None, observer.stages, statistics)
+
+    def save(self, state: State) -> dict[str, Any]:
+        """Return a copy of the state that needs no machine."""
+        get = self.machine.get
+        picture = None if state.picture is None else get(state.picture)
+        return state._replace(source=get(state.source), counts=get(state.counts), picture=picture)._asdict()
+
+    def load(self, saved: dict[str, Any]) -> State:
+        """Return the state that `save` copied, on this machine."""
+        state, put = State(**saved), self.machine.put
+        picture = None if state.picture is None else put(state.picture)
+        return self._prepared(state._replace(source=put(state.source), counts=put(state.counts), picture=picture))
+
+    def observer(self, callback: Callback | None) -> Record:
+        """Return what watches this run."""
+        return Record(self, callback)
+
+
+class Record:
+    """The stages and reports of a run, and its progress.
+
+    Parameters
+    ----------
+    run : Run
+    callback : callable, optional
+        Called with a `simdtex.run.Sampling` after every launch and at every level's end.
+    """
+
+    def __init__(self, run: Run, callback: Callback | None) -> None:
         self.stages: list[Stage] = []
         self.reports: list[dict[str, Any]] = []
-        self._shapes, self._callback = shapes, callback
-        self._before, self._began = before or [], perf_counter()
+        self._run, self._callback, self._began = run, callback, perf_counter()
 
-    @property
-    def seconds(self) -> list[float]:
-        """What each level took, and the present one so far."""
-        return [*(report["seconds"] for report in self.reports), self._so_far()]
+    def part(self, *seen: Any) -> None:
+        """See nothing: steps are short."""
 
-    def _so_far(self) -> float:
-        before = self._before[len(self.reports)] if len(self.reports) < len(self._before) else 0.0
-        return before + perf_counter() - self._began
-
-    def tell(self, level: int, sampled: int, ended: bool = False) -> None:
-        """So many pixels of a level are sampled. Pictures are those of the last stage, which has been read back."""
+    def step(self, state: State, info: Info) -> None:
+        """Report the pixels that are sampled; at a level's end, keep its stage and report it."""
+        if info.stage is not None and info.counts is not None:
+            self._end(info.stage, info.counts)
         if self._callback:
-            share = (pixels(self._shapes[level + 1 :]) + sampled) / pixels(self._shapes)
-            last = self.stages[-1]
-            now: dict[str, Any] = {"level": level, "levels": len(self._shapes), "fraction": share}
+            shapes, last = self._run.shapes, self.stages[-1]
+            share = (pixels(shapes[info.level + 1 :]) + info.done) / pixels(shapes)
+            now: dict[str, Any] = {"level": info.level, "levels": len(shapes), "fraction": share}
             now |= {"image": lambda: last.image, "candidates": lambda: last.candidates}
-            self._callback(Sampling(end_of_level=ended, **now))
+            self._callback(Sampling(end_of_level=info.stage is not None, **now))
 
-    def end(self, stage: Stage, counts: NDArray[np.int32], nodes: int) -> None:
-        """A level is done; counts (rows, cols, 2) are candidates and nodes compared, of so many nodes."""
+    def _end(self, stage: Stage, counts: NDArray[np.int32]) -> None:
+        """Keep a level's stage; counts (rows, cols, 2) are candidates and nodes compared."""
         self.stages.append(stage)
         rows, cols = counts.shape[:2]
         mean, compared = (float(np.ascontiguousarray(counts[..., k]).mean()) for k in range(2))
-        report = {
-            "level": stage.level,
-            "rows": rows,
-            "cols": cols,
-            "candidates": mean,
-            "most": int(counts[..., 0].max()),
-        }
-        self.reports.append(report | {"nodes": nodes, "compared": compared, "seconds": self._so_far()})
+        self.reports.append(
+            {
+                **{"level": stage.level, "rows": rows, "cols": cols},
+                **{"candidates": mean, "most": int(counts[..., 0].max())},
+                **{"nodes": pixels(self._run.analysis.shapes[stage.level + 1 :]), "compared": compared},
+                "seconds": perf_counter() - self._began,
+            }
+        )
         self._began = perf_counter()
-        self.tell(stage.level, rows * cols, ended=True)
+
+    def save(self) -> dict[str, Any]:
+        """Return all that was seen, as plain arrays and numbers."""
+        stages = [tuple(vars(stage).values()) for stage in self.stages]
+        return {"stages": stages, "reports": self.reports, "seconds": perf_counter() - self._began}
+
+    def load(self, saved: dict[str, Any]) -> None:
+        """Go on from what `save` returned."""
+        self.stages[:] = [Stage(*stage) for stage in saved["stages"]]
+        self.reports[:] = saved["reports"]
+        self._began = perf_counter() - saved["seconds"]
 
 
 def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int], spacing: int) -> tuple[int, int]:
@@ -240,18 +280,6 @@ def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int],
     """
     rows, cols = (n // m * k + -(-(n % m) // spacing) for n, m, k in zip(shape, sample, own, strict=True))
     return rows, cols
-
-
-def _collapsed(
-    machine: Machine, analysis: Analysis, level: int, source: NDArray[np.int32], coarse: Array | None, blend: bool
-) -> Array:
-    """G of a level of the output, from its source map and G of the level above."""
-    band = analysis.bands[level]
-    if coarse is None:
-        residue = machine.get(band)
-        return machine.put(np.ascontiguousarray(residue.reshape(len(residue), -1)[:, source]))
-    collapse = laplacian_blend if blend else laplacian_collapse
-    return collapse(machine, band, machine.put(source), coarse, analysis.torus)
 
 
 def _on_host(shape: tuple[int, int], channels: int, itemsize: int) -> int:

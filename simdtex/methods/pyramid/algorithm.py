@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pyramid matching: the procedure of Heeger and Bergen (1995).
 
-`match_texture` is their Match-texture, `Matcher` (matcher.py) their Match-Histogram, `Transform` (pyramids.py) their
-Make-Pyramid and Collapse-Pyramid. Solid textures (solid.py) and mixtures (mixtures.py) are the same program with
-another pyramid and with other histograms.
+`Run` is their Match-texture, `Matcher` (matcher.py) their Match-Histogram, `Transform` (pyramids.py) their Make-Pyramid
+and Collapse-Pyramid. Solid textures (solid.py) and mixtures (mixtures.py) are the same program with another pyramid and
+with other histograms.
 """
 
 from __future__ import annotations
@@ -12,12 +12,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import prod
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.checkpoints.keep import NOTHING, Keep
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.pyramid.histograms import Histograms, histograms
@@ -29,7 +28,7 @@ from simdtex.model.stretched import Stretched
 from simdtex.ops.matching import match_ranks
 from simdtex.ops.noise import noise
 from simdtex.options import within_32_bits
-from simdtex.run import Callback, Iterating, Output, device_seconds
+from simdtex.run import Callback, Iterating, Output
 
 RESIDUE = 8
 """Rows and columns that the low-pass residue has at least, where the number of levels is not given."""
@@ -112,35 +111,32 @@ def analyse(machine: Machine, sample: NDArray[Any], options: Options, *pyramids:
 # -- match-texture --------------------------------------------------------------------------------------------
 
 
-def synthesize(
-    machine: Machine,
-    sample: NDArray[Any],
-    shape: tuple[int, int],
-    options: Options,
-    seed: int,
-    callback: Callback | None = None,
-    keep: Keep = NOTHING,
-) -> tuple[NDArray[Any], Output]:
-    """Analyse the sample and make more of it, see `match_texture`."""
-    began, worked = perf_counter(), machine.seconds
-    levels = number_of_levels(options, *shape, *sample.shape[:2])
-    texture = analyse(machine, sample, options, transform(machine, options, levels, options.edges == "wrap"))
-    image, output = synthesize_from(machine, texture, shape, options, levels, seed, callback, keep)
-    output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
-    return image, output
+@dataclass(frozen=True)
+class Plan:
+    """A run of the method ``pyramid`` before it has a machine and a seed.
+
+    Attributes
+    ----------
+    sample : (rows, cols, channels) array
+    shape : (int, int)
+        Rows and columns of the output.
+    options : Options
+    """
+
+    sample: NDArray[Any]
+    shape: tuple[int, int]
+    options: Options
+
+    def on(self, machine: Machine, seed: int) -> Run:
+        """Analyse the sample on a machine; raise if the memory does not suffice."""
+        levels = number_of_levels(self.options, *self.shape, *self.sample.shape[:2])
+        pyramid = transform(machine, self.options, levels, self.options.edges == "wrap")
+        return picture_run(machine, analyse(machine, self.sample, self.options, pyramid), self, levels, seed)
 
 
-def synthesize_from(
-    machine: Machine,
-    texture: Texture,
-    shape: tuple[int, int],
-    options: Options,
-    levels: int,
-    seed: int,
-    callback: Callback | None = None,
-    keep: Keep = NOTHING,
-) -> tuple[NDArray[Any], Output]:
-    """A picture of a texture whose histograms are known, see `match_texture`."""
+def picture_run(machine: Machine, texture: Texture, plan: Any, levels: int, seed: int) -> Run:
+    """Return the run that makes a picture of ``plan.shape`` with ``plan.options`` match a texture."""
+    shape, options = plan.shape, plan.options
     within_32_bits(shape, max(VALUES, len(texture.histograms)))
     check_memory(machine, shape, texture, MEMORY)
     pyramid = transform(machine, options, levels, torus=True)
@@ -150,7 +146,7 @@ def synthesize_from(
         matched = match_subbands(matcher, pyramid.names, synthesis_pyr, wanted)
         return pyramid.collapse(matched)  # Collapse-Pyramid(synthesis-pyr)
 
-    return match_texture(machine, texture, shape, turn, options, levels, seed, callback, keep)
+    return Run(machine, texture, shape, turn, options, levels, seed)
 
 
 def check_memory(machine: Machine, shape: tuple[int, ...], texture: Texture, on_device: int) -> None:
@@ -172,105 +168,131 @@ Turn = Callable[[Array, list[Wanted], Matcher, Callable[[float], None]], Array]
 """One turn of the loop, but for the pixels: pyramid of the picture, subbands matched, collapsed."""
 
 
-def match_texture(
-    machine: Machine,
-    texture: Texture,
-    shape: tuple[int, ...],
-    turn: Turn,
-    options: Options,
-    levels: int,
-    seed: int,
-    callback: Callback | None = None,
-    keep: Keep = NOTHING,
-) -> tuple[NDArray[Any], Output]:
-    """Match-texture of the paper, for each of the decorrelated channels.
+class State(NamedTuple):
+    """The state between two channels' turns.
+
+    ``turns`` done, all channels and iterations together; ``pictures`` (1, 1, ...) int32 arrays of the machine, one for
+    each channel that varies; ``moved`` how far values were moved in this iteration, as of `Matcher.moved`.
+    """
+
+    turns: int
+    pictures: tuple[Array, ...]
+    moved: tuple[Any, ...] = ()
+
+
+class Info(NamedTuple):
+    """What a step did: ``turns`` done, and at the end of an iteration the distances of the histograms by subband."""
+
+    turns: int
+    distances: dict[str, float] | None
+    pictures: tuple[Array, ...]
+
+
+class Run:
+    """Match-texture of the paper, for each of the decorrelated channels; a step is one channel's turn.
 
     Parameters
     ----------
     machine : Machine
-        What executes the steps.
     texture : Texture
         What is to be matched.
     shape : (rows, cols) or (depth, rows, cols)
         Of the output.
     turn : callable
-        What makes, matches and collapses the pyramid of a picture.
+        Makes, matches and collapses the pyramid of a picture.
     options : Options
     levels : int
         Of the pyramids.
     seed : int
         Key of every random number.
-    callback : callable, optional
-        Called with a `simdtex.run.Iterating` after every channel, and after every part of a solid's turn.
-    keep : Keep
-        Keeps the state after every channel's turn.
-
-    Returns
-    -------
-    image : (*shape, channels) array
-        In the sample's type.
-    output : simdtex.run.Output
-        Statistics: how far the histograms of each iteration were from the sample's.
 
     Notes
     -----
-    Memory in bytes per pixel: 160 on the device (240 per voxel of a block); on the host, where a CPU's device memory is
-    too, 20 + (20 + 3 n) channels, n the bytes of a value of the sample. Both are asked for before the run.
+    Memory in bytes per pixel: 160 on the device (240 per voxel of a block); on the host, which includes a CPU's device
+    memory, 20 + (20 + 3 n) channels, n the bytes of a value of the sample.
     """
-    began, worked = perf_counter(), machine.seconds
-    matcher = Matcher(machine, options, seed)
-    channels = enumerate(texture.histograms)
-    busy = [c for c, own in channels if own.pixels[0, 0] < own.pixels[0, -1]]  # the others are flat
-    pixels = {c: matcher.wanted(texture.histograms[c].pixels) for c in busy}
-    subbands = {c: [matcher.wanted(band) for band in texture.histograms[c].subbands] for c in busy}
-    begun, kept = _begin(machine, texture, shape, options, seed), keep.found
-    if kept is None:
-        pictures = {c: matcher.match("pixels", begun(c), pixels[c]) for c in busy}  # Match-Histogram(noise, texture)
-    else:
-        pictures = {c: machine.put(picture) for c, picture in zip(busy, kept["pictures"], strict=True)}
 
-    def read() -> list[NDArray[np.int32]]:
-        return [
-            machine.get(pictures[c]).reshape(shape) if c in pictures else np.full(shape, own.pixels[0, 0])
-            for c, own in enumerate(texture.histograms)
-        ]
+    def __init__(
+        self,
+        machine: Machine,
+        texture: Texture,
+        shape: tuple[int, ...],
+        turn: Turn,
+        options: Options,
+        levels: int,
+        seed: int,
+    ) -> None:
+        self.machine, self.texture, self.shape, self.options = machine, texture, shape, options
+        self.levels, self.seed, self._turn = levels, seed, turn
+        self.matcher = Matcher(machine, options, seed)
+        found = texture.histograms
+        self.busy = [c for c, own in enumerate(found) if own.pixels[0, 0] < own.pixels[0, -1]]  # the others are flat
+        self._pixels = [self.matcher.wanted(found[c].pixels) for c in self.busy]
+        self._subbands = [[self.matcher.wanted(band) for band in found[c].subbands] for c in self.busy]
 
-    record = _Record(options.iterations, len(busy), lambda: texture.image(read()), len(shape) == 3, callback)
-    matcher.distances()  # forget those of the noise
-    if kept is not None:
-        matcher.restore(kept["moved"])
-        record.restore(kept)
+    def begin(self) -> State:
+        """Return noise with the histograms of the sample's pixels: Match-Histogram(noise, texture)."""
+        begun = _begin(self.machine, self.texture, self.shape, self.options, self.seed)
+        pairs = zip(self.busy, self._pixels, strict=True)
+        pictures = tuple(self.matcher.match("pixels", begun(c), pixels) for c, pixels in pairs)
+        self.matcher.moved.clear()  # those of the noise
+        return State(0, pictures)
 
-    def state() -> dict[str, Any]:
-        return {"pictures": [machine.get(pictures[c]) for c in busy], "moved": matcher.kept(), **record.kept()}
+    def step(self, state: State, watch: Callable[[State, float], None]) -> tuple[State, Info]:
+        """Match the subbands and the pixels of the next channel: the body of Loop for several iterations."""
+        c, matcher = state.turns % len(self.busy), self.matcher
+        matcher.moved[:] = state.moved
+        picture = self._turn(state.pictures[c], self._subbands[c], matcher, lambda share: watch(state, share))
+        picture = matcher.match("pixels", picture.reshape(state.pictures[c].shape), self._pixels[c])
+        self.machine.sync()
+        pictures = (*state.pictures[:c], picture, *state.pictures[c + 1 :])
+        distances = matcher.distances() if c == len(self.busy) - 1 else None
+        after = State(state.turns + 1, pictures, tuple(matcher.moved))
+        return after, Info(after.turns, distances, pictures)
 
-    for iteration in range(1 + len(record.reports), options.iterations + 1):  # Loop for several iterations do
-        for c in busy[record.turns - (iteration - 1) * len(busy) :]:
-            picture = turn(pictures[c], subbands[c], matcher, record.part)
-            pictures[c] = matcher.match("pixels", picture.reshape(pictures[c].shape), pixels[c])
-            machine.sync()
-            record.turn(c == busy[-1])
-            if c != busy[-1]:
-                keep.offer(state)
-        record.end(iteration, matcher.distances())
-        keep.offer(state)
-    record.nothing_to_do()
-    if texture.own is not None and busy:  # grey: the k-th smallest pixel becomes the k-th smallest of the sample
-        ranks = machine.put(np.arange(texture.own.size, dtype=np.int32)[None])
-        order = matcher.order(pictures[0].reshape((1, prod(shape))))
-        image = texture.own[machine.get(match_ranks(machine, order, ranks)).reshape(*shape, 1)]
-    else:
-        image = texture.image(read())
-    kept = {name: value for name, value in vars(options).items() if name != "start"}
-    statistics = {
-        "device": machine.name,
-        "seed": seed,
-        "options": kept | {"levels": levels},
-        "seconds": perf_counter() - began,
-        "device_seconds": device_seconds(machine, worked),
-        "iterations": record.reports,
-    }
-    return image, Output(None, None, [], statistics)
+    def ended(self, state: State) -> bool:
+        """Return whether all iterations are done."""
+        return state.turns >= self.options.iterations * len(self.busy)
+
+    def read(self, pictures: tuple[Array, ...]) -> NDArray[Any]:
+        """Read back the image that the channels' pictures stand for."""
+        found = dict(zip(self.busy, pictures, strict=True))
+        return self.texture.image(
+            [
+                self.machine.get(found[c]).reshape(self.shape) if c in found else np.full(self.shape, own.pixels[0, 0])
+                for c, own in enumerate(self.texture.histograms)
+            ]
+        )
+
+    def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
+        """Return the image (*shape, channels) in the sample's type, and the statistics."""
+        observer.nothing_done(state)
+        own, machine = self.texture.own, self.machine
+        if own is not None and self.busy:  # grey: the k-th smallest pixel becomes the k-th smallest of the sample
+            ranks = machine.put(np.arange(own.size, dtype=np.int32)[None])
+            order = self.matcher.order(state.pictures[0].reshape((1, prod(self.shape))))
+            image = own[machine.get(match_ranks(machine, order, ranks)).reshape(*self.shape, 1)]
+        else:
+            image = self.read(state.pictures)
+        options = {name: value for name, value in vars(self.options).items() if name != "start"}
+        statistics = {"options": options | {"levels": self.levels}, "iterations": observer.reports}
+        return image, Output(None, None, [], statistics)
+
+    def save(self, state: State) -> dict[str, Any]:
+        """Return a copy of the state that needs no machine."""
+        get = self.machine.get
+        moved = [(name, get(array), scale) for name, array, scale in state.moved]
+        return State(state.turns, tuple(map(get, state.pictures)), tuple(moved))._asdict()
+
+    def load(self, saved: dict[str, Any]) -> State:
+        """Return the state that `save` copied, on this machine."""
+        put = self.machine.put
+        moved = tuple((name, put(array), scale) for name, array, scale in saved["moved"])
+        return State(saved["turns"], tuple(map(put, saved["pictures"])), moved)
+
+    def observer(self, callback: Callback | None) -> Record:
+        """Return what watches this run."""
+        return Record(self, callback)
 
 
 def _begin(
@@ -298,58 +320,56 @@ def _own_channels(image: NDArray[Any]) -> NDArray[np.int32]:
     return channels.reshape(-1, *image.shape[:-1])
 
 
-class _Record:
-    """What a run reports of its iterations, and what its callback is told."""
+class Record:
+    """The reports of a run's iterations, and its progress.
 
-    def __init__(
-        self,
-        iterations: int,
-        channels: int,
-        image: Callable[[], NDArray[Any]],
-        solid: bool,
-        callback: Callback | None,
-    ) -> None:
+    Parameters
+    ----------
+    run : Run
+    callback : callable, optional
+        Called with a `simdtex.run.Iterating` after every channel's turn, and after every part of a solid's.
+    """
+
+    def __init__(self, run: Run, callback: Callback | None) -> None:
         self.reports: list[dict[str, Any]] = []
-        self.turns = 0
-        self._iterations, self._channels = iterations, channels
-        self._image, self._solid, self._callback = image, solid, callback
-        self._began = perf_counter()
+        self._run, self._callback, self._began = run, callback, perf_counter()
 
-    def kept(self) -> dict[str, Any]:
-        """What is to be kept of it."""
-        return {"turns": self.turns, "reports": self.reports, "seconds": perf_counter() - self._began}
+    def part(self, state: State, share: float) -> None:
+        """Report a share of the present channel's turn."""
+        self._report(state.turns + share, state.pictures, ended=False)
 
-    def restore(self, kept: dict[str, Any]) -> None:
-        """Go on from what `kept` gave."""
-        self.turns, self.reports, self._began = kept["turns"], kept["reports"], perf_counter() - kept["seconds"]
+    def step(self, state: State, info: Info) -> None:
+        """Report a channel's turn, and note the end of an iteration."""
+        self._report(info.turns, info.pictures, ended=info.distances is not None)
+        if info.distances is not None:
+            seconds, self._began = perf_counter() - self._began, perf_counter()
+            number = len(self.reports) + 1
+            self.reports.append({"iteration": number, "seconds": seconds, "distances": info.distances})
 
-    def part(self, share: float) -> None:
-        """A share of the present channel's turn is done."""
-        self._tell(share, ended=False)
+    def nothing_done(self, state: State) -> None:
+        """If there was no turn, because nothing varies or no iteration is wanted, complete the reports."""
+        if not self._run.busy:
+            wanted = range(1, self._run.options.iterations + 1)
+            self.reports[:] = [{"iteration": number, "seconds": 0.0, "distances": {}} for number in wanted]
+        if not state.turns:
+            self._call(1.0, self._run.options.iterations, state.pictures, ended=False)
 
-    def turn(self, ended: bool) -> None:
-        """A channel's turn is over, and with it perhaps the iteration."""
-        self.turns += 1
-        self._tell(0.0, ended)
+    def _report(self, done: float, pictures: tuple[Array, ...], ended: bool) -> None:
+        iterations, channels = self._run.options.iterations, len(self._run.busy)
+        iteration = min(iterations, int(done / channels) + (not ended))
+        self._call(done / (iterations * channels), iteration, pictures, ended)
 
-    def end(self, iteration: int, distances: dict[str, float]) -> None:
-        """An iteration is over."""
-        seconds, self._began = perf_counter() - self._began, perf_counter()
-        self.reports.append({"iteration": iteration, "seconds": seconds, "distances": distances})
-
-    def nothing_to_do(self) -> None:
-        """Where there was no turn at all, be it that nothing varies or that no iteration was asked for, say so once."""
-        if self._callback and not self.turns:
-            self._call(1.0, self._iterations, ended=False)
-
-    def _tell(self, share: float, ended: bool) -> None:
+    def _call(self, fraction: float, iteration: int, pictures: tuple[Array, ...], ended: bool) -> None:
         if self._callback:
-            done = self.turns + share
-            iteration = min(self._iterations, int(done / self._channels) + (not ended))
-            self._call(done / (self._iterations * self._channels), iteration, ended)
+            now: dict[str, Any] = {"level": 0, "levels": 1, "fraction": fraction, "end_of_iteration": ended}
+            now |= {"iteration": iteration, "iterations": self._run.options.iterations}
+            solid = len(self._run.shape) == 3
+            self._callback(Iterating(image=lambda: self._run.read(pictures), solid=solid, **now))
 
-    def _call(self, fraction: float, iteration: int, ended: bool) -> None:
-        now: dict[str, Any] = {"level": 0, "levels": 1, "fraction": fraction, "image": self._image}
-        now |= {"iteration": iteration, "iterations": self._iterations, "end_of_iteration": ended}
-        if self._callback:
-            self._callback(Iterating(solid=self._solid, **now))
+    def save(self) -> dict[str, Any]:
+        """Return all that was seen, as plain arrays and numbers."""
+        return {"reports": self.reports, "seconds": perf_counter() - self._began}
+
+    def load(self, saved: dict[str, Any]) -> None:
+        """Go on from what `save` returned."""
+        self.reports[:], self._began = saved["reports"], perf_counter() - saved["seconds"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import prod
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,12 +49,17 @@ class Matcher:
     options : Options
     seed : int
         Of the order in which equal values come.
+
+    Attributes
+    ----------
+    moved : list of (str, array of the machine, (bands,) array)
+        How far values were moved since `distances` was called last: name of the subband, sums, and their unit.
     """
 
     def __init__(self, machine: Machine, options: Options, seed: int) -> None:
         self._machine, self._options, self._seed = machine, options, seed
         self._first: dict[int, Array] = {}
-        self._moved: list[tuple[str, Array, NDArray[np.float64]]] = []
+        self.moved: list[tuple[str, Array, NDArray[np.float64]]] = []
 
     def wanted(self, values: NDArray[np.int32]) -> Wanted:
         """The histogram of sorted values (bands, m), as `match` takes it."""
@@ -77,7 +81,7 @@ class Matcher:
             matched = match_lookup(self._machine, segments, wanted.table)
             moved = distance(self._machine, segments, matched)
         self._machine.sync(MATCHING * bands * planes * prod(shape))
-        self._moved.append((name, moved, wanted.deviations * planes * prod(shape)))
+        self.moved.append((name, moved, wanted.deviations * planes * prod(shape)))
         return matched.reshape(values.shape)
 
     def order(self, segments: Array) -> Array:
@@ -92,19 +96,11 @@ class Matcher:
             self._first[n] = sort(self._machine, bits, itself).reshape(n)
         return self._first[n]
 
-    def kept(self) -> list[tuple[str, NDArray[Any], NDArray[np.float64]]]:
-        """How far values were moved since the last call of `distances`, to be kept."""
-        return [(name, self._machine.get(moved), scale) for name, moved, scale in self._moved]
-
-    def restore(self, kept: list[tuple[str, NDArray[Any], NDArray[np.float64]]]) -> None:
-        """Go on from what `kept` gave."""
-        self._moved = [(name, self._machine.put(moved), scale) for name, moved, scale in kept]
-
     def distances(self) -> dict[str, float]:
         """Mean distance that the values of each subband were moved since the last call, in its standard deviations."""
         found: dict[str, list[float]] = {}
-        for name, moved, scale in self._moved:
+        for name, moved, scale in self.moved:
             total = np.asarray(self._machine.get(moved)).reshape(len(scale), -1).sum(1)
             found.setdefault(name, []).append(float((total / scale).mean()))
-        self._moved.clear()
+        self.moved.clear()
         return {name: float(np.mean(several)) for name, several in found.items()}

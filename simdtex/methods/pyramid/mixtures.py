@@ -4,15 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from numbers import Integral
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.checkpoints.keep import Keep
-from simdtex.envelope import begin, check_shape, executed, with_channels_last
+from simdtex.driver import PlannedJob, check_shape, execute, with_channels_last
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, memory
 from simdtex.methods.pyramid import algorithm as pyramid
@@ -22,7 +21,7 @@ from simdtex.methods.pyramid.palette import decorrelated
 from simdtex.methods.pyramid.palette import palette as colours_of
 from simdtex.model.stretched import Stretched
 from simdtex.options import one_of, real, whole
-from simdtex.run import Callback, Output, device_seconds
+from simdtex.run import Callback, Output
 
 __all__ = ["mix"]
 
@@ -44,6 +43,7 @@ def mix(
     device: str | Machine | None = None,
     callback: Callback | None = None,
     full_output: bool = False,
+    checkpoint: Any = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
     """A texture that looks a bit like each of several, by pyramid matching.
@@ -74,7 +74,7 @@ def mix(
         Where there is a palette, whose pixels the output's histogram is matched to.
     channel_axis : int, optional
         The axis that holds channels; None for grey samples.
-    rng, device, callback, full_output
+    rng, device, callback, full_output, checkpoint
         As in `simdtex.synthesize`.
     **options
         See `simdtex.methods.pyramid.Options`; ``start`` is a picture to begin with in place of noise.
@@ -111,31 +111,57 @@ def mix(
     if palette is not None:
         _check_number("palette", palette, len(pictures))
     chosen = make_options(**with_channels_last(options, channel_axis))
-    begun = begin(
-        "mix",
-        rng,
-        lambda: {
-            **{"shape": size, "options": chosen, "samples": pictures, "average": weights, "palette": palette},
-            **{"low": low, "high": high, "split": split, "blend": blend, "pixels": pixels},
-        },
-    )
+    sides = None if low is None or high is None else (low, high, split)
+    plan = Mixture(pictures, size, chosen, weights, sides, palette, blend, pixels)
+    return execute(PlannedJob("mix", plan, plan.inputs, channel_axis), rng, device, callback, full_output, checkpoint)
 
-    def run(machine: Machine, seen: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
-        began, worked = perf_counter(), machine.seconds
-        used = [i for i, weight in enumerate(weights) if weight] + ([] if palette is None else [palette])
-        levels = pyramid.number_of_levels(chosen, *size, *(side for i in used for side in pictures[i].shape[:2]))
-        blender = _Blender(machine, pictures, weights, palette, chosen, levels)
-        if low is not None and high is not None:
-            finest = _high_subbands(split, levels, chosen.pyramid)
-            found = blender.spliced(low, high, finest)
+
+@dataclass(frozen=True)
+class Mixture:
+    """A mixture before it has a machine and a seed.
+
+    Attributes
+    ----------
+    pictures : list of (rows, cols, channels) arrays
+    shape : (int, int)
+        Rows and columns of the output.
+    options : Options
+    weights : list of float
+        Of each picture in the pattern.
+    sides : (int, int, int or None) or None
+        Which pictures low and high frequencies are taken from, and the split between them.
+    palette : int, optional
+    blend, pixels : str
+        As of `mix`.
+    """
+
+    pictures: list[NDArray[Any]]
+    shape: tuple[int, int]
+    options: Options
+    weights: list[float]
+    sides: tuple[int, int, int | None] | None
+    palette: int | None
+    blend: str
+    pixels: str
+
+    def inputs(self) -> dict[str, Any]:
+        """Return all that determines the result but the seed."""
+        return dict(vars(self))
+
+    def on(self, machine: Machine, seed: int) -> pyramid.Run:
+        """Analyse the samples on a machine."""
+        used = [i for i, weight in enumerate(self.weights) if weight]
+        used += [] if self.palette is None else [self.palette]
+        sizes = (side for i in used for side in self.pictures[i].shape[:2])
+        levels = pyramid.number_of_levels(self.options, *self.shape, *sizes)
+        blender = _Blender(machine, self, levels)
+        if self.sides is not None:
+            low, high, split = self.sides
+            found = blender.spliced(low, high, _high_subbands(split, levels, self.options.pyramid))
         else:
-            found = blender.averaged(blend)
-        texture = blender.texture(found, palette if pixels == "palette" else None)
-        image, output = pyramid.synthesize_from(machine, texture, size, chosen, levels, begun.seed, seen, keep)
-        output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
-        return image, output
-
-    return executed(device, channel_axis, callback, full_output, run, begun)
+            found = blender.averaged(self.blend)
+        texture = blender.texture(found, self.palette if self.pixels == "palette" else None)
+        return pyramid.picture_run(machine, texture, self, levels, seed)
 
 
 class _Blender:
@@ -144,16 +170,9 @@ class _Blender:
     Samples that are blended are decorrelated together, so that their channels mean the same.
     """
 
-    def __init__(
-        self,
-        machine: Machine,
-        pictures: list[NDArray[Any]],
-        weights: list[float],
-        palette: int | None,
-        options: Options,
-        levels: int,
-    ) -> None:
-        self._weights = weights
+    def __init__(self, machine: Machine, mixture: Mixture, levels: int) -> None:
+        pictures, weights, options = mixture.pictures, mixture.weights, mixture.options
+        self._weights, palette = weights, mixture.palette
         self._used = [i for i, weight in enumerate(weights) if weight]
         memory.require(machine, max(p.shape[0] * p.shape[1] for p in pictures) * pyramid.MEMORY)
         together = np.concatenate([p.reshape(-1, 1, p.shape[-1]) for p in pictures])

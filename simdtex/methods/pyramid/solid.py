@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Solid textures: section 4 of Heeger and Bergen (1995).
 
-The program is `simdtex.methods.pyramid.match_texture`; only the pyramids differ. A 2-D Laplacian pyramid of the sample
+The program is `simdtex.methods.pyramid.Run`; only the pyramids differ. A 2-D Laplacian pyramid of the sample
 is matched by the 3-D Laplacian pyramid of a block, and a steerable pyramid of the sample by those of all slices.
 """
 
@@ -11,29 +11,26 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import prod
-from time import perf_counter
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.checkpoints.keep import NOTHING, Keep
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.pyramid import options as pyramid
 from simdtex.methods.pyramid.algorithm import (
     VALUES,
+    Run,
     analyse,
     check_memory,
     match_subbands,
-    match_texture,
     number_of_levels,
     transform,
 )
 from simdtex.methods.pyramid.matcher import Matcher, Wanted
 from simdtex.ops.solid import solid_band, solid_collapse, solid_mean, solid_reduce, solid_turn
 from simdtex.options import build, within_32_bits, words
-from simdtex.run import Callback, Output, device_seconds
 
 FAMILIES = {"x-y": ((0, 1, 2), (0, 1, 2)), "x-z": ((1, 0, 2), (1, 0, 2)), "y-z": ((2, 0, 1), (1, 2, 0))}
 """Slices by name: the axes in the order slice, row, column, and the order that turns them back."""
@@ -71,40 +68,35 @@ def make_options(**given: Any) -> Options:
     return build(Options, "solid", given)
 
 
-def synthesize(
-    machine: Machine,
-    sample: NDArray[Any],
-    shape: tuple[int, int, int],
-    options: Options,
-    seed: int,
-    callback: Callback | None = None,
-    keep: Keep = NOTHING,
-) -> tuple[NDArray[Any], Output]:
-    """Analyse the sample and make a block of it.
+@dataclass(frozen=True)
+class Plan:
+    """A solid texture before it has a machine and a seed.
 
-    Parameters
+    Attributes
     ----------
-    machine : Machine
     sample : (rows, cols, channels) array
     shape : (depth, rows, cols)
         Of the block.
     options : Options
-    seed : int
-    callback : callable, optional
-    keep : Keep
-        Keeps the state after every channel's turn.
-
-    Returns
-    -------
-    volume : (depth, rows, cols, channels) array
-        In the sample's type.
-    output : simdtex.run.Output
-
-    Notes
-    -----
-    Cost: 5000 multiply-adds and 25 sorted values for every voxel, channel and iteration, with four orientations.
     """
-    began, worked = perf_counter(), machine.seconds
+
+    sample: NDArray[Any]
+    shape: tuple[int, int, int]
+    options: Options
+
+    def on(self, machine: Machine, seed: int) -> Run:
+        """Analyse the sample on a machine; raise if the memory does not suffice.
+
+        Notes
+        -----
+        Cost: 5000 multiply-adds and 25 sorted values for every voxel, channel and iteration, with four orientations.
+        """
+        return block_run(machine, self, seed)
+
+
+def block_run(machine: Machine, plan: Plan, seed: int) -> Run:
+    """Return the run that makes a block match the sample."""
+    sample, shape, options = plan.sample, plan.shape, plan.options
     within_32_bits(shape, max(VALUES, sample.shape[-1]))
     memory.require(machine, prod(shape) * MEMORY)  # before any work
     levels, oriented = number_of_levels(options, *shape, *sample.shape[:2]), options.pyramid == "steerable"
@@ -130,9 +122,7 @@ def synthesize(
                 del solids[0]
         return solid_mean(machine, solids) if len(solids) > 1 else solids[0]
 
-    volume, output = match_texture(machine, texture, shape, turn, options, levels, seed, callback, keep)
-    output.statistics.update(seconds=perf_counter() - began, device_seconds=device_seconds(machine, worked))
-    return volume, output
+    return Run(machine, texture, shape, turn, options, levels, seed)
 
 
 def _matched_block(machine: Machine, block: Array, wanted: list[Wanted], matcher: Matcher) -> Array:

@@ -1,115 +1,92 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a run of the method ``mrf`` is before there is a machine: all on the host, checked."""
+"""The plan of a run of the method ``mrf``: all of its input, validated, on the host."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import schedules
-from simdtex.machine.interface import Array, Machine
-from simdtex.methods.mrf.holding import Holder, Holding
-from simdtex.methods.mrf.level import Run, number_of_levels
+from simdtex.machine import Machine, memory
+from simdtex.methods.mrf.algorithm import Run
+from simdtex.methods.mrf.level import Input, number_of_levels
 from simdtex.methods.mrf.options import CATEGORIES as MOST
 from simdtex.methods.mrf.options import Options
-from simdtex.model.given import Given, Planes, planes
+from simdtex.model.given import Given, planes
 from simdtex.model.guide import Beside, Guide
-from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import NothingUsable, Sample
 from simdtex.ops.finish import around
+from simdtex.options import SMALLER, within_32_bits
+
+TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.distributed"
+"""The remedy if an output is too large for this machine."""
 
 LABELS = 64
-"""Labels of a guide, at most: each is a channel."""
+"""The most labels of a guide: each is a channel."""
+
+GuidePair = tuple[tuple[NDArray[Any], ...], NDArray[Any]]
+"""A guide: (rows, cols, G) arrays, one for each picture of the sample, and (H, W, G) of the output."""
 
 
-class Kit(NamedTuple):
-    """What a sample is laid out with beside its pictures: see `simdtex.model.sample.Sample`."""
+class Plan(Input):
+    """A run of the method ``mrf`` before it has a machine and a seed."""
 
-    values: int
-    margin: int
-    weight: float
-    step: int
-    unsure: float
-    apart: int
+    def on(self, machine: Machine, seed: int) -> Run:
+        """Lay the plan out on a machine; raise if its memory does not suffice.
 
-    def sample(self, pictures: Pictures, beside: Sequence[Beside]) -> Sample:
-        """The sample."""
-        return Sample(pictures, self.values, self.margin, self.weight, self.step, beside, self.unsure, self.apart)
-
-
-@dataclass(frozen=True)
-class Outline:
-    """A run without a machine.
-
-    Attributes
-    ----------
-    sample : Sample
-    kit : Kit
-        What it is laid out with.
-    shape : (int, int)
-        Rows and columns of X.
-    offsets : (N, 2) int32 array
-        The neighbourhood.
-    options : Options
-        As they are executed.
-    schedule : simdtex.schedules.Schedule
-    seed : int
-    levels : int
-    laid : Planes, optional
-        Given values as the field has them.
-    """
-
-    sample: Sample
-    kit: Kit
-    shape: tuple[int, int]
-    offsets: NDArray[np.int32] = field(repr=False)
-    options: Options
-    schedule: schedules.Schedule
-    seed: int
-    levels: int
-    laid: Planes | None = None
-
-    def holding(self, machine: Machine) -> Holding:
-        """What is given, of the whole output."""
-        finest = Grid(*self.shape, 1, self.options.boundary == "torus")
-        return Holding(machine, finest, self.levels, self.sample.guides, self.laid)
-
-    def run(self, machine: Machine, holding: Holder, weighed: Array) -> Run:
-        """The run on a machine; ``weighed`` counts the candidates that each site of the whole has weighed."""
-        return Run(
-            machine=machine,
-            sample=self.sample,
-            planes=self.sample.planes(machine),
-            shape=self.shape,
-            offsets=self.offsets,
-            options=self.options,
-            schedule=schedules.Checked(self.schedule) if self.options.check_schedule else self.schedule,
-            seed=self.seed,
-            levels=self.levels,
-            weighed=weighed,
-            holding=holding,
-        )
+        Notes
+        -----
+        Memory on the device, in bytes: 18 + 2 channels per output pixel (24 + 4 channels with the schedule ``block``),
+        14 channels + 4 similar + 159 per pixel of the sample with its margin, and the machine's scratch memory or, if
+        that is more, 65 per candidate. On the host, which includes a CPU's device memory: 84 per output pixel (100
+        with ``block``) and 10 + 1.5 n for each of its channels, n the bytes of a value of the sample, and 64 per pixel
+        of the sample (benchmarks/memory.py).
+        """
+        copies = 2 if self.schedule.tile else 1
+        pixels, channels = self.shape[0] * self.shape[1], len(self.sample.working)
+        within_32_bits(self.shape, channels * copies, TILED)
+        field, held = copies * (6 + 2 * channels), self.sample.rows * self.sample.cols
+        each = 68 + 16 * copies + channels * (10 + 3 * self.sample.pixels.dtype.itemsize // 2)
+        device = pixels * (12 + field) + held * (14 * channels + 159 + 4 * self.options.similar)
+        memory.require(machine, device, pixels * each + 64 * held, TILED)
+        return Run(self, machine, seed)
 
 
-def outlined(
-    pixels: NDArray[Any] | Pictures,
+def plan(
+    pictures: Pictures,
     shape: tuple[int, int],
     options: Options,
-    seed: int,
     given: Given | None = None,
-    guide: tuple[tuple[NDArray[Any], ...], NDArray[Any]] | None = None,
-) -> Outline:
-    """Check what a run is given, and lay its sample out; arguments as of `simdtex.methods.mrf.synthesize`."""
-    pictures = options.of(pixels if isinstance(pixels, Pictures) else Pictures((pixels,)))
+    guide: GuidePair | None = None,
+    most: int | None = None,
+) -> Plan:
+    """Validate the input of a run, and lay its sample out.
+
+    Parameters
+    ----------
+    pictures : Pictures
+        Y, the sample.
+    shape : (int, int)
+        Rows and columns of X, the output.
+    options : Options
+    given : Given, optional
+        Conditioning data of X.
+    guide : GuidePair, optional
+        Which label or number belongs where in Y and in X.
+    most : int, optional
+        The most levels, if the options leave their number open.
+    """
+    pictures = options.of(pictures)
     check_categories(pictures, given, options)
     options = options.resolved(pictures)
     offsets = neighbourhood_offsets(options.order)
     levels = number_of_levels([picture.shape[:2] for picture in pictures.pixels], offsets, shape, options)  # 1
+    levels = levels if most is None or options.levels is not None else min(levels, most)
     beside: list[Beside] = [check_guide(guide, options)] if guide else []
     if given and given.partly:
         if options.pixel == "density":
@@ -118,9 +95,11 @@ def outlined(
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in beside)
     heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or beside else 1.0  # in sums of squares
     values = round(heavy * (channels * len(offsets) + len(beside)))
-    levels, kit, sample = sampled(pictures, levels, offsets, values, options, beside)
-    laid = planes(given, sample) if given and given.whole.any() else None
-    return Outline(sample, kit, shape, offsets, options, schedules.get(options.schedule), seed, levels, laid)
+    levels, sample = sampled(pictures, levels, offsets, values, options, beside)
+    known = planes(given, sample) if given and given.whole.any() else None
+    schedule = schedules.get(options.schedule)
+    schedule = schedules.Checked(schedule) if options.check_schedule else schedule
+    return Plan(sample, shape, offsets, options, schedule, levels, given, known)
 
 
 def sampled(
@@ -130,13 +109,13 @@ def sampled(
     values: int,
     options: Options,
     beside: Sequence[Beside],
-) -> tuple[int, Kit, Sample]:
-    """How many levels there are, and the sample; fewer, where some level has no candidate and nobody asked for it."""
+) -> tuple[int, Sample]:
+    """Return the number of levels and the sample: fewer levels if one has no candidate and their number is open."""
     far = int(around(options.finish)[0].max()) if options.finish else 0
     for fewer in range(levels, 0, -1):
         step = 2 ** (fewer - 1)
-        kit = Kit(values, int(offsets.max()) * step, options.structure, step, options.unsure, far)
-        sample = kit.sample(pictures, beside)
+        margin = int(offsets.max()) * step
+        sample = Sample(pictures, values, margin, options.structure, step, beside, options.unsure, far)
         try:
             for number in range(fewer):
                 sample.allowed(offsets, 2**number, options.phases, options.edges)
@@ -145,18 +124,18 @@ def sampled(
                 raise
             continue
         break
-    return fewer, kit, sample
+    return fewer, sample
 
 
 def check_categories(pictures: Pictures, given: Given | None, options: Options) -> None:
-    """Raise where a category is given that the sample does not have, or a share of one."""
+    """Raise if a known value or a proportion is of a category that the sample lacks."""
     for variable in range(pictures.pixels[0].shape[-1]):
         categories = pictures.categories(variable)
         if categories is None:
             continue
         if given:
-            told = np.unique(given.values[given.known[..., variable], variable])
-            strange = told[~np.isin(told, categories)]
+            asked = np.unique(given.values[given.known[..., variable], variable])
+            strange = asked[~np.isin(asked, categories)]
             if strange.size:
                 raise ValueError(
                     f"known has the category {strange[0]} and the sample has {_listed(categories)}; give one of these"
@@ -176,8 +155,8 @@ def check_categories(pictures: Pictures, given: Given | None, options: Options) 
             )
 
 
-def check_guide(guide: tuple[tuple[NDArray[Any], ...], NDArray[Any]], options: Options) -> Guide:
-    """The guide with its kind and weight; raises where it names a label that the sample lacks."""
+def check_guide(guide: GuidePair, options: Options) -> Guide:
+    """Return the guide with its kind and weight; raise if it asks for a label that the sample lacks."""
     if options.pixel == "density":
         raise ValueError('a guide chooses among pixels of the sample; give pixel="source"')
     samples, output = guide
@@ -188,9 +167,9 @@ def check_guide(guide: tuple[tuple[NDArray[Any], ...], NDArray[Any]], options: O
     if labels:
         for channel in range(output.shape[-1]):
             there = np.unique(np.concatenate([np.unique(one[..., channel]) for one in samples]))
-            told = np.unique(output[..., channel])
-            told = told[~np.isnan(told)] if told.dtype.kind == "f" else told
-            strange = told[~np.isin(told, there)]
+            asked = np.unique(output[..., channel])
+            asked = asked[~np.isnan(asked)] if asked.dtype.kind == "f" else asked
+            strange = asked[~np.isin(asked, there)]
             if strange.size:
                 raise ValueError(
                     f"the guide of the output asks for the label {strange[0]} and that of the sample has "
@@ -202,6 +181,6 @@ def check_guide(guide: tuple[tuple[NDArray[Any], ...], NDArray[Any]], options: O
 
 
 def _listed(values: NDArray[Any]) -> str:
-    """Up to ten values in words."""
+    """Return up to ten values as text."""
     words = [str(value) for value in values[:10]]
     return ", ".join(words) + (", ..." if len(values) > 10 else "")

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil
 
-from simdtex.methods.mrf.outline import Outline
+from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.tiles import Tile, framed
 from simdtex.model.lattice import Grid
 from simdtex.ops.finish import around
@@ -39,7 +39,7 @@ PIXEL = 400, 40
 
 
 @dataclass(frozen=True)
-class LevelPlan:
+class LevelLayout:
     """A level in tiles.
 
     Attributes
@@ -123,12 +123,12 @@ class LevelPlan:
 
 
 @dataclass(frozen=True)
-class Plan:
+class Layout:
     """An output in tiles.
 
     Attributes
     ----------
-    levels : tuple of LevelPlan
+    levels : tuple of LevelLayout
         The finest first.
     channels : int
         Of the sites' values.
@@ -140,7 +140,7 @@ class Plan:
         Bytes that the store needs at most, uncompressed: two states of the finest level, the output, one level above.
     """
 
-    levels: tuple[LevelPlan, ...]
+    levels: tuple[LevelLayout, ...]
     channels: int
     workers: int
     memory: int
@@ -158,12 +158,14 @@ class Plan:
         return [*found, f"a worker needs at most {memory:.0f} MiB, the store {disk:.0f} MiB before compression"]
 
 
-def planned(outline: Outline, tile: int, workers: int) -> Plan:
+def planned(plan: Plan, seed: int, tile: int, workers: int) -> Layout:
     """Cut an output into tiles.
 
     Parameters
     ----------
-    outline : Outline
+    plan : simdtex.methods.mrf.Plan
+        Of the whole output.
+    seed : int
     tile : int
         Sites to the side of the largest tiles.
     workers : int
@@ -176,60 +178,60 @@ def planned(outline: Outline, tile: int, workers: int) -> Plan:
     """
     whole("tiles", tile, 1)
     whole("workers", workers, 1, MOST)
-    options, schedule = outline.options, outline.schedule
+    options, schedule = plan.options, plan.schedule
     if not (schedule.windows and isinstance(schedule, Windowed)) or options.array:
         given = f"array {options.array}" if options.array else f"schedule {schedule.name}"
         raise ValueError(f"{given} needs the whole output at once; give the schedule coloring, or leave tiles out")
-    count = ceil(outline.shape[0] / tile) * ceil(outline.shape[1] / tile)
+    count = ceil(plan.shape[0] / tile) * ceil(plan.shape[1] / tile)
     if count > TILES:
         raise ValueError(f"tiles of {tile}x{tile} pixels are {count}, more than {TILES}; give larger ones")
     levels = []
-    for number in range(outline.levels):
-        sides, least = [tile], max(SMALLEST, _halo(outline, number))
+    for number in range(plan.levels):
+        sides, least = [tile], max(SMALLEST, _halo(plan, seed, number))
         while number and sides[-1] // 2 >= least:
             sides.append(sides[-1] // 2)
-        some = [_level(outline, number, side) for side in sides]
+        some = [_level(plan, seed, number, side) for side in sides]
         levels.append(min(some, key=lambda one: _span(one, workers)))
-    return laid(outline, [one.side for one in levels], workers)
+    return laid(plan, seed, [one.side for one in levels], workers)
 
 
-def laid(outline: Outline, sides: Sequence[int], workers: int) -> Plan:
+def laid(plan: Plan, seed: int, sides: Sequence[int], workers: int) -> Layout:
     """The plan of tiles whose sides, level by level, are known."""
-    sample, levels = outline.sample, tuple(_level(outline, number, side) for number, side in enumerate(sides))
+    sample, levels = plan.sample, tuple(_level(plan, seed, number, side) for number, side in enumerate(sides))
     channels = sample.working.shape[0]
-    window = max(max(one.window for one in levels), _shown(levels[0], outline.options.finish or 0))
+    window = max(max(one.window for one in levels), _shown(levels[0], plan.options.finish or 0))
     memory = (
         PROCESS + window * (SITE[0] + SITE[1] * channels) + sample.rows * sample.cols * (PIXEL[0] + PIXEL[1] * channels)
     )
-    sites = outline.shape[0] * outline.shape[1]
+    sites = plan.shape[0] * plan.shape[1]
     shown = sites * sample.shown * sample.pixels.dtype.itemsize
     disk = int(sites * (6 + 2 * channels) * 2.25) + shown
-    return Plan(levels, channels, workers, memory, disk)
+    return Layout(levels, channels, workers, memory, disk)
 
 
-def _halo(outline: Outline, number: int) -> int:
+def _halo(plan: Plan, seed: int, number: int) -> int:
     """Sites that a sweep reaches: each of its steps as far as a neighbourhood does."""
-    options, lattice = outline.options, Grid(*outline.shape, 2**number)
+    options, lattice = plan.options, Grid(*plan.shape, 2**number)
     grid = Grid(lattice.rows, lattice.cols, 1, options.boundary == "torus")
-    assert isinstance(outline.schedule, Windowed)
-    return outline.schedule.count(grid, options.order, outline.seed) * int(outline.offsets.max())
+    assert isinstance(plan.schedule, Windowed)
+    return plan.schedule.count(grid, options.order, seed) * int(plan.offsets.max())
 
 
-def _level(outline: Outline, number: int, side: int) -> LevelPlan:
-    lattice, torus = Grid(*outline.shape, 2**number), outline.options.boundary == "torus"
-    return LevelPlan(number, lattice.rows, lattice.cols, side, _halo(outline, number), torus)
+def _level(plan: Plan, seed: int, number: int, side: int) -> LevelLayout:
+    lattice, torus = Grid(*plan.shape, 2**number), plan.options.boundary == "torus"
+    return LevelLayout(number, lattice.rows, lattice.cols, side, _halo(plan, seed, number), torus)
 
 
-def _span(level: LevelPlan, workers: int) -> float:
+def _span(level: LevelLayout, workers: int) -> float:
     """What a sweep of a level takes, in sites that one worker relaxes."""
     if level.count == 1:
         return level.rows * level.cols
     return ceil(level.count / workers) * level.relaxed(level.tile(0))
 
 
-def _shown(level: LevelPlan, sd: float) -> int:
+def _shown(level: LevelLayout, sd: float) -> int:
     reach = int(around(sd)[0].max(initial=0)) if sd else 0
     return min(level.side + 2 * reach, level.rows) * min(level.side + 2 * reach, level.cols)
 
 
-__all__ = ["LevelPlan", "Plan", "laid", "planned"]
+__all__ = ["Layout", "LevelLayout", "laid", "planned"]

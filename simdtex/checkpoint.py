@@ -1,0 +1,457 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Checkpoints: one file that holds the latest state of a run, so that the run can be stopped and resumed.
+
+The file describes the call (version, function, digests of its input, seed, command line) and holds one state of the
+driver (`simdtex.driver.drive`). It is written atomically with a checksum, and nothing in it is pickled.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from importlib.metadata import version
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any, BinaryIO
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.io.atomic import Damaged, check_target, lock, read_checked, write_checked
+from simdtex.options import real
+from simdtex.random import as_seed
+
+FORMAT = 2
+"""Format of the file; another one is refused."""
+
+FIRST = 1.0
+"""Seconds before the first state is written, at least."""
+
+SHARE = 75
+"""Seconds between two writes over the seconds that the last one took: writing takes at most 1/76 of the time."""
+
+SPEED = 2.0**27
+"""Bytes a second that the first write is assumed to manage."""
+
+NAMES = {"job": "call", "shape": "shape of the output"}
+"""Names of inputs in messages, if they differ from the input's own."""
+
+
+class Pace:
+    """When to write a state.
+
+    Parameters
+    ----------
+    every : float, optional
+        Seconds between two writes. None: at least a second, and 75 times what the last write took; the first write, and
+        one of more than twice the bytes of the last, waits 75 times what it should take.
+    """
+
+    def __init__(self, every: float | None) -> None:
+        self._every = every
+        self._since = time.perf_counter()
+        self._next = self._since + (FIRST if every is None else every)
+        self._size = 0
+
+    @property
+    def due(self) -> bool:
+        """Whether it is time to write."""
+        return time.perf_counter() >= self._next
+
+    def early(self, began: float, size: int) -> bool:
+        """Return whether a write of so many bytes, collected since ``began``, should wait longer, and postpone it."""
+        now = time.perf_counter()
+        if self._every is not None or size <= 2 * self._size:
+            return False
+        self._next = self._since + SHARE * (now - began + size / SPEED)
+        return now < self._next
+
+    def wrote(self, began: float, size: int) -> None:
+        """Note a write of so many bytes that began then and ends now."""
+        now, self._size = time.perf_counter(), size
+        self._since = now
+        self._next = now + (max(FIRST, SHARE * (now - began)) if self._every is None else self._every)
+
+
+class Checkpoint:
+    """A file that keeps the latest state of one run.
+
+    Public functions take one, or the file's path, as ``checkpoint``. If the file exists, the run goes on from its
+    state, and the result has the bytes of a run that was never stopped. With a path, the file is removed when the
+    function returns; with a Checkpoint, by `remove`.
+
+    Parameters
+    ----------
+    path : path
+        The file; its folder must exist. One process at a time uses it.
+    every : float, optional
+        Seconds between two writes at least; 0 writes after every step. None: a second, and 75 times what the last write
+        took, so that writing takes less than 2 % of the time.
+    command : dict, optional
+        The command line, for ``simdtex resume``.
+    note : callable, optional
+        Receives a sentence for the user. None: a warning.
+
+    Attributes
+    ----------
+    running : bool
+        Whether a run is going on, which `stop` stops after its present step.
+    resumed : bool
+        Whether that run went on from a state.
+
+    Notes
+    -----
+    A state takes on disk about what the run takes on the device. If writing fails, the run goes on and tries again.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        every: float | None = None,
+        command: dict[str, Any] | None = None,
+        note: Callable[[str], None] | None = None,
+    ) -> None:
+        if every is not None:
+            real("every", every, 0)
+        self.path = Path(os.path.abspath(path))
+        check_target(self.path)
+        self.running = self.resumed = self.stopping = False
+        self._every, self._command, self._note = every, command, note or _warn
+        self._failed = self._used = self._saved = False
+        self._about: dict[str, Any] = {}
+        self._pace = Pace(every)
+
+    def stop(self) -> None:
+        """Write the state after the present step, and raise KeyboardInterrupt there.
+
+        A callback or a signal handler may call it.
+        """
+        self.stopping = True
+
+    def remove(self) -> None:
+        """Remove the file: the run is finished."""
+        self.path.unlink(missing_ok=True)
+
+    @contextmanager
+    def opened(
+        self, job: str, rng: Any, inputs: Callable[[], dict[str, Any]], device: str
+    ) -> Iterator[tuple[int, Any, Callable[..., bool]]]:
+        """Lock the file, and begin a run or resume the run in the file.
+
+        Parameters
+        ----------
+        job : str
+            The public function.
+        rng : None, int or numpy.random.Generator
+            As of `simdtex.random.as_seed`; None takes the seed of the run in the file.
+        inputs : callable
+            Returns everything else that determines the result, by name.
+        device : str
+            The device's name.
+
+        Yields
+        ------
+        seed : int
+        found : tree or None
+            The state to go on from.
+        offer : callable
+            ``offer(info, tree)``: write the state ``tree()`` if it is time; return whether it was written.
+
+        Raises
+        ------
+        ValueError
+            The file is of another run, version or format, is damaged or in use, or cannot be written.
+        """
+        if self._used:
+            raise ValueError("a checkpoint keeps one run; give each call a checkpoint of its own")
+        self._used = True
+        with _locked(self.path):
+            seed, found = self._open(job, rng, inputs(), device)
+            self.running, self.resumed = True, found is not None
+            try:
+                yield seed, found, self.offer
+            except (ValueError, TypeError):  # the input, which a plan finds out; a checkpoint of it is of no use
+                if not self._saved and found is None:
+                    self.remove()
+                raise
+            finally:
+                self.running = False
+
+    def _open(self, job: str, rng: Any, inputs: dict[str, Any], device: str) -> tuple[int, Any]:
+        """Return the seed and the state to go on from; write the file if it is new."""
+        about, found = read(self.path) if self.path.exists() else (None, None)
+        now = {"job": job, **{name: identity(value) for name, value in inputs.items()}}
+        seed = None if rng is None else as_seed(rng)
+        if about is not None:
+            self._compare(about, now, seed)
+            seed = int(about["seed"])
+            if about["device"] != device:
+                self._note(
+                    f"the run in {self.path} was begun on {about['device']} and goes on on {device}; "
+                    "the bytes are the same on every device"
+                )
+        command = self._command or (about or {}).get("command")
+        seed = as_seed(None) if seed is None else seed
+        self._about = {"version": version("simdtex"), "seed": seed, "inputs": now, "command": command, "device": device}
+        if about is None:
+            self._write(None)
+        return seed, found
+
+    def _compare(self, about: dict[str, Any], now: dict[str, Any], seed: int | None) -> None:
+        """Raise if the file is of another run; the sentence says how they differ."""
+        here, before = version("simdtex"), about["inputs"]
+        if about["version"] != here:
+            raise ValueError(
+                f"the checkpoint {self.path} is of simdtex {about['version']} and this is {here}, "
+                f"whose results may differ; resume with {about['version']}, or give a new file"
+            )
+        for name in {**before, **now}:
+            old, new = before.get(name), now.get(name)
+            if old == new:
+                continue
+            if name == "options" and isinstance(old, dict) and isinstance(new, dict):
+                name = next(one for one in {**old, **new} if old.get(one) != new.get(one))
+                old, new, name = old.get(name), new.get(name), f"option {name}"
+            raise self._another(NAMES.get(name, name), _shown(old, new))
+        if seed is not None and seed != about["seed"]:
+            raise self._another("seed", f" ({about['seed']}, not {seed})")
+
+    def _another(self, what: str, shown: str) -> ValueError:
+        return ValueError(
+            f"the checkpoint {self.path} is of another {what}{shown}; give the same, or a new file for this run"
+        )
+
+    def offer(self, info: Any, tree: Callable[[], Any], *, now: bool = False) -> bool:
+        """Write the state ``tree()`` if it is time, ``now`` is true, or the run is to stop; return whether it was.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            The run is to stop here.
+        """
+        stopping = self.stopping
+        wrote = (now or stopping or self._pace.due) and self._save(tree)
+        if stopping or (wrote and self.stopping):
+            raise KeyboardInterrupt
+        return wrote
+
+    def _save(self, tree: Callable[[], Any]) -> bool:
+        began = time.perf_counter()
+        found = tree()
+        much = size(found)
+        if not self.stopping and self._pace.early(began, much):
+            return False
+        try:
+            self._write(found)
+        except ValueError as error:  # the run is worth more than its checkpoint
+            if not self._failed:
+                self._note(f"{error}; the run goes on, and will try again")
+            self._failed = True
+            return False
+        finally:
+            self._pace.wrote(began, much)
+        self._failed, self._saved = False, True
+        return True
+
+    def _write(self, tree: Any) -> None:
+        text, arrays = pack(tree)
+        about = {"format": FORMAT, **self._about, "tree": text}
+
+        def write(file: BinaryIO) -> None:
+            named: dict[str, Any] = {str(number): array for number, array in enumerate(arrays)}
+            named["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
+            np.savez(file, **named)
+
+        write_checked(self.path, write)
+
+
+@contextmanager
+def opened(
+    checkpoint: str | os.PathLike[str] | Checkpoint | None,
+    job: str,
+    rng: Any,
+    inputs: Callable[[], dict[str, Any]],
+    device: str,
+) -> Iterator[tuple[int, Any, Callable[..., bool]]]:
+    """Open the checkpoint that a public function was given; see `Checkpoint.opened`."""
+    if checkpoint is None:
+        yield as_seed(rng), None, _nothing
+        return
+    own = not isinstance(checkpoint, Checkpoint)
+    kept = checkpoint if isinstance(checkpoint, Checkpoint) else Checkpoint(checkpoint)
+    with kept.opened(job, rng, inputs, device) as run:
+        yield run
+    if own:
+        kept.remove()
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Keep other processes off a checkpoint, by a lock on a file beside it; a process that is killed releases it."""
+    beside = path.with_name(f".{path.name}.lock")
+    try:
+        descriptor = os.open(beside, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError as error:
+        raise ValueError(f"{path} could not be written ({error.strerror}): choose another path") from None
+    try:
+        try:
+            lock(descriptor)
+        except BlockingIOError:
+            raise ValueError(f"another run keeps its state in {path} now; wait for it, or stop it") from None
+        except OSError:  # a file system without locks
+            pass
+        try:
+            yield
+        finally:
+            beside.unlink(missing_ok=True)
+    finally:
+        os.close(descriptor)
+
+
+def _nothing(info: Any, tree: Callable[[], Any], *, now: bool = False) -> bool:
+    """Keep no state."""
+    return False
+
+
+def read(path: Path) -> tuple[dict[str, Any], Any]:
+    """Return the description of the run in a checkpoint, and its state.
+
+    Raises
+    ------
+    ValueError
+        The file is no checkpoint, is damaged, or of another format.
+    """
+    try:
+        with read_checked(path) as file, np.load(file, allow_pickle=False) as found:
+            arrays = {name: found[name] for name in found.files}
+        about: dict[str, Any] = json.loads(arrays.pop("about").tobytes())
+    except (Damaged, ValueError, KeyError, BadZipFile):
+        raise ValueError(f"{path} is no checkpoint, or is damaged; remove it, and run the command again") from None
+    except OSError as error:
+        raise ValueError(f"{path} cannot be read ({error.strerror}); give another file") from None
+    if about.get("format") != FORMAT:
+        raise ValueError(
+            f"the checkpoint {path} is of format {about.get('format')} and this simdtex reads {FORMAT}; "
+            f"resume with simdtex {about.get('version')}, or give a new file"
+        )
+    return about, unpack(about.pop("tree"), [arrays[str(number)] for number in range(len(arrays))])
+
+
+def _shown(old: Any, new: Any) -> str:
+    """Return both values in parentheses, or nothing if they are long."""
+    words = [value_text(one) for one in (old, new)]
+    return "" if any("sha256:" in word or len(word) > 60 for word in words) else f" ({words[0]}, not {words[1]})"
+
+
+def value_text(value: Any) -> str:
+    """Return a JSON value as text."""
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if isinstance(value, list):
+        return "x".join(map(value_text, value))
+    return "none" if value is None else str(value)
+
+
+def _warn(sentence: str) -> None:
+    warnings.warn(sentence, stacklevel=2)
+
+
+# ---------------------------------------------------------------- trees of plain arrays and numbers
+
+LEAVES = (str, int, float, bool, type(None))
+
+
+def pack(tree: Any) -> tuple[Any, list[NDArray[Any]]]:
+    """A tree of plain things as what JSON holds exactly, and the arrays that it refers to by number.
+
+    Raises
+    ------
+    TypeError
+        Something is no array, number, text, dict, list or tuple.
+    """
+    arrays: list[NDArray[Any]] = []
+
+    def packed(node: Any) -> Any:
+        if isinstance(node, (np.ndarray, np.generic)):
+            if node.dtype.hasobject:
+                raise TypeError("an array of objects cannot be kept in a checkpoint; give arrays of numbers")
+            arrays.append(np.asarray(node))
+            return {"array" if isinstance(node, np.ndarray) else "scalar": len(arrays) - 1}
+        if type(node) in LEAVES:
+            return node
+        if isinstance(node, dict) and all(type(key) is str for key in node):
+            return {"dict": {key: packed(value) for key, value in node.items()}}
+        if isinstance(node, (list, tuple)):
+            return {"tuple" if isinstance(node, tuple) else "list": [packed(value) for value in node]}
+        raise TypeError(
+            f"a state holds {type(node).__name__}, which a checkpoint cannot keep; give plain arrays and numbers"
+        )
+
+    return packed(tree), arrays
+
+
+def size(tree: Any) -> int:
+    """Bytes of the arrays of a tree."""
+    return sum(array.nbytes for array in pack(tree)[1])
+
+
+def unpack(told: Any, arrays: Sequence[NDArray[Any]]) -> Any:
+    """What `pack` was given; tuples with names come back without them (see `like`)."""
+    if not isinstance(told, dict):
+        return told
+    ((kind, node),) = told.items()
+    if kind == "array":
+        return arrays[node]
+    if kind == "scalar":
+        return arrays[node][()]
+    if kind == "dict":
+        return {key: unpack(value, arrays) for key, value in node.items()}
+    found = [unpack(value, arrays) for value in node]
+    return tuple(found) if kind == "tuple" else found
+
+
+def like(template: Any, node: Any) -> Any:
+    """A tree whose tuples have the types of those of another tree of the same form."""
+    if not (isinstance(node, tuple) and isinstance(template, tuple) and len(node) == len(template)):
+        return node
+    inside = [like(one, value) for one, value in zip(template, node, strict=True)]
+    kind: Any = type(template)
+    return tuple(inside) if kind is tuple else kind(*inside)
+
+
+def digest(*arrays: NDArray[Any]) -> str:
+    """SHA-256 over types, shapes and bytes in C order."""
+    found = hashlib.sha256()
+    for array in arrays:
+        found.update(f"{array.dtype.str}{array.shape}".encode())
+        found.update(np.ascontiguousarray(array).tobytes())
+    return found.hexdigest()
+
+
+def identity(thing: Any) -> Any:
+    """What tells an input from another, for JSON: numbers and texts themselves, arrays by their digest."""
+    if isinstance(thing, np.ndarray):
+        return f"sha256:{digest(thing)}"
+    if thing is None or isinstance(thing, (bool, str)):
+        return thing
+    if isinstance(thing, np.bool_):
+        return bool(thing)
+    if isinstance(thing, Integral) and abs(int(thing)) >= 2**53:
+        return str(int(thing))
+    if isinstance(thing, Real):
+        return float(thing)  # 1 and 1.0 say the same
+    if isinstance(thing, (list, tuple)):
+        return [identity(one) for one in thing]
+    if isinstance(thing, dict):
+        return {str(name): identity(one) for name, one in thing.items()}
+    if is_dataclass(thing):
+        return {field.name: identity(getattr(thing, field.name)) for field in fields(thing)}
+    return f"{type(thing).__qualname__} {getattr(thing, 'name', '')}".strip()

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Algorithm 1 over a store, as the driver runs it: a step is one turn, done to every tile by any process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.distributed.layout import LevelLayout
+from simdtex.distributed.store import PLANES, Store, Stored, Turn, phase_of
+from simdtex.machine import Machine
+from simdtex.methods.mrf.level import Lattices
+from simdtex.methods.mrf.record import expected_work
+from simdtex.ops.use import price
+from simdtex.run import Callback, Output, Tiling
+
+Execute = Callable[[Turn, Sequence[int]], Iterator[int]]
+"""Has tiles of a turn done, in any order; yields the number of each tile that is done."""
+
+SHOWN = 1024
+"""The most sites to the side of the picture that a callback sees."""
+
+
+@dataclass(frozen=True)
+class Tiles:
+    """The plan of an output in tiles: its store, and who does the tiles."""
+
+    store: Store
+    execute: Execute
+
+    def on(self, machine: Machine, seed: int) -> Run:
+        """Lay out what the leading process needs: the sample, and one number for each of its candidates."""
+        return Run(self, machine)
+
+
+class Run:
+    """All turns that are left of an output; the state is the turn, which the store keeps."""
+
+    def __init__(self, tiles: Tiles, machine: Machine) -> None:
+        self.store, self.execute, self.work = tiles.store, tiles.execute, tiles.store.work()
+        work = self.work
+        self.lattices = Lattices(work.plan, machine, work.seed, Stored(self.store, work))
+
+    def begin(self) -> Turn:
+        """Return the turn that the store is at."""
+        return self.store.turn
+
+    def step(self, turn: Turn, watch: Callable[..., None]) -> tuple[Turn, None]:
+        """Do a turn to all tiles that have not had it, and return the next turn."""
+        level = self.work.layout.levels[turn.level]
+        new = self.store.prepare(turn, level, self.work.layout.channels, self._candidates(turn))
+        left = list(range(level.count)) if new else np.flatnonzero(~self.store.done(turn, level.count)).tolist()
+        for done, _ in enumerate(self.execute(turn, left), level.count - len(left) + 1):
+            watch(turn, done)
+        return self._complete(turn), None
+
+    def ended(self, turn: Turn) -> bool:
+        """Return whether the output is written."""
+        return turn.phase == "done"
+
+    def result(self, turn: Turn, observer: Any) -> tuple[NDArray[Any], Output]:
+        """Remove what is no longer needed from the store; the picture stays there."""
+        self.store.finish()
+        return np.zeros((0, 0, 0)), Output(None)
+
+    def save(self, turn: Turn) -> Turn:
+        """Return the turn: the store keeps all else."""
+        return turn
+
+    load = save
+
+    def observer(self, callback: Callback | None) -> Watch:
+        """Return what watches this run."""
+        return Watch(self, callback)
+
+    def _candidates(self, turn: Turn) -> int:
+        """Return how many candidates a tile counts the use of."""
+        if turn.phase in ("whole", "show"):
+            return 0
+        lattices, where = self.lattices, self.lattices.where(turn.level)
+        sample, every = lattices.sample, lattices.exhaustive(turn.level)
+        return int((sample.everywhere(*where) if every else sample.positions(*where)).size)
+
+    def _complete(self, turn: Turn) -> Turn:
+        """Return the next turn, now that all tiles have had this one; the store goes on to it."""
+        store, lattices, levels = self.store, self.lattices, self.work.layout.levels
+        if turn.phase == "show":
+            after = turn._replace(number=turn.number + 1, phase="done")
+            store.save(after)
+            return after
+        counts, active, heat = store.total(turn, levels[turn.level].count)
+        cooling = turn.cooling + (turn.phase == "sweep" and turn.active > 0)
+        free = turn.free + (turn.phase == "sweep" and turn.active == 0)
+        number, read = turn.number + 1, turn.write
+        if turn.phase != "whole" and (active or free < lattices.options.free_sweeps):
+            before = store.price(turn) if turn.phase == "sweep" else None
+            rate = lattices.options.balance * lattices.usual
+            after = Turn(number, "sweep", turn.level, read, 1 - read, cooling, free, active, heat)
+            store.save(after, price(counts, lattices.market(turn.level), rate, before))
+        elif turn.level:
+            after = Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1, read)
+            store.save(after)
+        else:
+            after = Turn(number, "show", 0, read, read)
+            store.save(after)
+        if turn.phase in ("begin", "whole"):
+            store.forget(turn.level + 1)
+        return after
+
+
+class Watch:
+    """Reports how far an output is.
+
+    Parameters
+    ----------
+    run : Run
+    callback : callable, optional
+        Called with a `simdtex.run.Tiling` after every tile.
+    """
+
+    def __init__(self, run: Run, callback: Callback | None) -> None:
+        self._run, self._callback = run, callback
+        self._expected = expected_work(run.lattices)
+        self._fraction = 0.0
+
+    def part(self, turn: Turn, done: int) -> None:
+        """Report that so many tiles have had their turn."""
+        if self._callback is None:
+            return
+        level = self._run.work.layout.levels[turn.level]
+        self._fraction = max(self._fraction, self._share(turn, level, done / level.count))
+        self._callback(
+            Tiling(
+                level=turn.level,
+                levels=self._run.lattices.levels,
+                fraction=self._fraction,
+                image=partial(self._picture, turn, level),
+                phase=turn.phase,
+                sweep=turn.cooling + turn.free + 1,
+                tile=done,
+                tiles=level.count,
+            )
+        )
+
+    def step(self, turn: Turn, info: None) -> None:
+        """See nothing: tiles are reported one by one."""
+
+    def save(self) -> None:
+        """Return nothing: the store keeps the state."""
+
+    def load(self, saved: None) -> None:
+        """Go on from nothing."""
+
+    def _share(self, turn: Turn, level: LevelLayout, part: float) -> float:
+        """Return the share of the expected work that is done; the last hundredth is for writing the picture."""
+        total = sum(map(sum, self._expected.values()))
+        coarser = range(turn.level + 1, self._run.lattices.levels)
+        over = sum(sum(self._expected[number]) for number in coarser)
+        cooling, free = self._expected[turn.level]
+        if turn.phase == "show":
+            return 0.99 + 0.01 * part
+        if turn.phase == "sweep" and not turn.active:
+            over += cooling + free * min(1.0, (turn.free + part) / max(1, self._run.lattices.options.free_sweeps))
+        elif turn.phase == "sweep":
+            first = (
+                1.0 if turn.level == self._run.lattices.levels - 1 else 0.75
+            )  # mean temperature where the level began
+            left = turn.heat / (1024 * level.rows * level.cols * first)
+            over += cooling * min(1.0, 1 - sqrt(left) + 0.1 * part)
+        elif turn.phase == "whole":
+            over += (cooling + free) * part
+        return 0.99 * min(1.0, over / total)
+
+    def _picture(self, turn: Turn, level: LevelLayout) -> NDArray[Any]:
+        """Return every n-th site of the state before the turn, at most about `SHOWN` to the side."""
+        step, state = -(-max(level.rows, level.cols) // SHOWN), self._run.store.root["work"]
+        where = (
+            f"level{turn.level}/{turn.read}"
+            if turn.phase in ("sweep", "show")
+            else f"level{turn.level + 1}/{turn.read}"
+        )
+        if f"{where}/{PLANES[-1]}" not in state:
+            return np.zeros((1, 1, self._run.lattices.sample.shown), self._run.lattices.sample.pixels.dtype)
+        values, source = (state[f"{where}/{name}"] for name in PLANES[:2])
+        rows = [
+            self._run.lattices.sample.picture(values[:, i, ::step][:, None], source[i, ::step][None])
+            for i in range(0, source.shape[0], step)
+        ]
+        return np.concatenate(rows)
+
+
+__all__ = ["Execute", "Tiles"]

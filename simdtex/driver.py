@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The one loop that runs every method, and what a public function does around it.
+
+A `Plan` is validated input. On a machine it is a `Run`, which `drive` begins, steps and ends. All that must survive
+between two steps is in the state, a tree of plain arrays and numbers; everything else watches from outside.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from math import inf
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.checkpoint import Checkpoint, opened
+from simdtex.machine import Machine, open_machine
+from simdtex.options import real_array, whole
+from simdtex.random import as_seed
+from simdtex.run import Callback, Output
+
+Tree = Any
+"""Plain arrays and numbers, in dicts, lists and tuples."""
+
+
+class Observer(Protocol):
+    """What watches a run: it reports progress, counts the work, and keeps the stages."""
+
+    def part(self, *seen: Any) -> None:
+        """See a part of a step that takes long."""
+
+    def step(self, state: Any, info: Any) -> None:
+        """See a step: the state after it, and what it did."""
+
+    def save(self) -> Tree:
+        """Return what has been seen so far."""
+
+    def load(self, saved: Tree) -> None:
+        """Go on from what `save` returned."""
+
+
+class Run(Protocol):
+    """A plan on a machine."""
+
+    def begin(self) -> Any:
+        """Return the state before the first step."""
+
+    def step(self, state: Any, watch: Callable[..., None]) -> tuple[Any, Any]:
+        """Return the state after the next step, and what the step did; ``watch`` sees parts of a long step."""
+
+    def ended(self, state: Any) -> bool:
+        """Return whether there is no further step."""
+
+    def result(self, state: Any, observer: Any) -> tuple[NDArray[Any], Output]:
+        """Return the picture, channels last, and the rest of the output."""
+
+    def save(self, state: Any) -> Tree:
+        """Return a copy of the state that needs no machine."""
+
+    def load(self, saved: Tree) -> Any:
+        """Return the state that `save` copied, on this machine."""
+
+    def observer(self, callback: Callback | None) -> Observer:
+        """Return what watches this run."""
+
+
+class Plan(Protocol):
+    """Validated input of a run, as plain data."""
+
+    def on(self, machine: Machine, seed: int) -> Run:
+        """Lay the plan out on a machine; ``seed`` is the key of every random number."""
+
+
+@dataclass(frozen=True)
+class Keep:
+    """Where a run begins, and who is offered its states.
+
+    Attributes
+    ----------
+    found : tree or None
+        The state to go on from; None: the beginning.
+    offer : callable
+        ``offer(info, tree)``, called after every step; ``tree()`` returns the state, to be passed as `found`.
+    """
+
+    found: Tree = None
+    offer: Callable[[Any, Callable[[], Tree]], Any] = lambda info, tree: None
+
+
+NOTHING = Keep()
+"""Begins at the beginning, and keeps nothing."""
+
+
+def drive(
+    plan: Plan, machine: Machine, seed: int, callback: Callback | None = None, keep: Keep = NOTHING
+) -> tuple[NDArray[Any], Output]:
+    """Run a plan to its end.
+
+    Parameters
+    ----------
+    plan : Plan
+    machine : Machine
+    seed : int
+    callback : callable, optional
+        Called with a `simdtex.run.Progress` after every part of a step.
+    keep : Keep
+        Where to begin, and who is offered every state.
+
+    Returns
+    -------
+    image : (rows, cols, channels) array
+        In the sample's type; a block is (depth, rows, cols, channels).
+    output : simdtex.run.Output
+    """
+    began, worked = time.perf_counter(), machine.seconds
+    run = plan.on(machine, seed)
+    observer = run.observer(callback)
+    if keep.found is None:
+        state = run.begin()
+    else:
+        state = run.load(keep.found["state"])
+        observer.load(keep.found["observer"])
+    while not run.ended(state):
+        state, info = run.step(state, observer.part)
+        observer.step(state, info)
+        keep.offer(info, partial(_saved, run, state, observer))
+    image, output = run.result(state, observer)
+    output.statistics.update(
+        device=machine.name,
+        seed=seed,
+        seconds=time.perf_counter() - began,
+        device_seconds=None if worked is None else (machine.seconds or 0.0) - worked,
+    )
+    return image, output
+
+
+def _saved(run: Run, state: Any, observer: Observer) -> Tree:
+    return {"state": run.save(state), "observer": observer.save()}
+
+
+class Job(Protocol):
+    """A validated call of a public function, see `PlannedJob`; `simdtex.fill` drives several plans."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+
+    @property
+    def channel_axis(self) -> int | None: ...  # noqa: D102
+
+    def inputs(self) -> dict[str, Any]: ...  # noqa: D102
+
+    def run(  # noqa: D102
+        self, machine: Machine, seed: int, callback: Callback | None, keep: Keep
+    ) -> tuple[NDArray[Any], Output]: ...
+
+
+@dataclass(frozen=True)
+class PlannedJob:
+    """A validated call of a public function that drives one plan.
+
+    Attributes
+    ----------
+    name : str
+        The function.
+    plan : Plan
+    inputs : callable
+        Returns all that determines the result but the seed, by the names that users give it.
+    channel_axis : int or None
+        The axis of channels in what the function returns.
+    """
+
+    name: str
+    plan: Plan
+    inputs: Callable[[], dict[str, Any]]
+    channel_axis: int | None
+
+    def run(self, machine: Machine, seed: int, callback: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
+        """Drive the plan."""
+        return drive(self.plan, machine, seed, callback, keep)
+
+
+Result = NDArray[Any] | tuple[NDArray[Any], Output]
+"""What a public function returns: the picture or, with ``full_output=True``, the picture and the rest."""
+
+
+def execute(
+    job: Job,
+    rng: Any,
+    device: str | Machine | None,
+    callback: Callback | None,
+    full_output: bool,
+    checkpoint: str | os.PathLike[str] | Checkpoint | Keep | None = None,
+) -> Result:
+    """Run a job on a device: what every public function does once its input is validated.
+
+    The arguments are those of `simdtex.synthesize`; a `Keep` as ``checkpoint`` keeps states in memory.
+    """
+    machine, axis = open_machine(device), job.channel_axis
+    machine.profile()  # forget what was before
+    if isinstance(checkpoint, Keep):
+        image, output = job.run(machine, as_seed(rng), seeing(callback, axis), checkpoint)
+    else:
+        with opened(checkpoint, job.name, rng, job.inputs, machine.name) as (seed, found, offer):
+            image, output = job.run(machine, seed, seeing(callback, axis), Keep(found, offer))
+    output.statistics.update(machine.profile() or {})
+    picture = restored(image, axis)
+    if not full_output:
+        return picture
+    stages = [replace(stage, image=restored(stage.image, axis)) for stage in output.stages]
+    return picture, replace(output, stages=stages, made=image)
+
+
+def seeing(callback: Callback | None, channel_axis: int | None) -> Callback | None:
+    """Return the callback, made to see pictures with the sample's own axes."""
+    if callback is None:
+        return None
+
+    def seen(progress: Any) -> Any:
+        read: Callable[[], NDArray[Any]] = progress.image
+        return callback(replace(progress, image=lambda: restored(read(), channel_axis)))
+
+    return seen
+
+
+def restored(image: NDArray[Any], channel_axis: int | None) -> NDArray[Any]:
+    """Return a picture (rows, cols, channels) with the axes that the sample has."""
+    return image[..., 0] if channel_axis is None else np.moveaxis(image, -1, channel_axis)
+
+
+def with_channels_last(options: dict[str, Any], channel_axis: int | None) -> dict[str, Any]:
+    """Return the options; the channels of a picture to start from are moved to the last axis."""
+    start = options.get("start")
+    if start is None or channel_axis is None or real_array("start", start).ndim < 3:
+        return options
+    return options | {"start": np.moveaxis(np.asarray(start), channel_axis, -1)}
+
+
+def check_shape(shape: Any, least: int = 1) -> tuple[int, int]:
+    """Return the rows and columns of an output; raise unless they are two integers of at least `least`."""
+    try:
+        rows, cols = shape
+    except (TypeError, ValueError):
+        raise ValueError(f"shape must be two integers (rows, columns), not {shape!r}") from None
+    whole("rows of the output", rows, least, inf)  # `within_32_bits` limits their product in one sentence
+    whole("columns of the output", cols, least, inf)
+    return int(rows), int(cols)

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Conditioning data and guides of an output, level by level: known sites, stand-ins for off-grid data, guides."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.machine.interface import Array, Machine
+from simdtex.model.given import NOBODY, Planes, Stand, stand_ins
+from simdtex.model.guide import UNKNOWN
+from simdtex.model.lattice import Grid
+from simdtex.ops.neighbourhood import UNTOUCHED, Beside, Field
+
+FREE, KNOWN, STANDING = 0, 1, 2
+"""Site kinds: free, known, or standing in for an off-grid datum."""
+
+
+class Held(NamedTuple):
+    """Conditioning data and guides of a level's sites, on the host.
+
+    ``values`` (C, rows, cols) uint16, at free sites only those of guides; ``source`` (rows, cols) int32; ``kind``
+    (rows, cols) uint8: `FREE`, `KNOWN` or `STANDING`.
+    """
+
+    values: NDArray[np.uint16]
+    source: NDArray[np.int32]
+    kind: NDArray[np.uint8]
+
+
+class Conditions(ABC):
+    """Conditioning data and guides of an output: all in memory, or windows out of a store.
+
+    Parameters
+    ----------
+    levels : int
+        M of Algorithm 1.
+    beside : Beside
+        Which channels are guides, whether values have confidences of their own, and the weights.
+    """
+
+    def __init__(self, levels: int, beside: Beside) -> None:
+        self.levels, self.beside = levels, beside
+
+    @abstractmethod
+    def at(self, number: int, grid: Grid) -> Held | None:
+        """Return the data and guides of a level at the sites of its lattice, or of a window; None if there are none."""
+
+    def entered(self, machine: Machine, number: int, grid: Grid, field: Field) -> Field:
+        """Return the field at the beginning of a level, with its known sites at temperature 0.
+
+        Data between the sites have stand-ins; the stand-ins of the level above are free again, at temperature 1.
+        """
+        held = self.at(number, grid)
+        if held is None:
+            return field
+        planes = [np.array(machine.get(plane)) for plane in field]
+        values, source, temperature = (grid.view(plane) for plane in planes)
+        (top, rows), (left, cols) = grid.above
+        if number + 1 < self.levels and rows and cols:
+            coarse = Grid(grid.within.rows, grid.within.cols, 2, grid.torus).window(top, left, rows, cols)
+            above = self.at(number + 1, coarse)
+            released = temperature[grid.within.top % 2 :: 2, grid.within.left % 2 :: 2]
+            released[above is not None and above.kind == STANDING] = UNTOUCHED
+        matched, known = len(values) - self.beside.guides, held.kind != FREE
+        if self.beside.guides:
+            values[matched:] = held.values[-self.beside.guides :]
+        if known.any():
+            values[:matched, known] = held.values[:matched, known]
+            source[known], temperature[known] = held.source[known], 0
+        return Field(*map(machine.put, planes))
+
+    def movable(self, machine: Machine, number: int, grid: Grid) -> Array | None:
+        """Return an (H, W) uint16 array that is 0 at the known sites of a grid; None if all sites are free."""
+        held = self.at(number, grid)
+        if held is None or not held.kind.any():
+            return None
+        plane = np.zeros((grid.height, grid.width), np.uint16)
+        grid.view(plane)[...] = held.kind == FREE
+        return machine.put(plane)
+
+
+class Conditioning(Conditions):
+    """Conditioning data and guides of a whole output, in memory.
+
+    Parameters
+    ----------
+    levels : int
+    guides : (G, H, W) uint16 array
+        Working levels of the output's guides.
+    planes : Planes, optional
+        Known values, their sources and sites. None: no site is known.
+    neighbours : int
+        N of the neighbourhood.
+    data_weight : float
+        How many neighbours a hard datum counts for.
+    """
+
+    def __init__(
+        self, levels: int, guides: NDArray[np.uint16], planes: Planes | None, neighbours: int, data_weight: float
+    ) -> None:
+        hard = planes is not None and bool((planes.source < 0)[planes.known].any())
+        centre = np.float32(max(1, round(sqrt(neighbours) / 2)))
+        weight = np.float32(round(8 * sqrt(data_weight)) / 8)  # in eighths, so that sums stay exact
+        super().__init__(levels, Beside(len(guides), len(guides) > 0 or hard, centre, weight))
+        self.guides, self.planes = guides, planes
+        self._held: dict[int, Held] = {}
+
+    def at(self, number: int, grid: Grid) -> Held | None:
+        """Return the data and guides of a level at the sites of its lattice, or of a window; None if there are none."""
+        if self.planes is None and not len(self.guides):
+            return None
+        if number not in self._held:
+            self._held = {other: held for other, held in self._held.items() if other == number + 1}  # two are enough
+            self._held[number] = self._whole(Grid(*self._shape, 2**number, grid.torus))
+        held = self._held[number]
+        return Held(*(grid.cut(plane) for plane in held)) if grid.part else held
+
+    @property
+    def _shape(self) -> tuple[int, int]:
+        rows, cols = self.guides.shape[1:] if self.planes is None else self.planes.known.shape
+        return rows, cols
+
+    def _whole(self, grid: Grid) -> Held:
+        """Return the data and guides of a whole lattice."""
+        planes, matched = self.planes, 0 if self.planes is None else len(self.planes.values)
+        values = np.zeros((matched + len(self.guides), *self._shape), np.uint16)
+        source, kind = np.full(self._shape, -1, np.int32), np.full(self._shape, FREE, np.uint8)
+        if planes is not None:
+            values[:matched] = np.where(planes.known, planes.values, 0)
+            source[:], kind[:] = planes.source, planes.known * np.uint8(KNOWN)
+            site, datum = stand_ins(planes.known, grid)
+            values.reshape(len(values), -1)[:matched, site] = planes.values.reshape(matched, -1)[:, datum]
+            source.flat[site], kind.flat[site] = -1, STANDING
+        gaps = bool((self.guides == UNKNOWN).any())
+        for plane, guide in zip(values[matched:], self.guides, strict=True):
+            stand: Stand = stand_ins(guide != UNKNOWN, grid) if gaps else NOBODY
+            plane[:] = guide
+            plane.flat[stand.site] = guide.flat[stand.datum]
+        return Held(*(np.ascontiguousarray(grid.view(plane)) for plane in (values, source, kind)))
+
+
+__all__ = ["FREE", "KNOWN", "STANDING", "Conditioning", "Conditions", "Held"]
