@@ -239,7 +239,7 @@ def output(run: Lattices, state: State, source: NDArray[np.int32], record: Recor
     launches = run.machine.launches - record.launches
     statistics = {
         "options": vars(run.options) | {"levels": run.levels, "schedule": run.plan.schedule.name},
-        "accounting": record.account.report() | {"emulated": False, "launches": launches},
+        "accounting": record.account.report() | {"launches": launches},
         "levels": record.meter.reports,
         "use": None,
     }
