@@ -56,8 +56,6 @@ def pictures():
         ("animated.webp", colour, "webp", {"save_all": True, "append_images": others}),
         ("animated.png", colour, "png", {"save_all": True, "append_images": others}),
         ("lossy.webp", colour, "webp", {"quality": 50}),
-        ("colour.ppm", colour, "ppm", {}),
-        ("grey.pgm", plain, "ppm", {}),
         ("palette.png", colour.quantize(8), "png", {}),
         ("bits.png", plain.convert("1"), "png", {}),
         ("sixteen.png", Image.fromarray(_pixels(1, np.uint16)[..., 0]), "png", {}),

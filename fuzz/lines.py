@@ -108,7 +108,7 @@ DEEP = {"synth": 0.6, "sheet": 0.8, "schedules": 0.7, "demo": 0.2, "bench": 0.0}
 OUTPUTS = {
     "solid": ("out.npz", "out.npy", "out.nrrd", "out.tif", "out", "out.png", "out.xyz"),
     "simulate": ("out.zarr", "out.nc", "out.npz", "out.png", "out"),
-    "": ("out.npy", "out.tif", "out.png", "out.webp", "out.jpg", "out.bmp", "out.gif", "out.ppm", "out.xyz"),
+    "": ("out.npy", "out.tif", "out.png", "out.webp", "out.jpg", "out.bmp", "out.xyz"),
 }
 
 

@@ -19,7 +19,6 @@ COMMANDS = {
     "webp": "synth RGB.png -o out.webp --size 40x40 --method multires",
     "jpg": "synth L.png -o out.jpg --size 40x40 --method multires",
     "bmp": "synth L.png -o out.bmp --size 40x40 --method multires",
-    "ppm": "synth RGB.png -o out.ppm --size 24x24 --method multires",
     "several": "synth L.png -o out.png --source-map map.npz --also RGB.png=other.png --size 20x20 --method multires",
     "source map png": "synth L.png -o out.npy --source-map map.png --size 20x20 --method multires",
     "stages": "synth L.png -o out.png --size 8x8 --method multires --levels 2 --stages pages",

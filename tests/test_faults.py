@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from volumes import loaded
 
 from simdtex.io import atomic, image, realisations, volume
 from simdtex.io.atomic import Damaged, NotWritten, atomic_folder, atomic_path, read_checked, write_checked
@@ -43,7 +44,7 @@ def page(path, seed):
 WRITERS = {
     **{
         f"a{suffix}": lambda path, seed: image.write(path, picture(seed))
-        for suffix in (".png", ".tif", ".jpg", ".webp", ".bmp", ".gif", ".pgm", ".npy")
+        for suffix in (".png", ".tif", ".jpg", ".webp", ".bmp", ".npy")
     },
     "deep.png": lambda path, seed: image.write(path, picture(seed, np.uint16)),
     **{
@@ -261,7 +262,7 @@ def test_a_folder_that_was_taken_away_comes_back(tmp_path):
     assert done.returncode == -9 and "a" not in os.listdir(tmp_path)
     with pytest.raises(KeyboardInterrupt), atomic_folder(tmp_path / "a"):
         raise KeyboardInterrupt
-    assert os.listdir(tmp_path) == ["a"] and np.array_equal(volume.read(tmp_path / "a"), block(1))
+    assert os.listdir(tmp_path) == ["a"] and np.array_equal(loaded(tmp_path / "a"), block(1))
 
 
 def test_a_hidden_name_is_not_too_long(tmp_path):

@@ -7,8 +7,6 @@ import logging
 import os
 import stat
 import struct
-import subprocess
-import sys
 import zlib
 
 import imagecodecs
@@ -21,6 +19,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simdtex.io import image
+from simdtex.io.atomic import atomic_folder, atomic_path
 
 
 def noise(shape, dtype, seed=0):
@@ -47,10 +46,6 @@ ROUND_TRIPS = [
     (".bmp", "uint8", 3),
     (".webp", "uint8", 3),
     (".webp", "uint8", 4),
-    (".ppm", "uint8", 3),
-    (".ppm", "uint16", 3),
-    (".pgm", "uint8", None),
-    (".pgm", "uint16", None),
     (".npy", "bool", None),
     (".npy", "float64", 7),
     (".NPY", ">i4", 1),
@@ -85,7 +80,7 @@ def test_jpeg_is_close(tmp_path, suffix, channels):
 
 def test_bool_becomes_black_and_white(tmp_path):
     pixels = noise((5, 7), bool)
-    for suffix in (".png", ".tif", ".bmp", ".gif"):
+    for suffix in (".png", ".tif", ".bmp"):
         image.write(tmp_path / f"a{suffix}", pixels)
         back = image.read(tmp_path / f"a{suffix}").pixels
         assert back.dtype == np.uint8
@@ -184,12 +179,6 @@ def test_tiff_kinds(tmp_path):
     assert image.read(path).pixels.shape == (16, 16, 3)
 
 
-def test_pnm_of_10_bits_with_a_comment(tmp_path):
-    values = np.array([[0, 1023], [512, 1]], ">u2")
-    (tmp_path / "a.pgm").write_bytes(b"P5\n# made by hand\n2 2\n1023\n" + values.tobytes())
-    np.testing.assert_array_equal(image.read(tmp_path / "a.pgm").pixels, [[0, 65535], [32800, 64]])
-
-
 def test_format_is_told_by_content(tmp_path):
     pixels = noise((5, 4, 3), np.uint16)
     image.write(tmp_path / "a.png", pixels)
@@ -208,8 +197,8 @@ def encoded(suffix, dtype, tmp_path):
 
 @pytest.mark.parametrize(
     ("suffix", "dtype"),
-    [(s, "uint8") for s in (".png", ".tif", ".jpg", ".bmp", ".webp", ".ppm", ".npy")]
-    + [(s, "uint16") for s in (".png", ".tif", ".ppm")],
+    [(s, "uint8") for s in (".png", ".tif", ".jpg", ".bmp", ".webp", ".npy")]
+    + [(s, "uint16") for s in (".png", ".tif")],
 )
 @pytest.mark.parametrize("share", [0.02, 0.5, 0.95])
 def test_truncated_files(tmp_path, suffix, dtype, share):
@@ -262,7 +251,7 @@ def test_files_that_are_no_images(tmp_path):
         image.read("a\0b")
 
 
-@given(st.binary(max_size=200), st.sampled_from([b"", b"\x93NUMPY", b"II*\0", b"P5 2 2 65535 "]))
+@given(st.binary(max_size=200), st.sampled_from([b"", b"\x93NUMPY", b"II*\0", b"BM"]))
 def test_no_bytes_escape_the_errors(tmp_path_factory, data, start):
     path = tmp_path_factory.getbasetemp() / "any.bin"
     path.write_bytes(start + data)
@@ -425,8 +414,6 @@ def test_parse_size_errors(text):
         (".png", "uint8", 5, ".tif"),
         (".jpg", "uint8", 4, ".png"),
         (".tif", "longdouble", 1, ".npy"),
-        (".gif", "uint8", 3, ".png"),
-        (".pgm", "uint8", 3, ".png"),
     ],
 )
 def test_formats_that_cannot_hold_the_pixels(tmp_path, suffix, dtype, channels, remedy):
@@ -464,7 +451,7 @@ def test_folder_without_permission(tmp_path, monkeypatch):
 
 
 def fail_halfway(path, error):
-    with image.atomic_path(path) as temporary:
+    with atomic_path(path) as temporary:
         assert temporary.parent == path.parent
         assert temporary.suffix == path.suffix
         temporary.write_bytes(b"half")
@@ -492,11 +479,11 @@ def test_failure_leaves_the_old_file_alone(tmp_path, monkeypatch):
 def test_a_folder_is_replaced_whole_or_left_alone(tmp_path):
     path = tmp_path / "some.kind"
     for content in ("first", "second"):
-        with image.atomic_folder(path) as temporary:
+        with atomic_folder(path) as temporary:
             assert (temporary.parent, temporary.suffix) == (tmp_path, ".kind")
             (temporary / content).touch()
         assert os.listdir(path) == [content]
-    with pytest.raises(KeyboardInterrupt), image.atomic_folder(path) as temporary:
+    with pytest.raises(KeyboardInterrupt), atomic_folder(path) as temporary:
         (temporary / "third").touch()
         raise KeyboardInterrupt
     assert os.listdir(path) == ["second"]
@@ -534,12 +521,3 @@ def test_image_is_read_from_a_path_object_and_text(tmp_path):
     PIL.Image.new("L", (3, 2), 9).save(buffer, "PNG")
     (tmp_path / "a.png").write_bytes(buffer.getvalue())
     assert image.read(str(tmp_path / "a.png")).pixels.shape == (2, 3)
-
-
-def test_nothing_is_told_of_a_damaged_png_but_the_sentence(tmp_path):
-    """libpng prints what it dislikes about chunks that no pixel needs, when the process ends."""
-    image.write(tmp_path / "a.png", np.arange(64, dtype=np.uint16).reshape(8, 8))
-    (tmp_path / "b.png").write_bytes((tmp_path / "a.png").read_bytes().replace(b"IHDR", b"rHDR"))
-    reading = f"from simdtex.io import image; image.read({str(tmp_path / 'b.png')!r})"
-    done = subprocess.run([sys.executable, "-c", reading], capture_output=True, text=True, check=False, timeout=120)
-    assert "b.png cannot be decoded" in done.stderr and "warning" not in done.stdout + done.stderr

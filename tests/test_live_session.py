@@ -485,7 +485,7 @@ def test_what_is_wrong_is_said_in_a_sentence_and_the_page_goes_on(opened, case):
 
 FILES = {
     "empty": (b"", "a.png is empty (0 bytes): give a file with an image in it"),
-    "text": (b"hello", "a.png is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF, PPM or .npy file"),
+    "text": (b"hello", "a.png is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF or .npy file"),
     "cut": (png(texture())[:100], "a.png cannot be decoded, it is truncated, damaged or of an unknown kind"),
 }
 

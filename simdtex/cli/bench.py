@@ -38,7 +38,8 @@ def bench(device: str | None, quick: bool, path: Path | None, folder: Path | Non
 
     from simdtex.bench import run as benchmark
     from simdtex.bench import sizes
-    from simdtex.io.image import atomic_path, check_writable
+    from simdtex.io.atomic import atomic_path
+    from simdtex.io.image import check_writable
     from simdtex.report.bench import plot, render
     from simdtex.report.folder import earlier_files
 

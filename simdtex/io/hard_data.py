@@ -1,45 +1,41 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hard data: values that are known at some points, read from a table and placed on the sites of a picture.
+"""Hard data: values known at points, read from a table and placed on the sites of a picture.
 
-x is the column and y the row, in pixels: (0, 0) is the centre of the first pixel and row 0 is at the top. A
-value that is NaN is unknown.
+x is the column and y the row, in pixels: (0, 0) is the centre of the first pixel and row 0 is at the top. NaN is an
+unknown value.
 """
 
 from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from operator import index
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from simdtex.io.limits import VARIABLE, TooLarge, check_file, max_pixels_or_default, read_npy
+from simdtex.io.limits import BYTES, TooLarge, check_file, max_pixels_or_default, read_npy
 
 __all__ = ["HardData", "place_hard_data", "read_hard_data"]
 
 PathLike = str | os.PathLike[str]
 Floats = NDArray[np.float64]
 
-_SPLIT = f"give fewer rows or columns, or set {VARIABLE} higher"
-
-_EXACT = 2**53 - 1
-"""Integers up to here are exact in float64, which the values are read as; no larger one is rounded to one of them."""
-
 
 @dataclass(frozen=True, eq=False)
 class HardData:
-    """A table of known values, a row for each datum; `len` is how many.
+    """A table of known values, a row for each datum; `len` is the number of data.
 
     Attributes
     ----------
     points : ndarray of float64, (data, 2)
         x and y of each datum, pixels.
     values : ndarray of float64, (data, variables)
-        NaN where a variable is unknown.
+        NaN if a variable is unknown.
     names : tuple of str
         The name of each variable.
     lines : tuple of int, or None
@@ -55,7 +51,7 @@ class HardData:
         return len(self.points)
 
     def where(self, row: int) -> str:
-        """Say in words where a datum stands: in a line of the file, or in a row, counted from 0."""
+        """Name a datum by its line in the file, or by its row, counted from 0."""
         return f"row {row}" if self.lines is None else f"line {self.lines[row]}"
 
 
@@ -69,12 +65,12 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
     ----------
     path : path
         A text with a datum in each line: x, y and a value, or one value for each of several variables. Cells are
-        separated by semicolons, tabs, commas or blanks, whichever of these comes first in this list and is in the first
-        line. Numbers have a decimal point. An empty cell, or NaN, is an unknown value. A first line with names
-        for x and y is a header, which names the variables. From ``#`` to the end of a line is a comment. Or a NumPy
-        ``.npy`` of real numbers, (data, 3 or more), with the same columns.
+        separated by semicolons, tabs, commas or blanks: the first of these, in this order, that is in the first line.
+        Numbers have a decimal point. An empty cell, or NaN, is an unknown value. A first line with names for x and y
+        is a header, which names the variables. From ``#`` to the end of a line is a comment. Or a NumPy ``.npy`` of
+        real numbers, (data, 3 or more), with the same columns.
     max_pixels : int, optional
-        Cells, and bytes of a text, that are read at most. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
+        The most cells, or bytes of a text, that are read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
 
     Returns
     -------
@@ -84,7 +80,7 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
     Raises
     ------
     ValueError
-        The file is missing, no table, too large, has no rows, or a row is wrong; it names the line.
+        The file is missing, no table, too large, has no rows, or a row is wrong; the message names the line.
 
     Notes
     -----
@@ -92,14 +88,14 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
     """
     name = os.fspath(path)
     most = max_pixels_or_default(max_pixels)
-    check_file(path, "the hard data", most)
+    binary = Path(path).suffix.lower() == ".npy"
+    check_file(path, "the hard data", most if binary else -(-most // BYTES))
     try:
-        if Path(path).suffix.lower() == ".npy":
-            return _table(_array(Path(path), most))
-        if os.path.getsize(path) > most:
-            raise TooLarge(f"is a text of {os.path.getsize(path)} bytes and no more than {most} are read: {_SPLIT}")
-        with open(path, encoding="utf-8-sig", newline=None) as text:
-            return _parsed(text.read().split("\n"), most)
+        if binary:
+            with open(path, "rb") as file:
+                return _table(_numbers(file, os.fstat(file.fileno()).st_size, most))
+        with open(path, encoding="utf-8-sig") as text:
+            return _parsed(text)
     except TooLarge as error:
         raise ValueError(f"{name} {error}") from None
     except UnicodeDecodeError:
@@ -110,76 +106,69 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
         raise ValueError(f"{name}: {error}") from None
 
 
-def _array(path: Path, most: int) -> Any:
+def _numbers(file: Any, length: int, most: int) -> Any:
     try:
-        with path.open("rb") as file:
-            return read_npy(file, os.fstat(file.fileno()).st_size, 2, most)
+        return read_npy(file, length, most)
     except TooLarge:
         raise
     except (ValueError, EOFError):
         raise ValueError("it is damaged, or holds no array of numbers: write it with numpy.save") from None
 
 
-def _parsed(text: Sequence[str], most: int) -> HardData:
-    """The table in the lines of a text."""
-    kept = [(number, line) for number, line in enumerate((one.partition("#")[0] for one in text), 1) if line.strip()]
+def _parsed(text: Iterable[str]) -> HardData:
+    """Parse the lines of a table."""
+    stripped = ((number, line.partition("#")[0].strip("\r\n ")) for number, line in enumerate(text, 1))
+    kept = [(number, line) for number, line in stripped if line.strip()]
     if not kept:
         raise ValueError("the table is empty: give a line with x, y and a value for each datum")
-    between = next((one for one in ";\t," if one in kept[0][1]), None)
-    rows = [(number, _cells(line, number, between)) for number, line in kept]
-    columns = len(rows[0][1])
+    delimiter = next((one for one in ";\t," if one in kept[0][1]), None)
+    rows = [(number, _cells(line, number, delimiter)) for number, line in kept]
+    columns, names = len(rows[0][1]), None
     if columns < 3:
         raise ValueError(
             f"line {rows[0][0]} has {columns} cell{'s' * (columns != 1)}: give x, y and one value or more, with "
             "commas, semicolons, tabs or blanks between them"
         )
-    header: list[str] | None = None
-    if all(cell[:1].isalpha() and not _is_number(cell) for cell in rows[0][1][:2]):
-        header = rows.pop(0)[1]
-        _check_order(header)
+    if all(cell[:1].isalpha() and _number(cell) is None for cell in rows[0][1][:2]):
+        names = rows.pop(0)[1]
+        _check_order(names)
     if not rows:
         raise ValueError("the table has a header and no rows: give a line with x, y and a value for each datum")
     for number, cells in rows:
         if len(cells) != columns:
             raise ValueError(f"line {number} has {len(cells)} cells and those before it {columns}: give as many in all")
-    if len(rows) * columns > most:
-        raise TooLarge(f"has {len(rows) * columns} cells and no more than {most} are read: {_SPLIT}")
-    numbers = np.empty((len(rows), columns))
+    table = np.empty((len(rows), columns))
     for k, (number, cells) in enumerate(rows):
         for column, cell in enumerate(cells):
-            if not cell and column >= 2:
-                numbers[k, column] = np.nan
-                continue
-            if not _is_number(cell):
+            value = np.nan if not cell and column >= 2 else _number(cell)
+            if value is None:
                 raise ValueError(
                     f"line {number} has {cell[:40]!r} in column {column + 1}, which is no number: write numbers with a "
                     "decimal point" + (", and leave the cell of an unknown value empty" if column >= 2 else "")
                 )
-            numbers[k, column] = float(cell)
-    return HardData(numbers[:, :2], numbers[:, 2:], _names(columns - 2, header), tuple(number for number, _ in rows))
+            table[k, column] = value
+    return HardData(table[:, :2], table[:, 2:], _names(columns - 2, names), tuple(number for number, _ in rows))
 
 
-def _cells(line: str, number: int, between: str | None) -> list[str]:
-    if between is None:
+def _cells(line: str, number: int, delimiter: str | None) -> list[str]:
+    if delimiter is None:
         return line.split()
     try:
-        return [
-            cell.strip() for cell in next(csv.reader([line], delimiter=between, strict=True, skipinitialspace=True))
-        ]
+        cells = next(csv.reader([line], delimiter=delimiter, strict=True, skipinitialspace=True))
     except csv.Error as error:
-        raise ValueError(f"line {number} cannot be taken apart ({error}): check its quotation marks") from None
+        raise ValueError(f"line {number} cannot be split into cells ({error}): check its quotation marks") from None
+    return [cell.strip() for cell in cells]
 
 
-def _is_number(cell: str) -> bool:
+def _number(cell: str) -> float | None:
     try:
-        float(cell)
+        return float(cell)
     except ValueError:
-        return False
-    return "_" not in cell  # Python's way to write thousands, and nobody else's
+        return None
 
 
 def _check_order(header: Sequence[str]) -> None:
-    """A header that names x and y must have them in front; other names of coordinates are not known."""
+    """Raise unless a header that names x and y has them in front."""
     names = [name.lower() for name in header]
     if ("x" in names and names[0] != "x") or ("y" in names and names[1] != "y") or names[0] in ("row", "rows"):
         raise ValueError(
@@ -189,18 +178,13 @@ def _check_order(header: Sequence[str]) -> None:
 
 def _names(variables: int, header: Sequence[str] | None = None) -> tuple[str, ...]:
     plain = ["value"] if variables == 1 else [f"value {k + 1}" for k in range(variables)]
-    names = tuple(given or name for given, name in zip(header[2:], plain, strict=True)) if header else tuple(plain)
-    twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
-    if twice is not None:
-        raise ValueError(f"two columns are named {twice}: give each variable a name of its own")
-    return names
+    return tuple(given or name for given, name in zip(header[2:] if header else plain, plain, strict=True))
 
 
 def _table(array: Any) -> HardData:
-    """The table in an array of rows."""
-    masked = np.ma.getmaskarray(array) if isinstance(array, np.ma.MaskedArray) else None
+    """Convert an array of rows."""
     try:
-        numbers = np.asarray(array)
+        numbers = np.ma.asarray(array)
     except ValueError:
         raise ValueError("the rows of hard data are of unequal length: give x, y and the same values in each") from None
     if numbers.size == 0:
@@ -209,9 +193,7 @@ def _table(array: Any) -> HardData:
         raise TypeError(f"the hard data holds {numbers.dtype} values: give real numbers")
     if numbers.ndim != 2 or numbers.shape[1] < 3:
         raise ValueError(f"the hard data has the shape {numbers.shape}: give (data, 3) of x, y, value, or more values")
-    found = numbers.astype(np.float64)
-    if masked is not None:
-        found[masked] = np.nan
+    found = np.where(np.ma.getmaskarray(numbers), np.nan, numbers.data).astype(np.float64)
     return HardData(found[:, :2], found[:, 2:], _names(numbers.shape[1] - 2))
 
 
@@ -238,8 +220,8 @@ def place_hard_data(
     Returns
     -------
     MaskedArray, (rows, cols) or (rows, cols, variables)
-        The values where they are known, masked where they are not; without the last axis where there is one variable.
-        ``filled()`` has NaN in place of what is unknown, or 0 if the type is not of floats.
+        The known values; unknown ones are masked. A single variable has no last axis. ``filled()`` replaces unknown
+        values by NaN, or by 0 if the type is not of floats.
 
     Raises
     ------
@@ -247,7 +229,7 @@ def place_hard_data(
         The table or the type is not of real numbers.
     ValueError
         A coordinate is not finite, a datum is outside of the picture, two data at one site have different values, the
-        type cannot hold a value, or nothing is known; it names the row.
+        type cannot hold a value, or nothing is known; the message names the row.
 
     Examples
     --------
@@ -257,7 +239,12 @@ def place_hard_data(
      [7 -- 9]]
     """
     data = table if isinstance(table, HardData) else _table(table)
-    rows, cols = _checked_shape(shape)
+    try:
+        rows, cols = (index(side) for side in shape)
+    except (TypeError, ValueError):
+        rows = cols = 0
+    if rows < 1 or cols < 1:
+        raise ValueError(f"shape is {shape!r}: give (rows, cols) of the picture, integers of 1 or more")
     kind = np.dtype(np.float64 if dtype is None else dtype).newbyteorder("=")
     if kind.kind not in "buif":
         raise TypeError(f"dtype is {kind}: give bool, or a type of integers or real floats")
@@ -289,29 +276,14 @@ def place_hard_data(
     return np.ma.MaskedArray(placed.reshape(form), mask=mask.reshape(form), fill_value=unknown)
 
 
-def _checked_shape(shape: Sequence[int]) -> tuple[int, int]:
-    try:
-        rows, cols = shape
-        whole = all(isinstance(side, (int, np.integer)) and not isinstance(side, bool) and side >= 1 for side in shape)
-    except (TypeError, ValueError):
-        whole = False
-    if not whole:
-        raise ValueError(f"shape is {shape!r}: give (rows, cols) of the picture, integers of 1 or more")
-    return int(rows), int(cols)
-
-
 def _sites(data: HardData, rows: int, cols: int) -> NDArray[np.intp]:
-    """The number of each datum's site, row by row."""
-    wrong = ~np.isfinite(data.points).all(axis=1)
-    if wrong.any():
-        row = int(wrong.argmax())
-        x, y = data.points[row]
-        raise ValueError(f"{data.where(row)} of the hard data is at x {x}, y {y}: give finite coordinates")
+    """Return the index of each datum's site, row by row."""
     low = np.floor(data.points)
-    nearest = low + (data.points - low >= 0.5)  # not floor(x + 0.5), which rounds the sum first
-    wrong = ((nearest < 0) | (nearest > (cols - 1, rows - 1))).any(axis=1)
-    if wrong.any():
-        row = int(wrong.argmax())
+    with np.errstate(invalid="ignore"):  # infinity is outside
+        nearest = low + (data.points - low >= 0.5)  # not floor(x + 0.5), which rounds the sum first
+    outside = ~((nearest >= 0) & (nearest <= (cols - 1, rows - 1))).all(axis=1)  # NaN too
+    if outside.any():
+        row = int(outside.argmax())
         x, y = data.points[row]
         raise ValueError(
             f"{data.where(row)} of the hard data is at x {x}, y {y}, outside of a picture of {cols} x {rows} pixels "
@@ -322,20 +294,18 @@ def _sites(data: HardData, rows: int, cols: int) -> NDArray[np.intp]:
 
 
 def _cast(data: HardData, kind: np.dtype[Any]) -> NDArray[Any]:
-    """The values in another type; what is unknown is 0."""
+    """Return the values in another type; unknown ones are 0."""
     values = np.where(np.isnan(data.values), 0.0, data.values)
-    if kind.kind == "f":
-        with np.errstate(over="ignore"):
-            wrong = np.isinf(values.astype(kind))
-    else:
-        least, most = (0, 1) if kind.kind == "b" else (np.iinfo(kind).min, np.iinfo(kind).max)
-        wrong = (values != np.floor(values)) | (values < max(least, -_EXACT)) | (values > min(most, _EXACT))
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = values.astype(kind)
+        wrong = np.isinf(found) if kind.kind == "f" else found.astype(np.float64) != values
+    if kind.kind in "iu":
+        wrong |= np.abs(values) >= 2**53  # float64, which the table was read as, may have rounded these
     if wrong.any():
         row, variable = (int(k) for k in np.argwhere(wrong)[0])
-        remedy = "finite values" if kind.kind == "f" else "0 and 1" if kind.kind == "b" else "integers"
-        remedy += " below 2**53" if kind.kind in "iu" and kind.itemsize == 8 else " within its range"
+        remedy = "finite values" if kind.kind == "f" else "0 and 1" if kind.kind == "b" else "integers below 2**53"
         raise ValueError(
             f"{data.where(row)} of the hard data has {values[row, variable]} for {data.names[variable]}, which {kind} "
-            f"cannot hold: give {remedy}, or a dtype that holds it"
+            f"cannot hold: give {remedy} within its range, or a dtype that holds it"
         )
-    return values.astype(kind)
+    return found

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""How much a file may unpack to: looked at in its headers, before anything of it is decoded."""
+"""Limits on the size of files: the header is checked before anything is decoded."""
 
 from __future__ import annotations
 
@@ -20,24 +20,21 @@ __all__ = ["BYTES", "PIXELS", "VARIABLE", "TooLarge", "max_pixels_or_default"]
 PathLike = str | os.PathLike[str]
 
 VARIABLE = "SIMDTEX_MAX_PIXELS"
-"""The variable of the environment that says how many pixels a file may have."""
+"""The environment variable that sets how many pixels a file may have."""
 
 PIXELS = 2**27
-"""Pixels of a picture, voxels of a volume or values' places of all realisations, at most, where nothing is said."""
+"""The default limit: pixels of a picture or of a source map, cells of a table."""
 
 BYTES = 8
-"""Bytes that a file may unpack to for each of these pixels."""
-
-PAGE = 2**13
-"""There may be one page, slice or frame for so many pixels, since each takes time whatever its size."""
+"""A file may unpack to this many bytes for each allowed pixel."""
 
 
 class TooLarge(ValueError):
-    """A file has more in it than is allowed; the sentence goes on from the file's name."""
+    """A file exceeds a limit; the message continues after the file's name."""
 
 
 def max_pixels_or_default(max_pixels: int | None) -> int:
-    """How many pixels a file may have: the argument, or `VARIABLE`, or `PIXELS`; raises where it is no such number."""
+    """Return the limit in pixels: the argument, else `VARIABLE` of the environment, else `PIXELS`."""
     if max_pixels is not None:
         whole("max_pixels", max_pixels, 1)
         return int(max_pixels)
@@ -50,41 +47,28 @@ def max_pixels_or_default(max_pixels: int | None) -> int:
 
 
 def check_pixels(pixels: int, most: int) -> None:
-    """Raise where a file has more pixels than `most`."""
+    """Raise TooLarge if a file has more pixels than `most`."""
     if pixels > most:
         raise TooLarge(f"has {pixels} pixels and no more than {most} are read: crop it, or set {VARIABLE} higher")
 
 
-def check_parts(count: int, pixels: int, most: int) -> None:
-    """Raise where so many pages, slices or frames of so many pixels are too many, or too many pixels together."""
-    if count > max(1, most // PAGE):
-        raise TooLarge(
-            f"has {count} pages, slices or frames and no more than {max(1, most // PAGE)} are read: split it, or set "
-            f"{VARIABLE} higher"
-        )
-    check_pixels(count * pixels, most)
-
-
 def check_bytes(unpacked: int, most: int) -> None:
-    """Raise where a file unpacks to more bytes than go with `most` pixels."""
+    """Raise TooLarge if a file unpacks to more bytes than `most` pixels may have."""
     if unpacked > BYTES * most:
         raise TooLarge(
             f"unpacks to {unpacked} bytes and no more than {BYTES * most} are read: crop it, or set {VARIABLE} higher"
         )
 
 
-def check_array(shape: Iterable[int], itemsize: int, axes: int, most: int) -> None:
-    """Raise where an array is too large; its first `axes` are those of its pixels, and channels may follow."""
+def check_array(shape: Iterable[int], itemsize: int, most: int) -> None:
+    """Raise TooLarge if an array (rows, cols, ...) has too many pixels or bytes."""
     sides = [int(side) for side in shape]
-    check_pixels(prod(sides[:axes]), most)
+    check_pixels(prod(sides[:2]), most)
     check_bytes(prod(sides) * itemsize, most)
 
 
 def check_file(path: PathLike, what: str, most: int) -> None:
-    """Raise unless a path is a regular file that is no larger than what it may unpack to.
-
-    `what` says what it should be: ``"the volume"``.
-    """
+    """Raise unless a path is a regular file of an allowed size; `what` names it, for example ``"the image"``."""
     name = os.fspath(path)
     try:
         found = os.stat(name)
@@ -102,11 +86,8 @@ def check_file(path: PathLike, what: str, most: int) -> None:
         raise ValueError(f"{name} {error}") from None
 
 
-# ---------------------------------------------------------------- NumPy's own files
-
-
-def read_npy(file: IO[bytes], length: int, axes: int, most: int) -> NDArray[Any]:
-    """Read an array of `length` bytes with its header, if it is no larger than it may be."""
+def read_npy(file: IO[bytes], length: int, most: int) -> NDArray[Any]:
+    """Read an ``.npy`` array of `length` bytes, header included, if it is within the limits."""
     begin = file.tell()
     version = np.lib.format.read_magic(file)
     if version == (1, 0):
@@ -116,29 +97,19 @@ def read_npy(file: IO[bytes], length: int, axes: int, most: int) -> NDArray[Any]
     else:
         raise ValueError("it holds no plain array of numbers")
     if dtype.hasobject:
-        raise ValueError("it holds objects of Python and no numbers")
-    check_array(shape, dtype.itemsize, axes, most)
+        raise ValueError("it holds Python objects and no numbers")
+    check_array(shape, dtype.itemsize, most)
     if file.tell() - begin + prod(shape) * dtype.itemsize > length:
         raise ValueError("it ends before its last value")
     file.seek(begin)
     return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
 
 
-def check_zip(archive: zipfile.ZipFile, most: int) -> None:
-    """Raise where a zip file unpacks to too much, or is packed in a way that does not say how much."""
-    inside = archive.infolist()
-    if any(one.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) for one in inside):
-        raise ValueError("it is packed by another method than deflate")
-    check_bytes(sum(one.file_size for one in inside), most)
-
-
-def read_npz(path: PathLike, name: str, axes: int, most: int, *, alone: bool = True) -> NDArray[Any]:
-    """Read the array of a name from an ``.npz`` file or, if that suffices, the one that is `alone` in it."""
+def read_npz(path: PathLike, name: str, most: int) -> NDArray[Any]:
+    """Read the array called `name` from an ``.npz`` file, if it is within the limits."""
     with zipfile.ZipFile(path) as archive:
-        check_zip(archive, most)
-        names = [inside.removesuffix(".npy") for inside in archive.namelist()]
-        if name not in names and not (alone and len(names) == 1):
-            raise ValueError(f"it has the arrays {', '.join(names[:5])} and none called {name}")
-        inside = archive.getinfo(f"{name if name in names else names[0]}.npy")
-        with archive.open(inside) as file:
-            return read_npy(file, inside.file_size, axes, most)
+        member = archive.getinfo(f"{name}.npy")
+        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError("it is compressed by another method than deflate")
+        with archive.open(member) as file:
+            return read_npy(file, member.file_size, most)

@@ -19,7 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.io.image import atomic_path, check_writable, read, write
+from simdtex.io.atomic import atomic_path
+from simdtex.io.image import check_writable, read, write
 from simdtex.io.limits import TooLarge, max_pixels_or_default, read_npz
 from simdtex.options import unmasked
 
@@ -223,7 +224,7 @@ def load_source_map(path: PathLike, *, max_pixels: int | None = None) -> SourceM
             raise ValueError(f"{name} is a picture of 8 bits and holds no source map: give one saved by simdtex")
     else:
         try:
-            pixels = read_npz(path, "source", 2, max_pixels_or_default(max_pixels), alone=False)
+            pixels = read_npz(path, "source", max_pixels_or_default(max_pixels))
         except TooLarge as error:
             raise ValueError(f"{name} {error}") from None
         except (KeyError, NotImplementedError, OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error):

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from simdtex.bench import results as worked_out
-from simdtex.io.image import atomic_path
+from simdtex.io.atomic import atomic_path
 from simdtex.report.profile import digits, rate_text, seconds_text
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ import jinja2
 import numpy as np
 
 from simdtex import __version__
-from simdtex.io.image import atomic_path
+from simdtex.io.atomic import atomic_path
 from simdtex.report.folder import earlier_files
 
 __all__ = ["Figure", "Section", "Table", "Text", "check_folder", "write_report"]

@@ -16,7 +16,8 @@ import PIL.ImageDraw
 import PIL.ImageFont
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.io.image import atomic_path, check_writable, pillow_bytes, to_display, write
+from simdtex.io.atomic import atomic_path
+from simdtex.io.image import check_writable, pillow_bytes, to_display, write
 
 __all__ = [
     "animation",

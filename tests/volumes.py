@@ -1,0 +1,23 @@
+"""Volumes read back by the libraries of their formats."""
+
+from pathlib import Path
+
+import imagecodecs
+import nrrd
+import numpy as np
+import tifffile
+
+
+def loaded(path):
+    """The volume (depth, rows, cols) or (depth, rows, cols, channels) of a file or of a folder of slices."""
+    path = Path(path)
+    if path.is_dir():
+        return np.stack([imagecodecs.png_decode(slice_.read_bytes()) for slice_ in sorted(path.iterdir())])
+    suffix = path.suffix.lower()
+    if suffix == ".nrrd":
+        return nrrd.read(str(path), index_order="C")[0]
+    if suffix in (".tif", ".tiff"):
+        with tifffile.TiffFile(path) as file:
+            return np.stack([page.asarray() for page in file.pages])
+    found = np.load(path)
+    return found["volume"] if suffix == ".npz" else found
