@@ -29,7 +29,7 @@ from simdtex.distributed.drive import go_on
 from simdtex.distributed.plan import laid
 from simdtex.distributed.store import Store, Turn
 from simdtex.distributed.tasks import do, forget
-from simdtex.methods.mrf import make_options
+from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.outline import outlined
 from simdtex.methods.mrf.tiles import Tally
 
@@ -39,7 +39,7 @@ WORKERS = (1, 10, 100, 1000, 10_000)
 
 def turns(sample: np.ndarray, tiles: int, device: str | None, folder: str) -> tuple[dict, float]:
     """Seconds a site, tile by tile, by level, kind and number of a turn; and the leader's of a turn."""
-    side, options = 2 * tiles, make_options()
+    side, options = 2 * tiles, Options()
     outline = outlined(sample, (side, side), options, 1)
     plan = laid(outline, [max(1, tiles >> number) for number in range(outline.levels)], 1)  # four tiles to each level
     store = Store.create(str(Path(folder) / "s.zarr"), outline, plan, None, sample.ndim == 3, False, "benchmark")
@@ -68,7 +68,7 @@ def turns(sample: np.ndarray, tiles: int, device: str | None, folder: str) -> tu
 
 def adding_up(candidates: int, folder: str, tiles: int = 500) -> float:
     """Seconds of the leader for what is noted of a tile."""
-    outline = outlined(data.brick()[:64, :64, None], (tiles, 64), make_options(order=1, levels=1), 1)
+    outline = outlined(data.brick()[:64, :64, None], (tiles, 64), Options(order=1, levels=1), 1)
     plan = laid(outline, [1], 1)
     store, turn = (
         Store.create(str(Path(folder) / "t.zarr"), outline, plan, None, True, False, "benchmark"),

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an option may be, said where it is declared; and one sentence that says what is wrong and what would be right.
+"""The table of options: what a field of a method's `Options` declares, and the checks of values.
 
-A field of a method's options has its kind in its metadata: `words`, `integer`, `number_of`, `switch`. From there it is
-checked, and the command line completes it.
+An option is declared once, by `option`, as a field of the frozen dataclass ``Options`` of its method. From there come
+its check, its place in the docstring, in ``simdtex/typed_options.py``, on the command line, on the live page and in the
+reference pages.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from math import isfinite, prod
 from numbers import Integral, Real
+from textwrap import wrap
 from typing import Any, TypeVar
 
 import numpy as np
@@ -20,49 +22,70 @@ from numpy.typing import NDArray
 T = TypeVar("T")
 
 MOST = 2**31 - 1
-"""The largest whole number that an option takes, where it names no other: kernels count in 32 bits."""
+"""The largest integer of an option that names no other: kernels count in 32 bits."""
 
 GREATEST = 1e6
-"""The largest number that an option takes, where it names no other: beyond it a weight is the only one that counts."""
+"""The largest number of an option that names no other: beyond it a weight is the only one that counts."""
+
+UNSET = object()
+"""Stands for a value that is not given, since None is one."""
 
 LONGEST = 100
-"""Characters of a value that a sentence repeats, at most."""
+"""Characters of a value that an error message repeats, at most."""
 
 
 @dataclass(frozen=True)
-class Words:
-    """One of some words."""
+class Choice:
+    """One of several words."""
 
     valid: tuple[str, ...]
 
     def check(self, name: str, value: Any) -> None:
-        """Raise unless it is one of them."""
+        """Raise unless the value is one of the words."""
         one_of(name, value, self.valid)
+
+    def __str__(self) -> str:
+        return "{" + ", ".join(f'"{word}"' for word in self.valid) + "}"
 
 
 @dataclass(frozen=True)
 class Whole:
-    """A whole number from `least` to `most`."""
+    """An integer from `least` to `most`."""
 
     least: int
     most: int = MOST
 
     def check(self, name: str, value: Any) -> None:
-        """Raise unless it is one."""
+        """Raise unless the value is an integer within the range."""
         whole(name, value, self.least, self.most)
+
+    def __str__(self) -> str:
+        return f"int, {self.least} or more" if self.most == MOST else f"int, {self.least} to {self.most}"
 
 
 @dataclass(frozen=True)
 class Number:
-    """A number from `least`, or above it, to `most`."""
+    """A number from `least` to `most`, one of which may be excluded; or, if given, the word `word`."""
 
     least: float
     most: float = GREATEST
     above: bool = False
+    below: bool = False
+    word: str = ""
 
     def check(self, name: str, value: Any) -> None:
-        """Raise unless it is one."""
-        real(name, value, self.least, self.most, above=self.above)
+        """Raise unless the value is a number within the range, or the word."""
+        if not self.word or not isinstance(value, str):
+            real(name, value, self.least, self.most, above=self.above, below=self.below)
+        elif value != self.word:
+            raise ValueError(f"{name} is {shown(value)}; give a number of at least {self.least}, or {self.word!r}")
+
+    def __str__(self) -> str:
+        if self.below:
+            return f"float, below {self.most}"
+        least = f"above {self.least}" if self.above else f"{self.least} or more"
+        least = least if self.most in (GREATEST, np.inf) else f"{self.least} to {self.most:g}"
+        return f'float, {least}, or "{self.word}"' if self.word else f"float, {least}"
 
 
 @dataclass(frozen=True)
@@ -70,61 +93,206 @@ class Switch:
     """True or False."""
 
     def check(self, name: str, value: Any) -> None:
-        """Raise unless it is one of them."""
+        """Raise unless the value is True or False."""
         true_or_false(name, value)
 
-
-Kind = Words | Whole | Number | Switch
-
-
-def words(default: str | None, *valid: str) -> Any:
-    """A field that is one of these words."""
-    return _declared(default, Words(valid))
+    def __str__(self) -> str:
+        return "bool"
 
 
-def integer(default: int | None, least: int, most: int = MOST) -> Any:
-    """A field that is a whole number."""
-    return _declared(default, Whole(least, most))
+@dataclass(frozen=True)
+class Numbers:
+    """A tuple of numbers of 0 or more, one of which is above 0."""
+
+    def check(self, name: str, value: Any) -> None:
+        """Raise unless the value is such a tuple."""
+        if not isinstance(value, tuple) or not value:
+            raise TypeError(f"{name} must be a tuple of numbers, not {shown(value)}")
+        for number in value:
+            real(f"one of {name}", number, 0)
+        if not any(value):
+            raise ValueError(f"{name} are all 0; give a number above 0")
+
+    def __str__(self) -> str:
+        return "tuple of float"
 
 
-def number_of(default: float | None, least: float, most: float = GREATEST, *, above: bool = False) -> Any:
-    """A field that is a number."""
-    return _declared(default, Number(least, most, above))
+@dataclass(frozen=True)
+class Other:
+    """Any other value: `examine` raises if it is not valid, `says` is its type, a `flag` is True or False on a page."""
+
+    examine: Callable[[Any], object]
+    says: str
+    flag: bool = False
+
+    def check(self, name: str, value: Any) -> None:
+        """Raise unless the value is valid."""
+        self.examine(value)
+
+    def __str__(self) -> str:
+        return self.says
 
 
-def switch(default: bool | None) -> Any:
-    """A field that is True or False."""
-    return _declared(default, Switch())
+Kind = Choice | Whole | Number | Switch | Numbers | Other
 
 
-def _declared(default: Any, kind: Kind) -> Any:
-    return field(default=default, metadata={"kind": kind})
+def is_flag(kind: Kind) -> bool:
+    """Return whether the command line and the live page give no value but True or False."""
+    return isinstance(kind, Switch) or (isinstance(kind, Other) and kind.flag)
 
 
-def kinds(options: Any) -> dict[str, Kind]:
-    """The kinds of a method's options, a class or one of its kind, by name: of those that are declared with one."""
-    return {one.name: one.metadata["kind"] for one in fields(options) if "kind" in one.metadata}
+@dataclass(frozen=True)
+class Option:
+    """The declaration of an option.
+
+    Parameters
+    ----------
+    default : object
+    kind : Kind
+        Type and range.
+    help : str
+        What the option does, in one sentence that begins with a verb and has no final stop.
+    more : str
+        Further sentences for the docstring and the reference pages.
+    none : str
+        What the default None stands for.
+    symbol : str
+        Symbol and equation in the paper.
+    paper : object
+        The paper's value, if it differs from the default.
+    jobs : mapping
+        Job -> the default there, if it differs. Jobs are named as their commands.
+    shown : tuple of str
+        The commands that have the option.
+    group : str
+        The heading under which commands and the live page list it.
+    unit : str
+    slider : (least, largest, step), optional
+        Of the control on the live page. A number without a slider has no control.
+    label : str
+        The name on the live page; by default that of the field.
+    """
+
+    default: Any
+    kind: Kind
+    help: str
+    more: str = ""
+    none: str = ""
+    symbol: str = ""
+    paper: Any = UNSET
+    jobs: Mapping[str, Any] = field(default_factory=dict)
+    shown: tuple[str, ...] = ()
+    group: str = ""
+    unit: str = ""
+    slider: tuple[float, float, float] | None = None
+    label: str = ""
+
+    def default_of(self, job: str) -> Any:
+        """Return the default value in a job."""
+        return self.jobs.get(job, self.default)
+
+    def check(self, name: str, value: Any) -> None:
+        """Raise unless the value is valid; None is if it is the default."""
+        if value is not None or self.default is not None:
+            self.kind.check(name, value)
+
+
+PRESETS = ("default", "paper")
+
+PRESET = Option(
+    "default",
+    Choice(PRESETS),
+    "Begin with the defaults of the method, or with the rules of its paper",
+    group="Appearance",
+)
+"""The option ``preset``, which every method has beside its table."""
+
+
+def option(default: Any, kind: Kind, help: str, **more: Any) -> Any:
+    """Declare a field of `Options`; the arguments are those of `Option`."""
+    return field(default=default, metadata={"option": Option(default, kind, help, **more)})
+
+
+def table(options: Any) -> dict[str, Option]:
+    """Return the options of a class, or of an instance, by name."""
+    return {one.name: one.metadata["option"] for one in fields(options)}
 
 
 def check(options: Any) -> None:
-    """Raise unless every declared value is of its kind; None is where it is the default."""
-    for one in fields(options):
-        kind, value = one.metadata.get("kind"), getattr(options, one.name)
-        if kind and not (value is None and one.default is None):
-            kind.check(one.name, value)
+    """Raise unless every value of an instance is valid."""
+    for name, one in table(options).items():
+        one.check(name, getattr(options, name))
 
 
-def build(options: type[T], method: str, given: Mapping[str, Any], also: tuple[str, ...] = ()) -> T:
-    """A method's options from what the user gave; an unknown name is a TypeError that lists the valid ones."""
-    valid = [f.name for f in fields(options)]  # type: ignore[arg-type]
+def preset_values(options: Any, preset: str) -> dict[str, Any]:
+    """Return the values of a preset of a class of options."""
+    one_of("preset", preset, PRESETS)
+    declared = table(options).items() if preset == "paper" else ()
+    return {name: one.paper for name, one in declared if one.paper is not UNSET}
+
+
+def resolve(options: type[T], job: str, given: Mapping[str, Any]) -> T:
+    """Return the options of a job: the method's defaults < the job's < the preset's values < what the user gave.
+
+    Parameters
+    ----------
+    options : type
+        The class of options of a method.
+    job : str
+        The name of its command: ``"synth"``, ``"fill"``, ``"extend"``, ``"simulate"``...
+    given : mapping
+        The values that the user gave, and possibly ``preset``. Lists become tuples.
+
+    Raises
+    ------
+    TypeError
+        A name is unknown; the message lists the valid ones.
+    ValueError, TypeError
+        A value is not valid.
+    """
+    own = table(options)
+    known = ["preset", *own]
     for name in given:
-        if name not in valid:
-            near = get_close_matches(name, [*also, *valid], 1, 0.75)
+        if name not in known:
+            near = get_close_matches(name, known, 1, 0.75)
             meant = f" (did you mean {near[0]!r}?)" if near else ""
-            raise TypeError(
-                f"unknown option {name!r} of the method {method!r}{meant}; choose from: {', '.join([*also, *valid])}"
-            )
-    return options(**given)
+            method = options.__module__.split(".")[2]
+            raise TypeError(f"unknown option {name!r} of the method {method!r}{meant}; choose from: {', '.join(known)}")
+    values = {name: one.default_of(job) for name, one in own.items()}
+    values |= preset_values(options, given.get("preset", "default"))
+    values |= {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
+    values.pop("preset", None)
+    return options(**values)
+
+
+INDENTED: dict[str, Any] = {"initial_indent": " " * 8, "subsequent_indent": " " * 8, "break_on_hyphens": False}
+
+
+def documented(options: type[T]) -> type[T]:
+    """Append the section Parameters to the docstring of a class of options."""
+    lines = ["", "", "    Parameters", "    ----------"]
+    for name, one in table(options).items():
+        default = "optional" if one.default is None else f"default {quoted(one.default)}"
+        unit = f", in {one.unit}" if one.unit else ""
+        lines += [f"    {name} : {one.kind}{unit}, {default}", *wrap(described(one), 120, **INDENTED)]
+    options.__doc__ = f"{(options.__doc__ or '').rstrip()}" + "\n".join(lines) + "\n    "
+    return options
+
+
+def described(one: Option) -> str:
+    """Return all that a declaration says of an option beside its type and default, in sentences."""
+    text = [f"{one.help}.", one.more, f"None: {one.none}." if one.none else ""]
+    text.append(f"In the paper: {one.symbol}." if one.symbol else "")
+    if one.jobs:
+        jobs = [f"``{quoted(value)}`` in ``{job}``" for job, value in one.jobs.items()]
+        text.append(f"By default {', '.join(jobs)}.")
+    text.append("" if one.paper is UNSET else f'With ``preset="paper"``: ``{quoted(one.paper)}``.')
+    return " ".join(sentence for sentence in text if sentence)
+
+
+def quoted(value: Any) -> str:
+    """Return a value as in Python, a text in double quotes."""
+    return f'"{value}"' if isinstance(value, str) else str(value)
 
 
 SMALLER = "give a smaller size"
@@ -154,14 +322,16 @@ def whole(name: str, value: Any, least: int, most: float = MOST) -> None:
         raise ValueError(f"{name} is {number(value)}; give {most} or fewer")
 
 
-def real(name: str, value: Any, least: float, most: float = GREATEST, *, above: bool = False) -> None:
-    """Raise unless the value is a number from `least`, or above it, to `most`."""
+def real(
+    name: str, value: Any, least: float, most: float = GREATEST, *, above: bool = False, below: bool = False
+) -> None:
+    """Raise unless the value is a number from `least` to `most`; `above` and `below` exclude these."""
     if isinstance(value, bool) or not isinstance(value, Real):
         raise TypeError(f"{name} must be a number, not {shown(value)}")
-    if not _finite(value) or value < least or (above and value == least):
-        raise ValueError(f"{name} is {number(value)}; give a number {'above' if above else 'of at least'} {least}")
-    if float(value) > most:
-        raise ValueError(f"{name} is {number(value)}; give at most {most:g}")
+    if not (_finite(value) or value == most) or value < least or (above and value == least):
+        raise ValueError(f"{name} is {number(value)}; give a number {'above' if above else 'of at least'} {least:g}")
+    if float(value) > most or (below and value == most):
+        raise ValueError(f"{name} is {number(value)}; give {'a number below' if below else 'at most'} {most:g}")
 
 
 def unmasked(name: str, value: Any) -> None:

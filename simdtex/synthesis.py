@@ -19,7 +19,7 @@ from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine, open_machine
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
-from simdtex.options import one_of, real, unmasked, whole
+from simdtex.options import one_of, real, resolve, unmasked, whole
 from simdtex.run import Callback, Output
 
 METHODS = ("mrf", "multires", "pyramid")
@@ -143,7 +143,7 @@ def synthesize(
             'give method="mrf"'
         )
     package = import_module(f"simdtex.methods.{method}")
-    chosen = package.make_options(**with_channels_last(options, channel_axis))
+    chosen = resolve(package.Options, "synth", with_channels_last(options, channel_axis))
     if method == "mrf":
         plan: Plan = package.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
     else:
@@ -222,7 +222,7 @@ def synthesize_solid(
 
     pixels = check_sample(sample, channel_axis)
     size = _check_block(shape)
-    chosen = solid.make_options(**options)
+    chosen = resolve(solid.Options, "solid", options)
     plan = solid.Plan(pixels, size, chosen)
     job = PlannedJob(
         "synthesize_solid",
@@ -290,7 +290,7 @@ def suggest_alpha(
     for name in ("alpha", "thresholds"):
         if name in options:
             raise TypeError(f"suggest_alpha finds alpha; leave {name} out")
-    chosen = multires.make_options(**({} if target is None else {"target": target}), **options)
+    chosen = resolve(multires.Options, "synth", ({} if target is None else {"target": target}) | options)
     machine = open_machine(device)
     return multires.suggest_alpha(machine, analyse(machine, pixels, **chosen.analysis), chosen)
 

@@ -10,7 +10,8 @@ from cases import REFERENCE, assert_same_bits, texture
 
 import simdtex
 from simdtex import schedules
-from simdtex.methods.mrf import PRESETS, Options
+from simdtex.methods.mrf import Options
+from simdtex.options import PRESETS, preset_values
 
 SEED = 2**40 + 3
 
@@ -196,7 +197,7 @@ def test_sums_have_their_order(monkeypatch, how):
 
 def test_the_plain_loops_have_the_engines_defaults_and_presets():
     assert {f.name: f.default for f in fields(Options)} == plain_mrf.DEFAULTS | NO_BYTE
-    assert {name: plain_mrf.DEFAULTS | preset for name, preset in PRESETS.items()} == {
+    assert {name: plain_mrf.DEFAULTS | preset_values(Options, name) for name in PRESETS} == {
         "default": plain_mrf.DEFAULTS,
         "paper": plain_mrf.DEFAULTS | plain_mrf.PAPER,
     }

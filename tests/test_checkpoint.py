@@ -16,7 +16,7 @@ from simdtex import checkpoint as checkpoints
 from simdtex import schedules
 from simdtex.checkpoint import Checkpoint, identity, like, pack, read, unpack
 from simdtex.io.atomic import write_checked
-from simdtex.methods.mrf import make_options
+from simdtex.methods.mrf import Options
 
 GREY, COLOUR = texture((14, 15)), texture((16, 18), 3)
 HOLE = np.zeros((14, 15), bool)
@@ -510,7 +510,7 @@ def test_identities_tell_inputs_apart():
     assert identity(np.arange(4)) != identity(np.arange(4).reshape(2, 2)) != identity(np.arange(4, dtype=float))
     assert identity((1, None, "a", True)) == [1.0, None, "a", True]
     assert identity(schedules.get("block:3x4")) == "Block block:3x4"
-    assert identity(make_options(xi=-2))["xi"] == -2 and json.dumps(identity(make_options()))
+    assert identity(Options(xi=-2))["xi"] == -2 and json.dumps(identity(Options()))
 
 
 # -- killed ---------------------------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from simdtex.distributed.store import Store, cut
 from simdtex.distributed.tasks import do, forget
 from simdtex.distributed.tiling import Tiles
 from simdtex.driver import drive
-from simdtex.methods.mrf import make_options
+from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.algorithm import Run
 from simdtex.methods.mrf.plan import plan as planned_run
 from simdtex.methods.mrf.tiles import Tile, framed
@@ -164,7 +164,7 @@ def test_categories(tmp_path):
 
 def test_a_sample_and_options_of_every_kind_come_back_from_a_store(tmp_path):
     """What a worker lays out is what was laid out: see also that all options survive JSON."""
-    options = make_options(order=2, weights=(1.0, 0.5, 0.1 + 0.2), xi=-1.7)
+    options = Options(order=2, weights=(1.0, 0.5, 0.1 + 0.2), xi=-1.7)
     plan, seed = planned_run(Pictures((COLOUR,)), (30, 31), options), 2**40 + 1
     layout = planned(plan, seed, 10, 1)
     store = Store.create(str(tmp_path / "s.zarr"), plan, seed, layout, channels=True, source=False)
@@ -199,7 +199,7 @@ def shuffled(store, seed, stop=None):
 
 
 def created(tmp_path, name="s.zarr", **options):
-    options = make_options(order=1, levels=2, xi=-8.0, **options)
+    options = Options(order=1, levels=2, xi=-8.0, **options)
     plan, where = planned_run(Pictures((SAMPLE[..., None],)), (26, 31), options), str(tmp_path / name)
     return Store.create(where, plan, 11, planned(plan, 11, 12, 1), channels=False, source=False), where
 
@@ -394,7 +394,7 @@ def test_redundant_work_is_what_the_schedule_does(tmp_path):
     from simdtex.methods.mrf.level import Active
     from simdtex.schedules.trimmed import Trimmed
 
-    plan = planned_run(Pictures((SAMPLE[..., None],)), (60, 64), make_options(order=2, levels=1))
+    plan = planned_run(Pictures((SAMPLE[..., None],)), (60, 64), Options(order=2, levels=1))
     level = planned(plan, 1, 20, 1).levels[0]
     run = Run(plan, REFERENCE, 1)
     sites = 0

@@ -550,7 +550,7 @@ BAD_FILL = {
     "a channel axis that is not there": ({"image": texture(SHAPE, 3), "channel_axis": 3}, ValueError, "-3 to 2"),
     "a channel axis in words": ({"image": texture(SHAPE, 3), "channel_axis": "c"}, TypeError, "None or an integer"),
     "an unknown option": ({"method": "mrf"}, TypeError, "unknown option 'method'"),
-    "an order": ({"order": 0}, ValueError, "order 0 has no neighbours"),
+    "an order": ({"order": 0}, ValueError, "order is 0; give 1"),
     "a boundary": ({"boundary": "mirror"}, ValueError, "choose one of: torus, open"),
     "a seed": ({"rng": -1}, ValueError, "integer from 0"),
     "a device": ({"device": "abacus"}, simdtex.DeviceError, "choose one of"),

@@ -350,10 +350,10 @@ def test_a_stage_shows_what_stands_for_data():
 
 
 def test_pictures_keep_their_gaps_when_their_kinds_are_told():
-    from simdtex.methods.mrf.options import make_options
+    from simdtex.methods.mrf.options import Options
 
     sample = texture((8, 9), 2, np.float32)
     sample[2, 3] = np.nan
-    pictures = make_options(weights=(1.0, 2.0)).of(Pictures((sample,)))
+    pictures = Options(weights=(1.0, 2.0)).of(Pictures((sample,)))
     assert pictures.weights == (1.0, 2.0)
     assert np.argwhere(~pictures.known[0]).tolist() == [[2, 3]]

@@ -209,7 +209,7 @@ GREY = np.arange(42, dtype=np.uint8).reshape(6, 7)
 @pytest.mark.parametrize(
     ("change", "error", "words"),
     [
-        ({"order": 0}, ValueError, "order 0 has no neighbours; give 1"),
+        ({"order": 0}, ValueError, "order is 0; give 1"),
         ({"order": 1.5}, TypeError, "order must be an integer"),
         ({"order": 16}, ValueError, "the largest order that fits is 8"),
         ({"bandwidth": 0}, ValueError, "bandwidth is 0; give a number above 0"),

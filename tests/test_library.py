@@ -114,7 +114,7 @@ class Beside(Library):
 @pytest.mark.parametrize("shape", [(32, 32), (24, 40)])
 def test_pixels_have_as_many_candidates(parity, shape):
     machine, pixels = Beside(), texture((32, 32))[..., None]
-    options = multires.make_options(parity=parity, alpha=0.6, edges="keep")
+    options = multires.Options(parity=parity, alpha=0.6, edges="keep")
     _, run = drive(multires.Plan(pixels, shape, options), machine, 1)
     assert machine.used["candidates"] >= 4
     assert run.stages[-1].candidates.max() > 1
@@ -124,7 +124,7 @@ def test_pixels_have_as_many_candidates(parity, shape):
 def test_candidates_are_drawn_one_like_the_other(monkeypatch):
     monkeypatch.setattr(module, "QUERIES", 100)  # in several turns
     machine, pixels = Library(), texture((32, 32))[..., None]
-    options = multires.make_options(alpha=np.inf, edges="keep")  # all are candidates of all
+    options = multires.Options(alpha=np.inf, edges="keep")  # all are candidates of all
     _, run = drive(multires.Plan(pixels, (64, 64), options), machine, 1)
     source = run.stages[-1].source
     row, col = np.indices((64, 64))

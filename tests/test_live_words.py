@@ -1,7 +1,5 @@
 """The controls of the page are the options as they are declared, in words; windows and strokes are what is meant."""
 
-from dataclasses import fields
-
 import click
 import numpy as np
 import pytest
@@ -11,49 +9,39 @@ from hypothesis import strategies as st
 from simdtex import cli
 from simdtex.live.looking import Look, Plane, seen
 from simdtex.live.strokes import Stroke, painted
-from simdtex.live.words import GROUPS, METHODS, OF_JOBS, UNDECLARED, WORDS, controls
-from simdtex.options import Words, kinds
-
-ELSEWHERE = {
-    "mrf": {
-        *("schedule", "check_schedule", "array", "mapping"),  # studies
-        *("weights", "shares", "proportions", "data_weight", "guide_weight", "labels", "unsure"),  # of data and guides
-    },
-    "multires": {"target", "thresholds"},
-    "pyramid": {"start"},
-}
-"""The options that have no control, since a page gives nothing that they are about."""
-COMMANDS = {"mrf": "synth", "multires": "synth", "pyramid": "synth", "fill": "fill", "tile": "extend"}
+from simdtex.live.words import TABLES, controls
+from simdtex.options import table
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_every_option_has_a_control_or_is_named_here(method):
-    options = METHODS[method][1]
-    assert {one.name for one in fields(options)} == set(WORDS[method]) | ELSEWHERE[method]
-    assert not set(WORDS[method]) & ELSEWHERE[method]
-    assert not set(kinds(options)) & set(UNDECLARED.get(method, {})), "what is declared is declared once"
-
-
-@pytest.mark.parametrize("table", COMMANDS)
-def test_controls_are_what_options_may_be_and_the_command_line_has_them(table):
-    flags = {flag for one in cli.load(COMMANDS[table]).params if isinstance(one, click.Option) for flag in one.opts}
-    options = METHODS["mrf" if table in OF_JOBS else table][1]
-    for control in controls(table):
-        name = control["name"]
-        assert f"--{name.replace('_', '-')}" in flags, name
-        assert control["group"] in GROUPS
-        kind = (kinds(options) | UNDECLARED.get("mrf" if table in OF_JOBS else table, {}))[name]
-        if isinstance(kind, Words):
-            assert [word for word, _ in control["valid"]] == list(kind.valid)
-            assert all(says != word for word, says in control["valid"]), f"{name} says what its words mean"
+@pytest.mark.parametrize("name", TABLES)
+def test_controls_are_what_options_may_be_and_the_command_line_has_them(name):
+    options, command = TABLES[name]
+    flags = {flag for one in cli.load(command).params if isinstance(one, click.Option) for flag in one.opts}
+    own = table(options)
+    found = controls(name)
+    assert {one["name"] for one in found} <= {other for other, one in own.items() if command in one.shown}
+    for control in found:
+        one = own[control["name"]]
+        assert f"--{control['name'].replace('_', '-')}" in flags
+        assert control["hint"].startswith(one.help) and control["group"] == one.group and control["label"]
+        assert control["default"] == one.default_of(command)
+        if control["kind"] == "words":
+            assert [word for word, _ in control["valid"]] == list(one.kind.valid)
         elif control["kind"] != "switch":
             least, most, step = control["span"]
-            assert kind.least <= least < most <= kind.most and step > 0, name
-            if control["default"] is not None:
-                kind.check(name, control["default"])
-                assert least <= control["default"] <= most, name
+            assert (control["least"], control["most"]) == (one.kind.least, one.kind.most)
+            assert one.kind.least <= least < most <= one.kind.most and step > 0
+            if control["default"] is None:
+                assert control["empty"], "it says what an empty field means"
             else:
-                assert control["empty"], f"{name} says what it is when it is left out"
+                assert least <= control["default"] <= most
+
+
+def test_the_controls_of_a_texture():
+    assert {one["name"] for one in controls("mrf")} >= {"order", "finish", "boundary", "categorical", "levels"}
+    assert {one["blank"] for one in controls("multires") if one["name"] == "alpha"} == {"auto"}
+    assert not {"schedule", "array", "weights", "labels"} & {one["name"] for one in controls("mrf")}
+    assert controls("mrf")[0]["group"] == "Appearance"
 
 
 def test_jobs_have_their_own_defaults():

@@ -357,7 +357,7 @@ def test_an_alpha_without_a_target_is_the_freest_whose_strain_is_small_enough():
     for beta in (0, 1):
         strains = {}
         for most in (0, 0.02, 0.1, 0.3, 9):
-            options = multires.make_options(strain=most, beta=beta)
+            options = multires.Options(strain=most, beta=beta)
             alpha = multires.suggest_alpha(REFERENCE, analysis, options)
             found = simdtex.suggest_alpha(sample, strain=most, beta=beta, channel_axis=-1, device=REFERENCE)
             assert found == alpha
@@ -375,13 +375,13 @@ def test_where_nothing_meets_nothing_strains():
         assert simdtex.suggest_alpha(sample, device=REFERENCE) == 0.4
     assert simdtex.suggest_alpha(texture((9, 9)), levels=1, device=REFERENCE) == 0.4
     analysis = analyse(REFERENCE, texture((32, 32), 1))
-    assert multires.strain(REFERENCE, analysis, multires.make_options(), 0) == 0
+    assert multires.strain(REFERENCE, analysis, multires.Options(), 0) == 0
 
 
 @pytest.mark.parametrize("boundary", ["torus", "open"])
 def test_a_strain_is_what_neighbours_differ_by_from_what_the_other_goes_on_with(boundary):
     sample, torus = texture((24, 20), 2), boundary == "torus"
-    options = multires.make_options(boundary=boundary, alpha=1.0, edges="keep")
+    options = multires.Options(boundary=boundary, alpha=1.0, edges="keep")
     analysis = analyse(REFERENCE, sample, **options.analysis)
     _, output = drive(multires.Plan(sample, (24, 20), options, analysis), REFERENCE, 0)
     levels = []
@@ -404,7 +404,7 @@ def test_a_strain_is_what_neighbours_differ_by_from_what_the_other_goes_on_with(
 def test_strangers_strain_by_1():
     noise = np.random.default_rng(1).integers(0, 256, (80, 80, 1)).astype(np.uint8)
     analysis = analyse(REFERENCE, noise, edges="keep", levels=3)
-    free = multires.strain(REFERENCE, analysis, multires.make_options(parity="free"), INF)
+    free = multires.strain(REFERENCE, analysis, multires.Options(parity="free"), INF)
     assert free == pytest.approx(1, abs=0.05)
 
 

@@ -17,6 +17,7 @@ from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.ops.relax import Everything, Listed
+from simdtex.options import resolve
 
 # -- options ------------------------------------------------------------------------------------------------------
 
@@ -34,7 +35,7 @@ REFUSED = [
             "preset": "default, paper",
         }.items()
     ),
-    ("order", 0, "order 0 has no neighbours; give 1 "),
+    ("order", 0, "order is 0; give 1 "),
     ("levels", 0, "levels is 0; give 1 or more"),
     ("overview", 0, "overview is 0; give 1 or more"),
     ("bandwidth", 0, "bandwidth is 0; give a number above 0"),
@@ -44,7 +45,7 @@ REFUSED = [
         for name in ("balance", "structure", "novelty", "finish")
     ),
     ("xi", 0, "xi is 0; give a number below 0"),
-    ("xi", math.nan, "xi is nan; give a number of at least -1000000.0"),
+    ("xi", math.nan, "xi is nan; give a number of at least -1e+06"),
     ("free_sweeps", -1, "free_sweeps is -1; give 0 or more"),
     ("suggesting", 0, "suggesting is 0; give 1 or more"),
     ("similar", -1, "similar is -1; give 0 or more"),
@@ -58,24 +59,24 @@ REFUSED = [
 @pytest.mark.parametrize(("name", "value", "words"), REFUSED, ids=[name for name, *_ in REFUSED])
 def test_every_option_is_refused_by_its_name(name, value, words):
     with pytest.raises((TypeError, ValueError), match="^" + re.escape(words)):
-        mrf.make_options(**{name: value})
+        resolve(mrf.Options, "synth", {name: value})
 
 
 def test_the_least_of_every_option_is_accepted():
     least = {"order": 1, "levels": 1, "coherence": 0, "free_sweeps": 0}
-    mrf.make_options(**least, suggesting=1, similar=0, chance=0, exhaustive=0, overview=1)
-    mrf.make_options(balance=0, structure=0, novelty=0, finish=0)
+    mrf.Options(**least, suggesting=1, similar=0, chance=0, exhaustive=0, overview=1)
+    mrf.Options(balance=0, structure=0, novelty=0, finish=0)
 
 
 def test_a_list_finds_no_mode_of_a_density():
     words = 'search="coherent" finds no mode of a density; give search="exact", pixel="source" or relaxation="gibbs"'
     with pytest.raises(ValueError, match=f"^{words}$"):
-        mrf.make_options(search="coherent", pixel="density")
+        mrf.Options(search="coherent", pixel="density")
 
 
 def test_options_resolve():
     def resolved(**given):
-        found = mrf.make_options(**given).resolved(Pictures((np.arange(17).reshape(1, 17, 1),)))
+        found = mrf.Options(**given).resolved(Pictures((np.arange(17).reshape(1, 17, 1),)))
         return found.search, found.finish
 
     assert resolved() == ("coherent", 1.5)
@@ -91,8 +92,8 @@ def test_a_sample_of_sixteen_different_pixels_is_a_map_of_categories():
     late[299, 284:, 1] = np.arange(16)  # in its last few pixels, and one of them is the 0 of all others
     for changed, finish in ((16, 0.0), (17, 1.5)):
         late[0, 0] = (7, 0) if changed == 17 else 0
-        assert mrf.make_options().resolved(Pictures((late,))).finish == finish
-    assert mrf.make_options(finish=1.5).resolved(Pictures((late[1:],))).finish == 1.5
+        assert mrf.Options().resolved(Pictures((late,))).finish == finish
+    assert mrf.Options(finish=1.5).resolved(Pictures((late[1:],))).finish == 1.5
 
 
 # -- levels -------------------------------------------------------------------------------------------------------
@@ -131,7 +132,7 @@ def test_a_neighbourhood_that_does_not_fit():
     ],
 )
 def test_how_many_levels(sample, shape, given, expected):
-    options = mrf.make_options(**{"overview": 64} | given)
+    options = mrf.Options(**{"overview": 64} | given)
     offsets = neighbourhood_offsets(options.order)
     if isinstance(expected, int):
         assert number_of_levels([sample], offsets, shape, options) == expected

@@ -1,5 +1,6 @@
 """Every option has a range: what is beyond it is said in one sentence, whatever is given."""
 
+import re
 from dataclasses import fields
 from math import inf, nan
 
@@ -16,7 +17,7 @@ from simdtex.experiments.ising import ising
 from simdtex.machine.reference import Reference
 from simdtex.methods import mrf, multires, pyramid
 from simdtex.methods.pyramid import solid
-from simdtex.options import GREATEST, MOST, Number, Whole, Words, kinds, real, whole, within_32_bits
+from simdtex.options import GREATEST, MOST, UNSET, Number, Whole, real, resolve, table, whole, within_32_bits
 
 SAMPLE = np.random.default_rng(1).integers(0, 256, (9, 9), dtype=np.uint8)
 STRANGE = [
@@ -24,6 +25,39 @@ STRANGE = [
     *(nan, inf, -inf, 1e308, -1e308, 1e-320, 5e-324, -3e6, np.float32(3e38), np.int64(2**62), 1j),
     *(None, True, False, "", "x", "nan", "a" * 10**4, b"0", (), [], [[]], {}, object(), np.zeros(0), np.zeros((2, 2))),
 ]
+VERBS = {
+    *(
+        "account",
+        "begin",
+        "blend",
+        "break",
+        "bring",
+        "check",
+        "compare",
+        "cool",
+        "count",
+        "cover",
+        "exchange",
+        "follow",
+    ),
+    *(
+        "give",
+        "go",
+        "keep",
+        "launch",
+        "lay",
+        "let",
+        "look",
+        "make",
+        "match",
+        "prefer",
+        "relax",
+        "run",
+        "split",
+        "sweep",
+    ),
+    *("take", "use", "weigh", "be"),
+}
 METHODS = {"mrf": mrf, "multires": multires, "pyramid": pyramid, "solid": solid}
 OPTIONS = [
     (method, field.name)
@@ -37,7 +71,7 @@ OPTIONS = [
 def test_any_value_of_an_option_is_taken_or_refused_in_one_sentence(method, name):
     for value in STRANGE:
         try:
-            METHODS[method].make_options(**{name: value})
+            METHODS[method].Options(**{name: value})
         except (TypeError, ValueError) as error:
             text = str(error)
             assert "\n" not in text and 10 < len(text) < 400, (value, text)
@@ -81,9 +115,9 @@ SMALLEST = {
 }
 EXTREME = [
     (method, {name: value})
-    for table in (LARGEST, SMALLEST)
-    for method in table
-    for name, value in table[method].items()
+    for values in (LARGEST, SMALLEST)
+    for method in values
+    for name, value in values[method].items()
 ]
 
 
@@ -154,28 +188,61 @@ def test_memory_errors_are_said_in_one_sentence():
 @pytest.mark.parametrize("method", METHODS)
 def test_what_is_declared_is_what_is_checked(method):
     options = METHODS[method].Options
-    defaults = {field.name: field.default for field in fields(options)}
-    for name, kind in kinds(options).items():
-        if defaults[name] is not None:
-            kind.check(name, defaults[name])
+    for name, one in table(options).items():
+        one.check(name, one.default)
+        for value in (object(), *([] if one.default is None else [None])):
             with pytest.raises((TypeError, ValueError), match=name):
-                options(**{name: None})
-        with pytest.raises((TypeError, ValueError), match=name):
-            options(**{name: object()})
-        if isinstance(kind, Words):
-            for word in kind.valid:
-                kind.check(name, word)
-        elif isinstance(kind, (Whole, Number)):
-            with pytest.raises(ValueError, match=name):
-                options(**{name: kind.least - 1})
-            with pytest.raises(ValueError, match=name):
-                options(**{name: kind.most + 1})
+                options(**{name: value})
+        if isinstance(one.kind, (Whole, Number)):
+            for value in (one.kind.least - 1, *([] if one.kind.most == inf else [one.kind.most + 1])):
+                with pytest.raises(ValueError, match=name):
+                    options(**{name: value})
+        for value in (*one.jobs.values(), *([] if one.paper is UNSET else [one.paper])):
+            one.check(name, value)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_declaration_is_complete_and_its_docstring_says_it(method):
+    options = METHODS[method].Options
+    told = options.__doc__.partition("Parameters")[2]
+    assert re.findall(r"^    (\w+) : ", told, re.MULTILINE) == list(table(options))
+    for name, one in table(options).items():
+        assert one.help[0].isupper() and one.help[-1] != "." and ". " not in one.help, name
+        assert one.help.split()[0].lower() in VERBS, one.help
+        assert one.group and set(one.jobs) <= {"synth", "fill", "extend", "simulate", "schedules"}
+        assert (one.default is None) == bool(one.none), f"{name} says what None stands for"
+        said = " ".join(told.partition(f"    {name} : ")[2].partition("\n    " + name)[0].split())
+        assert said.startswith(f"{one.kind}") and one.help in said
 
 
 def test_a_near_miss_is_named():
     with pytest.raises(
         TypeError, match=r"unknown option 'coherense' of the method 'mrf' \(did you mean 'coherence'\?\); choose"
     ):
-        mrf.make_options(coherense=1)
-    with pytest.raises(TypeError, match=r"unknown option 'zzzz' of the method 'pyramid'; choose from: pyramid, levels"):
-        pyramid.make_options(zzzz=1)
+        resolve(mrf.Options, "synth", {"coherense": 1})
+    with pytest.raises(TypeError, match=r"unknown option 'zzzz' of the method 'pyramid'; choose from: preset, pyramid"):
+        resolve(pyramid.Options, "synth", {"zzzz": 1})
+
+
+def test_the_users_values_win_over_the_preset_over_the_job_over_the_method():
+    def values(job, **given):
+        found = resolve(mrf.Options, job, given)
+        return found.novelty, found.boundary, found.order
+
+    assert values("synth") == (1.0, "torus", 18)
+    assert values("simulate") == (0.25, "open", 18)
+    assert values("simulate", preset="default") == (0.25, "open", 18)
+    assert values("simulate", preset="paper") == (0.0, "open", 18)
+    assert values("simulate", preset="paper", novelty=0.5, boundary="torus", order=8) == (0.5, "torus", 8)
+    assert resolve(mrf.Options, "schedules", {}).search == "exact"
+    assert resolve(mrf.Options, "synth", {"weights": [1, 2.5]}).weights == (1, 2.5)
+    with pytest.raises(ValueError, match=r"^unknown preset 'papers'; choose one of: default, paper$"):
+        resolve(mrf.Options, "synth", {"preset": "papers"})
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_paper_is_a_preset_of_every_method(method):
+    options = METHODS[method].Options
+    paper = resolve(options, "synth", {"preset": "paper"})
+    expected = {name: one.default if one.paper is UNSET else one.paper for name, one in table(options).items()}
+    assert vars(paper) == expected

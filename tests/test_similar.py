@@ -7,7 +7,7 @@ from cases import REFERENCE, assert_same_bits, opencl, problem, texture
 from simdtex.methods.mrf.synthesis import laid_out
 
 import simdtex
-from simdtex.methods.mrf.options import make_options
+from simdtex.methods.mrf.options import Options
 from simdtex.ops import similar as module
 from simdtex.ops.similar import most_similar
 
@@ -88,7 +88,7 @@ def test_the_coarsest_level_may_have_many(machine, monkeypatch):
 def test_a_runs_tables_are_made_once():
     """And a level has the same from whichever level a run begins."""
     pixels = texture((40, 44), 1, seed=2)
-    options = make_options(similar=2, order=2, levels=3)
+    options = Options(similar=2, order=2, levels=3)
     run, again = (laid_out(REFERENCE, pixels, (50, 48), options, 1) for _ in range(2))
     for number in (2, 1, 0):
         run.similar(number)

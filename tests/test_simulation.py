@@ -11,11 +11,13 @@ from cases import assert_same_bits, texture
 import simdtex
 from simdtex.io.hard_data import place_hard_data, read_hard_data
 from simdtex.jobs import simulation
-from simdtex.jobs.simulation import DEFAULTS, realisation_seed
+from simdtex.jobs.simulation import realisation_seed
 
 xarray = pytest.importorskip("xarray")
 
 SHAPE = (12, 14)
+OWN = {"boundary": "open", "novelty": 0.25}
+"""The defaults of a simulation that differ from those of a texture."""
 QUICK = {"order": 2, "device": "reference", "rng": 5, "jobs": 1}
 TRAINING = texture((16, 20))
 CATEGORIES = (TRAINING > 90).astype(np.uint8) * 3 + (TRAINING > 170) * np.uint8(4)
@@ -54,13 +56,17 @@ def test_how_many_at_a_time_makes_no_difference(jobs):
 
 
 def test_a_realisation_is_what_synthesize_gives_with_its_seed():
-    assert DEFAULTS == {"boundary": "open", "novelty": 0.25}
     data = holed()
     options = {"order": 2, "device": "reference"}
     found = simulate(texture((16, 20), dtype=np.float32), known=data)
     for seed, values in zip(found.seed.values, found.values, strict=True):
         own = simdtex.synthesize(
-            texture((16, 20), dtype=np.float32), SHAPE, rng=int(seed), known=data, **DEFAULTS, **options
+            texture((16, 20), dtype=np.float32),
+            SHAPE,
+            rng=int(seed),
+            known=data,
+            **OWN,
+            **options,
         )
         assert_same_bits(values, own)
 
@@ -72,7 +78,7 @@ def test_guides_and_masks_are_those_of_synthesize():
     found = simulate(n=1, guide=guide, mask=mask, finish=0.0)
     own = simdtex.synthesize(
         TRAINING, SHAPE, rng=int(found.seed[0]), guide=guide, mask=mask, finish=0.0, order=2, device="reference",
-        **DEFAULTS,
+        **OWN,
     )  # fmt: skip
     assert_same_bits(found.values[0], own)
     assert np.isin(found.values, TRAINING[:, :12]).all()
@@ -85,6 +91,15 @@ def test_seeds_are_apart_and_stay_what_they_are():
     # written down once: files of realisations name these seeds
     assert [realisation_seed(1, number) for number in (0, 1)] == [8431846347943309920, 4042681867674859579]
     assert simulate(first=3).seed.values.tolist() == [realisation_seed(5, 3), realisation_seed(5, 4)]
+
+
+def test_the_preset_wins_over_the_defaults_of_a_simulation():
+    found = simulate(n=1, preset="paper", order=1, levels=2)
+    own = simdtex.synthesize(
+        TRAINING, SHAPE, rng=int(found.seed[0]), preset="paper", boundary="open", order=1, levels=2, device="reference"
+    )
+    assert_same_bits(found.values[0], own)
+    assert found.attrs["options"]["novelty"] == 0
 
 
 def test_an_option_of_ones_own_goes_before_the_defaults():
@@ -182,7 +197,13 @@ def test_several_variables_are_the_last_dimension(axis):
     found = simulate(training, n=2, channel_axis=axis)
     assert found.dims == ("realisation", "y", "x", "variable") and found.shape == (2, *SHAPE, 3)
     own = simdtex.synthesize(
-        training, SHAPE, channel_axis=axis, rng=int(found.seed[1]), order=2, device="reference", **DEFAULTS
+        training,
+        SHAPE,
+        channel_axis=axis,
+        rng=int(found.seed[1]),
+        order=2,
+        device="reference",
+        **OWN,
     )
     assert np.array_equal(found.values[1], np.moveaxis(own, axis, -1))
 
@@ -362,7 +383,7 @@ BAD = {
     "a mask of nothing": ({"mask": np.zeros((16, 20), bool)}, ValueError, "the mask leaves nothing of the sample"),
     "no pair of guides": ({"guide": TRAINING}, TypeError, "guide is no pair"),
     "an unknown option": ({"preset": "default", "reach": 3}, TypeError, "unknown option 'reach'"),
-    "an order": ({"order": 0}, ValueError, "order 0 has no neighbours"),
+    "an order": ({"order": 0}, ValueError, "order is 0; give 1 or more"),
     "a seed": ({"rng": -1}, ValueError, "integer from 0"),
     "a device": ({"device": "abacus"}, simdtex.DeviceError, "choose one of"),
 }  # fmt: skip

@@ -27,13 +27,12 @@ def _defaults() -> dict[str, Any]:
 def _words(name: str) -> list[tuple[str, ...]]:
     """What an option of this name may be, for each method in which it is one of some words."""
     from simdtex import schedules
-    from simdtex.methods.mrf.options import PRESETS
     from simdtex.methods.pyramid import solid
-    from simdtex.options import Words, kinds
+    from simdtex.options import PRESETS, Choice, table
 
-    others = {"method": tuple(_defaults()), "preset": tuple(PRESETS), "schedule": tuple(schedules.SCHEDULES)}
-    declared = (kinds(one).get(name) for one in (*_defaults().values(), solid.Options))
-    found = [one.valid for one in declared if isinstance(one, Words)]
+    others = {"method": tuple(_defaults()), "preset": PRESETS, "schedule": tuple(schedules.SCHEDULES)}
+    declared = (table(one).get(name) for one in (*_defaults().values(), solid.Options))
+    found = [one.kind.valid for one in declared if one and isinstance(one.kind, Choice)]
     return [others[name]] if name in others else list(dict.fromkeys(found))
 
 

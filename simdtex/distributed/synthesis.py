@@ -20,10 +20,10 @@ from simdtex.io.atomic import atomic_folder, exclusive
 from simdtex.jobs.inputs import Inputs, check_inputs
 from simdtex.machine import Machine, memory
 from simdtex.machine.reference import Reference
-from simdtex.methods.mrf import make_options
+from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.plan import plan as planned_run
-from simdtex.options import whole
+from simdtex.options import resolve, whole
 from simdtex.random import as_seed
 from simdtex.run import Callback
 
@@ -200,7 +200,7 @@ def plan(
 
 
 def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any]) -> Plan:
-    chosen = make_options(**options)
+    chosen = resolve(Options, "synth", options)
     if not isinstance(chosen.schedule, str):
         raise TypeError("workers know schedules by their names; give schedule the name of one")
     return planned_run(inputs.pictures, size, chosen, inputs.given, inputs.guide)

@@ -19,7 +19,8 @@ from simdtex.experiments.quality import COPIED_PATCH, Quality, measure
 from simdtex.experiments.recorder import Noted, Recorder, Sweep
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, open_machine
-from simdtex.methods.mrf import make_options
+from simdtex.methods.mrf import Options
+from simdtex.options import resolve
 from simdtex.random import as_seed
 from simdtex.run import Relaxing
 from simdtex.schedules import Schedule
@@ -338,11 +339,10 @@ def compare(
     _check_distinct("seed", keys)
     if "schedule" in options:
         raise TypeError("schedule is no option here; give schedules, a sequence of them")
-    options = {"search": "exact"} | options | {"array": array, "mapping": mapping}
-    make_options(**options)
+    settled = resolve(Options, "schedules", options | {"array": array, "mapping": mapping})
     pixels = check_sample(sample, channel_axis)
     size = _check_sides(pixels.shape[:2], shape)
-    job = _Job(np.asarray(sample), pixels, channel_axis, open_machine(device, profile=True), options)
+    job = _Job(np.asarray(sample), pixels, channel_axis, open_machine(device, profile=True), vars(settled))
     found: dict[str, list[tuple[Run, tuple[bool, ...]]]] = {name: [] for name in names}
     turns = [(seed, schedule) for seed in keys for schedule in chosen]  # a slow hour then slows all schedules alike
     for number, (seed, schedule) in enumerate(turns, 1):
@@ -394,10 +394,9 @@ class _Job:
 
     def warm_up(self, schedule: Schedule, size: tuple[int, int], tell: Tell | None) -> None:
         """Build every kernel that the schedule needs, by a small picture of at most two levels."""
-        options = make_options(**self.options)
-        side = 4 * isqrt(options.order) + 1
+        side, levels = 4 * isqrt(self.options["order"]) + 1, self.options["levels"]
         small = (min(size[0], side), min(size[1], side))
-        fewer = {} if options.levels is None else {"levels": min(options.levels, 2)}
+        fewer = {} if levels is None else {"levels": min(levels, 2)}
         self._synthesize(schedule, 0, small, tell and (lambda progress: tell(replace(progress, fraction=0.0))), fewer)
 
     def _synthesize(

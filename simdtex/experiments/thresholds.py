@@ -15,6 +15,7 @@ from simdtex.io.image import check_sample
 from simdtex.machine import Machine, open_machine
 from simdtex.methods import multires
 from simdtex.methods.multires.analysis import analyse
+from simdtex.options import resolve
 from simdtex.random import as_seed
 
 __all__ = ["Member", "series"]
@@ -79,7 +80,8 @@ def series(
     pixels, size, seed = check_sample(sample, channel_axis), check_shape(shape), as_seed(rng)
     alphas = list(alphas)
     made: list[Member] = []
-    chosen = [multires.make_options(alpha=alpha, beta=beta, **options) for beta in betas for alpha in alphas]
+    pairs = [{"alpha": alpha, "beta": beta} for beta in betas for alpha in alphas]
+    chosen = [resolve(multires.Options, "sheet", pair | options) for pair in pairs]
     if not chosen:
         raise ValueError("there is no alpha or no beta; give one of each or more")
     machine = open_machine(device)

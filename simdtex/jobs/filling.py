@@ -22,14 +22,8 @@ from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures, unknown_in
-from simdtex.options import whole, within_32_bits
+from simdtex.options import resolve, whole, within_32_bits
 from simdtex.run import Callback, Output
-
-OF_HOLES: dict[str, Any] = {"boundary": "open", "balance": 0.0, "novelty": 0.0, "chance": 16, "data_weight": 4.0}
-"""Where filling differs from making a texture: what lies near a hole may be used again, and the rim counts more."""
-
-OF_EDGES: dict[str, Any] = {"chance": 16, "data_weight": 4.0}
-"""The same of extending."""
 
 REACH = 128
 """How far around its window a hole is filled from, at least, pixels."""
@@ -118,8 +112,7 @@ def fill(
     full_output : bool
         Return the source map, temperatures and statistics too.
     **options
-        Of the method ``mrf``: see `simdtex.methods.mrf.Options`. By default ``boundary`` is ``"open"``, ``balance`` and
-        ``novelty`` are 0, ``chance`` is 16 and ``data_weight`` 4.
+        Of the method ``mrf``: see `simdtex.methods.mrf.Options`, which says what defaults differ in ``fill``.
 
     Returns
     -------
@@ -163,7 +156,7 @@ def fill(
     if reach is not None:
         whole("reach", reach, 1)
     given = None if sample is None else _check_sample(sample, channel_axis, pixels)
-    chosen = mrf.make_options(**OF_HOLES | options)
+    chosen = resolve(Options, "fill", options)
     job = Filling(pixels, hole, given, reach, chosen, channel_axis)
     return execute(job, rng, device, callback, full_output, checkpoint)
 
@@ -249,7 +242,7 @@ def extend(
     hole[top + along : top + rows - along, left + across : left + cols - across] = False
     if "boundary" in options:
         raise ValueError("the boundary of what is extended follows from seamless; leave boundary out")
-    chosen = mrf.make_options(**{"boundary": "torus" if seamless else "open"} | OF_EDGES | options)
+    chosen = resolve(Options, "extend", {"boundary": "torus" if seamless else "open"} | options)
     sides = {"top": top, "bottom": bottom, "left": left, "right": right, "seamless": seamless, "band": width}
     place = np.full((*hole.shape, 2), -1, np.int32)
     place[top : top + rows, left : left + cols] = np.moveaxis(np.indices((rows, cols)), 0, -1)

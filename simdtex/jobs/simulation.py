@@ -23,14 +23,11 @@ from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
 from simdtex.jobs.inputs import Inputs, check_array, check_inputs, check_samples
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
-from simdtex.options import whole, within_32_bits
+from simdtex.options import resolve, whole, within_32_bits
 from simdtex.run import Callback, Simulating
 
 if TYPE_CHECKING:
     import xarray
-
-DEFAULTS: dict[str, Any] = {"boundary": "open", "novelty": 0.25}
-"""Where a simulation differs from a texture: its edges are edges, and the training image's layout may come again."""
 
 AT_ONCE = 4
 """Realisations that a processor works on at once, at most: each has a queue of its own."""
@@ -84,8 +81,7 @@ def simulate(
     checkpoint
         As in `simdtex.synthesize`; it keeps the realisations that are finished.
     **options
-        Of the method ``mrf``: see `simdtex.methods.mrf.Options`; by default ``boundary`` is ``"open"`` and ``novelty``
-        0.25.
+        Of the method ``mrf``: see `simdtex.methods.mrf.Options`, which says what defaults differ in ``simulate``.
 
     Returns
     -------
@@ -123,7 +119,7 @@ def simulate(
         within_32_bits(check_shape(shape), 1)
     data, size = _known(known, shape, check_samples(training, channel_axis, mask).pixels[0], channel_axis)
     inputs = check_inputs(training, size, channel_axis, mask, data, None, guide)
-    chosen = mrf.make_options(**DEFAULTS | options)
+    chosen = resolve(mrf.Options, "simulate", options)
     plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
     pixels = inputs.pictures.pixels[0]
     each = 2 * prod((*size, pixels.shape[2])) * pixels.dtype.itemsize  # they are copied once

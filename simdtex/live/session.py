@@ -27,10 +27,10 @@ from simdtex.live.looking import Look, Plane
 from simdtex.live.recipe import stem
 from simdtex.live.results import Result, Results
 from simdtex.live.settings import Picture, parsed
-from simdtex.live.words import METHODS, OF_JOBS, WORDS, controls
+from simdtex.live.words import METHODS, TABLES, controls
 from simdtex.machine import Machine
 from simdtex.methods import mrf
-from simdtex.options import whole
+from simdtex.options import resolve, whole
 
 __all__ = ["BYTES", "PIXELS", "Session"]
 
@@ -159,9 +159,9 @@ class Session:
 
     def _hello(self, message: Message, buffers: Sequence[Any]) -> None:
         """Tell the page all that it shows, at once: a run may be going on."""
-        tables = {name: controls(name) for name in (*WORDS, *OF_JOBS)}
+        tables = {name: controls(name) for name in TABLES}
         hello = {"version": version("simdtex"), "device": self._machine().name, "controls": tables, "bytes": BYTES}
-        hello |= {"methods": {name: label for name, (label, _) in METHODS.items()}, "examples": list(EXAMPLES)}
+        hello |= {"methods": METHODS, "examples": list(EXAMPLES)}
         self._send({"kind": "hello", **hello, "fresh": self._picture is None}, [])
         if self._picture is not None:
             self._show_picture(new=not self._made_any)
@@ -351,7 +351,8 @@ class Session:
             before = self._results.get(settings.of)
             earlier = Earlier(before.image, before.maps, before.steps)
         asked = job(settings, self._picture, self._maps, earlier, self._pictures)
-        options = mrf.make_options(**settings.options) if settings.method == "mrf" else mrf.Options()
+        of_mrf = settings.options if settings.method == "mrf" else {}
+        options = resolve(mrf.Options, TABLES.get(settings.job, TABLES["mrf"])[1], of_mrf)
         key = asked.key if settings.method == "mrf" else None
         levels = Levels(key, options, self._levels)
         self._levels = levels

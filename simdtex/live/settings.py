@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.live.strokes import Stroke, parse
-from simdtex.live.words import METHODS as TOLD
-from simdtex.live.words import UNDECLARED, controls
-from simdtex.options import Number, kinds, one_of, shown, whole
+from simdtex.live.words import controls
+from simdtex.options import one_of, shown, whole
 from simdtex.synthesis import METHODS
 
 JOBS = ("synth", "tile", "fill")
@@ -114,7 +113,7 @@ def parsed(message: Mapping[str, Any], picture: Picture) -> Settings:
         method=method,
         shape=(int(height), int(width)),  # type: ignore[arg-type]  # checked above
         seed=int(seed),  # type: ignore[arg-type]
-        options=_options(options, job if job != "synth" else method, method),
+        options=_options(options, job if job != "synth" else method),
         part=part,
         guide=(parse(guide.get("sample", [])), parse(guide.get("output", []))) if job == "synth" else ((), ()),
         hole=parse(message.get("hole", [])) if job == "fill" else (),
@@ -122,15 +121,14 @@ def parsed(message: Mapping[str, Any], picture: Picture) -> Settings:
     )
 
 
-def _options(given: dict[str, Any], table: str, method: str) -> dict[str, Any]:
+def _options(given: dict[str, Any], table: str) -> dict[str, Any]:
     """The options that differ from what they are by default; only those with a control are taken."""
     known = {one["name"]: one for one in controls(table)}
-    of = kinds(TOLD[method][1]) | UNDECLARED.get(method, {})
     found: dict[str, Any] = {}
     for name, value in given.items():
         if name not in known:
             raise ValueError(f"there is no control for {shown(name)}; choose one of: {', '.join(known)}")
-        if isinstance(of[name], Number) and isinstance(value, int) and not isinstance(value, bool):
+        if known[name]["kind"] == "number" and isinstance(value, int) and not isinstance(value, bool):
             value = float(value) if abs(value) < 2**53 else value
         if value is not None and value != known[name]["default"]:
             found[name] = value

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.options import number
+from simdtex.options import whole
 
 MOST_ORDER = 4096
 """The largest order of a neighbourhood: 64 pixels to each side, 12852 neighbours."""
@@ -31,7 +31,7 @@ def neighbourhood_offsets(order: int) -> NDArray[np.int32]:
         (row, column) offsets in canonical order: by distance, then row, then column. o = 1 has 4, o = 8
         has 24, o = 18 has 60.
     """
-    check_order(order)
+    whole("order", order, 1, MOST_ORDER)
     radius = isqrt(order)
     row, col = np.mgrid[-radius : radius + 1, -radius : radius + 1].reshape(2, -1)
     squared = row * row + col * col
@@ -39,16 +39,6 @@ def neighbourhood_offsets(order: int) -> NDArray[np.int32]:
     row, col, squared = row[inside], col[inside], squared[inside]
     canonical = np.lexsort((col, row, squared))
     return np.stack([row, col], 1)[canonical].astype(np.int32)
-
-
-def check_order(order: Any) -> None:
-    """Raise unless `order` is an integer from 1 to `MOST_ORDER`."""
-    if isinstance(order, bool) or not isinstance(order, (int, np.integer)):
-        raise TypeError(f"order must be an integer, not {type(order).__name__}")
-    if order < 1:
-        raise ValueError(f"order {number(order)} has no neighbours; give 1 (4 neighbours) or more, say 8 or 18")
-    if order > MOST_ORDER:
-        raise ValueError(f"order is {number(order)}; give {MOST_ORDER} or less, say 8 or 18")
 
 
 LATTICE = np.dtype(

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The options of the method ``mrf``, their defaults, and the presets."""
+"""The options of the method ``mrf``."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,32 +13,21 @@ from numpy.typing import NDArray
 
 from simdtex import schedules
 from simdtex.maspar.array import MAPPINGS, parse_array
-from simdtex.model.lattice import check_order
+from simdtex.model.lattice import MOST_ORDER
 from simdtex.model.pictures import Pictures
-from simdtex.options import build, check, integer, number_of, one_of, real, shown, switch, whole, words
-
-PRESETS: dict[str, dict[str, Any]] = {
-    "default": {},
-    "paper": {
-        "relaxation": "gibbs",
-        "bandwidth": 1.0,
-        "coherence": 0.0,
-        "xi": -1.0,
-        "free_sweeps": 0,
-        "pixel": "density",
-        "phases": "decimated",
-        "edges": "whole",
-        "coarsest": "same",
-        "search": "exact",
-        "overview": 64,
-        "balance": 0.0,
-        "structure": 0.0,
-        "novelty": 0.0,
-        "finish": 0.0,
-    },
-}
-"""``paper`` keeps the 1998 rules to the letter."""
-
+from simdtex.options import (
+    Choice,
+    Number,
+    Numbers,
+    Other,
+    Switch,
+    Whole,
+    check,
+    documented,
+    option,
+    shown,
+    whole,
+)
 
 CATEGORIES = 16
 """Different pixels up to which a sample is taken for a map of categories."""
@@ -55,169 +45,306 @@ SEARCHED = ("search", "suggesting", "similar", "chance", "exhaustive")
 """The options that say how candidates are searched for, which makes no difference at the coarsest level."""
 
 
+def check_categorical(value: Any) -> None:
+    """Raise unless a value is True, False or a tuple of channels."""
+    if not isinstance(value, bool):
+        if not isinstance(value, tuple) or not value:
+            raise TypeError(f"categorical must be True, False or a tuple of channels, not {shown(value)}")
+        for channel in value:
+            whole("a channel of categorical", channel, 0)
+
+
+ALL = ("synth", "fill", "extend", "simulate", "schedules")
+TEXTURES = ("synth", "extend", "simulate", "schedules")
+DATA = ("synth", "fill", "extend", "simulate")
+
+appearance = partial(option, group="Appearance", shown=ALL)
+scales = partial(option, group="Scales and edges", shown=ALL)
+searching = partial(option, group="Search", shown=ALL)
+sampling = partial(option, group="Sampling", shown=ALL)
+parallel = partial(option, group="Schedule and processor array", shown=("synth",))
+data = partial(option, group="Data and guides", shown=DATA)
+
+
+@documented
 @dataclass(frozen=True)
 class Options:
     """The options of the method ``mrf``.
 
-    Parameters
-    ----------
-    order : int
-        o of equation (3): neighbours within the distance sqrt(o); 1 to 4096.
-    levels : int, optional
-        M of Algorithm 1. None: the most levels at which the sample still has `overview` candidates, and the output's
-        lattice a whole neighbourhood.
-    overview : int
-        Candidates that the sample still has at the coarsest of the default levels, at least. The fewer, the more of
-        the sample's own layout comes out again.
-    relaxation : {"icm", "gibbs"}
-        Take the LCPDF's mode, or draw from it.
-    bandwidth : float
-        h in units of h_opt, equation (8); above 0.
-    coherence : float
-        The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence.
-    balance : float
-        lambda of the price on use: a candidate whose surroundings serve more sites than their share costs
-        lambda N C sigma^2 min(4, u - 1), u their use over the fair share. 0: nobody counts.
-    structure : float
-        Weight of a channel that tells how far a pixel is from the sample's edges, matched like the others and not
-        shown; its standard deviation in units of the sample's, or less where grey levels would not hold it. 0, and with
-        ``pixel="density"``: there is none.
-    novelty : float
-        mu: at the coarsest level, of n candidates, one costs mu C sigma^2 min(1, 256 / n) for each neighbour whose
-        source it continues, and four times that for each whose source it is, where a site takes a sample's pixel and n
-        is 1024 or less.
-    finish : float, optional
-        Each output pixel is the mean of what its neighbours' sources say of it, with Gaussian weights of this
-        standard deviation, pixels; 0: it is its own source's. None: 1.5, but 0 where a sample has 16 different pixels
-        or fewer, since a mean of categories is none of them, and with ``pixel="density"``. 0.01 to 16, or 0.
-    xi : float
-        xi < 0 of equation (13): the further below 0, the fewer sweeps.
-    free_sweeps : int
-        Sweeps over all sites of a level, held ones too, after its equilibrium.
-    pixel : {"source", "density"}
-        A relaxed site takes the pixel of its source in the sample, or a grey level of the Parzen density, whose
-        kernel also spreads over x_s.
-    phases : {"all", "decimated"}
-        Candidates at coarse levels: every sample position, or those of the decimated sample, equation (10).
-    edges : {"auto", "reflect", "whole"}
-        Candidates are those sample positions whose whole neighbourhood lies in the sample, equation (4)
-        (``whole``), or all, those near the edge with a neighbourhood completed by reflection (``reflect``);
-        ``auto`` reflects at all levels but the finest, and there where fewer than three quarters of them have a whole
-        neighbourhood.
-    coarsest : {"gibbs", "same"}
-        How the coarsest level relaxes: by draws, or as the other levels. Its mode says nothing while all is unknown.
-    schedule : str or simdtex.schedules.Schedule
-        Which sites relax together: ``"coloring"``, ``"coloring-fixed"``, ``"luby"``, ``"checkerboard"``,
-        ``"synchronous"``, ``"random-subset"``, ``"raster"``, ``"random-scan"``, ``"block"``, or one of your own.
-    check_schedule : bool
-        Check at every step that a schedule which claims independent sites keeps equation (14).
-    boundary : {"torus", "open"}
-        Whether the output wraps around.
-    array : str, optional
-        A processor array to account for: ``"ROWSxCOLS"`` or ``"maspar-mp1-1k"`` to ``"maspar-mp1-16k"``. None
-        accounts for packed active sites on a full MP-1. No byte of the result depends on it.
-    mapping : {"cut-and-stack", "hierarchical"}
-        How a picture larger than the array lies on it.
-    search : {"auto", "exact", "coherent"}
-        Whether a site weighs all candidates of a level, or, at all but the coarsest level, only a few: those that
-        continue the source of a neighbour, its own source, and some more. ``auto`` is ``coherent`` for
-        ``relaxation="icm"`` with ``pixel="source"``, and ``exact`` where a site draws or takes the mode of a density.
-    suggesting : int
-        ``coherent``: nearest neighbours whose sources suggest a candidate each.
-    similar : int
-        ``coherent``: candidates more for each of these, those whose neighbourhoods in the sample are most like its own;
-        64 or fewer.
-    chance : int
-        ``coherent``: candidates at random, 4096 or fewer.
-    exhaustive : int
-        ``coherent``: a level with so many candidates or fewer weighs them all.
-    categorical : bool or tuple of int
-        Whether the sample's numbers name categories: two differ or they do not, and none is ever a mean of others. A
-        tuple names the variables (channels) of which that is so.
-    weights : tuple of float, optional
-        One for each variable (channel): each is brought to the same spread, times its weight. None: all are on one
-        scale, as colours are, but for categories.
-    shares : tuple of float, optional
-        One for each of several samples: how much of the output they are to be used for, kept by the price on use. None:
-        every pixel of all samples counts alike.
-    proportions : tuple of float, optional
-        Of a sample of categories: how much of the output each category, in ascending order, is to be, kept by a price.
-        None: as comes of the sample and of what is given.
-    data_weight : float
-        How many neighbours a known site counts for that is from nowhere in the sample: hard data.
-    guide_weight : float
-        Variance of the guide in units of the sample's.
-    labels : bool, optional
-        Whether the guide's numbers are names. None: integers of at most 16 different values are.
-    unsure : float
-        Where a sample is not known everywhere: the share of a candidate's neighbours that may be unknown, 0 to 1. These
-        are taken to be as the nearest known pixel.
-
-    Notes
-    -----
-    Where no other range is said, numbers are 0 to 1e6, and whole numbers 2**31 - 1 or less.
+    Numbers are at most 1e6 and integers at most 2**31 - 1, if no other limit is given.
     """
 
-    order: int = 18
-    levels: int | None = integer(None, 1)
-    overview: int = integer(128, 1)
-    relaxation: str = words("icm", "icm", "gibbs")
-    bandwidth: float = number_of(0.15, 0, above=True)
-    coherence: float = number_of(0.5, 0)
-    balance: float = number_of(0.5, 0)
-    structure: float = number_of(2.0, 0)
-    novelty: float = number_of(1.0, 0)
-    finish: float | None = number_of(None, 0, WIDEST)
-    xi: float = number_of(-1.0, -1e6)
-    free_sweeps: int = integer(2, 0)
-    pixel: str = words("source", "source", "density")
-    phases: str = words("decimated", "all", "decimated")
-    edges: str = words("auto", "auto", "reflect", "whole")
-    coarsest: str = words("gibbs", "gibbs", "same")
-    schedule: str | schedules.Schedule = "coloring"
-    check_schedule: bool = switch(False)
-    boundary: str = words("torus", "torus", "open")
-    array: str | None = None
-    mapping: str = words("cut-and-stack", *MAPPINGS)
-    search: str = words("auto", "auto", "exact", "coherent")
-    suggesting: int = integer(12, 1)
-    similar: int = integer(0, 0, SIMILAR)
-    chance: int = integer(4, 0, CHANCE)
-    exhaustive: int = integer(64, 0)
-    categorical: bool | tuple[int, ...] = False
-    weights: tuple[float, ...] | None = None
-    shares: tuple[float, ...] | None = None
-    proportions: tuple[float, ...] | None = None
-    data_weight: float = number_of(16.0, 0)
-    guide_weight: float = number_of(1.0, 0)
-    labels: bool | None = switch(None)
-    unsure: float = number_of(0.25, 0, 1)
+    order: int = appearance(
+        18,
+        Whole(1, MOST_ORDER),
+        "Compare neighbours within sqrt(order) pixels: 8 has 24 of them, 18 has 60; more keep larger shapes",
+        more="The time grows with their number.",
+        symbol="o of equation (3)",
+        slider=(2, 40, 1),
+    )
+    structure: float = appearance(
+        2.0,
+        Number(0),
+        "Follow the sample's outlines: more keeps joints and contours whole",
+        more="It is the weight of a channel that holds the distance from the sample's edges, is matched like the "
+        "others and is not shown: its standard deviation in units of the sample's, or less if grey levels would not "
+        'hold it. With 0, and with ``pixel="density"``, there is no such channel.',
+        paper=0.0,
+        slider=(0, 6, 0.25),
+    )
+    coherence: float = appearance(
+        0.5,
+        Number(0),
+        "Prefer to continue a neighbour's source: more keeps pieces together",
+        more="The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence.",
+        paper=0.0,
+        slider=(0, 4, 0.1),
+    )
+    balance: float = appearance(
+        0.5,
+        Number(0),
+        "Use all of the sample evenly: more repeats its pieces less",
+        more="A candidate whose surroundings serve more sites than their share costs lambda N C sigma^2 "
+        "min(4, u - 1): lambda is the balance, u the use over the fair share.",
+        paper=0.0,
+        jobs={"fill": 0.0},
+        slider=(0, 4, 0.1),
+    )
+    novelty: float = appearance(
+        1.0,
+        Number(0),
+        "Break up the sample's layout: more keeps less of it",
+        more="At the coarsest level, of n candidates, one costs mu C sigma^2 min(1, 256 / n) for each neighbour whose "
+        "source it continues, and four times that for each whose source it is: mu is the novelty. This holds if sites "
+        "take pixels of the sample and n is 1024 or less.",
+        paper=0.0,
+        jobs={"fill": 0.0, "simulate": 0.25},
+        slider=(0, 4, 0.25),
+    )
+    finish: float | None = appearance(
+        None,
+        Number(0, WIDEST),
+        "Blend seams over this many pixels; 0 keeps every pixel as one of the sample's",
+        more="Each output pixel is the mean of what its neighbours' sources say of it, with Gaussian weights of this "
+        "standard deviation, 0.01 to 16 or 0.",
+        none="1.5; 0 if a sample has 16 different pixels or fewer, since categories have no mean, and with "
+        '``pixel="density"``',
+        unit="pixels",
+        paper=0.0,
+        slider=(0, 4, 0.25),
+    )
+    overview: int = appearance(
+        128,
+        Whole(1),
+        "Keep this many candidates of the sample at the coarsest of the default levels, at least; the fewer, the more "
+        "of its layout comes out again",
+        paper=64,
+        shown=TEXTURES,
+        slider=(16, 1024, 16),
+    )
+    levels: int | None = scales(
+        None,
+        Whole(1),
+        "Go through this many levels, from coarse to fine",
+        none="as many as leave the sample `overview` candidates, and the output's lattice a whole neighbourhood",
+        symbol="M of Algorithm 1",
+        slider=(1, 8, 1),
+    )
+    boundary: str = scales(
+        "torus",
+        Choice(("torus", "open")),
+        "Let the output wrap around, so that it tiles (torus), or not (open)",
+        jobs={"fill": "open", "simulate": "open"},
+        shown=("synth", "fill", "simulate", "schedules"),
+    )
+    edges: str = scales(
+        "auto",
+        Choice(("auto", "reflect", "whole")),
+        "Take candidates with their whole neighbourhood in the sample (whole), or all, with neighbourhoods completed "
+        "by reflection at its edges (reflect), or reflect at all levels but the finest (auto)",
+        more="``auto`` reflects at the finest level too if fewer than three quarters of the positions have a whole "
+        "neighbourhood.",
+        symbol="equation (4)",
+        paper="whole",
+    )
+    phases: str = scales(
+        "decimated",
+        Choice(("all", "decimated")),
+        "Take candidates at coarse levels from all positions of the sample, or from the decimated sample",
+        symbol="equation (10)",
+        paper="decimated",
+    )
+    search: str = searching(
+        "auto",
+        Choice(("auto", "exact", "coherent")),
+        "Weigh all candidates (exact), or only a few, which is much faster (coherent), or as it suits (auto)",
+        more="``coherent`` weighs, at all but the coarsest level, the candidates that continue the source of a "
+        'neighbour, the site\'s own source and some more. ``auto`` is ``coherent`` for ``relaxation="icm"`` with '
+        '``pixel="source"``, and ``exact`` if a site draws or takes the mode of a density.',
+        paper="exact",
+        jobs={"schedules": "exact"},
+    )
+    suggesting: int = searching(
+        12,
+        Whole(1),
+        "Let this many nearest neighbours suggest a candidate each, in a coherent search",
+        slider=(1, 24, 1),
+    )
+    similar: int = searching(
+        0,
+        Whole(0, SIMILAR),
+        "Weigh this many more candidates that are like each of these, in a coherent search",
+        slider=(0, 8, 1),
+    )
+    chance: int = searching(
+        4,
+        Whole(0, CHANCE),
+        "Weigh this many more candidates at random, in a coherent search",
+        jobs={"fill": 16, "extend": 16},
+        slider=(0, 32, 1),
+    )
+    exhaustive: int = searching(
+        64,
+        Whole(0),
+        "Weigh all candidates at levels with this many or fewer, in a coherent search",
+        slider=(0, 1024, 16),
+    )
+    relaxation: str = sampling(
+        "icm",
+        Choice(("icm", "gibbs")),
+        "Take the LCPDF's mode (icm), or draw from it (gibbs)",
+        symbol="Algorithm 1",
+        paper="gibbs",
+    )
+    bandwidth: float = sampling(
+        0.15,
+        Number(0, above=True),
+        "Give the Parzen kernel this width; wider is freer",
+        unit="units of h_opt",
+        symbol="h / h_opt of equation (8)",
+        paper=1.0,
+        slider=(0.05, 2, 0.05),
+    )
+    xi: float = sampling(
+        -1.0,
+        Number(-1e6, 0, below=True),
+        "Cool at this pace: further below 0 is fewer sweeps",
+        more="The paper gives no number.",
+        symbol="xi of equation (13)",
+        paper=-1.0,
+        slider=(-4, -0.25, 0.25),
+    )
+    free_sweeps: int = sampling(
+        2,
+        Whole(0),
+        "Sweep over all sites, also those of the coarser level, this many times after the equilibrium of a level",
+        paper=0,
+        slider=(0, 8, 1),
+    )
+    pixel: str = sampling(
+        "source",
+        Choice(("source", "density")),
+        "Take pixels of the sample (source), or grey levels of the Parzen density, whose kernel also spreads over the "
+        "site itself (density)",
+        paper="density",
+    )
+    coarsest: str = sampling(
+        "gibbs",
+        Choice(("gibbs", "same")),
+        "Let the coarsest level draw (gibbs), or relax as the others (same)",
+        more="Its mode says nothing while all is unknown.",
+        paper="same",
+    )
+    schedule: str | schedules.Schedule = parallel(
+        "coloring",
+        Other(schedules.get, "str or simdtex.schedules.Schedule"),
+        "Relax sites together by this schedule: coloring, coloring-fixed, luby, checkerboard, synchronous, "
+        "random-subset[:P], raster, random-scan or block[:ROWSxCOLS]",
+        symbol="equation (14)",
+    )
+    check_schedule: bool = parallel(
+        False,
+        Switch(),
+        "Check at every step that a schedule which claims independent sites keeps equation (14)",
+    )
+    array: str | None = parallel(
+        None,
+        Other(parse_array, "str"),
+        "Account for the run on this processor array: ROWSxCOLS, or maspar-mp1-1k to maspar-mp1-16k",
+        more="No byte of the result depends on it.",
+        none="packed active sites on a full MP-1",
+        jobs={"schedules": "maspar-mp1-16k"},
+        shown=("synth", "schedules"),
+    )
+    mapping: str = parallel(
+        "cut-and-stack",
+        Choice(MAPPINGS),
+        "Lay a picture larger than the array onto it in this way",
+        shown=("synth", "schedules"),
+    )
+    categorical: bool | tuple[int, ...] = data(
+        False,
+        Other(check_categorical, "bool or tuple of int", flag=True),
+        "Take values for names of categories, which differ or not, and are never mixed",
+        more="A tuple names the channels (variables) of which this is so.",
+    )
+    weights: tuple[float, ...] | None = data(
+        None,
+        Numbers(),
+        "Bring all channels to one spread, times these weights, one for each channel (variable)",
+        none="all but categories are on one scale, as colours are",
+    )
+    shares: tuple[float, ...] | None = data(
+        None,
+        Numbers(),
+        "Use each of several samples this much, kept by the price on use",
+        none="every pixel of all samples counts alike",
+        shown=("synth", "fill", "simulate"),
+    )
+    proportions: tuple[float, ...] | None = data(
+        None,
+        Numbers(),
+        "Make this much of the output of each category, in ascending order, kept by a price",
+        none="as follows from the sample and the known pixels",
+        shown=("synth", "simulate"),
+    )
+    data_weight: float = data(
+        16.0,
+        Number(0),
+        "Count a known pixel that is from no sample for this many neighbours",
+        jobs={"fill": 4.0, "extend": 4.0},
+    )
+    guide_weight: float = data(
+        1.0,
+        Number(0),
+        "Give the guide this variance, in units of the sample's; more follows it more closely",
+        shown=("synth", "simulate"),
+    )
+    labels: bool | None = data(
+        None,
+        Switch(),
+        "Take the guide's values for names, or for numbers",
+        none="names if they are integers of at most 16 different values",
+        shown=("synth", "simulate"),
+    )
+    unsure: float = data(
+        0.25,
+        Number(0, 1),
+        "Let this share of a candidate's neighbours be unknown, if the sample is not known everywhere",
+        more="They are taken to be as the nearest known pixel.",
+        shown=("synth", "fill", "simulate"),
+    )
 
     def __post_init__(self) -> None:
-        """Check every value."""
-        check_order(self.order)
+        """Check every value, and what goes together."""
         check(self)
         if self.finish and self.finish < NARROWEST:
             raise ValueError(f"finish is {self.finish}; give 0, or a number of at least {NARROWEST}")
-        if self.xi >= 0:
-            raise ValueError(f"xi is {self.xi}; give a number below 0")
         if (self.search, self.relaxation, self.pixel) == ("coherent", "icm", "density"):
             raise ValueError(
                 'search="coherent" finds no mode of a density; '
                 'give search="exact", pixel="source" or relaxation="gibbs"'
             )
-        schedules.get(self.schedule)
-        parse_array(self.array or "1x1", self.mapping)
-        lists = {"weights": self.weights, "shares": self.shares, "proportions": self.proportions}
-        for name, value in lists.items():
-            _numbers(name, value)
-        if not isinstance(self.categorical, bool):
-            if not isinstance(self.categorical, tuple) or not self.categorical:
-                raise TypeError(
-                    f"categorical must be True, False or a tuple of channels, not {shown(self.categorical)}"
-                )
-            for channel in self.categorical:
-                whole("a channel of categorical", channel, 0)
         if self.pixel == "density" and (self.categorical or self.weights):
             raise ValueError('categories and weights go with pixels of the sample; give pixel="source"')
         if self.categorical and self.finish:
@@ -282,22 +409,3 @@ def few(pictures: Sequence[NDArray[Any]]) -> bool:
             if len(seen) > CATEGORIES:
                 return False
     return True
-
-
-def _numbers(name: str, value: Any) -> None:
-    """Raise unless a value is None or a tuple of numbers of which one is above 0."""
-    if value is None:
-        return
-    if not isinstance(value, tuple) or not value:
-        raise TypeError(f"{name} must be a tuple of numbers, not {shown(value)}")
-    for number in value:
-        real(f"one of {name}", number, 0)
-    if not any(value):
-        raise ValueError(f"{name} are all 0; give a number above 0")
-
-
-def make_options(preset: str = "default", **given: Any) -> Options:
-    """Options from a preset and what the user gave; unknown names are a TypeError that lists the valid ones."""
-    one_of("preset", preset, PRESETS)
-    given = {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
-    return build(Options, "mrf", PRESETS[preset] | given, also=("preset",))

@@ -4,7 +4,7 @@
 from simdtex.methods.multires.algorithm import Plan, Run, tiled
 from simdtex.methods.multires.alpha import STRETCH, STRETCHES, strain, suggest_alpha
 from simdtex.methods.multires.levels import differences, thresholds
-from simdtex.methods.multires.options import Options, make_options
+from simdtex.methods.multires.options import Options
 
 __all__ = [
     "STRETCH",
@@ -13,7 +13,6 @@ __all__ = [
     "Plan",
     "Run",
     "differences",
-    "make_options",
     "strain",
     "suggest_alpha",
     "thresholds",

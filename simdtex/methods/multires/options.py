@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The options of the method ``multires``, and their defaults."""
+"""The options of the method ``multires``."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import inf
-from numbers import Real
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from simdtex.options import build, check, integer, number_of, real, shown, unmasked, words
+from simdtex.options import Choice, Number, Other, Whole, check, documented, option, unmasked
 
 WIDEST = 100
 """The largest sigma; a filter of one far narrower does not know it from a larger one."""
@@ -20,91 +20,8 @@ DIRECTIONS, FILTER = 64, 101
 """The most orientations, and the largest filters: any more are alike, or larger than the levels they are for."""
 
 
-@dataclass(frozen=True)
-class Options:
-    """The options of the method ``multires``.
-
-    Parameters
-    ----------
-    alpha : float or "auto"
-        Of T = alpha / k**beta (13), 0 or more: 0 tiles the sample (but for parts that are equal to the bit), infinity
-        samples every band on its own. ``"auto"`` takes what `simdtex.suggest_alpha` finds for ``strain`` or ``target``.
-    beta : float
-        Of the same, 0 or more. k counts levels from the lowest frequency upward.
-    strain : float
-        With ``alpha="auto"``, how much pieces that meet may differ from what either would go on with: 0, nothing, to 1,
-        as much as strangers. See `simdtex.methods.multires.strain`.
-    target : float, optional
-        With ``alpha="auto"``, in place of the strain: candidates that a pixel of the coarser levels is to have on
-        average.
-    thresholds : array, optional
-        T itself, in place of alpha and beta: one row for each level but the finest, the lowest frequency first; one
-        column for all features or one for each.
-    orientations : int
-        Of the first and of the second derivatives of a Gaussian in the filter bank (7), 64 or fewer; 0 leaves the bands
-        alone.
-    sigma : float
-        Of that Gaussian, in pixels; 0.2 to 100.
-    filter_size : int
-        Rows and columns of the filters; odd, 3 to 101. A level smaller than that has no responses.
-    features : {"luminance", "channels"}
-        Whether features are made of the luminance or of every channel. Bands are copied with all their channels.
-    levels : int, optional
-        Of the pyramids. None: down to a single pixel.
-    parity : {"match", "free"}
-        Whether a candidate must stand in an even or odd row and column as the pixel does. ``"free"`` is the paper's
-        text.
-    boundary : {"torus", "open"}
-        Whether pyramids wrap around, or continue as in a mirror.
-    edges : {"mend", "keep"}
-        Whether the edges of a sample that does not wrap around are first covered with a piece of itself, so that it
-        does; see `simdtex.methods.multires.mend.mend`.
-    seams : {"blend", "cut"}
-        Whether the bands of pieces that meet fade into each other, over a pixel of each level, or end where they meet.
-        ``"cut"`` is the paper's text.
-    """
-
-    alpha: float | str = 0.3
-    beta: float = number_of(0.0, 0)
-    strain: float = number_of(0.05, 0)
-    target: float | None = number_of(None, 1, 2**31)
-    thresholds: ArrayLike | None = None
-    orientations: int = integer(4, 0, DIRECTIONS)
-    sigma: float = number_of(0.7, 0.2, WIDEST)
-    filter_size: int = integer(3, 3, FILTER)
-    features: str = words("luminance", "luminance", "channels")
-    levels: int | None = integer(None, 1)
-    parity: str = words("match", "match", "free")
-    boundary: str = words("torus", "torus", "open")
-    edges: str = words("mend", "mend", "keep")
-    seams: str = words("blend", "blend", "cut")
-
-    def __post_init__(self) -> None:
-        """Check every value."""
-        if isinstance(self.alpha, str):
-            if self.alpha != "auto":
-                raise ValueError(f"alpha is {shown(self.alpha)}; give a number of at least 0, or 'auto'")
-        elif not (isinstance(self.alpha, Real) and self.alpha == inf):
-            real("alpha", self.alpha, 0, inf)
-        check(self)
-        if self.filter_size % 2 == 0:
-            raise ValueError(f"filter_size is {self.filter_size}; give an odd number, 3 or 5")
-        if self.thresholds is not None:
-            _check_thresholds(self.thresholds)
-
-    @property
-    def analysis(self) -> dict[str, Any]:
-        """Those that bear on the analysis."""
-        names = ("orientations", "sigma", "filter_size", "features", "levels", "boundary", "edges")
-        return {name: vars(self)[name] for name in names}
-
-
-def make_options(**given: Any) -> Options:
-    """Options from what the user gave; unknown names are a TypeError that lists the valid ones."""
-    return build(Options, "multires", given)
-
-
-def _check_thresholds(table: ArrayLike) -> None:
+def check_thresholds(table: ArrayLike) -> None:
+    """Raise unless a table of thresholds is an array of numbers of 0 or more."""
     unmasked("thresholds", table)
     try:
         values = np.asarray(table)
@@ -116,3 +33,129 @@ def _check_thresholds(table: ArrayLike) -> None:
         raise ValueError(f"thresholds has shape {values.shape}; give one row for each level but the finest")
     if not (values >= 0).all():
         raise ValueError("thresholds must be numbers of at least 0")
+
+
+appearance = partial(option, group="Appearance", shown=("synth", "sheet"))
+scales = partial(option, group="Scales and edges", shown=("synth", "sheet"))
+
+
+@documented
+@dataclass(frozen=True)
+class Options:
+    """The options of the method ``multires``."""
+
+    alpha: float | str = appearance(
+        0.3,
+        Number(0, inf, word="auto"),
+        "Exchange places that differ by no more than this: 0 tiles the sample, more is freer, auto finds a value",
+        more="0 tiles the sample but for parts that are equal to the bit, infinity samples every band on its own. "
+        '``"auto"`` takes what `simdtex.suggest_alpha` finds for ``strain`` or ``target``.',
+        symbol="alpha of T = alpha / k^beta, equation (13)",
+        shown=("synth",),
+        slider=(0, 1, 0.01),
+    )
+    beta: float = appearance(
+        0.0,
+        Number(0),
+        "Be stricter at high frequencies, by alpha / k^beta; k counts levels from the lowest frequency upward",
+        symbol="beta of equation (13)",
+        shown=("synth",),
+        slider=(0, 3, 0.1),
+    )
+    strain: float = appearance(
+        0.05,
+        Number(0),
+        "Let pieces that meet differ by at most this from what either would continue with, with alpha auto",
+        more="0 is nothing, 1 as much as unrelated pieces. See `simdtex.methods.multires.strain`.",
+        shown=("synth",),
+        slider=(0, 0.5, 0.01),
+    )
+    target: float | None = appearance(
+        None,
+        Number(1, 2**31),
+        "Let alpha auto find this many candidates for a pixel of the coarser levels, on average",
+        none="`strain` decides",
+        shown=("synth",),
+    )
+    thresholds: ArrayLike | None = appearance(
+        None,
+        Other(check_thresholds, "array"),
+        "Take these thresholds in place of alpha and beta: a row for each level but the finest, the lowest frequency "
+        "first, and a column for all features or one for each",
+        none="those of alpha and beta",
+        symbol="T of equation (13)",
+        shown=("synth",),
+    )
+    seams: str = appearance(
+        "blend",
+        Choice(("blend", "cut")),
+        "Let the bands of pieces that meet fade into each other over a pixel of each level (blend), or end there (cut)",
+        paper="cut",
+    )
+    parity: str = appearance(
+        "match",
+        Choice(("match", "free")),
+        "Take a candidate from even or odd rows and columns, as the pixel's are (match), or from any (free)",
+        symbol="equation (8)",
+        paper="free",
+    )
+    features: str = appearance(
+        "luminance",
+        Choice(("luminance", "channels")),
+        "Make features of the luminance, or of every channel",
+        more="Bands are copied with all their channels.",
+    )
+    levels: int | None = scales(
+        None,
+        Whole(1),
+        "Go through this many levels of the pyramids, from coarse to fine",
+        none="down to a single pixel",
+        slider=(1, 10, 1),
+    )
+    boundary: str = scales(
+        "torus",
+        Choice(("torus", "open")),
+        "Let pyramids wrap around, so that the output tiles (torus), or continue as in a mirror (open)",
+    )
+    edges: str = scales(
+        "mend",
+        Choice(("mend", "keep")),
+        "Cover the edges of a sample that does not wrap around with a piece of itself, so that it does (mend), or keep "
+        "them",
+        more="See `simdtex.methods.multires.mend.mend`.",
+        paper="keep",
+    )
+    orientations: int = scales(
+        4,
+        Whole(0, DIRECTIONS),
+        "Look for edges and lines in this many directions; 0 compares the bands alone",
+        more="The filter bank has so many first and second derivatives of a Gaussian.",
+        symbol="equation (7)",
+        slider=(0, 12, 1),
+    )
+    sigma: float = scales(
+        0.7,
+        Number(0.2, WIDEST),
+        "Make the Gaussian of the filters this wide",
+        unit="pixels",
+        slider=(0.3, 3, 0.1),
+    )
+    filter_size: int = scales(
+        3,
+        Whole(3, FILTER),
+        "Give filters this many rows and columns, an odd number",
+        more="A level smaller than that has no responses.",
+        slider=(3, 15, 2),
+    )
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        check(self)
+        if self.filter_size % 2 == 0:
+            raise ValueError(f"filter_size is {self.filter_size}; give an odd number, 3 or 5")
+
+    @property
+    def analysis(self) -> dict[str, Any]:
+        """Those that bear on the analysis."""
+        names = ("orientations", "sigma", "filter_size", "features", "levels", "boundary", "edges")
+        return {name: vars(self)[name] for name in names}

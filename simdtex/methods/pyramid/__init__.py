@@ -3,6 +3,6 @@
 
 from simdtex.methods.pyramid.algorithm import MEMORY, Plan, Run
 from simdtex.methods.pyramid.matcher import TIES
-from simdtex.methods.pyramid.options import Options, make_options
+from simdtex.methods.pyramid.options import Options
 
-__all__ = ["MEMORY", "TIES", "Options", "Plan", "Run", "make_options"]
+__all__ = ["MEMORY", "TIES", "Options", "Plan", "Run"]

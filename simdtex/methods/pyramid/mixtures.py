@@ -16,11 +16,11 @@ from simdtex.io.image import check_sample
 from simdtex.machine import Machine, memory
 from simdtex.methods.pyramid import algorithm as pyramid
 from simdtex.methods.pyramid.histograms import Histograms, Sorted, averaged, histograms, spliced
-from simdtex.methods.pyramid.options import Options, make_options
+from simdtex.methods.pyramid.options import Options
 from simdtex.methods.pyramid.palette import decorrelated
 from simdtex.methods.pyramid.palette import palette as colours_of
 from simdtex.model.stretched import Stretched
-from simdtex.options import one_of, real, whole
+from simdtex.options import one_of, real, resolve, whole
 from simdtex.run import Callback, Output
 
 __all__ = ["mix"]
@@ -110,7 +110,7 @@ def mix(
     weights = _weights(len(pictures), pattern, average, low, high, split)
     if palette is not None:
         _check_number("palette", palette, len(pictures))
-    chosen = make_options(**with_channels_last(options, channel_axis))
+    chosen = resolve(Options, "mix", with_channels_last(options, channel_axis))
     sides = None if low is None or high is None else (low, high, split)
     plan = Mixture(pictures, size, chosen, weights, sides, palette, blend, pixels)
     return execute(PlannedJob("mix", plan, plan.inputs, channel_axis), rng, device, callback, full_output, checkpoint)

@@ -30,7 +30,7 @@ from simdtex.methods.pyramid.algorithm import (
 )
 from simdtex.methods.pyramid.matcher import Matcher, Wanted
 from simdtex.ops.solid import solid_band, solid_collapse, solid_mean, solid_reduce, solid_turn
-from simdtex.options import build, within_32_bits, words
+from simdtex.options import Choice, documented, option, within_32_bits
 
 FAMILIES = {"x-y": ((0, 1, 2), (0, 1, 2)), "x-z": ((1, 0, 2), (1, 0, 2)), "y-z": ((2, 0, 1), (1, 2, 0))}
 """Slices by name: the axes in the order slice, row, column, and the order that turns them back."""
@@ -40,32 +40,29 @@ MEMORY = 240
 """Bytes for each voxel on the device, at most (measured by benchmarks/pyramid_cost.py)."""
 
 
+@documented
 @dataclass(frozen=True)
 class Options(pyramid.Options):
-    """The options of solid textures: those of the method ``pyramid``, and two more.
+    """The options of solid textures: those of the method ``pyramid``, and two more."""
 
-    Parameters
-    ----------
-    solids : {"turns", "average"}
-        With ``pyramid="steerable"``: match the Laplacian pyramid of the block and then the steerable pyramids of each
-        family of slices in turn, each of what the one before has made; or, as the paper does, all four of the same
-        block, and average the four solids.
-    slices : {"together", "each"}
-        Match the histograms of a family's slices taken together, or, as the paper does, of every slice.
-
-    Notes
-    -----
-    The others are those of `simdtex.methods.pyramid.Options`; ``pyramid="laplacian"`` matches the 3-D Laplacian
-    pyramid alone.
-    """
-
-    solids: str = words("turns", "turns", "average")
-    slices: str = words("together", "each", "together")
-
-
-def make_options(**given: Any) -> Options:
-    """Options from what the user gave; unknown names are a TypeError that lists the valid ones."""
-    return build(Options, "solid", given)
+    solids: str = option(
+        "turns",
+        Choice(("turns", "average")),
+        "Match the families of slices in turns, each of what the one before has made, or match all of the same block "
+        "and average the solids",
+        more='This matters with ``pyramid="steerable"``: the Laplacian pyramid of the block comes first.',
+        paper="average",
+        shown=("solid",),
+        group="Appearance",
+    )
+    slices: str = option(
+        "together",
+        Choice(("each", "together")),
+        "Match the histograms of a family's slices together, or each alone",
+        paper="each",
+        shown=("solid",),
+        group="Appearance",
+    )
 
 
 @dataclass(frozen=True)
