@@ -99,7 +99,7 @@ def test_the_preset_wins_over_the_defaults_of_a_simulation():
         TRAINING, SHAPE, rng=int(found.seed[0]), preset="paper", boundary="open", order=1, levels=2, device="reference"
     )
     assert_same_bits(found.values[0], own)
-    assert found.attrs["options"]["novelty"] == 0
+    assert json.loads(found.attrs["options"])["novelty"] == 0
 
 
 def test_an_option_of_ones_own_goes_before_the_defaults():
