@@ -19,7 +19,7 @@ from skimage import data
 
 import simdtex
 from simdtex.live import session
-from simdtex.live.settings import Picture
+from simdtex.live.job import Picture
 from simdtex.machine import open_machine
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -40,19 +40,17 @@ def plain(machine, size, seed):
 
 def watched(page, size, seed):
     after = len(page.got)
-    message, _ = page.ask("result", kind="make", width=size, height=size, seed=seed)
-    frames = sum(one["kind"] == "frame" and "fraction" in one for one, _ in page.got[after:])
+    message, _ = page.ask("result", kind="make", job="synth", width=size, height=size, seed=seed)
+    frames = sum(one["kind"] == "frame" and one["of"] == "run" for one, _ in page.got[after:])
     page.got.clear()
     return message["seconds"], frames
 
 
 def cost(machine, sizes, runs):
-    session.AFTER = 1e6  # no figures of quality meanwhile
-    page = Fake(machine=machine)
-    page.session.use(Picture("sample.png", SAMPLE, -1))
-    page.ask("picture", kind="hello")
+    session.IDLE = 1e6  # no figures of quality meanwhile
+    page = Fake(Picture("sample.png", SAMPLE, -1), machine=machine)
     for size in sizes:
-        page.ask("frame", kind="look", left=0, top=0, width=size, height=size)
+        page.ask("frame", kind="view", left=0, top=0, width=size, height=size)
         alone, seen, frames = [], [], []
         for seed in range(runs + 1):
             order = (0, 1) if seed % 2 else (1, 0)
@@ -77,7 +75,7 @@ page.marks = [];
 const before = page.on_frame.bind(page);
 page.on_frame = (message, buffers) => {
   before(message, buffers);
-  if (message.fraction !== undefined) requestAnimationFrame(() => page.marks.push(performance.now()));
+  if (message.of === "run") requestAnimationFrame(() => page.marks.push(performance.now()));
 };
 """
 

@@ -48,17 +48,18 @@ def main():
         keep(driver, "result")
         script("page.seed.value = 3; page.make()")
         made(2)
-        script("page.look('arrangement')")
+        script("page.showLayer('arrangement')")
         until(lambda: script("return page.seen") == "arrangement")
         keep(driver, "arrangement")
         script(
-            "page.look('picture'); page.job.value = 'fill'; page.settle(); page.toFill(); page.brushWidth.value = 40;"
+            "page.showLayer('picture'); page.job.value = 'fill'; page.showJob(); page.startHole();"
+            "page.brushWidth.value = 40;"
         )
         until(lambda: script("return page.seen") == "picture")
         script("page.brush.begin([90, 100]); page.hole[0].points.push([150, 120], [260, 110]); page.view.draw()")
         keep(driver, "hole")
         shown(driver, width=390, height=844, dark=True)
-        script("page.job.value = 'synth'; page.settle(); page.view.fit(); scrollTo(0, 560)")
+        script("page.job.value = 'synth'; page.showJob(); page.view.fit(); scrollTo(0, 560)")
         keep(driver, "phone")
 
 

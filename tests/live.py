@@ -30,46 +30,46 @@ def png(pixels):
 
 
 def asked(**settings):
-    """A wish with few levels, so that it is quick."""
+    """A request with few levels, which is quick."""
     options = {"order": 4} if settings.get("method", "mrf") == "mrf" else {}
-    wish = {"kind": "make", "job": "synth", "width": 36, "height": 28, "seed": 7}
-    return wish | settings | {"options": options | settings.get("options", {})}
+    message = {"kind": "make", "job": "synth", "method": "mrf", "width": 36, "height": 28, "seed": 7}
+    return message | settings | {"options": options | settings.get("options", {})}
 
 
 class Fake:
     """A page without a browser: it gives messages, and waits for those that come."""
 
-    def __init__(self, *, sees=True, machine=None):
+    def __init__(self, picture=None, *, sees=True, machine=None):
         self.got, self.sees = [], sees
         self._came = threading.Condition()
-        machine = machine or open_machine("reference")
-        self.session = Session(self.send, lambda: machine)
+        self.session = Session(self.send, machine or open_machine("reference"), picture)
 
     def send(self, message, buffers):
         with self._came:
             self.got.append((message, buffers))
             self._came.notify_all()
         if self.sees and message["kind"] == "frame":
-            self.session.receive({"kind": "seen"})
+            self.session.receive({"kind": "shown"})
 
     def say(self, *buffers, **message):
         self.session.receive(message, buffers)
 
-    def wait(self, *kinds, after=0, timeout=60):
-        """The first message of one of these kinds that came after so many, and its buffers."""
+    def wait(self, *kinds, after=0, timeout=60, **values):
+        """The first message of one of these kinds, with these values, that came after so many, and its buffers."""
 
         def found():
-            return next((one for one in self.got[after:] if one[0]["kind"] in kinds), None)
+            matching = (one for one in self.got[after:] if one[0]["kind"] in kinds)
+            return next((one for one in matching if values.items() <= one[0].items()), None)
 
         with self._came:
             assert self._came.wait_for(found, timeout), f"no {kinds} came, but {[one['kind'] for one, _ in self.got]}"
             return found()
 
-    def ask(self, kinds, *buffers, **message):
-        """Say something, and wait for an answer of these kinds."""
+    def ask(self, kinds, *buffers, wanted=None, **message):
+        """Say something, and wait for an answer of these kinds, with the values that are wanted."""
         after = len(self.got)
         self.say(*buffers, **message)
-        return self.wait(*([kinds] if isinstance(kinds, str) else kinds), after=after)
+        return self.wait(*([kinds] if isinstance(kinds, str) else kinds), after=after, **(wanted or {}))
 
     def result(self, **settings):
         """Have something made; what is told of it."""
@@ -82,9 +82,14 @@ class Fake:
 
     def package(self, number):
         """The files of a result, by name."""
-        _, (data,) = self.ask("file", kind="take", result=number, what="all")
+        _, (data,) = self.ask("file", kind="download", result=number, name="texture.zip")
         with zipfile.ZipFile(BytesIO(data)) as archive:
             return {name: archive.read(name) for name in archive.namelist()}
 
-    def kinds(self):
-        return [message["kind"] for message, _ in self.got]
+    def kinds(self, after=0):
+        return [message["kind"] for message, _ in self.got[after:]]
+
+    @property
+    def latest(self):
+        results = self.session.results
+        return results[max(results)]

@@ -1,30 +1,26 @@
-"""The server of the live page: who is let in, what a frame is, pages that are lost and come back, and its end."""
+"""The server of the live page: access, messages, pages that lose their connection, and the command."""
 
 import http.client
+import json
 import os
 import re
 import signal
 import socket
 import subprocess
 import sys
-import threading
 import time
 from contextlib import ExitStack, contextmanager
 from contextlib import closing as closing_of
 
 import pytest
-import uvicorn
 from click.testing import CliRunner
-from hypothesis import given
-from hypothesis import strategies as st
 from live import asked, png, texture
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from simdtex import cli
 from simdtex.live import server as serving
-from simdtex.live.server import Pages, application, host_name, pack, unpack
-from simdtex.live.serving import TOKEN, serve
+from simdtex.live.server import TOKEN, Pages, is_own_name, listen, serve
 from simdtex.machine import open_machine
 
 SECRET = "a-token-of-the-tests"
@@ -32,30 +28,11 @@ OPEN = ExitStack()  # connections, which are closed when a test ends
 
 
 @contextmanager
-def running(address="127.0.0.1", begin=None):
+def running(address="127.0.0.1"):
     """A server in this process; its port, and its pages."""
-    machine = open_machine("reference")
-    pages = Pages(lambda: machine, begin)
-    listening = socket.socket()
-    listening.bind(("127.0.0.1", 0))
-    config = uvicorn.Config(
-        application(pages, SECRET, address),
-        log_level="warning",
-        ws="websockets-sansio",
-        ws_max_size=2**20,
-        timeout_graceful_shutdown=1,
-    )
-    server = uvicorn.Server(config)
-    thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
-    thread.start()
-    while not server.started:
-        time.sleep(0.01)
-    try:
-        yield listening.getsockname()[1], pages
-    finally:
-        server.should_exit = True
-        thread.join(10)
-        assert not thread.is_alive()
+    pages = Pages(open_machine("reference"))
+    with listen(pages, SECRET, address, 0) as port:
+        yield port, pages
 
 
 @pytest.fixture
@@ -88,18 +65,23 @@ class Client:
         tcp = socket.create_connection(("127.0.0.1", port))
         how = {"sock": tcp, "origin": origin, "max_size": None, "compression": None}
         self.socket = OPEN.enter_context(connect(f"ws://{host}/{token}/socket{query}", **how))
-        self.key = self.wait("session")[0]["key"]
+        self.say(kind="hello")
+        self.hello = self.wait("hello")[0]
+        self.key = self.hello["session"]
 
     def say(self, *buffers, **message):
-        self.socket.send(pack(message, buffers))
+        self.socket.send(json.dumps(message | {"buffers": len(buffers)}))
+        for one in buffers:
+            self.socket.send(one)
 
     def wait(self, *kinds):
         while True:
-            message, buffers = unpack(self.socket.recv(timeout=60))
+            message = json.loads(self.socket.recv(timeout=60))
+            buffers = [self.socket.recv(timeout=60) for _ in range(message["buffers"])]
             if message["kind"] == "frame":
-                self.say(kind="seen")
+                self.say(kind="shown")
             if message["kind"] in kinds:
-                return message, [bytes(one) for one in buffers]
+                return message, buffers
 
 
 def test_the_page_is_served_to_whoever_knows_the_token(port):
@@ -130,7 +112,7 @@ def test_another_host_is_refused(port, host):
     assert get(port, f"/{SECRET}/", Host=host)[0].status == 400
     with pytest.raises(InvalidStatus) as refused:
         Client(port, host=host or "x")
-    assert refused.value.response.status_code == 403
+    assert refused.value.response.status_code == 400
 
 
 @pytest.mark.parametrize("host", ["localhost", "LOCALHOST", "[::1]"])
@@ -143,7 +125,7 @@ def test_an_address_that_others_reach_has_no_names_but_its_own():
         assert get(port, f"/{SECRET}/", Host="192.168.1.5:80")[0].status == 200
         assert get(port, f"/{SECRET}/", Host="[fe80::1]:80")[0].status == 200
         assert get(port, f"/{SECRET}/", Host="evil.example")[0].status == 400
-    assert host_name("[::1]:80") == "[::1]"
+    assert is_own_name("[::1]:80", "127.0.0.1") and is_own_name("Wall.local:80", "wall.local")
 
 
 @pytest.mark.parametrize("origin", [None, "http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"])
@@ -161,14 +143,12 @@ def test_a_socket_needs_the_token(port):
 
 def test_a_page_gives_a_picture_and_takes_a_result_away(port):
     page = Client(port)
-    page.say(kind="hello")
-    hello, _ = page.wait("hello")
-    assert hello["fresh"] and hello["device"] == "reference (NumPy)"
+    assert page.hello["fresh"] and page.hello["device"] == "reference (NumPy)"
     page.say(png(texture()), kind="open", name="a.png")
     assert page.wait("picture")[0]["width"] == 48
     page.say(**asked())
     assert page.wait("result")[0]["result"] == 1
-    page.say(kind="take", result=1, what="picture")
+    page.say(kind="download", result=1, name="texture.png")
     message, (data,) = page.wait("file")
     assert message["name"] == "texture.png" and data.startswith(b"\x89PNG")
 
@@ -179,7 +159,7 @@ def test_two_pages_have_nothing_in_common(port):
     for page, seed in ((first, 1), (second, 2)):
         page.say(png(texture(seed=seed)), kind="open", name=f"{seed}.png")
         page.say(**asked(seed=seed))
-    assert [page.wait("result")[0]["asked"]["seed"] for page in (first, second)] == [1, 2]
+    assert [page.wait("result")[0]["settings"]["seed"] for page in (first, second)] == [1, 2]
     other = Client(port, session=first.key)  # as a tab that was duplicated asks: the first is still open
     assert other.key not in (first.key, second.key)
 
@@ -196,61 +176,47 @@ def test_a_page_that_was_lost_comes_back_to_its_results(port):
             break
         again.socket.close()
         time.sleep(0.02)
-    again.say(kind="hello")
-    assert again.wait("hello")[0]["fresh"] is False
+    assert again.hello["fresh"] is False
     assert again.wait("result")[0]["result"] == 1
 
 
 def test_pages_are_few_and_those_that_were_lost_give_way(monkeypatch):
-    monkeypatch.setattr(serving, "PAGES", 2)
+    monkeypatch.setattr(serving, "MAX_PAGES", 2)
     with running() as (port, pages):
-        first, _ = Client(port), Client(port)
+        first, second = Client(port), Client(port)
         with pytest.raises(ConnectionClosed) as closed:
             Client(port)
         assert closed.value.rcvd.code == serving.TOO_MANY
         first.socket.close()
-        while not pages._left:
+        while not pages._lost:
             time.sleep(0.01)
         Client(port)
-        assert first.key not in pages._sessions
-        monkeypatch.setattr(serving, "WAITED", -1.0)
-        pages.leave(next(iter(pages._sessions)))
-        pages.join(None, lambda *_: None)
-        assert not pages._left
+        assert set(pages._sessions) > {second.key} and first.key not in pages._sessions
+        second.socket.close()
+        while not pages._lost:
+            time.sleep(0.01)
+        monkeypatch.setattr(serving, "KEPT", -1.0)
+        assert pages.join(second.key, lambda *_: None).key != second.key, "it has been lost for too long"
 
 
-@pytest.mark.parametrize("frame", [b"", b"\x05\x00\x00\x00", b"\x02\x00\x00\x00{}x", b"\x01\x00\x00\x00[", "text"])
-def test_a_frame_that_is_no_message_ends_the_connection(port, frame):
+@pytest.mark.parametrize("text", ["", "[", "[]", "3", '{"buffers": "x"}', '{"buffers": []}', "[" * 10000, b"\xff"])
+def test_what_is_no_message_ends_the_connection(port, text):
     page = Client(port)
-    page.socket.send(frame)
-    with pytest.raises(ConnectionClosed):
+    page.socket.send(text)
+    with pytest.raises(ConnectionClosed) as closed:
         page.wait("hello")
+    assert closed.value.rcvd.code == serving.BAD_MESSAGE
     assert Client(port).key, "others go on"
 
 
-def test_a_frame_that_is_too_large_ends_the_connection(port):
-    page = Client(port)
-    with pytest.raises(ConnectionClosed) as closed:
-        page.socket.send(bytes(2**21))
-        page.wait("hello")
-    assert closed.value.rcvd is None or closed.value.rcvd.code == 1009  # None: it was still being sent
-
-
-@given(st.lists(st.binary(max_size=9), max_size=4), st.dictionaries(st.text(max_size=5), st.integers(), max_size=3))
-def test_a_frame_brings_a_message_back(buffers, message):
-    message = {name: value for name, value in message.items() if name != "buffers"}
-    found, parts = unpack(pack(message, buffers))
-    assert (found, [bytes(one) for one in parts]) == (message, buffers)
-
-
-@given(st.binary(max_size=40))
-def test_any_bytes_are_a_message_or_none(frame):
-    try:
-        message, _ = unpack(frame)
-    except ValueError as error:
-        assert str(error) == "a frame that is no message"
-    else:
-        assert isinstance(message, dict)
+def test_a_message_that_is_too_large_ends_the_connection(monkeypatch):
+    monkeypatch.setattr(serving, "MAX_BYTES", 2**20)
+    with running() as (port, _):
+        page = Client(port)
+        with pytest.raises(ConnectionClosed) as closed:
+            page.socket.send(bytes(2**21))
+            page.wait("hello")
+        assert closed.value.rcvd is None or closed.value.rcvd.code == 1009  # None: it was still being sent
 
 
 # -- the command ------------------------------------------------------------------------------------------------------
@@ -317,7 +283,6 @@ def test_a_picture_of_the_command_line_is_there_at_once(tmp_path):
                 break
             except ConnectionError:
                 time.sleep(0.05)
-        page.say(kind="hello")
         assert page.wait("picture")[0]["name"] == "wall.png"
     finally:
         process.kill()
@@ -338,8 +303,8 @@ def test_what_cannot_be_listened_to_is_said(tmp_path):
 
 
 def test_a_missing_package_is_named(monkeypatch):
-    monkeypatch.setitem(sys.modules, "uvicorn", None)
-    monkeypatch.delitem(sys.modules, "simdtex.live.serving", raising=False)
+    monkeypatch.setitem(sys.modules, "websockets.sync.server", None)
+    monkeypatch.delitem(sys.modules, "simdtex.live.server", raising=False)
     found = CliRunner().invoke(cli.main, ["live"])
     assert found.exit_code == 2
     assert "pip install 'simdtex[live]'" in found.output

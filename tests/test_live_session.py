@@ -1,7 +1,8 @@
-"""The live page's side of the work: the bytes of the command line, restarts, stops, and sentences."""
+"""The sessions of the live page: lines that repeat a result, restarts, pauses, frames, and error messages."""
 
 import runpy
 import shlex
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,11 +13,12 @@ from live import Fake, asked, png, texture
 
 import simdtex
 from simdtex import cli
+from simdtex.io.image import read_bytes
 from simdtex.live import results
 from simdtex.live import session as sessions
+from simdtex.live.job import Job, Picture
 from simdtex.live.levels import Levels
 from simdtex.live.results import Results
-from simdtex.live.settings import parsed
 from simdtex.methods import mrf
 from simdtex.model.source_map import apply_source_map
 
@@ -32,6 +34,12 @@ def page():
 def opened(page):
     page.ask("picture", png(texture()), kind="open", name="C:\\photos\\Old Wall.PNG")
     return page
+
+
+def whole(shape=(28, 36), **options):
+    """What is made by one call, as `asked` asks for it."""
+    options = {"order": 4, "rng": 7} | options
+    return simdtex.synthesize(texture(), shape, channel_axis=-1, device="reference", **options)
 
 
 def stroke(*points, label=1, width=6):
@@ -52,13 +60,13 @@ JOBS = {
     "multires": {"method": "multires"},
     "multires-auto": {"method": "multires", "options": {"alpha": "auto"}},
     "pyramid": {"method": "pyramid", "options": {"iterations": 2}},
-    "tile": {"job": "tile"},
-    "tile-a-part": {"job": "tile", "part": [0, 0, 40, 36]},
+    "extend": {"job": "extend"},
+    "extend-a-part": {"job": "extend", "part": [0, 0, 40, 36]},
 }
 
 
 SLOW = (
-    *("guide-everywhere", "guide-of-a-part", "tile-a-part", "multires-auto", "a result"),
+    *("guide-everywhere", "guide-of-a-part", "extend-a-part", "multires-auto", "a result"),
     *("search", "both", "similar", "suggesting", "edges", "levels"),
 )
 
@@ -68,84 +76,71 @@ def cases(names):
     return [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in names]
 
 
-@pytest.mark.parametrize("case", cases(JOBS))
-def test_what_is_taken_away_makes_the_same_bytes(opened, case, tmp_path, monkeypatch):
-    wanted = JOBS[case]
-    made = wanted.get("method") != "pyramid"
-    if made:
-        opened.ask("maps", png(texture(channels=1, seed=2)), kind="map", name="Height map.png")
-    result = opened.result(**wanted)
-    assert result["maps"] == (["height-map"] if made else [])
-    files = opened.package(result["result"])
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("SIMDTEX_DEVICE", "reference")
+def assert_lines_repeat(page, number, folder, monkeypatch):
+    """The command line and the script of a package write the bytes of its outputs from its other files."""
+    files, result = page.package(number), page.session.results[number]
+    assert files["again.txt"].decode() == result.job.command and files["again.py"].decode() == result.job.python
     outputs = [name for name in files if name.startswith("texture")]
-    assert len(outputs) == 1 + made
+    assert len(outputs) == 1 + len(result.maps)
     for name in set(files) - set(outputs):
-        (tmp_path / name).write_bytes(files[name])
-    assert files["again.txt"].decode() == result["command"]
-    for line in result["command"].splitlines():
-        words = shlex.split(line)
+        (folder / name).write_bytes(files[name])
+    monkeypatch.chdir(folder)
+    monkeypatch.setenv("SIMDTEX_DEVICE", "reference")
+
+    def run_command():
+        words = shlex.split(result.job.command)
         done = CliRunner().invoke(cli.main, [*words[1:], "--quiet"], catch_exceptions=False)
         assert (words[0], done.exit_code) == ("simdtex", 0), done.output
-    for name in outputs:
-        assert (tmp_path / name).read_bytes() == files[name], name
-        (tmp_path / name).unlink()
-    (tmp_path / "again.py").write_bytes(files["again.py"])
-    assert files["again.py"].decode() == result["python"]
-    runpy.run_path(str(tmp_path / "again.py"))
-    for name in outputs:
-        assert (tmp_path / name).read_bytes() == files[name], name
+
+    for run in (run_command, lambda: runpy.run_path("again.py")):
+        run()
+        for name in outputs:
+            assert (folder / name).read_bytes() == files[name], name
+            (folder / name).unlink()
 
 
-@pytest.mark.parametrize("of", cases(["the picture", "a result", "a result of that"]))
-def test_a_hole_is_filled_with_the_same_bytes(opened, of, tmp_path, monkeypatch):
+@pytest.mark.parametrize("case", cases(JOBS))
+def test_the_lines_of_a_result_repeat_its_bytes(opened, case, tmp_path, monkeypatch):
+    carries = JOBS[case].get("method") != "pyramid"
+    if carries:
+        opened.ask("maps", png(texture(channels=1, seed=2)), kind="map", name="Height map.png")
+    result = opened.result(**JOBS[case])
+    maps = ["map height-map"] * carries
+    assert [layer for layer in result["layers"] if layer.startswith("map")] == maps
+    assert_lines_repeat(opened, 1, tmp_path, monkeypatch)
+
+
+@pytest.mark.parametrize("of", cases(["the picture", "a result"]))
+def test_the_lines_of_a_filled_hole_repeat_its_bytes(opened, of, tmp_path, monkeypatch):
     opened.ask("maps", png(texture(channels=1, seed=2)), kind="map", name="h.png")
-    before = None
-    if of != "the picture":
-        before = opened.result()["result"]
-    if of == "a result of that":
-        before = opened.result(job="fill", of=before, hole=[stroke((10, 10))])["result"]
+    before = None if of == "the picture" else opened.result()["result"]
     result = opened.result(job="fill", of=before, hole=[stroke((30, 20), (40, 24)), stroke((35, 22), label=0, width=2)])
-    files = opened.package(result["result"])
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("SIMDTEX_DEVICE", "reference")
-    outputs = [shlex.split(line)[shlex.split(line).index("-o") + 1] for line in result["command"].splitlines()]
-    assert len(outputs) == {"the picture": 1, "a result": 2, "a result of that": 3}[of]
-    last = {name: data for name, data in files.items() if name.startswith(outputs[-1].removesuffix(".png"))}
-    assert len(last) == 2
-    for name in set(files) - set(last):
-        (tmp_path / name).write_bytes(files[name])
-    for line in result["command"].splitlines():
-        done = CliRunner().invoke(cli.main, [*shlex.split(line)[1:], "--quiet"], catch_exceptions=False)
-        assert done.exit_code == 0, done.output
-    for name, data in last.items():
-        assert (tmp_path / name).read_bytes() == data, name
-        (tmp_path / name).unlink()
-    runpy.run_path(str(tmp_path / "again.py"))
-    for name, data in last.items():
-        assert (tmp_path / name).read_bytes() == data, name
+    assert set(result["files"]) == {"texture.png", "texture-h.png", "arrangement.npz", "texture.zip"}
+    assert_lines_repeat(opened, result["result"], tmp_path, monkeypatch)
+
+
+@pytest.mark.parametrize("name", ["hole.png", "guide-sample.png", "texture.png"])
+def test_no_file_of_a_package_takes_the_name_of_another(page, name):
+    page.ask("picture", png(texture()), kind="open", name=name)
+    hole = page.result(job="fill", hole=[stroke((30, 20))])
+    assert {"sample.png", "hole.png", "texture.png"} <= set(page.package(hole["result"]))
 
 
 def test_categories_stay_categories(page):
     labels = (texture(channels=1) // 80).astype(np.uint8)
     page.ask("picture", png(labels), kind="open", name="facies.png")
     result = page.result(options={"categorical": True})
-    assert set(np.unique(page.session.latest.image)) <= set(np.unique(labels))
+    assert set(np.unique(page.latest.image)) <= set(np.unique(labels))
     assert "--categorical" in shlex.split(result["command"])
 
 
-def test_16_bits_stay_16_bits(page):
-    from simdtex.io import image
-
-    deep = texture(channels=1, dtype=np.uint16)
-    page.session.use(sessions.Picture("deep.tif", deep, None))
-    result = page.result()
-    assert page.package(result["result"])
-    assert page.session.latest.image.dtype == np.uint16
-    message, (data,) = page.ask("file", kind="take", result=1, what="tif")
-    assert message["name"] == "texture.tif"
-    np.testing.assert_array_equal(image.read_bytes("texture.tif", data).pixels, page.session.latest.image)
+def test_16_bits_stay_16_bits():
+    page = Fake(Picture("deep.tif", texture(channels=1, dtype=np.uint16), None))
+    page.result()
+    _, (data,) = page.ask("file", kind="download", result=1, name="texture.png")
+    assert page.latest.image.dtype == np.uint16
+    np.testing.assert_array_equal(read_bytes("texture.png", data).pixels, page.latest.image)
+    page.session.close()
 
 
 CHANGES = {
@@ -171,32 +166,26 @@ def test_a_change_restarts_from_the_level_it_affects_and_gives_the_same_bytes(op
     after = len(opened.got)
     opened.result(options=options)
     begun, _ = opened.wait("begun", after=after)
-    told = opened.session._levels
-    coarsest = max(told._states)
+    coarsest = max(opened.session._levels._states)
     assert coarsest > 0
     assert begun["from"] == (coarsest if level == "coarsest" else level)
-    whole = simdtex.synthesize(texture(), (28, 36), channel_axis=-1, rng=7, device="reference", order=4, **options)
-    np.testing.assert_array_equal(opened.session.latest.image, whole)
+    np.testing.assert_array_equal(opened.latest.image, whole(**options))
 
 
-def test_a_run_that_was_given_up_is_gone_on_from_where_it_was(opened):
-    seen = []
-    send = opened.session._send
+def test_a_cancelled_run_is_continued(opened):
+    send = opened.session.send
 
-    def stopping(message, buffers):
+    def cancelling(message, buffers):
         send(message, buffers)
-        if message["kind"] == "frame" and message.get("level") == 0 and not seen:
-            seen.append(message)
-            opened.session.receive({"kind": "end"})
+        if message["kind"] == "progress" and message["level"] == 0:
+            opened.say(kind="cancel")
 
-    opened.session.attach(stopping)
+    opened.session.send = cancelling
     opened.ask("ended", **asked())
-    opened.session.attach(send)
-    after = len(opened.got)
-    opened.result()
-    assert opened.wait("begun", after=after)[0]["from"] == 1
-    whole = simdtex.synthesize(texture(), (28, 36), channel_axis=-1, rng=7, device="reference", order=4)
-    np.testing.assert_array_equal(opened.session.latest.image, whole)
+    opened.session.send = send
+    assert opened.ask("begun", **asked())[0]["from"] == 1
+    opened.wait("result")
+    np.testing.assert_array_equal(opened.latest.image, whole())
 
 
 def test_another_seed_size_part_or_picture_begins_anew(opened):
@@ -211,273 +200,246 @@ def test_another_seed_size_part_or_picture_begins_anew(opened):
     assert opened.wait("begun", after=after)[0]["from"] is None
 
 
-def test_states_that_are_held_are_their_own():
+def test_states_are_kept_apart_from_the_runs_that_use_them():
     before = Levels(("key",), mrf.Options())
-    state = {"state": {"values": np.zeros(4)}, "observer": {"stages": [1]}}
-    assert before.offer(lambda: state, 1) and not before.offer(lambda: state)
-    state["observer"]["stages"].append(2)
-    state["state"]["values"][:] = 1
-    found = Levels(("key",), mrf.Options(finish=0.5), before).found
-    assert found["observer"]["stages"] == [1] and not found["state"]["values"].any()
-    found["observer"]["stages"].append(3)
-    assert before.found["observer"]["stages"] == [1]
-    assert Levels(("other",), mrf.Options(), before).found is None
-    assert Levels(None, mrf.Options(), before).found is None
+    state = {"state": np.zeros(4), "observer": [1]}
+    for ended, level in ((True, 1), (False, 0)):
+        before.keep.offer(SimpleNamespace(ended=ended, level=level), lambda: state)
+    state["observer"].append(2)
+    state["state"][:] = 1
+    assert before.level == 1, "states within a level are not kept"
+    found = Levels(("key",), mrf.Options(finish=0.5), before).keep.found
+    assert found["observer"] == [1] and not found["state"].any()
+    found["observer"].append(3)
+    assert before.keep.found["observer"] == [1]
+    for other in (Levels(("other",), mrf.Options(), before), Levels(None, mrf.Options(), before)):
+        assert other.keep.found is None
+    other.keep.offer(SimpleNamespace(ended=True, level=1), lambda: state)
+    assert other.level is None, "without a key no state is kept"
 
 
-def test_frames_go_from_coarse_to_fine_and_end_in_the_result(opened):
-    sessions.SHARE, share = 0, sessions.SHARE
-    try:
-        opened.ask("frame", kind="look", layer="picture", left=0, top=0, width=36, height=28, step=1, tiled=False)
-        after = len(opened.got)
-        opened.result()
-        final = opened.wait("frame", after=len(opened.got) - 1)
-    finally:
-        sessions.SHARE = share
-    frames = [(message, buffers) for message, buffers in opened.got[after:] if message["kind"] == "frame"]
-    running = [message for message, _ in frames if "fraction" in message]
-    assert [one["level"] for one in running] == sorted((one["level"] for one in running), reverse=True)
-    assert {one["level"] for one in running} >= {0, 1}
-    assert all(0 <= one["fraction"] <= 1 for one in running)
-    pixels = np.frombuffer(final[1][0], np.uint8).reshape(28, 36, 4)
-    np.testing.assert_array_equal(pixels[..., :3], opened.session.latest.image)
-    assert (pixels[..., 3] == 255).all()
+WINDOW = {"kind": "view", "left": 0, "top": 0, "width": 36, "height": 28, "step": 1, "tiled": False}
+
+
+def test_frames_go_from_coarse_to_fine_and_end_in_the_result(opened, monkeypatch):
+    monkeypatch.setattr(sessions, "INTERVAL", 0)
+    monkeypatch.setattr(sessions, "MAX_RATE", 1e9)
+    opened.ask("frame", layer="picture", **WINDOW)
+    after = len(opened.got)
+    opened.result()
+    _, (pixels,) = opened.wait("frame", after=after, of=1)
+    progress = [message for message, _ in opened.got[after:] if message["kind"] == "progress"]
+    frames = [message for message, _ in opened.got[after:] if message["kind"] == "frame" and message["of"] == "run"]
+    assert len(frames) == len(progress)
+    levels = [one["level"] for one in progress]
+    assert levels == sorted(levels, reverse=True) and set(levels) >= {0, 1}
+    assert all(0 <= one["fraction"] <= 1 for one in progress)
+    shown = np.frombuffer(pixels, np.uint8).reshape(28, 36, 4)
+    np.testing.assert_array_equal(shown[..., :3], opened.latest.image)
+    assert (shown[..., 3] == 255).all()
 
 
 @pytest.mark.parametrize("layer", ["temperature", "arrangement", "use", "sample"])
-def test_layers_are_seen_while_a_run_goes_on_and_afterwards(opened, layer):
-    opened.ask("frame", kind="look", layer=layer, left=0, top=0, width=64, height=64, step=1, tiled=False)
+def test_layers_are_shown_during_a_run_and_afterwards(opened, layer):
+    opened.ask("frame", layer=layer, **WINDOW | {"width": 64, "height": 64})
     after = len(opened.got)
     result = opened.result()
-    running = [one for one, _ in opened.got[after:] if one["kind"] == "frame" and "fraction" in one]
+    message, (pixels,) = opened.wait("frame", after=after, of=1)
+    running = [one for one, _ in opened.got[after:] if one["kind"] == "frame" and one["of"] == "run"]
     assert running and all(one["layer"] == layer for one in running)
-    message, (pixels,) = opened.wait("frame", after=len(opened.got) - 1)
-    assert layer in result["layers"] and message["layer"] == layer
     shape = (40, 48) if layer in ("use", "sample") else (28, 36)  # of the sample, and of the output
+    assert layer in result["layers"] and message["layer"] == layer
     assert (message["rows"], message["cols"]) == shape == (message["height"], message["width"])
     assert len(pixels) == 4 * shape[0] * shape[1]
 
 
-def test_no_more_frames_come_than_are_seen():
+def test_no_more_frames_are_sent_than_are_shown(monkeypatch):
+    monkeypatch.setattr(sessions, "INTERVAL", 0)
     page = Fake(sees=False)
-    page.ask("picture", png(texture()), kind="open", name="a.png")
-    page.wait("frame")
-    sessions.SHARE, share = 0, sessions.SHARE
-    try:
-        page.result()
-    finally:
-        sessions.SHARE = share
-    assert sum("fraction" in message for message, _ in page.got) <= 1  # beside that of the picture
+    page.ask("frame", png(texture()), kind="open", name="a.png")
+    page.result()
+    assert page.kinds().count("frame") <= sessions.MAX_UNSEEN
     page.session.close()
 
 
-def frame_of(page, found, **message):
-    """The first frame of this kind after something was said."""
-    after = len(page.got)
-    page.say(**message)
-    while not found(one := page.wait("frame", after=after)[0]):
-        after += 1
-    return one
+def begin_and_pause(page, **settings):
+    """Have something made, and pause it at its first frame."""
+    page.say(**asked(**settings))
+    page.ask("progress", kind="pause", wanted={"paused": True})
 
 
-def begin_and_stop(page, **settings):
-    """Have something made, and stop it at its first frame."""
-    send, stopped = page.session._send, []
-
-    def stopping(message, buffers):
-        if message["kind"] == "frame" and "fraction" in message and not stopped:
-            stopped.append(message)
-            page.session.receive({"kind": "stop"})
-        send(message, buffers)
-
-    page.session.attach(stopping)
-    frame_of(page, lambda one: one.get("paused"), **asked(**settings))
-
-
-def test_an_earlier_result_is_looked_at_while_a_run_goes_on(opened, monkeypatch):
+def test_an_earlier_result_is_shown_during_a_run(opened, monkeypatch):
     opened.result()
-    begin_and_stop(opened, seed=8, width=50)
-    frame = frame_of(opened, lambda one: one.get("result") == 1, kind="choose", result=1)
-    assert (frame["cols"], frame["layer"], "fraction" in frame) == (36, "picture", False)
-    assert opened.wait("progress")[0]["paused"]
-    where = {"left": 0, "top": 0, "width": 9, "height": 9, "step": 1, "tiled": False}
-    frame = frame_of(opened, lambda one: one["width"] == 9, kind="look", layer="use", **where)
-    assert (frame["result"], frame["layer"], frame["cols"]) == (1, "use", 48)
-    frame = frame_of(opened, lambda one: "fraction" in one, kind="choose", result=None)
-    assert (frame["cols"], frame["layer"]) == (48, "use"), "what is being made is looked at again"
-    assert opened.error(kind="choose", result=2) == "result 2 is no longer there; make it again with its command line"
-    frame_of(opened, lambda one: one.get("result") == 1, kind="choose", result=1)
-    result, _ = opened.ask("result", kind="go")
-    assert (result["result"], result["width"], result["chosen"]) == (2, 50, False)
-    assert opened.ask("chosen", kind="hello")[0]["result"] == 1
-    whole = simdtex.synthesize(texture(), (28, 50), channel_axis=-1, rng=8, device="reference", order=4)
-    np.testing.assert_array_equal(opened.session.latest.image, whole)
-    monkeypatch.setattr(results, "KEPT", 2)
-    begin_and_stop(opened)
-    frame_of(opened, lambda one: one.get("result") == 1, kind="choose", result=1)
-    result, _ = opened.ask("result", kind="go")
-    assert (result["gone"], result["chosen"]) == ([1], True), "what is let go is looked at no longer"
+    begin_and_pause(opened, seed=8, width=50)
+    frame, _ = opened.ask("frame", kind="select", result=1, wanted={"of": 1})
+    assert (frame["cols"], frame["layer"]) == (36, "picture")
+    frame, _ = opened.ask("frame", layer="use", **WINDOW, wanted={"layer": "use"})
+    assert (frame["of"], frame["cols"]) == (1, 48)
+    frame, _ = opened.ask("frame", kind="select", result=None, wanted={"of": "run"})
+    assert frame["layer"] == "use"
+    assert opened.error(kind="select", result=2) == "result 2 is no longer kept; make it again with its command line"
+    opened.ask("frame", kind="select", result=1, wanted={"of": 1})
+    after = len(opened.got)
+    opened.ask("result", kind="resume", wanted={"result": 2, "width": 50})
+    assert opened.ask("selected", kind="hello")[0]["result"] == 1, "the page goes on showing what it has selected"
+    assert opened.kinds(after).count("selected") == 1
+    np.testing.assert_array_equal(opened.latest.image, whole((28, 50), rng=8))
+    monkeypatch.setattr(results, "MAX_RESULTS", 2)
+    begin_and_pause(opened)
+    opened.ask("frame", kind="select", result=1, wanted={"of": 1})
+    after = len(opened.got)
+    assert opened.ask("result", kind="resume")[0]["dropped"] == [1]
+    assert opened.wait("selected", after=after)[0]["result"] == 3, "a dropped result is shown no longer"
 
 
-def test_a_page_that_comes_back_looks_at_what_is_being_made(opened):
+def test_a_page_that_is_loaded_again_shows_the_run(opened):
     opened.result()
-    begin_and_stop(opened, seed=8)
-    frame_of(opened, lambda one: one.get("result") == 1, kind="choose", result=1)
+    begin_and_pause(opened, seed=8)
+    opened.ask("frame", kind="select", result=1, wanted={"of": 1})
     after = len(opened.got)
-    opened.say(kind="hello")
-    told = [one for one, _ in opened.got[after:] if one["kind"] not in ("frame", "progress")]
-    assert [one["kind"] for one in told] == ["hello", "picture", "result", "begun"]
-    assert told[-1]["layers"] == ["picture", "sample", "arrangement", "use", "temperature"]
-    assert not told[2]["chosen"]
-    assert opened.ask("result", kind="go")[0]["chosen"]
+    begun, _ = opened.ask("begun", kind="hello")
+    kinds = [kind for kind in opened.kinds(after) if kind not in ("frame", "progress")]
+    assert kinds == ["hello", "picture", "result", "begun"]
+    assert begun["layers"] == ["picture", "sample", "arrangement", "use", "temperature"]
+    after = len(opened.got)
+    opened.ask("result", kind="resume")
+    assert opened.wait("selected", after=after)[0]["result"] == 2
 
 
-def test_it_stops_and_goes_on_and_shows_what_is_asked_for_meanwhile(opened):
-    begin_and_stop(opened)
-    where = {"left": 0, "top": 0, "width": 9, "height": 9, "step": 1, "tiled": False}
-    message = opened.ask("frame", kind="look", layer="temperature", **where)[0]
-    while not message.get("paused"):
-        message = opened.wait("frame", after=len(opened.got) - 1)[0]
-    message = opened.ask("frame", kind="look", layer="picture", **where)[0]
-    assert (message["paused"], message["width"]) == (True, 9)
-    after = len(opened.got)
-    opened.say(kind="hello")  # of a page that comes back meanwhile
-    assert [one["kind"] for one, _ in opened.got[after:]] == ["hello", "picture", "begun"]
+def test_a_run_pauses_and_resumes_and_shows_other_layers_meanwhile(opened):
+    begin_and_pause(opened)
+    for layer in ("temperature", "picture"):
+        opened.ask("frame", layer=layer, **WINDOW | {"width": 9}, wanted={"of": "run", "layer": layer, "width": 9})
     assert "result" not in opened.kinds()
-    opened.ask("result", kind="go")
-    whole = simdtex.synthesize(texture(), (28, 36), channel_axis=-1, rng=7, device="reference", order=4)
-    np.testing.assert_array_equal(opened.session.latest.image, whole)
+    opened.ask("result", kind="resume")
+    np.testing.assert_array_equal(opened.latest.image, whole())
 
 
-def test_one_thing_is_made_at_a_time_and_the_last_wish_counts(opened):
+def test_the_last_request_counts(opened):
     for seed in range(1, 6):
         opened.say(**asked(seed=seed))
-    message, _ = opened.wait("result")
-    assert message["asked"]["seed"] == 5
+    assert opened.wait("result")[0]["settings"]["seed"] == 5
     assert opened.kinds().count("result") == 1
+    begin_and_pause(opened, seed=1)
+    assert opened.ask("result", **asked(seed=2))[0]["settings"]["seed"] == 2, "and ends a paused run"
 
 
-def test_a_stopped_run_gives_way_to_another_wish(opened):
-    opened.session.receive({"kind": "stop"})
-    opened.say(**asked(seed=1))
-    opened.session.receive({"kind": "stop"})
-    opened.say(**asked(seed=2))
-    assert opened.wait("result")[0]["asked"]["seed"] == 2
+def test_another_picture_ends_the_run(opened):
+    begin_and_pause(opened)
+    after = len(opened.got)
+    opened.ask("ended", png(texture(seed=3)), kind="open", name="other.png")
+    assert [kind for kind in opened.kinds(after) if kind in ("picture", "ended")] == ["picture", "ended"]
 
 
-def test_figures_of_quality_come_when_nothing_else_is_wanted(page, monkeypatch):
-    monkeypatch.setattr(sessions, "AFTER", 0.05)
+def test_figures_of_quality_come_when_nothing_else_is_asked_for(page, monkeypatch):
+    monkeypatch.setattr(sessions, "IDLE", 0.02)
     page.ask("picture", png(texture(64, 64)), kind="open", name="a.png")
     page.result(width=64, height=64)
     while len(page.wait("quality", after=len(page.got) - 1)[0]["figures"]) < 8:
         pass
-    figures = {one["label"]: one["value"] for one in page.session.latest.figures}
-    found = simdtex.quality.measure(texture(64, 64), page.session.latest.image, page.session.latest.source)
+    figures = {one["label"]: one["value"] for one in page.latest.figures}
+    found = simdtex.quality.measure(texture(64, 64), page.latest.image, page.latest.source)
     assert figures["Effective share of the sample"] == found.effective_share
     assert figures["Repeats in the result"] == found.repeats
 
 
-def test_a_page_that_comes_back_is_told_all_again(opened):
+def test_a_page_that_is_loaded_again_gets_everything(opened):
     opened.result()
     opened.result(seed=8)
     after = len(opened.got)
-    opened.say(kind="hello")
-    opened.wait("chosen", after=after)
+    assert opened.ask("selected", kind="hello")[0] == {"kind": "selected", "result": 2, "restore": True}
     told = [message for message, _ in opened.got[after:] if message["kind"] != "frame"]
-    hello, picture, *results = told[:4]
-    assert (hello["kind"], hello["fresh"], picture["kind"], picture["new"]) == ("hello", False, "picture", False)
-    assert [one["result"] for one in results] == [1, 2]
+    assert [one["kind"] for one in told] == ["hello", "picture", "result", "result", "selected"]
+    assert not told[0]["fresh"] and not told[1]["new"]
 
 
-def test_a_picture_that_is_there_from_the_beginning_is_new_to_the_first_page(page):
-    page.session.use(sessions.Picture("a.png", texture(), -1))
+def test_the_first_picture_is_new_to_the_page_until_it_has_a_result():
+    page = Fake(Picture("a.png", texture(), -1))
     message, _ = page.ask("picture", kind="hello")
-    assert page.kinds()[:2] == ["hello", "picture"], "what the page is made of comes first"
+    assert page.kinds()[:2] == ["hello", "picture"]
     assert (message["name"], message["new"]) == ("a.png", True)
     page.result()
     assert page.ask("picture", kind="hello")[0]["new"] is False
+    page.session.close()
 
 
-def test_maps_are_of_the_pictures_size_and_have_names_of_their_own(opened):
+def test_maps_have_the_pictures_size_and_names_of_their_own(opened):
     assert opened.error(png(texture(9, 9)), kind="map", name="n.png") == (
         "n.png is 9x9 and the picture 48x40; give a map of the picture's size"
     )
     for _ in range(2):
         opened.ask("maps", png(texture(channels=1)), kind="map", name="n.png")
     assert opened.ask("maps", kind="unmap", name="n")[0]["names"] == ["n-2"]
-    result = opened.result()
-    source = opened.session.latest.source
-    np.testing.assert_array_equal(opened.session.latest.maps["n-2"], apply_source_map(source, texture(channels=1)))
-    assert "map n-2" in result["layers"]
-    where = {"left": 0, "top": 0, "width": 36, "height": 28, "step": 1, "tiled": False}
-    message = opened.ask("frame", kind="look", layer="map n-2", **where)[0]
-    while message["layer"] != "map n-2":  # that of the result comes first
-        message = opened.wait("frame", after=len(opened.got) - 1)[0]
+    opened.result()
+    carried = apply_source_map(opened.latest.source, texture(channels=1))
+    np.testing.assert_array_equal(opened.latest.maps["n-2"], carried)
+    _, (pixels,) = opened.ask("frame", layer="map n-2", **WINDOW, wanted={"layer": "map n-2"})
+    np.testing.assert_array_equal(np.frombuffer(pixels, np.uint8).reshape(28, 36, 4)[..., 0], carried)
 
 
 WRONG = {
-    "a kind": ({"kind": "rm -rf"}, "the page and simdtex do not understand each other; load the page again"),
-    "no kind": ({}, "the page and simdtex do not understand each other; load the page again"),
+    "a kind": ({"kind": "rm -rf"}, "the page and simdtex are of different versions; load the page again"),
+    "no kind": ({}, "the page and simdtex are of different versions; load the page again"),
     "an example": (
         {"kind": "example", "name": "../x"},
-        "there is no example ../x; choose one of: brick, grass, gravel",
+        "unknown example '../x'; choose one of: brick, grass, gravel",
     ),
     "no file": ({"kind": "open", "name": "a.png"}, "no file came with that; give the picture again"),
-    "a result": ({"kind": "choose", "result": 5}, "result 5 is no longer there; make it again with its command line"),
-    "a result's kind": ({"kind": "choose", "result": "x"}, "the result must be an integer, not 'x'"),
+    "a result": ({"kind": "select", "result": 5}, "result 5 is no longer kept; make it again with its command line"),
+    "a result's kind": ({"kind": "select", "result": "x"}, "the result must be an integer, not 'x'"),
     "a size": (asked(width=0), "width is 0; give 1 or more"),
     "a large size": (asked(height=10**6), "height is 1000000; give 16384 or fewer"),
     "a size in words": (asked(width="big"), "width must be an integer, not 'big'"),
     "a seed": (asked(seed=-1), "seed is -1; give 0 or more"),
-    "a job": (asked(job="rm"), "unknown job 'rm'; choose one of: synth, tile, fill"),
+    "a job": (asked(job="rm"), "unknown job 'rm'; choose one of: synth, extend, fill"),
     "a method": (asked(method="os"), "unknown method 'os'; choose one of: mrf, multires, pyramid"),
     "an option": (asked(options={"array": "4x4"}), "there is no control for 'array'; choose one of: "),
-    "an option's value": (asked(options={"balance": -1}), "balance is -1.0; give a number of at least 0"),
+    "an option's value": (asked(options={"balance": -1}), "balance is -1; give a number of at least 0"),
     "an option's kind": (asked(options={"balance": [1]}), "balance must be a number, not "),
     "options": (asked(options={}) | {"options": 3}, "options must be names and values, not 3"),
     "a part": (asked(part=[40, 0, 20, 20]), "the part reaches beyond the picture of 48x40; choose one within it"),
     "a small part": (asked(part=[0, 0, 2, 20]), "the width of the part is 2; give 8 or more"),
     "no part": (asked(part=[1, 2]), "a part of the picture is four numbers: left, top, width and height"),
-    "a guide": (asked(guide=[1]), "a guide is painted on the sample and on the result; paint both"),
+    "a guide": (asked(guide=[1]), "a guide is painted on the sample and on the output; paint both"),
     "half a guide": (
         asked(guide={"output": [stroke((1, 1))]}),
-        "the result is to have label 1, and nothing of the sample has it; paint it on the sample too",
+        "label 1 is on the output and not on the sample; paint it on the sample too",
     ),
     "no hole": (
         asked(job="fill"),
-        "nothing is painted, so there is nothing to fill; paint over what is to be made anew",
+        "there is no hole to fill; paint over what is to be replaced",
     ),
     "all hole": (
         asked(job="fill", hole=[stroke((20, 20), width=200)]),
-        "all of the picture is painted, so nothing of it is known; leave some of it",
+        "the hole covers the whole picture; leave some of it",
     ),
-    "strokes": (asked(job="fill", hole="x"), "what is painted is no list of strokes; paint again"),
+    "strokes": (asked(job="fill", hole="x"), "strokes must be a list; paint again"),
     "a stroke": (asked(job="fill", hole=[{}]), "a stroke has no points; paint again"),
     "points": (
         asked(job="fill", hole=[{"label": 1, "width": 4, "points": [["a", 1]]}]),
-        "a point of a stroke is no pair of numbers; paint again",
+        "a point of a stroke must be two numbers; paint again",
     ),
     "far points": (
         asked(job="fill", hole=[stroke((1e30, 0))]),
-        "a point of a stroke is no pair of numbers; paint again",
+        "a point of a stroke must be two numbers; paint again",
     ),
     "a label": (asked(job="fill", hole=[stroke((1, 1), label=99)]), "the label of a stroke is 99; give 8 or fewer"),
     "many points": (
         asked(job="fill", hole=[stroke(*[(1, 1)] * 70000)]),
-        "more than 65536 points are painted; paint with a wider brush",
+        "there are more than 65536 points; paint with a wider brush",
     ),
-    "a look": ({"kind": "look", "width": 0}, "width is 0; give 1 or more"),
+    "a look": ({"kind": "view", "width": 0}, "width is 0; give 1 or more"),
     "a large look": (
-        {"kind": "look", "width": 4096, "height": 4096},
-        "a window has 4194304 pixels at most; make it smaller",
+        {"kind": "view", "width": 4096, "height": 4096},
+        "a window has at most 4194304 pixels; make it smaller",
     ),
-    "a layer": ({"kind": "look", "layer": 3}, "a layer has a name; choose one of those that are there"),
-    "what to take": ({"kind": "take", "result": 1, "what": "/etc"}, "result 1 is no longer there; make it again with"),
+    "a layer": ({"kind": "view", "layer": 3}, "the layer must be a name"),
+    "a file of no result": ({"kind": "download", "result": 1, "name": "/etc"}, "result 1 is no longer kept; make it"),
 }
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_what_is_wrong_is_said_in_a_sentence_and_the_page_goes_on(opened, case):
+def test_what_is_wrong_is_said_in_a_sentence_and_the_session_goes_on(opened, case):
     message, sentence = WRONG[case]
     assert opened.error(**message).startswith(sentence)
     assert opened.result(method="pyramid", options={"iterations": 0})["result"] == 1
@@ -498,47 +460,38 @@ def test_a_file_that_is_no_picture_is_refused(opened, case):
 
 
 def test_a_picture_of_too_many_pixels_or_bytes_is_refused(page, monkeypatch):
-    monkeypatch.setattr(sessions, "PIXELS", 100)
+    monkeypatch.setattr(sessions, "MAX_PIXELS", 100)
     assert page.error(png(texture()), kind="open", name="a.png").startswith(
         "a.png has 1920 pixels and no more than 100"
     )
-    monkeypatch.setattr(sessions, "BYTES", 100)
+    monkeypatch.setattr(sessions, "MAX_BYTES", 100)
     assert page.error(bytes(101), kind="open", name="a.png") == (
-        "the file has 101 bytes and 100 are taken at most; give a smaller one"
+        "the file has 101 bytes and at most 100 are taken; give a smaller one"
     )
 
 
-def test_what_fails_unforeseen_is_told_without_its_words(opened, monkeypatch, caplog):
-    monkeypatch.setattr(sessions, "job", lambda *_: 1 / 0)
-    assert opened.error(**asked()) == "something is wrong in simdtex itself; the terminal says more"
+def test_an_unforeseen_error_is_told_without_its_words(opened, monkeypatch, caplog):
+    monkeypatch.setattr(sessions, "Job", lambda *_: 1 / 0)
+    assert opened.error(**asked()) == "this is an error in simdtex itself; the terminal says more"
     assert "ZeroDivisionError" in caplog.text
 
 
 def test_few_results_are_kept(monkeypatch):
-    from simdtex.live import results
-
-    class Small:
-        def __init__(self, number, size):
-            self.number, self.size = number, size
-
-    monkeypatch.setattr(results, "Result", Small)
-    monkeypatch.setattr(results, "KEPT", 3)
-    monkeypatch.setattr(results, "HELD", 100)
+    monkeypatch.setattr(results, "Result", lambda number, job, *_: SimpleNamespace(number=number, nbytes=job))
+    monkeypatch.setattr(results, "MAX_RESULTS", 3)
+    monkeypatch.setattr(results, "MAX_BYTES", 100)
     kept = Results()
-    for size in (10, 10, 10, 10):
-        kept.add(size)
-    assert ([one.number for one in kept], kept.gone) == ([2, 3, 4], [1])
-    kept.add(95)
-    assert [one.number for one in kept] == [5]
-    kept.add(1000)
-    assert [one.number for one in kept] == [6]
+    for size, left in ((10, [1]), (10, [1, 2]), (10, [1, 2, 3]), (10, [2, 3, 4]), (95, [5]), (1000, [6])):
+        kept.add(size, None, None, 0.0)
+        assert list(kept) == left
+    assert kept.dropped == [1, 2, 3, 4, 5]
 
 
 def test_a_large_picture_begins_with_its_middle(page, monkeypatch):
     monkeypatch.setattr(sessions, "LARGE", 32)
     message, (pixels,) = page.ask("picture", png(texture(40, 48)), kind="open", name="a.png")
     assert message["part"] == [8, 4, 32, 32]
-    assert len(pixels) == 4 * message["shown"][0] * message["shown"][1]
+    assert len(pixels) == 4 * message["preview"][0] * message["preview"][1]
 
 
 HARDY = Fake()
@@ -551,27 +504,32 @@ FIELDS = ("name", "result", "what", "layer", "left", "top", "width", "height", "
 FIELDS += ("options", "part", "guide", "hole", "of")
 
 
+KINDS = [
+    *("hello", "open", "example", "map", "unmap", "pause", "resume", "cancel", "view", "shown"),
+    "select",
+    "download",
+]
+
+
 @given(
-    st.sampled_from(
-        ["hello", "open", "example", "map", "unmap", "stop", "go", "end", "look", "seen", "choose", "take"]
-    ),
+    st.sampled_from(KINDS),
     st.dictionaries(st.sampled_from(FIELDS), JSON, max_size=4),
     st.lists(st.binary(max_size=30), max_size=2),
 )
 @settings(max_examples=200)
 def test_no_message_does_harm(kind, message, buffers):
     HARDY.say(*buffers, **message | {"kind": kind})
-    assert "something is wrong in simdtex itself" not in str(HARDY.got)
+    HARDY.ask("hello", kind="hello")
+    assert "this is an error in simdtex itself" not in str(HARDY.got)
     HARDY.got.clear()
 
 
-@given(st.dictionaries(st.sampled_from(FIELDS), JSON, max_size=3), st.sampled_from(["synth", "tile", "fill"]))
+@given(st.dictionaries(st.sampled_from(FIELDS), JSON, max_size=3), st.sampled_from(["synth", "extend", "fill"]))
 @settings(max_examples=150)
-def test_no_wish_does_harm(message, job):
-    picture = sessions.Picture("a.png", texture(), -1)
+def test_no_request_does_harm(message, kind):
     try:
-        found = parsed(asked(job=job) | message, picture)
+        found = Job(asked(job=kind) | message, Picture("a.png", texture(), -1), {}, Results().find)
     except (ValueError, TypeError) as error:
         assert str(error)
     else:
-        assert found.job in ("synth", "tile", "fill") and min(found.shape) >= 1
+        assert found.kind in ("synth", "extend", "fill") and min(found.shape) >= 1

@@ -42,8 +42,8 @@ def live(picture: Path | None, port: int, host: str, browser: bool, device: str 
     from simdtex.io import image
 
     try:
-        from simdtex.live.serving import serve
-        from simdtex.live.settings import Picture
+        from simdtex.live.job import Picture
+        from simdtex.live.server import serve
     except ModuleNotFoundError as error:
         if error.name is None or error.name.startswith("simdtex"):
             raise

@@ -1,35 +1,38 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What was made for a page: results that it looks at again and takes away."""
+"""The results of a page: what it shows of them, their files, and their figures of quality."""
 
 from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Iterator
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, partial
 from math import isfinite
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.experiments.quality import measure
-from simdtex.io import image as pictures
-from simdtex.live import planes
-from simdtex.live.looking import Look, Plane, seen
-from simdtex.live.recipe import Step, script, shell
-from simdtex.model.source_map import apply_source_map, save_source_map
-from simdtex.options import one_of
+from simdtex.io.image import write
+from simdtex.live import frames
+from simdtex.live.job import Job
+from simdtex.model.source_map import apply_source_map
+from simdtex.options import one_of, whole
+from simdtex.run import Output
 
-KEPT = 24
-"""Results that a page goes back to, at most."""
+MAX_RESULTS = 24
+"""Results that are kept, at most."""
 
-HELD = 2**29
-"""Bytes of their pictures and maps, at most; the latest is held whatever its size."""
+MAX_BYTES = 2**29
+"""Bytes of their arrays, at most; the latest is kept whatever its size."""
 
-THUMB = 96
+THUMBNAIL = 96
 """The longest side of a thumbnail, pixels."""
+
+ARCHIVE = "texture.zip"
 
 MEASURED = 384
 """Figures of quality are those of the middle of a result, of so many rows and columns at most."""
@@ -48,7 +51,7 @@ FIGURES = {
     "coverage": {"coverage": ("Distance of the sample's patches from its own", "0 is best")},
     "copying": {"copying": ("Share of patches that are copied whole", "1 is a copy")},
 }
-"""The figures of `simdtex.quality` that a page shows, in the order in which they are computed, and in plain words."""
+"""The figures of `simdtex.quality` that the page shows, in the order of computation, with labels and hints."""
 
 
 class Result:
@@ -58,198 +61,132 @@ class Result:
     ----------
     number : int
         From 1.
-    asked : dict
-        The message that asked for it.
+    job : Job
+        What it was made by.
     image : array
     output : simdtex.run.Output
-    sample : array
-        What its pixels are from.
-    maps : dict
-        Other maps of that, by name.
-    steps : tuple of Step
-        How it is made elsewhere.
     seconds : float
-        What it took here, with what was shown meanwhile.
+        The duration of the run, with the frames.
     """
 
-    def __init__(
-        self,
-        number: int,
-        asked: dict[str, Any],
-        image: NDArray[Any],
-        output: Any,
-        sample: NDArray[Any],
-        maps: dict[str, NDArray[Any]],
-        steps: tuple[Step, ...],
-        seconds: float,
-    ) -> None:
-        self.number, self.image, self.sample, self.steps = number, image, sample, steps
-        self.source, self.temperature, self.seconds = output.source, output.temperature, seconds
-        self._carries = self.source is not None and bool((self.source[..., 0] >= 0).all())
-        self.maps = {name: apply_source_map(output.source, one) for name, one in maps.items()} if self._carries else {}
+    def __init__(self, number: int, job: Job, image: NDArray[Any], output: Output, seconds: float) -> None:
+        self.number, self.job, self.image, self.seconds = number, job, image, seconds
+        self.source, self.temperature = output.source, output.temperature
+        self.device = output.statistics["device"]
+        complete = None  # the source map, if every pixel has a source
+        if self.source is not None and (self.source[..., 0] >= 0).all():
+            complete = self.source
+        self.maps = (
+            {} if complete is None else {name: apply_source_map(complete, one) for name, one in job.maps.items()}
+        )
         self.figures: list[dict[str, Any]] = []
-        self._asked, self._device = asked, output.statistics["device"]
-        job = asked.get("job", "synth")
-        able = job == "synth" and min(*image.shape[:2], *sample.shape[:2]) >= 48
-        skipped = () if self._carries else ("effective_use",)
-        self._open = [name for name in FIGURES if able and name not in skipped]
+        measurable = job.kind == "synth" and min(*image.shape[:2], *job.sample.shape[:2]) >= 48
+        left_out = ("effective_use",) if complete is None else ()
+        self.unmeasured = [name for name in FIGURES if measurable and name not in left_out]
+        arrays = [None if one is None else partial(np.asarray, one) for one in (complete, self.temperature)]
+        self.layers = frames.layers(job.sample, job.shape, lambda: image, *arrays)
+        for name, one in self.maps.items():
+            self.layers[f"map {name}"] = partial(frames.picture, one, one)
 
     @property
-    def size(self) -> int:
+    def nbytes(self) -> int:
         """Bytes of its arrays."""
-        held = [self.image, self.source, self.temperature, *self.maps.values()]
-        return sum(one.nbytes for one in held if one is not None)
-
-    @property
-    def layers(self) -> list[str]:
-        """What can be looked at."""
-        found = ["picture", "sample"]
-        found += ["arrangement", "use"] if self._carries else []
-        found += ["temperature"] if self.temperature is not None else []
-        return found + [f"map {name}" for name in self.maps]
+        arrays = [self.image, self.source, self.temperature, *self.maps.values()]
+        return sum(one.nbytes for one in arrays if one is not None)
 
     @cached_property
-    def thumbnail(self) -> bytes:
-        """A small picture, RGBA; its size is in `told`."""
-        return seen(planes.picture(self.image, self.sample), self._small).pixels
+    def thumbnail(self) -> frames.Frame:
+        """The picture, small."""
+        return frames.thumbnail(self.layers["picture"](), THUMBNAIL)
 
-    @cached_property
-    def _use(self) -> Plane:
-        return planes.use(self.source, self.sample)
-
-    @property
-    def _small(self) -> Look:
-        rows, cols = self.image.shape[:2]
-        step = -(-max(rows, cols) // THUMB)
-        return Look(width=-(-cols // step), height=-(-rows // step), step=step)
-
-    def told(self) -> dict[str, Any]:
-        """What a page is told of it."""
-        rows, cols = self.image.shape[:2]
+    def describe(self) -> dict[str, Any]:
+        """Return what the page is told of it."""
         return {
-            **{"result": self.number, "width": cols, "height": rows, "seconds": self.seconds, "device": self._device},
-            **{"layers": self.layers, "maps": list(self.maps), "thumbnail": [self._small.width, self._small.height]},
-            **{"asked": self._asked, "command": shell(self.steps), "python": script(self.steps)},
-            **{"figures": self.figures, "arrangement": self.source is not None},
+            **{"result": self.number, "width": self.job.shape[1], "height": self.job.shape[0]},
+            **{"seconds": self.seconds, "device": self.device, "settings": self.job.message},
+            **{"layers": ["sample", *self.layers], "files": [*self._files, ARCHIVE]},
+            **{"command": self.job.command, "python": self.job.python, "figures": self.figures},
+            "thumbnail": [self.thumbnail.width, self.thumbnail.height],
         }
 
-    def plane(self, layer: str, whole: NDArray[Any] | None) -> tuple[str, Plane]:
-        """What is looked at, and its name; the picture, where the layer is not there."""
-        if layer == "sample":
-            return layer, planes.picture(self.sample if whole is None else whole, self.sample)
-        if layer in self.layers:
-            if layer == "arrangement":
-                return layer, planes.arrangement(self.source, self.sample)
-            if layer == "use":
-                return layer, self._use
-            if layer == "temperature":
-                return layer, planes.temperature(self.temperature)
-            if layer.startswith("map "):
-                values = self.maps[layer.removeprefix("map ")]
-                return layer, planes.picture(values, values)
-        return "picture", planes.picture(self.image, self.sample)
-
-    # -- to take away ---------------------------------------------------------------------------------------------
-
-    def file(self, what: str) -> tuple[str, bytes]:
-        """A file: its name and its bytes.
-
-        ``what`` is ``"picture"``, ``"tif"``, ``"arrangement"``, a map as ``"map NAME"``, or ``"all"``: a zip file of
-        these, of all that is read to make them again, and of the lines that do so.
-        """
-        last = self.steps[-1]
-        if what == "picture":
-            return last.output, encoded(last.output, self.image)
-        if what == "tif":
-            name = f"{last.output.rpartition('.')[0]}.tif"
-            return name, encoded(name, self.image)
-        if what == "arrangement" and self.source is not None:
-            return "arrangement.npz", self._arrangement()
-        if what.startswith("map ") and what.removeprefix("map ") in self.maps:
-            name = what.removeprefix("map ")
-            return last.maps[name], encoded(last.maps[name], self.maps[name])
-        one_of("what to take away", what, ["all"])
-        return f"{last.output.rpartition('.')[0]}.zip", self._everything()
-
-    def _arrangement(self) -> bytes:
-        with TemporaryDirectory() as folder:
-            path = Path(folder) / "arrangement.npz"
-            save_source_map(path, self.source)
-            return path.read_bytes()
-
-    def _everything(self) -> bytes:
-        last = self.steps[-1]
-        files: dict[str, bytes] = {}
-        for step in self.steps:
-            files |= {name: encoded(name, pixels) for name, pixels in step.files.items()}
-        files[last.output] = encoded(last.output, self.image)
-        files |= {last.maps[name]: encoded(last.maps[name], one) for name, one in self.maps.items()}
-        files |= {"arrangement.npz": self._arrangement()} if self.source is not None else {}
-        files |= {"again.txt": shell(self.steps).encode(), "again.py": script(self.steps).encode()}
-        packed = io.BytesIO()
-        with zipfile.ZipFile(packed, "w") as archive:
-            for name, data in files.items():
-                archive.writestr(name, data)
-        return packed.getvalue()
-
-    # -- quality --------------------------------------------------------------------------------------------------
-
     @property
-    def unmeasured(self) -> bool:
-        """Whether there are figures to compute."""
-        return bool(self._open)
+    def _files(self) -> dict[str, Callable[[], bytes]]:
+        """Functions that make its files, by name."""
+        arrays = {self.job.output: self.image} | {self.job.carried[name]: one for name, one in self.maps.items()}
+        found: dict[str, Callable[[], bytes]] = {name: partial(encode, name, one) for name, one in arrays.items()}
+        return found if self.source is None else found | {"arrangement.npz": partial(encode_source, self.source)}
+
+    def file(self, name: str) -> bytes:
+        """Return the bytes of a file; ``texture.zip`` has all others, the files that the job reads, and its lines.
+
+        Raises
+        ------
+        ValueError
+            There is no such file.
+        """
+        files = self._files
+        one_of("file", name, [*files, ARCHIVE])
+        if name != ARCHIVE:
+            return files[name]()
+        found = {each: encode(each, pixels) for each, pixels in self.job.files.items()}
+        found |= {each: make() for each, make in files.items()}
+        found |= {"again.txt": self.job.command.encode(), "again.py": self.job.python.encode()}
+        buffer = io.BytesIO()
+        with zipfile.ZipFile(buffer, "w") as archive:
+            for each, data in found.items():
+                archive.writestr(each, data)
+        return buffer.getvalue()
 
     def measure(self) -> None:
-        """Compute the next figures."""
-        name = self._open.pop(0)
-        whole = name in ("seam", "effective_use")  # of edges, and quick
-        shown, sample = (self.image, self.sample) if whole else (_middle(self.image), _middle(self.sample))
-        found = measure(sample, shown, self.source if name == "effective_use" else None, figures=(name,))
+        """Compute the next figures of quality."""
+        name = self.unmeasured.pop(0)
+        sample, image, source = self.job.sample, self.image, self.source if name == "effective_use" else None
+        if name not in ("seam", "effective_use"):  # which are of edges, or quick
+            sample, image = _middle(sample), _middle(image)
+        found = measure(sample, image, source, figures=(name,))
         for key, (label, hint) in FIGURES[name].items():
             value = getattr(found, key)
             known = value is not None and isfinite(value)
             self.figures.append({"label": label, "hint": hint, "value": float(value) if known else None})
 
 
-class Results:
-    """The results of a page, the oldest let go where they are many."""
+class Results(dict[int, Result]):
+    """The results of a page by number; the oldest are dropped when they are many or large."""
 
     def __init__(self) -> None:
-        self._all: dict[int, Result] = {}
-        self._count = 0
-        self.gone: list[int] = []
+        super().__init__()
+        self.dropped: list[int] = []
 
-    def __iter__(self) -> Iterator[Result]:
-        return iter(list(self._all.values()))  # others may be added meanwhile
-
-    @property
-    def latest(self) -> Result | None:
-        """The last one."""
-        return self._all[max(self._all)] if self._all else None
-
-    def add(self, *what: Any) -> Result:
-        """Add a result; what is given is that of `Result` without its number."""
-        self._count += 1
-        result = Result(self._count, *what)
-        self._all[self._count] = result
-        while len(self._all) > KEPT or (len(self._all) > 1 and sum(one.size for one in self) > HELD):
-            self.gone.append(min(self._all))
-            del self._all[self.gone[-1]]
+    def add(self, job: Job, image: NDArray[Any], output: Output, seconds: float) -> Result:
+        """Add a result."""
+        number = 1 + max(self, default=0)
+        result = self[number] = Result(number, job, image, output, seconds)
+        while len(self) > MAX_RESULTS or (len(self) > 1 and sum(one.nbytes for one in self.values()) > MAX_BYTES):
+            self.dropped.append(min(self))
+            del self[self.dropped[-1]]
         return result
 
-    def get(self, number: int) -> Result:
-        """The result of a number; raises ValueError where it is gone."""
-        if number not in self._all:
-            raise ValueError(f"result {number} is no longer there; make it again with its command line")
-        return self._all[number]
+    def find(self, number: Any) -> Result:
+        """Return the result of a number; raises ValueError or TypeError if there is none."""
+        whole("the result", number, 1)
+        if number not in self:
+            raise ValueError(f"result {number} is no longer kept; make it again with its command line")
+        return self[number]
 
 
-def encoded(name: str, pixels: NDArray[Any]) -> bytes:
-    """The bytes of a picture's file, as ``simdtex.io.image.write`` writes it."""
+def encode(name: str, pixels: NDArray[Any]) -> bytes:
+    """Return the bytes of a picture's file, as `simdtex.io.image.write` writes it."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / name
-        pictures.write(path, pixels)
+        write(path, pixels)
         return path.read_bytes()
+
+
+def encode_source(source: NDArray[np.int32]) -> bytes:
+    """Return the bytes of a source map's file, as `simdtex.model.source_map.save_source_map` writes it."""
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, source=source)
+    return buffer.getvalue()
 
 
 def _middle(pixels: NDArray[Any]) -> NDArray[Any]:

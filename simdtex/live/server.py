@@ -1,42 +1,45 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The server of the live page: on this machine alone, for whoever knows its address.
+"""The server of the live page: for this computer alone, and for those who know the page's address.
 
-A message on the WebSocket is one binary frame: the length of a JSON text, 4 bytes little-endian, the text, and the
-buffers one after another; the text has the lengths of these under ``buffers``.
+A message is a text of JSON, whose ``buffers`` says how many binary messages with its buffers follow.
 """
 
 from __future__ import annotations
 
-import asyncio
 import ipaddress
 import json
+import os
+import re
 import secrets
-import struct
+import socket
+import threading
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import asynccontextmanager, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from importlib.resources import files
-from itertools import pairwise
-from typing import Any
 
-from starlette.applications import Starlette
-from starlette.requests import HTTPConnection, Request
-from starlette.responses import PlainTextResponse, Response
-from starlette.routing import Route, WebSocketRoute
-from starlette.types import ASGIApp, Receive, Scope, Send
-from starlette.websockets import WebSocket, WebSocketDisconnect
+import numpy as np
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+from websockets.sync.server import ServerConnection
+from websockets.sync.server import serve as websocket_server
 
-from simdtex.live.session import BYTES, Session
-from simdtex.machine import Machine
+from simdtex.live.job import Picture
+from simdtex.live.session import MAX_BYTES, Message, Send, Session
+from simdtex.machine import Machine, open_machine
+from simdtex.synthesis import synthesize
 
-__all__ = ["Pages", "application", "pack", "unpack"]
+__all__ = ["TOKEN", "Pages", "listen", "serve"]
+
+TOKEN = "SIMDTEX_LIVE_TOKEN"
+"""The environment variable with the token of the page's address, so that the address stays the same."""
 
 FILES = {
-    "": ("index.html", "text/html; charset=utf-8"),
-    "live.js": ("live.js", "text/javascript; charset=utf-8"),
-    "live.css": ("live.css", "text/css; charset=utf-8"),
+    "": ("index.html", "text/html"),
+    "live.js": ("live.js", "text/javascript"),
+    "live.css": ("live.css", "text/css"),
 }
-"""What is served, by its address after the token."""
+"""The files of the page, by the part of the address after the token."""
 
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
@@ -47,243 +50,210 @@ HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-"""Of every answer: nothing is loaded from elsewhere, nobody frames the page, and nobody learns its address from it."""
+"""Of every answer: the page loads nothing from elsewhere, is in nobody's frame, and tells nobody its address."""
 
 REFUSED = "This address lacks the right token. Open the address that `simdtex live` has printed."
 
-HEADER = 2**20
-"""Bytes of a message's text, at most."""
+MAX_PAGES = 8
+"""Pages that are open at a time, at most."""
 
-PAGES = 8
-"""Pages at a time, at most."""
-
-WAITED = 600.0
-"""Seconds that the work of a page is kept after its connection is lost."""
+KEPT = 600.0
+"""Seconds that a session is kept after its page has lost the connection."""
 
 ENDING = 2.0
-"""Seconds that the end of the server waits for a session's thread, at most."""
+"""Seconds that the end of the server waits for a session's run, or for a request that does not come."""
 
-LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
-REFUSING, TOO_MANY = 1008, 1013
+BAD_MESSAGE, POLICY, TOO_MANY = 1003, 1008, 1013
 """Codes with which a WebSocket is closed (RFC 6455, section 7.4.1)."""
 
 
-def pack(message: dict[str, Any], buffers: Sequence[bytes]) -> bytes:
-    """A message as one binary frame."""
-    text = json.dumps(message | {"buffers": [len(one) for one in buffers]}).encode()
-    return b"".join([struct.pack("<I", len(text)), text, *buffers])
+class Pages:
+    """The sessions of the pages that are open or have lost their connection lately."""
+
+    def __init__(self, machine: Machine, picture: Picture | None = None) -> None:
+        self._machine, self._picture = machine, picture
+        self._lock = threading.Lock()
+        self._sessions: dict[str, Session] = {}
+        self._lost: dict[str, float] = {}  # when, the oldest first
+
+    def join(self, key: str | None, send: Send) -> Session | None:
+        """Return the session of a page, the one it had before or a new one; None if there are too many."""
+        with self._lock:
+            overdue = [one for one, since in self._lost.items() if time.monotonic() - since > KEPT]
+            if key not in self._lost and len(self._sessions) - len(overdue) >= MAX_PAGES:
+                overdue += [one for one in self._lost if one not in overdue][:1]
+            for one in overdue:
+                del self._lost[one]
+                self._sessions.pop(one).close()
+            if key in self._lost:
+                del self._lost[key]
+                self._sessions[key].send = send
+                return self._sessions[key]
+            if len(self._sessions) >= MAX_PAGES:
+                return None
+            session = Session(send, self._machine, self._picture)
+            self._sessions[session.key] = session
+            return session
+
+    def leave(self, session: Session) -> None:
+        """Keep the session of a page that has lost its connection."""
+        with self._lock:
+            self._lost[session.key] = time.monotonic()
+            session.send = lambda message, buffers: None
+
+    def close(self) -> None:
+        """End all sessions."""
+        for wait in (0.0, ENDING):
+            for session in self._sessions.values():
+                session.close(wait)
 
 
-def unpack(frame: bytes) -> tuple[dict[str, Any], list[memoryview]]:
-    """The message and the buffers of a frame.
+def serve(
+    picture: Picture | None, device: str | None, address: str, port: int, ready: Callable[[str, Machine], None]
+) -> None:
+    """Serve the live page until Ctrl-C.
+
+    Parameters
+    ----------
+    picture : Picture, optional
+        What every new page begins with.
+    device : str, optional
+        As of `simdtex.open_machine`.
+    address : str
+        What to listen to; with any other than 127.0.0.1, other computers may reach the page.
+    port : int
+        0 takes a free one.
+    ready : callable
+        Called with the page's address and the machine, once the page can be opened.
 
     Raises
     ------
     ValueError
-        It is none.
+        The address cannot be listened to, or the token is too short.
     """
-    try:
-        (length,) = struct.unpack_from("<I", frame)
-        if length > HEADER:
-            raise ValueError
-        message = json.loads(frame[4 : 4 + length])
-        lengths = message.pop("buffers", [])
-        ends = [4 + length]
-        for one in lengths:
-            if not isinstance(one, int) or one < 0:
-                raise ValueError
-            ends.append(ends[-1] + one)
-        if ends[-1] != len(frame):
-            raise ValueError
-    except (ValueError, TypeError, AttributeError, struct.error, RecursionError):
-        raise ValueError("a frame that is no message") from None
-    view = memoryview(frame)
-    return message, [view[begin:end] for begin, end in pairwise(ends)]
+    token = os.environ.get(TOKEN) or secrets.token_urlsafe(24)
+    if not re.fullmatch(r"[\w-]{16,}", token, re.ASCII):
+        raise ValueError(f"{TOKEN} must be 16 or more letters, digits, - and _; leave it unset for a fresh one")
+    machine = open_machine(device)
+    with listen(Pages(machine, picture), token, address, port) as port:
+        threading.Thread(target=build_kernels, args=(machine,), daemon=True).start()
+        host = f"[{address}]" if ":" in address else address
+        ready(f"http://{host}:{port}/{token}/", machine)
+        while True:
+            time.sleep(3600)  # until Ctrl-C, which no wait for a thread lets through on Windows
 
 
-class Pages:
-    """The sessions of the pages that are open, or were a little while ago.
-
-    Parameters
-    ----------
-    machine : callable
-        Gives the machine.
-    begin : callable, optional
-        Called with each new session.
-    """
-
-    def __init__(self, machine: Callable[[], Machine], begin: Callable[[Session], None] | None = None) -> None:
-        self._machine, self._begin = machine, begin
-        self._sessions: dict[str, Session] = {}
-        self._left: dict[str, float] = {}  # when the page of a session was lost
-
-    def join(self, key: str | None, send: Callable[..., None]) -> tuple[str, Session] | None:
-        """The session of a page: the one that it had, or a new one; None where there are too many."""
-        self._tidy()
-        if key in self._left:
-            del self._left[key]
-            self._sessions[key].attach(send)
-            return key, self._sessions[key]
-        if len(self._sessions) >= PAGES and not self._drop():
-            return None
-        key, session = secrets.token_urlsafe(16), Session(send, self._machine)
-        self._sessions[key] = session
-        if self._begin:
-            self._begin(session)
-        return key, session
-
-    def leave(self, key: str) -> None:
-        """A page has lost its connection, or is closed."""
-        self._left[key] = time.monotonic()
-        self._sessions[key].attach(lambda message, buffers: None)
-
-    def close(self) -> None:
-        """End all that is being made."""
-        for session in self._sessions.values():
-            session.close()
-        for session in self._sessions.values():
-            session.close(ENDING)
-
-    def _tidy(self) -> None:
-        for key in [key for key, since in self._left.items() if time.monotonic() - since > WAITED]:
-            self._forget(key)
-
-    def _drop(self) -> bool:
-        if self._left:
-            self._forget(min(self._left, key=self._left.__getitem__))
-            return True
-        return False
-
-    def _forget(self, key: str) -> None:
-        del self._left[key]
-        self._sessions.pop(key).close()
-
-
-def host_name(host: str) -> str:
-    """The name of a Host header, without the port."""
-    if host.startswith("["):
-        return host.partition("]")[0] + "]"
-    return host.partition(":")[0].lower()
-
-
-class Guard:
-    """Lets a request pass whose Host is this server's, so that no other site's name can stand for it.
-
-    Parameters
-    ----------
-    app : ASGI application
-    address : str
-        What the server listens to. With one that others reach, any address in figures passes: only names can be made
-        to point here by somebody else.
-    """
-
-    def __init__(self, app: ASGIApp, address: str) -> None:
-        self._app, self._address = app, address
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer 400 or close where it is not."""
-        if scope["type"] in ("http", "websocket") and not self._own(HTTPConnection(scope).headers.get("host", "")):
-            if scope["type"] == "http":
-                await PlainTextResponse("This server has another name.", 400, HEADERS)(scope, receive, send)
-            else:
-                await WebSocket(scope, receive, send).close(REFUSING)
-            return
-        await self._app(scope, receive, send)
-
-    def _own(self, host: str) -> bool:
-        name = host_name(host)
-        if name in LOOPBACK or name == self._address.lower():
-            return True
-        try:
-            ipaddress.ip_address(name.strip("[]"))
-        except ValueError:
-            return False
-        return self._address not in (*LOOPBACK, "::1")
-
-
-def application(pages: Pages, token: str, address: str = "127.0.0.1") -> ASGIApp:
-    """The server's application.
+@contextmanager
+def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
+    """Serve pages in threads until the block ends; the value of the context is the port.
 
     Parameters
     ----------
     pages : Pages
     token : str
-        What comes first in every address.
-    address : str
-        What the server listens to.
+        The first part of every path.
+    address, port
+        As of `serve`.
+
+    Raises
+    ------
+    ValueError
+        The address cannot be listened to.
     """
+    try:
+        family = socket.AF_INET6 if ":" in address else socket.AF_INET
+        listening = socket.create_server((address, port), family=family)
+    except (OSError, OverflowError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise ValueError(
+            f"{address} port {port} cannot be listened to ({why}); give another --port or --host"
+        ) from None
 
-    def known(connection: HTTPConnection) -> bool:
-        return secrets.compare_digest(connection.path_params["token"].encode(), token.encode())
-
-    async def serve(request: Request) -> Response:
-        name = request.path_params.get("name", "")
-        if not known(request):
-            return PlainTextResponse(REFUSED, 403, HEADERS)
+    def answer(connection: ServerConnection, request: Request) -> Response | None:
+        """Answer a request; None has the WebSocket opened."""
+        host = request.headers.get("Host", "")
+        given, _, name = request.path.partition("?")[0].lstrip("/").partition("/")
+        if not is_own_name(host, address):
+            return _response(connection, 400, "This server has another name.")
+        if not secrets.compare_digest(given.encode(), token.encode()):
+            return _response(connection, 403, REFUSED)
+        if name == "socket":
+            own = request.headers.get("Origin") == f"http://{host}"
+            return None if own else _response(connection, 403, REFUSED)
         if name not in FILES:
-            return PlainTextResponse("There is no such page.", 404, HEADERS)
+            return _response(connection, 404, "There is no such page.")
         file, kind = FILES[name]
-        return Response((files("simdtex.live") / "page" / file).read_bytes(), 200, HEADERS, kind)
+        return _response(connection, 200, (files("simdtex.live") / "page" / file).read_text(encoding="utf-8"), kind)
 
-    async def refuse(request: Request) -> Response:
-        return PlainTextResponse(REFUSED, 403, HEADERS)
-
-    async def socket(websocket: WebSocket) -> None:
-        own = f"http://{websocket.headers.get('host')}"
-        if not known(websocket) or websocket.headers.get("origin") != own:
-            await websocket.close(REFUSING)  # before it is accepted: 403
-            return
-        await websocket.accept()
-        await _talk(websocket, pages)
-
-    @asynccontextmanager
-    async def lifespan(app: Any) -> AsyncIterator[None]:
-        yield
+    server = websocket_server(
+        lambda connection: talk(connection, pages),
+        sock=listening,
+        process_request=answer,
+        compression=None,
+        max_size=MAX_BYTES,
+        open_timeout=ENDING,
+        close_timeout=ENDING,
+    )
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        yield listening.getsockname()[1]
+    finally:
+        server.shutdown()
         pages.close()
 
-    routes = [
-        WebSocketRoute("/{token}/socket", socket),
-        Route("/{token}/", serve),
-        Route("/{token}/{name}", serve),
-        Route("/{rest:path}", refuse),
-    ]
-    return Guard(Starlette(routes=routes, lifespan=lifespan), address)
+
+def _response(connection: ServerConnection, status: int, text: str, kind: str = "text/plain") -> Response:
+    response = connection.respond(status, text)
+    del response.headers["Content-Type"]
+    response.headers.update(HEADERS | {"Content-Type": f"{kind}; charset=utf-8"})
+    return response
 
 
-async def _talk(websocket: WebSocket, pages: Pages) -> None:
-    """Carry the messages of a page and its session until one of them ends."""
-    loop, out = asyncio.get_running_loop(), asyncio.Queue[bytes]()
+def is_own_name(host: str, address: str) -> bool:
+    """Return whether a Host header names this server, so that no other site's name can stand for it.
 
-    def send(message: dict[str, Any], buffers: Sequence[bytes]) -> None:
-        frame = pack(message, buffers)
-        with suppress(RuntimeError):  # the server has ended
-            loop.call_soon_threadsafe(out.put_nowait, frame)
+    A server that listens to all addresses is also named by any number: others can only make names point here.
+    """
+    name = host.partition("]")[0].lstrip("[") if host.startswith("[") else host.partition(":")[0].lower()
+    if name in (*LOOPBACK, address.lower()):
+        return True
+    with suppress(ValueError):
+        ipaddress.ip_address(name)
+        return address not in LOOPBACK
+    return False
 
-    joined = pages.join(websocket.query_params.get("session"), send)
-    if joined is None:
-        await websocket.close(TOO_MANY, f"{PAGES} pages are open already; close one of them")
+
+def talk(connection: ServerConnection, pages: Pages) -> None:
+    """Carry messages between a page and its session until the connection ends."""
+
+    def send(message: Message, buffers: Sequence[bytes]) -> None:
+        with suppress(ConnectionClosed):
+            connection.send(json.dumps(message | {"buffers": len(buffers)}))
+            for one in buffers:
+                connection.send(one)
+
+    assert connection.request is not None
+    session = pages.join(connection.request.path.partition("?session=")[2], send)
+    if session is None:
+        connection.close(TOO_MANY, f"{MAX_PAGES} pages are open already; close one of them")
         return
-    key, session = joined
-    send({"kind": "session", "key": key}, [])
-
-    async def write() -> None:
-        while True:
-            await websocket.send_bytes(await out.get())
-
-    writer = asyncio.create_task(write())
     try:
-        while True:
-            message, buffers = unpack(await websocket.receive_bytes())
-            session.receive(message, buffers)
-    except (WebSocketDisconnect, KeyError):  # KeyError: a frame of text
+        for text in connection:
+            message = json.loads(text)
+            count = message.pop("buffers", 0)
+            session.receive(message, [connection.recv() for _ in range(count)])
+    except ConnectionClosed:
         pass
-    except ValueError:
-        await websocket.close(REFUSING, "a frame that is no message")
+    except (ValueError, TypeError, AttributeError, RecursionError):
+        connection.close(BAD_MESSAGE, "this is no message")
     finally:
-        writer.cancel()
-        pages.leave(key)
+        pages.leave(session)
 
 
-LARGEST = BYTES + HEADER
-"""Bytes of a frame, at most."""
+def build_kernels(machine: Machine) -> None:
+    """Build the kernels of a first run, of a grey and of a coloured sample."""
+    rng = np.random.default_rng(0)
+    for axis, shape in ((None, (32, 32)), (-1, (32, 32, 3))):
+        synthesize(rng.integers(0, 256, shape, np.uint8), (48, 48), channel_axis=axis, rng=0, device=machine)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""`Live`: the live page in a notebook, by its kernel's connection."""
+"""`Live`: the live page in a notebook, over the connection to its kernel."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.image import check_sample
+from simdtex.live.job import Picture
 from simdtex.live.results import Result
 from simdtex.live.session import Session
-from simdtex.live.settings import Picture
 from simdtex.machine import Machine, open_machine
 
 try:
@@ -20,7 +20,7 @@ try:
 except ModuleNotFoundError:
 
     class AnyWidget:  # type: ignore[no-redef]
-        """Stands for what is not installed, so that the name can be imported all the same."""
+        """Stands in for the missing package, so that the name can be imported."""
 
         def __init__(self) -> None:
             raise ValueError(
@@ -85,7 +85,7 @@ class Live(AnyWidget):
     _esm = (PAGE / "live.js").read_text(encoding="utf-8")
     _css = (PAGE / "live.css").read_text(encoding="utf-8")
 
-    _session: Session | None = None  # until there is a sample that will do
+    _session: Session | None = None  # None if the sample is refused
 
     def __init__(
         self,
@@ -101,16 +101,13 @@ class Live(AnyWidget):
             grey = channel_axis is None
             picture = Picture(name, np.array(pixels[..., 0] if grey else pixels), None if grey else -1)
         super().__init__()
-        machine = open_machine(device)
-        session = Session(self.send, lambda: machine)
+        session = self._session = Session(self.send, open_machine(device), picture)
         self.on_msg(lambda _, message, buffers: session.receive(message, buffers))
-        if picture is not None:
-            session.use(picture)
-        self._session = session
 
     @property
     def _latest(self) -> Result | None:
-        return self._session.latest if self._session else None
+        results = self._session.results if self._session else {}
+        return results[max(results)] if results else None
 
     @property
     def image(self) -> NDArray[Any] | None:  # noqa: D102
@@ -126,11 +123,11 @@ class Live(AnyWidget):
 
     @property
     def command(self) -> str:  # noqa: D102
-        return str(self._latest.told()["command"]) if self._latest else ""
+        return self._latest.job.command if self._latest else ""
 
     @property
     def python(self) -> str:  # noqa: D102
-        return str(self._latest.told()["python"]) if self._latest else ""
+        return self._latest.job.python if self._latest else ""
 
     def close(self) -> None:
         """End what is being made, and take the widget away."""

@@ -20,10 +20,9 @@ TABLES: dict[str, tuple[Any, str]] = {
     "multires": (multires.Options, "synth"),
     "pyramid": (pyramid.Options, "synth"),
     "fill": (mrf.Options, "fill"),
-    "tile": (mrf.Options, "extend"),
+    "extend": (mrf.Options, "extend"),
 }
-"""The sets of controls: of each method, and of the jobs that only ``mrf`` does; the options, and the command that
-does the same."""
+"""The sets of controls: of each method, and of the jobs that only ``mrf`` does; the options, and the command."""
 
 
 def controls(name: str) -> list[dict[str, Any]]:

@@ -1,30 +1,28 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The live page of simdtex: in a browser beside `simdtex live`, and in a notebook as the widget simdtex.Live.
-// All arithmetic on textures is done by simdtex; the page shows frames and sends wishes.
+// simdtex does all arithmetic on textures; the page shows frames and sends messages (docs/live.rst lists them).
 
-const LABELS = [
-  { name: "1", colour: "#e69f00" },
-  { name: "2", colour: "#56b4e9" },
-  { name: "3", colour: "#009e73" },
-  { name: "4", colour: "#f0e442" },
-  { name: "5", colour: "#cc79a7" },
-]; // of Okabe and Ito, told apart by most eyes
+const LABELS = ["#e69f00", "#56b4e9", "#009e73", "#f0e442", "#cc79a7"]; // of Okabe and Ito, told apart by most eyes
 const HOLE = "#ff1e9b";
 const LAYERS = {
   picture: "Picture",
   sample: "Sample",
-  arrangement: "Where from (arrangement)",
+  arrangement: "Arrangement (source map)",
   use: "Use of the sample",
   temperature: "Temperature",
 };
-const JOBS = { synth: "More of it", tile: "The picture without a seam", fill: "A hole that is filled" };
-const BUTTONS = { synth: "Make it", tile: "Make it seamless", fill: "Fill the hole" };
-const LARGEST = 2 ** 22; // pixels of a window, at most
+const JOBS = {
+  synth: ["More of the texture", "Make the texture"],
+  extend: ["A seamless picture", "Make it seamless"],
+  fill: ["A filled hole", "Fill the hole"],
+}; // what the page calls them, and their button
+const SIDES = ["left", "top", "width", "height"];
+const MAX_PIXELS = 2 ** 22; // of a frame
 const STARTING_SIDE = 512;
 
 // -- connections --------------------------------------------------------------------------------------------------
 
-/** A WebSocket to `simdtex live`; it comes back when it was lost. */
+/** A WebSocket to `simdtex live`, which is opened again when it is lost. */
 class Socket {
   constructor(address) {
     this.address = address;
@@ -34,7 +32,7 @@ class Socket {
 
   open() {
     const key = sessionStorage.getItem("simdtex-session");
-    this.socket = new WebSocket(`${this.address}${key ? `?session=${encodeURIComponent(key)}` : ""}`);
+    this.socket = new WebSocket(`${this.address}${key ? `?session=${key}` : ""}`);
     this.socket.binaryType = "arraybuffer";
     this.socket.onopen = () => {
       this.wait = 250;
@@ -45,25 +43,19 @@ class Socket {
       this.timer = setTimeout(() => this.open(), this.wait);
       this.wait = Math.min(2 * this.wait, 4000);
     };
-    this.socket.onmessage = (event) => {
-      const length = new DataView(event.data).getUint32(0, true);
-      const message = JSON.parse(new TextDecoder().decode(new Uint8Array(event.data, 4, length)));
-      let at = 4 + length;
-      const buffers = message.buffers.map((size) => {
-        at += size;
-        return new Uint8Array(event.data, at - size, size);
-      });
-      if (message.kind === "session") sessionStorage.setItem("simdtex-session", message.key);
-      else this.onmessage(message, buffers);
+    this.socket.onmessage = ({ data }) => {
+      if (typeof data === "string") [this.message, this.buffers] = [JSON.parse(data), []];
+      else this.buffers.push(new Uint8Array(data));
+      if (this.buffers.length < this.message.buffers) return;
+      if (this.message.kind === "hello") sessionStorage.setItem("simdtex-session", this.message.session);
+      this.onmessage(this.message, this.buffers);
     };
   }
 
   send(message, buffers = []) {
     if (this.socket.readyState !== WebSocket.OPEN) return;
-    const text = new TextEncoder().encode(JSON.stringify({ ...message, buffers: buffers.map((one) => one.byteLength) }));
-    const head = new Uint8Array(4);
-    new DataView(head.buffer).setUint32(0, text.length, true);
-    this.socket.send(new Blob([head, text, ...buffers]));
+    this.socket.send(JSON.stringify({ ...message, buffers: buffers.length }));
+    for (const buffer of buffers) this.socket.send(buffer);
   }
 
   close() {
@@ -78,12 +70,12 @@ class Kernel {
   constructor(model) {
     this.model = model;
     this.onmessage = this.onstate = () => {};
-    this.heard = (message, buffers) =>
+    this.received = (message, buffers) =>
       this.onmessage(message, (buffers ?? []).map((one) => new Uint8Array(one.buffer, one.byteOffset, one.byteLength)));
   }
 
   open() {
-    this.model.on("msg:custom", this.heard);
+    this.model.on("msg:custom", this.received);
     this.onstate("open", "");
   }
 
@@ -92,7 +84,7 @@ class Kernel {
   }
 
   close() {
-    this.model.off("msg:custom", this.heard);
+    this.model.off("msg:custom", this.received);
   }
 }
 
@@ -115,40 +107,50 @@ function make(tag, attributes = {}, ...children) {
 /** A control and its label. */
 function labelled(text, control, hint = "") {
   control.id ||= `simdtex-${++count}`;
-  const parts = [make("label", { for: control.id }, text), control];
+  const field = make("div", { class: "field" }, make("label", { for: control.id }, text), control);
   if (hint) {
-    const note = make("small", { id: `${control.id}-hint` }, hint);
-    control.setAttribute("aria-describedby", note.id);
-    parts.push(note);
+    field.append(make("small", { id: `${control.id}-hint` }, hint));
+    control.setAttribute("aria-describedby", `${control.id}-hint`);
   }
-  return make("div", { class: "field" }, ...parts);
+  return field;
 }
 
-function number(attributes) {
-  return make("input", { type: "number", ...attributes });
-}
-
-function choice(pairs, onchange) {
-  return make("select", { onchange }, ...pairs.map(([value, text]) => make("option", { value }, text)));
-}
+const button = (text, onclick, attributes = {}) => make("button", { type: "button", onclick, ...attributes }, text);
+const number = (attributes) => make("input", { type: "number", step: 1, ...attributes });
+const checkbox = (attributes) => make("input", { type: "checkbox", ...attributes });
+const bar = (...children) => make("div", { class: "bar" }, ...children);
+const choices = (pairs) => pairs.map(([value, text]) => make("option", { value }, text));
+const choice = (pairs, onchange) => make("select", { onchange }, ...choices(pairs));
+const clamp = (value, least, most) => Math.max(least, Math.min(most, value));
 
 /** RGBA bytes as something that a canvas draws. */
 function bitmap(bytes, width, height) {
-  const canvas = make("canvas");
-  [canvas.width, canvas.height] = [width, height];
+  const canvas = make("canvas", { width, height });
   const data = new ImageData(new Uint8ClampedArray(bytes.buffer, bytes.byteOffset, 4 * width * height), width, height);
   canvas.getContext("2d").putImageData(data, 0, 0);
   return canvas;
 }
 
+/** Follow a pointer that is pressed until it is released. */
+function drag(element, event, move, end) {
+  element.setPointerCapture(event.pointerId);
+  const following = new AbortController();
+  const stop = () => {
+    following.abort();
+    end();
+  };
+  const { signal } = following;
+  element.addEventListener("pointermove", move, { signal });
+  for (const kind of ["pointerup", "pointercancel"]) element.addEventListener(kind, stop, { signal });
+}
+
 // -- options ------------------------------------------------------------------------------------------------------
 
-/** The controls of a method, made of what simdtex says of its options. */
+/** The controls of a method, made from the options' declarations. */
 class Options {
   constructor(controls, onchange) {
     this.controls = controls;
     this.fields = new Map();
-    this.element = make("div", {});
     const groups = new Map();
     for (const control of controls) {
       if (!groups.has(control.group)) {
@@ -157,48 +159,41 @@ class Options {
       }
       groups.get(control.group).append(this.field(control, onchange));
     }
-    this.element.append(...groups.values());
+    this.element = make("div", {}, ...groups.values());
   }
 
   field(control, onchange) {
+    const { name, label, hint } = control;
     if (control.kind === "words" || control.kind === "switch") {
-      const input =
-        control.kind === "words"
-          ? choice(control.valid, onchange)
-          : make("input", { type: "checkbox", onchange });
-      const get = () => (control.kind === "words" ? input.value : input.checked);
-      const set = (value) => (control.kind === "words" ? (input.value = value) : (input.checked = value));
-      this.fields.set(control.name, { get, set });
-      set(control.default ?? false);
-      return labelled(control.label, input, control.hint);
+      const input = control.kind === "words" ? choice(control.valid, onchange) : checkbox({ onchange });
+      const property = control.kind === "words" ? "value" : "checked";
+      this.fields.set(name, { get: () => input[property], set: (value) => (input[property] = value ?? false) });
+      this.fields.get(name).set(control.default);
+      return labelled(label, input, hint);
     }
     const [least, most, step] = control.span;
     const input = number({ step: "any", min: control.least, placeholder: control.empty || null, onchange });
-    const slider = make("input", { type: "range", min: least, max: most, step, "aria-label": `${control.label}, slider` });
-    const show = () => (slider.value = input.value === "" ? (control.default ?? least) : input.value);
+    const slider = make("input", { type: "range", min: least, max: most, step, "aria-label": `${label}, slider` });
+    const follow = () => (slider.value = input.value === "" ? (control.default ?? least) : input.value);
     slider.addEventListener("input", () => (input.value = slider.value));
     slider.addEventListener("change", onchange);
-    input.addEventListener("input", show);
+    input.addEventListener("input", follow);
     const get = () => (input.value === "" ? control.blank : Number(input.value));
     const set = (value) => {
-      input.value = value === null || value === undefined || value === control.blank ? "" : value;
-      show();
+      input.value = value === control.blank ? "" : (value ?? "");
+      follow();
     };
-    this.fields.set(control.name, { get, set });
+    this.fields.set(name, { get, set });
     set(control.default);
-    const field = labelled(control.label, input, control.hint);
+    const field = labelled(label, input, hint);
     input.after(slider);
     return field;
   }
 
-  /** The options that differ from what they are by default. */
+  /** The options that differ from their defaults. */
   get values() {
-    const found = {};
-    for (const control of this.controls) {
-      const value = this.fields.get(control.name).get();
-      if (value !== null && value !== undefined && value !== control.default) found[control.name] = value;
-    }
-    return found;
+    const values = this.controls.map(({ name, default: usual }) => [name, this.fields.get(name).get() ?? usual, usual]);
+    return Object.fromEntries(values.filter(([, value, usual]) => value !== usual));
   }
 
   set values(given) {
@@ -208,17 +203,17 @@ class Options {
 
 // -- the view -----------------------------------------------------------------------------------------------------
 
-/** A window of a plane, at whole pixels: the server sends what is seen and no more, so memory has a bound. */
+/** A window of a layer, at whole pixels: simdtex sends what the window shows and no more, so memory is bounded. */
 class View {
   constructor(page) {
     this.page = page;
     this.left = this.top = 0;
-    this.scale = 1; // above 0 pixels of the screen for each of the plane, below 0 the other way round
+    this.scale = 1; // above 0 pixels of the screen for each of the layer, below 0 the other way round
     this.fitted = true;
     this.rows = this.cols = 0;
     this.frame = null;
     this.cursor = null;
-    this.canvas = make("canvas", { class: "view", tabindex: 0, role: "img", "aria-label": "Nothing is made yet." });
+    this.canvas = make("canvas", { class: "view", tabindex: 0, role: "img", "aria-label": "There is no result yet." });
     this.observer = new ResizeObserver(() => this.resized());
     this.observer.observe(this.canvas);
     this.canvas.addEventListener("pointerdown", (event) => this.press(event));
@@ -258,7 +253,7 @@ class View {
     const [col, row] = [this.left + x / this.unit, this.top + y / this.unit];
     let scale = this.scale + by;
     if (scale > -2 && scale < 1) scale = by > 0 ? 1 : -2;
-    this.scale = Math.max(-64, Math.min(64, scale));
+    this.scale = clamp(scale, -64, 64);
     this.left = Math.round(col - x / this.unit);
     this.top = Math.round(row - y / this.unit);
     this.fitted = false;
@@ -272,7 +267,7 @@ class View {
     this.moved();
   }
 
-  /** Ask for what is seen now. */
+  /** Ask for the window, soon. */
   moved() {
     this.draw();
     clearTimeout(this.asking);
@@ -283,11 +278,11 @@ class View {
     const { step } = this;
     const across = this.canvas.width / this.unit / step;
     const down = this.canvas.height / this.unit / step;
-    const width = Math.max(1, Math.min(4096, Math.ceil(across) + 1));
-    const height = Math.max(1, Math.min(Math.floor(LARGEST / width), Math.ceil(down) + 1));
+    const width = clamp(Math.ceil(across) + 1, 1, 4096);
+    const height = clamp(Math.ceil(down) + 1, 1, Math.floor(MAX_PIXELS / width));
     const { layer, tiled } = this.page;
-    this.page.send({ kind: "look", layer, left: this.left, top: this.top, width, height, step, tiled });
-    this.page.zoomed.textContent = this.scale > 0 ? `${100 * this.scale} %` : `1 : ${-this.scale}`;
+    this.page.send({ kind: "view", layer, left: this.left, top: this.top, width, height, step, tiled });
+    this.page.zoomOutput.textContent = this.scale > 0 ? `${100 * this.scale} %` : `1 : ${-this.scale}`;
   }
 
   show(message, bytes) {
@@ -318,7 +313,7 @@ class View {
       const [x, y] = [(frame.left - this.left) * unit, (frame.top - this.top) * unit];
       context.drawImage(frame.picture, x, y, frame.width * size, frame.height * size);
     }
-    for (const { strokes, colour } of this.page.painted()) this.strokes(context, strokes, colour);
+    for (const { strokes, colour } of this.page.visibleStrokes()) this.strokes(context, strokes, colour);
     const { cursor } = this;
     if (cursor && this.page.brush) {
       context.globalAlpha = 1;
@@ -364,16 +359,14 @@ class View {
 
   press(event) {
     if (event.button !== 0) return;
-    this.canvas.setPointerCapture(event.pointerId);
-    const brush = this.page.brush;
+    const { brush } = this.page;
     let [x, y] = this.place(event);
-    const at = () => [this.left + x / this.unit, this.top + y / this.unit].map((one) => Math.round(10 * (one - 0.5)) / 10);
-    if (brush) brush.begin(at());
+    const point = () => [this.left + x / this.unit, this.top + y / this.unit].map((one) => Math.round(10 * (one - 0.5)) / 10);
     const move = (now) => {
       const [toX, toY] = this.place(now);
       if (brush) {
         [x, y] = [toX, toY];
-        brush.go(at());
+        brush.add(point());
         this.draw();
         return;
       }
@@ -382,13 +375,8 @@ class View {
       [x, y] = [x - cols * this.unit, y - rows * this.unit];
       this.pan(cols, rows);
     };
-    const end = () => {
-      this.canvas.removeEventListener("pointermove", move);
-      for (const kind of ["pointerup", "pointercancel"]) this.canvas.removeEventListener(kind, end);
-      if (brush) brush.end();
-    };
-    this.canvas.addEventListener("pointermove", move);
-    for (const kind of ["pointerup", "pointercancel"]) this.canvas.addEventListener(kind, end);
+    brush?.begin(point());
+    drag(this.canvas, event, move, () => brush?.end());
     this.draw();
   }
 
@@ -398,17 +386,16 @@ class View {
   }
 
   key(event) {
-    const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-    const brush = this.page.brush;
+    const directions = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+    const { brush } = this.page;
     if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.key in ways) {
-      const [x, y] = ways[event.key];
+    if (event.key in directions) {
+      const [x, y] = directions[event.key];
       if (brush) {
         const by = Math.max(1, Math.round(brush.width / 4)) * (event.shiftKey ? 4 : 1);
         const [col, row] = this.cursor ?? [this.cols / 2, this.rows / 2];
-        const inside = (value, most) => Math.max(0, Math.min(most - 1, value));
-        this.cursor = [inside(col + x * by, this.cols), inside(row + y * by, this.rows)];
-        if (this.down) brush.go([...this.cursor]);
+        this.cursor = [clamp(col + x * by, 0, this.cols - 1), clamp(row + y * by, 0, this.rows - 1)];
+        if (this.down) brush.add([...this.cursor]);
         this.draw();
       } else {
         const by = Math.max(1, Math.round(32 / this.unit));
@@ -425,7 +412,7 @@ class View {
     else if (event.key === "0") this.fit();
     else return;
     event.preventDefault();
-    event.stopPropagation(); // a notebook has other plans with keys
+    event.stopPropagation(); // a notebook has its own meaning for keys
   }
 
   close() {
@@ -439,15 +426,15 @@ class Page {
   constructor(root, connection) {
     this.connection = connection;
     this.results = new Map();
-    this.shown = null; // the number of the result that is looked at
+    this.shown = null; // the number of the selected result
     this.picture = null;
-    this.given = null; // the file, to give it again to a server that has forgotten it
+    this.given = null; // the file, to give it again to a server that was started anew
     this.guide = { sample: [], output: [] };
     this.hole = [];
-    this.part = null;
-    this.layer = "picture";
+    this.part = null; // the region of the picture that is the sample
+    this.layer = "picture"; // that is asked for; the frame's own is `seen`
     this.tiled = false;
-    this.running = this.stopped = false;
+    this.running = this.paused = false;
     this.build(root);
     connection.onmessage = (message, buffers) => this[`on_${message.kind}`]?.(message, buffers);
     connection.onstate = (state, reason) => this.connected(state, reason);
@@ -470,46 +457,54 @@ class Page {
     this.root.addEventListener("dragover", (event) => event.preventDefault());
     this.root.addEventListener("drop", (event) => {
       event.preventDefault();
-      const [file] = event.dataTransfer.files;
-      if (file) this.open(file, event.target.closest?.(".maps") ? "map" : "open");
+      this.open(event.dataTransfer.files[0], event.target.closest?.(".maps") ? "map" : "open");
     });
-    this.paste = (event) => {
-      const file = [...(event.clipboardData?.files ?? [])][0];
-      if (file) this.open(file, "open");
-    };
+    this.paste = (event) => this.open(event.clipboardData?.files[0], "open");
     (root.id === "simdtex-live" ? document : this.root).addEventListener("paste", this.paste);
   }
 
   // -- sample
 
   sampleSection() {
-    this.file = make("input", { type: "file", accept: "image/*,.tif,.tiff,.npy", "aria-label": "A picture", onchange: () => this.chosen(this.file, "open") });
-    this.mapFile = make("input", { type: "file", accept: "image/*,.tif,.tiff,.npy", "aria-label": "A further map", onchange: () => this.chosen(this.mapFile, "map") });
     this.examples = make("p", { class: "bar" });
     this.preview = make("canvas", { class: "preview", role: "img", "aria-label": "There is no picture yet." });
-    this.preview.addEventListener("pointerdown", (event) => this.select(event));
-    const change = () => this.partTyped();
-    this.partFields = Object.fromEntries(
-      ["left", "top", "width", "height"].map((name) => [name, number({ min: 0, step: 1, onchange: change })]),
+    this.preview.addEventListener("pointerdown", (event) => this.drawPart(event));
+    this.partFields = SIDES.map(() => number({ min: 0, onchange: () => this.typePart() }));
+    this.partSet = make(
+      "fieldset",
+      { class: "part", hidden: true },
+      make("legend", {}, "The part that is the sample, pixels"),
+      ...this.partFields.map((input, index) => labelled(SIDES[index][0].toUpperCase() + SIDES[index].slice(1), input)),
+      button("Whole picture", () => this.setPart(null)),
     );
-    const fields = Object.entries(this.partFields).map(([name, input]) => labelled(name[0].toUpperCase() + name.slice(1), input));
-    const all = make("button", { type: "button", onclick: () => this.setPart(null) }, "All of it");
-    this.partSet = make("fieldset", { class: "part", hidden: true }, make("legend", {}, "The part that is the sample, in pixels"), ...fields, all);
     this.mapList = make("ul");
-    this.maps = make("details", { class: "maps", hidden: true }, make("summary", {}, "Further maps of the material"), make("p", {}, "Normal, height, roughness: they are carried along."), this.mapFile, this.mapList);
+    this.maps = make(
+      "details",
+      { class: "maps", hidden: true },
+      make("summary", {}, "Further maps of the material"),
+      make("p", {}, "Normal, height, roughness: each is arranged as the picture is."),
+      this.fileInput("A further map", "map"),
+      this.mapList,
+    );
     this.named = make("p", { class: "named" }, "Drop a picture anywhere, paste one, or choose a file.");
-    return make("section", { "aria-label": "Sample", class: "sample" }, make("h2", {}, "Sample"), this.named, this.file, this.examples, this.preview, this.partSet, this.maps);
+    const heading = make("h2", {}, "Sample");
+    const parts = [heading, this.named, this.fileInput("A picture", "open"), this.examples, this.preview, this.partSet];
+    return make("section", { "aria-label": "Sample", class: "sample" }, ...parts, this.maps);
   }
 
-  chosen(input, kind) {
-    const [file] = input.files;
-    if (file) this.open(file, kind);
-    input.value = "";
+  fileInput(label, kind) {
+    const input = make("input", { type: "file", accept: "image/*,.tif,.tiff,.npy", "aria-label": label });
+    input.addEventListener("change", () => {
+      this.open(input.files[0], kind);
+      input.value = "";
+    });
+    return input;
   }
 
   async open(file, kind) {
+    if (!file) return;
     if (this.bytes && file.size > this.bytes) {
-      this.tell(`The file has ${file.size} bytes and ${this.bytes} are taken at most; give a smaller one.`);
+      this.warn(`The file has ${file.size} bytes and at most ${this.bytes} are taken; give a smaller one.`);
       return;
     }
     const bytes = new Uint8Array(await file.arrayBuffer());
@@ -519,74 +514,64 @@ class Page {
 
   on_picture(message, [bytes]) {
     this.picture = message;
-    this.small = bitmap(bytes, ...message.shown);
-    [this.preview.width, this.preview.height] = message.shown;
+    this.small = bitmap(bytes, ...message.preview);
+    [this.preview.width, this.preview.height] = message.preview;
     this.preview.setAttribute("aria-label", `${message.name}, ${message.width} by ${message.height} pixels. Drag over it to choose the part that is the sample.`);
     this.named.textContent = `${message.name}, ${message.width} × ${message.height}, ${message.values}`;
     this.partSet.hidden = this.maps.hidden = false;
     this.on_maps({ names: message.maps });
-    this.part = message.part;
-    this.showPart();
+    this.setPart(message.part, false);
     if (!message.new) return;
     this.guide = { sample: [], output: [] };
     this.hole = [];
-    this.results.forEach((_, number) => this.mark(number, false));
+    this.mark(this.shown, false);
     this.shown = null;
-    const { width, height } = this.sampleSize;
     if (this.again) this.restore(this.again);
     else {
+      const [, , width, height] = this.wholePart;
       this.width.value = Math.min(2 * width, STARTING_SIDE);
       this.height.value = Math.min(2 * height, STARTING_SIDE);
     }
     this.again = null;
-    this.settle();
+    this.showJob();
     if (this.job.value !== "fill") this.make();
-    else this.look("sample");
+    else this.showLayer("sample");
   }
 
-  get sampleSize() {
-    return this.part ? { width: this.part[2], height: this.part[3] } : this.picture;
+  /** The part, also where it is the whole picture. */
+  get wholePart() {
+    return this.part ?? [0, 0, this.picture.width, this.picture.height];
   }
 
-  showPart() {
-    const { width, height } = this.picture;
-    const [x, y, w, h] = this.part ?? [0, 0, width, height];
-    Object.entries({ left: x, top: y, width: w, height: h }).forEach(([name, value]) => (this.partFields[name].value = value));
-    const context = this.preview.getContext("2d");
-    const { step } = this.picture;
-    context.globalAlpha = 1;
-    context.drawImage(this.small, 0, 0);
-    if (!this.part) return;
-    context.globalAlpha = 0.6;
-    context.fillStyle = "#000";
-    context.fillRect(0, 0, this.preview.width, this.preview.height);
-    context.globalAlpha = 1;
-    context.drawImage(this.small, x / step, y / step, w / step, h / step, x / step, y / step, w / step, h / step);
-  }
-
-  setPart(part, wish = true) {
-    const { width, height } = this.picture;
+  setPart(part, run = true) {
+    const { width, height, preview } = this.picture;
     this.part = part && part[2] === width && part[3] === height ? null : part;
-    this.showPart();
-    if (wish) this.changed();
+    this.partFields.forEach((input, index) => (input.value = this.wholePart[index]));
+    const context = this.preview.getContext("2d");
+    context.drawImage(this.small, 0, 0);
+    if (this.part) {
+      const scale = preview[0] / width;
+      const [x, y, w, h] = this.part.map((one) => one * scale);
+      context.fillStyle = "#0009";
+      context.fillRect(0, 0, ...preview);
+      context.drawImage(this.small, x, y, w, h, x, y, w, h);
+    }
+    if (run) this.changed();
   }
 
-  partTyped() {
+  typePart() {
     const { width, height } = this.picture;
-    const found = ["left", "top", "width", "height"].map((name) => Math.round(Number(this.partFields[name].value)));
-    const least = (side) => Math.min(8, side);
-    const w = Math.max(least(width), Math.min(width, found[2]));
-    const h = Math.max(least(height), Math.min(height, found[3]));
-    this.setPart([Math.max(0, Math.min(width - w, found[0])), Math.max(0, Math.min(height - h, found[1])), w, h]);
+    const [x, y, w, h] = this.partFields.map((input) => Math.round(Number(input.value)));
+    const [across, down] = [clamp(w, Math.min(8, width), width), clamp(h, Math.min(8, height), height)];
+    this.setPart([clamp(x, 0, width - across), clamp(y, 0, height - down), across, down]);
   }
 
-  select(event) {
+  drawPart(event) {
     if (!this.picture || event.button !== 0) return;
-    this.preview.setPointerCapture(event.pointerId);
     const box = this.preview.getBoundingClientRect();
     const place = (now) => [
-      Math.round(Math.max(0, Math.min(1, (now.clientX - box.left) / box.width)) * this.picture.width),
-      Math.round(Math.max(0, Math.min(1, (now.clientY - box.top) / box.height)) * this.picture.height),
+      Math.round(clamp((now.clientX - box.left) / box.width, 0, 1) * this.picture.width),
+      Math.round(clamp((now.clientY - box.top) / box.height, 0, 1) * this.picture.height),
     ];
     const [x, y] = place(event);
     const before = this.part;
@@ -595,19 +580,12 @@ class Page {
       const part = [Math.min(x, toX), Math.min(y, toY), Math.abs(toX - x), Math.abs(toY - y)];
       if (part[2] >= 8 && part[3] >= 8) this.setPart(part, false);
     };
-    const end = () => {
-      this.preview.removeEventListener("pointermove", move);
-      if (this.part !== before) this.changed();
-    };
-    this.preview.addEventListener("pointermove", move);
-    this.preview.addEventListener("pointerup", end, { once: true });
+    drag(this.preview, event, move, () => this.part !== before && this.changed());
   }
 
   on_maps({ names }) {
-    this.mapNames = names;
-    const item = (name) =>
-      make("li", {}, `${name} `, make("button", { type: "button", "aria-label": `Take ${name} away`, onclick: () => this.send({ kind: "unmap", name }) }, "×"));
-    this.mapList.replaceChildren(...names.map(item));
+    const remove = (name) => button("×", () => this.send({ kind: "unmap", name }), { "aria-label": `Remove ${name}` });
+    this.mapList.replaceChildren(...names.map((name) => make("li", {}, `${name} `, remove(name))));
     if (names.length && this.shown !== null) this.make();
   }
 
@@ -615,48 +593,57 @@ class Page {
 
   resultSection() {
     this.view = new View(this);
-    this.layerChoice = choice(Object.entries(LAYERS), () => this.look(this.layerChoice.value));
-    this.tiling = make("input", { type: "checkbox", onchange: () => this.tile() });
-    this.zoomed = make("output", { "aria-label": "Zoom" }, "100 %");
-    const zoom = (text, label, by) => make("button", { type: "button", "aria-label": label, onclick: () => by() }, text);
-    const looking = make(
-      "div",
-      { class: "bar" },
-      labelled("Look at", this.layerChoice),
-      labelled("Tiled 3 × 3", this.tiling),
-      make("span", { class: "bar" }, zoom("−", "Zoom out", () => this.view.zoom(-1)), this.zoomed, zoom("+", "Zoom in", () => this.view.zoom(1)), zoom("Fit", "Fit", () => this.view.fit())),
-    );
+    this.layerChoice = choice(Object.entries(LAYERS), () => this.showLayer(this.layerChoice.value));
+    this.tiling = checkbox({ onchange: () => this.tile() });
+    this.zoomOutput = make("output", { "aria-label": "Zoom" }, "100 %");
+    const zoom = [
+      button("−", () => this.view.zoom(-1), { "aria-label": "Zoom out" }),
+      this.zoomOutput,
+      button("+", () => this.view.zoom(1), { "aria-label": "Zoom in" }),
+      button("Fit", () => this.view.fit()),
+    ];
+    const shown = bar(labelled("Layer", this.layerChoice), labelled("Tiled 3 × 3", this.tiling), bar(...zoom));
     this.progress = make("progress", { max: 1, value: 0, "aria-label": "Progress" });
     this.doing = make("p", { class: "doing" });
-    this.stopping = make("button", { type: "button", disabled: true, onclick: () => this.stop() }, "Stop");
-    this.ending = make("button", { type: "button", disabled: true, onclick: () => this.send({ kind: "end" }) }, "Give up");
-    const running = make("div", { class: "bar" }, this.stopping, this.ending, this.progress);
-    this.current = make("button", { type: "button", onclick: () => this.send({ kind: "choose", result: null }) }, "What is being made");
+    this.pausing = button("Pause", () => this.pause(), { disabled: true });
+    this.cancelling = button("Cancel", () => this.send({ kind: "cancel" }), { disabled: true });
+    this.current = button("Present run", () => this.send({ kind: "select", result: null }));
     this.currentItem = make("li", { class: "current", hidden: true }, this.current);
     this.strip = make("ol", { class: "strip", "aria-label": "Results" }, this.currentItem);
-    this.takes = make("div", { class: "bar" });
+    this.files = bar();
     this.command = make("pre", { tabindex: 0, "aria-label": "Command line" });
     this.python = make("pre", { tabindex: 0, "aria-label": "Python" });
-    const copy = (of, what) => make("button", { type: "button", onclick: () => this.copy(of.textContent) }, `Copy the ${what}`);
-    this.away = make(
+    this.downloads = make(
       "section",
-      { "aria-label": "Take away", hidden: true },
-      make("h3", {}, "Take it away"),
-      this.takes,
-      make("p", {}, "These lines make the same bytes, from the files in the package:"),
+      { "aria-label": "Download", hidden: true },
+      make("h3", {}, "Download"),
+      this.files,
+      make("p", {}, "These lines make the same bytes from the files in texture.zip:"),
       this.command,
-      copy(this.command, "command line"),
+      button("Copy the command line", () => this.copy(this.command.textContent)),
       this.python,
-      copy(this.python, "lines of Python"),
+      button("Copy the lines of Python", () => this.copy(this.python.textContent)),
     );
     this.figures = make("dl", { class: "figures" });
-    this.quality = make("section", { "aria-label": "Quality", hidden: true }, make("h3", {}, "Figures of quality"), this.figures);
-    return make("section", { "aria-label": "Result", class: "result" }, make("h2", {}, "Result"), looking, this.view.canvas, running, this.doing, this.paintSet(), this.strip, this.away, this.quality);
+    const quality = make("h3", {}, "Figures of quality");
+    this.quality = make("section", { "aria-label": "Quality", hidden: true }, quality, this.figures);
+    return make(
+      "section",
+      { "aria-label": "Result", class: "result" },
+      make("h2", {}, "Result"),
+      shown,
+      this.view.canvas,
+      bar(this.pausing, this.cancelling, this.progress),
+      this.doing,
+      this.paintSet(),
+      this.strip,
+      this.downloads,
+      this.quality,
+    );
   }
 
-  look(layer) {
-    this.layer = layer;
-    this.layerChoice.value = layer;
+  showLayer(layer) {
+    this.layer = this.layerChoice.value = layer;
     this.view.moved();
     this.view.ask();
   }
@@ -667,120 +654,110 @@ class Page {
   }
 
   on_frame(message, [bytes]) {
-    this.send({ kind: "seen" });
+    this.send({ kind: "shown" });
     this.seen = message.layer;
     this.view.show(message, bytes);
-    if (message.fraction === undefined) return;
-    this.progress.value = message.fraction;
-    if (this.watching) this.doing.textContent = message.doing;
-    this.frames = (this.frames ?? 0) + 1;
+    if (message.of === "run") this.frames += 1;
   }
 
-  on_progress({ fraction }) {
+  on_progress({ fraction, doing }) {
     this.progress.value = fraction;
+    if (this.watching) this.doing.textContent = doing;
   }
 
-  /** Offer these to be looked at. */
+  /** Offer these layers. */
   offer(layers) {
     const text = (name) => LAYERS[name] ?? name.replace(/^map /, "Map: ");
-    this.layerChoice.replaceChildren(...layers.map((name) => make("option", { value: name }, text(name))));
-    if (!layers.includes(this.layer)) this.look("picture");
+    this.layerChoice.replaceChildren(...choices(layers.map((name) => [name, text(name)])));
+    if (!layers.includes(this.layer)) this.showLayer("picture");
     this.layerChoice.value = this.layer;
   }
 
   on_begun(message) {
-    this.running = true;
-    this.offered = message.layers;
-    this.stopped = false;
+    this.runLayers = message.layers;
     this.frames = 0;
-    this.say(message.from === null ? "It is being made." : `It goes on after level ${message.from}, where it begins to differ.`);
     this.progress.value = 0;
     this.alert.hidden = true;
-    this.showRunning();
-    this.mark(this.shown, false);
-    this.shown = null;
-    this.mark(null, true);
-    this.offer(this.offered);
-    if (this.layer === "sample") this.look("picture");
+    this.setRunning(true);
+    this.select(null);
+    this.say(message.from === null ? "Running." : `Continuing after level ${message.from}.`);
+    if (this.layer === "sample") this.showLayer("picture");
   }
 
   on_ended() {
-    this.running = this.stopped = false;
-    this.say("It was given up.");
-    this.showRunning();
+    this.setRunning(false);
+    this.say("Cancelled.");
   }
 
   on_result(message, [bytes]) {
-    this.running = this.stopped = false;
-    this.results.set(message.result, message);
-    for (const number of message.gone) {
-      this.results.get(number)?.item?.remove();
+    const { result, width, height, settings } = message;
+    this.setRunning(false);
+    this.progress.value = 1;
+    this.results.set(result, message);
+    for (const number of message.dropped) {
+      this.results.get(number)?.item.remove();
       this.results.delete(number);
     }
-    const button = make("button", { type: "button", onclick: () => this.send({ kind: "choose", result: message.result }) });
     const small = bitmap(bytes, ...message.thumbnail);
-    const text = `Result ${message.result}, ${message.width} × ${message.height}, seed ${message.asked.seed}`;
     small.setAttribute("aria-hidden", "true");
-    button.append(small, make("span", {}, text));
-    message.item = make("li", {}, button);
-    message.button = button;
+    message.button = button(small, () => this.send({ kind: "select", result }));
+    message.button.append(make("span", {}, `Result ${result}, ${width} × ${height}, seed ${settings.seed}`));
+    message.item = make("li", {}, message.button);
     this.currentItem.before(message.item);
     this.strip.scrollLeft = this.strip.scrollWidth;
-    if (message.chosen && message.asked.job === "fill") this.hole = [];
-    if (message.chosen) this.on_chosen({ result: message.result }, false);
-    this.say(`Result ${message.result} is made: ${this.summary(message)}.`);
-    this.progress.value = 1;
-    this.showRunning();
+    this.say(`Result ${result} is ready: ${this.summary(message)}.`);
   }
 
-  summary(result) {
-    return `${result.width} × ${result.height} in ${result.seconds.toFixed(2)} s on ${result.device}, seed ${result.asked.seed}`;
+  summary({ width, height, seconds, device, settings }) {
+    return `${width} × ${height} in ${seconds.toFixed(2)} s on ${device}, seed ${settings.seed}`;
   }
 
-  on_chosen({ result }, restore = true) {
-    this.mark(this.shown, false);
-    this.shown = result;
+  on_selected({ result, restore }) {
+    this.select(result);
     const found = this.results.get(result);
-    this.away.hidden = this.quality.hidden = !found;
-    this.mark(result, true);
-    if (!found && this.running) this.offer(this.offered);
     if (!found) return;
+    if (restore) this.restore(found.settings);
+    else if (found.settings.job === "fill") this.hole = [];
     this.doing.textContent = this.summary(found);
-    this.offer(found.layers);
     this.view.canvas.setAttribute("aria-label", `Result ${result}: ${this.summary(found)}. Arrow keys move, plus and minus zoom, 0 fits.`);
     this.command.textContent = found.command;
     this.python.textContent = found.python;
-    const take = (what, text) => make("button", { type: "button", "data-what": what, onclick: () => this.send({ kind: "take", result, what }) }, text);
-    const buttons = [take("picture", "Picture"), take("tif", "TIFF")];
-    if (found.arrangement) buttons.push(take("arrangement", "Arrangement"));
-    for (const name of found.maps) buttons.push(take(`map ${name}`, `Map: ${name}`));
-    this.takes.replaceChildren(...buttons, take("all", "Everything (.zip)"));
+    const download = (name) => button(name, () => this.send({ kind: "download", result, name }), { "data-file": name });
+    this.files.replaceChildren(...found.files.map(download));
     this.on_quality(found);
-    if (restore) this.restore(found.asked);
   }
 
-  mark(number, current) {
-    const button = number === null ? this.current : this.results.get(number)?.button;
-    if (current) button?.setAttribute("aria-current", "true");
-    else button?.removeAttribute("aria-current");
+  /** Mark a result, or the present run, as the one that is shown. */
+  select(result) {
+    this.mark(this.shown, false);
+    this.shown = result;
+    this.mark(result, true);
+    const found = this.results.get(result);
+    this.downloads.hidden = this.quality.hidden = !found;
+    if (found || this.running) this.offer(found?.layers ?? this.runLayers);
+  }
+
+  mark(result, current) {
+    const marked = result === null ? this.current : this.results.get(result)?.button;
+    if (current) marked?.setAttribute("aria-current", "true");
+    else marked?.removeAttribute("aria-current");
   }
 
   on_quality({ result, figures }) {
     const found = this.results.get(result);
-    if (!found) return;
-    found.figures = figures;
+    if (found) found.figures = figures;
     if (result !== this.shown) return;
     this.quality.hidden = figures.length === 0;
-    this.figures.replaceChildren(
-      ...figures.flatMap(({ label, hint, value }) => [make("dt", {}, label), make("dd", {}, value === null ? "–" : Number(value).toPrecision(3), " ", make("small", {}, hint))]),
-    );
+    const text = (value) => (value === null ? "–" : Number(value).toPrecision(3));
+    const row = ({ label, hint, value }) => [make("dt", {}, label), make("dd", {}, text(value), " ", make("small", {}, hint))];
+    this.figures.replaceChildren(...figures.flatMap(row));
   }
 
   on_file({ name }, [bytes]) {
     const address = URL.createObjectURL(new Blob([bytes]));
     make("a", { href: address, download: name }).click();
     setTimeout(() => URL.revokeObjectURL(address), 60000);
-    this.say(`${name} is taken away.`);
+    this.say(`${name} is downloaded.`);
   }
 
   async copy(text) {
@@ -788,85 +765,86 @@ class Page {
       await navigator.clipboard.writeText(text);
       this.say("Copied.");
     } catch {
-      this.tell("The browser does not allow copying here; select the text instead.");
+      this.warn("The browser does not allow copying here; select the text instead.");
     }
   }
 
-  stop() {
-    this.stopped = !this.stopped;
-    this.send({ kind: this.stopped ? "stop" : "go" });
-    this.say(this.stopped ? "It is stopped." : "It goes on.");
-    this.showRunning();
+  pause() {
+    this.send({ kind: this.paused ? "resume" : "pause" });
+    this.setRunning(true, !this.paused);
+    this.say(this.paused ? "Paused." : "Running.");
   }
 
-  showRunning() {
-    this.stopping.disabled = this.ending.disabled = !this.running;
-    this.stopping.textContent = this.stopped ? "Go on" : "Stop";
-    this.currentItem.hidden = !this.running;
+  setRunning(running, paused = false) {
+    [this.running, this.paused] = [running, paused];
+    this.pausing.disabled = this.cancelling.disabled = !running;
+    this.pausing.textContent = paused ? "Resume" : "Pause";
+    this.currentItem.hidden = !running;
   }
 
   // -- painting
 
   paintSet() {
-    const tools = [["", "Nothing: look around"], ["hole", "A hole to fill"], ...LABELS.map(({ name }) => [`label ${name}`, `Label ${name}`]), ["erase", "Rubber"]];
-    this.tool = choice(tools, () => this.toolChanged());
-    this.brushWidth = number({ min: 1, max: 1024, step: 1, value: 16 });
-    const undo = make("button", { type: "button", onclick: () => this.undo() }, "Undo");
-    const clear = make("button", { type: "button", onclick: () => this.clear() }, "Clear all");
+    const labels = LABELS.map((_, index) => [`${index + 1}`, `Label ${index + 1}`]);
+    this.tool = choice([["", "Nothing"], ["hole", "Hole"], ...labels, ["0", "Eraser"]], () => this.chooseTool());
+    this.brushWidth = number({ min: 1, max: 1024, value: 16 });
     const hint =
-      "Labels say where what is to be: paint them on the sample, and on the result. With the keyboard, arrow keys move the brush and the space bar puts it down and lifts it.";
+      "Labels are a guide: what has a label on the sample goes where the result has the same. With the keyboard, arrow keys move the brush, and the space bar starts and ends a stroke.";
     return make(
       "details",
       { class: "paint" },
-      make("summary", {}, "Paint a hole, or where what is to be"),
-      make("div", { class: "bar" }, labelled("Paint", this.tool), labelled("Brush, pixels", this.brushWidth), undo, clear),
+      make("summary", {}, "Paint a hole or a guide"),
+      bar(
+        labelled("Paint", this.tool),
+        labelled("Brush width, pixels", this.brushWidth),
+        button("Undo", () => this.undo()),
+        button("Clear all", () => this.clear()),
+      ),
       make("p", {}, hint),
     );
   }
 
-  toolChanged() {
-    if (this.tool.value === "hole" && this.job.value !== "fill") {
-      this.job.value = "fill";
-      this.settle();
-    }
-    this.view.draw();
+  chooseTool() {
+    if (this.tool.value === "hole") this.job.value = "fill";
+    this.showJob();
   }
 
-  /** Where a stroke goes that is painted now. */
+  /** The strokes that the tool adds to. */
   get surface() {
-    const onSample = this.seen === "sample";
-    if (this.tool.value === "hole" || (this.tool.value === "erase" && this.job.value === "fill")) return this.hole;
-    return onSample ? this.guide.sample : this.guide.output;
+    if (this.tool.value === "hole" || (this.tool.value === "0" && this.job.value === "fill")) return this.hole;
+    return this.seen === "sample" ? this.guide.sample : this.guide.output;
   }
 
-  /** Whether a run is looked at, on which nobody paints. */
+  /** Whether the run is shown, which cannot be painted on. */
   get watching() {
     return this.running && this.shown === null;
   }
 
+  get paintable() {
+    return !this.watching && ["sample", "picture"].includes(this.seen);
+  }
+
   get brush() {
-    const tool = this.tool.value;
-    if (!tool || !["sample", "picture"].includes(this.seen) || this.watching) return null;
+    if (!this.tool.value || !this.paintable) return null;
     const width = Math.max(1, Number(this.brushWidth.value) || 16);
-    const label = tool === "erase" ? 0 : tool === "hole" ? 1 : Number(tool.slice(6));
+    const label = this.tool.value === "hole" ? 1 : Number(this.tool.value);
     const { surface } = this;
     return {
       width,
       begin: (point) => surface.push({ label, width, points: [point] }),
-      go: (point) => surface.at(-1)?.points.push(point),
+      add: (point) => surface.at(-1)?.points.push(point),
       end: () => {
         if (surface !== this.hole && this.guide.sample.length && this.guide.output.length) this.changed();
       },
     };
   }
 
-  /** What is painted over what is seen. */
-  painted() {
-    if (this.watching) return [];
-    const label = (number) => LABELS[number - 1]?.colour ?? "#000";
-    if (this.job.value === "fill") return ["sample", "picture"].includes(this.seen) ? [{ strokes: this.hole, colour: () => HOLE }] : [];
-    if (this.seen === "sample") return [{ strokes: this.guide.sample, colour: label }];
-    return this.seen === "picture" && this.tool.value ? [{ strokes: this.guide.output, colour: label }] : [];
+  visibleStrokes() {
+    if (!this.paintable) return [];
+    if (this.job.value === "fill") return [{ strokes: this.hole, colour: () => HOLE }];
+    const colour = (label) => LABELS[label - 1] ?? "#000";
+    if (this.seen === "sample") return [{ strokes: this.guide.sample, colour }];
+    return this.tool.value ? [{ strokes: this.guide.output, colour }] : [];
   }
 
   undo() {
@@ -882,72 +860,70 @@ class Page {
   // -- options
 
   optionsSection() {
-    const change = () => this.changed();
-    this.job = choice(Object.entries(JOBS), () => {
-      this.settle();
-      if (this.job.value === "fill") this.toFill();
+    const onchange = () => this.changed();
+    const jobs = Object.entries(JOBS).map(([name, [label]]) => [name, label]);
+    this.job = choice(jobs, () => {
+      this.showJob();
+      if (this.job.value === "fill") this.startHole();
       else this.changed();
     });
     this.method = choice([], () => {
-      this.settle();
+      this.showJob();
       this.changed();
     });
-    this.width = number({ min: 1, max: 16384, step: 1, value: 256, onchange: change });
-    this.height = number({ min: 1, max: 16384, step: 1, value: 256, onchange: change });
-    this.seed = number({ min: 0, max: 4294967295, step: 1, value: 1, onchange: change });
-    this.auto = make("input", { type: "checkbox", checked: true });
-    this.makeButton = make("button", { type: "submit", class: "first" }, "Make it");
-    const another = make("button", { type: "button", onclick: () => this.another() }, "Another seed");
-    const reset = make("button", { type: "button", onclick: () => this.reset() }, "All options as by default");
-    this.size = make("div", { class: "bar" }, labelled("Result width", this.width), labelled("Result height", this.height));
+    this.width = number({ min: 1, max: 16384, value: 256, onchange });
+    this.height = number({ min: 1, max: 16384, value: 256, onchange });
+    this.seed = number({ min: 0, max: 4294967295, value: 1, onchange });
+    this.auto = checkbox({ checked: true });
+    this.makeButton = make("button", { type: "submit", class: "first" }, JOBS.synth[1]);
+    this.size = bar(labelled("Result width", this.width), labelled("Result height", this.height));
     this.methodField = labelled("Method", this.method);
     this.controls = make("div");
+    const onsubmit = (event) => {
+      event.preventDefault();
+      this.make();
+    };
     const form = make(
       "form",
-      {
-        onsubmit: (event) => {
-          event.preventDefault();
-          this.make();
-        },
-      },
-      labelled("What is made", this.job),
+      { onsubmit },
+      labelled("Make", this.job),
       this.methodField,
       this.size,
-      make("div", { class: "bar" }, labelled("Seed", this.seed), another),
-      labelled("Make it at every change", this.auto),
+      bar(labelled("Seed", this.seed), button("New seed", () => this.newSeed())),
+      labelled("Run at every change", this.auto),
       this.makeButton,
       this.controls,
-      reset,
+      button("Reset the options", () => this.reset()),
     );
     return make("section", { "aria-label": "Options", class: "options" }, make("h2", {}, "Options"), form);
   }
 
-  get table() {
-    return this.job.value === "synth" ? this.method.value : this.job.value;
+  /** The controls of the method, or of a job that has its own. */
+  get jobOptions() {
+    return this.options[this.job.value === "synth" ? this.method.value : this.job.value];
   }
 
-  /** Show what goes with the job and the method. */
-  settle() {
+  /** Show the controls of the job and the method. */
+  showJob() {
     this.methodField.hidden = this.size.hidden = this.job.value !== "synth";
-    this.makeButton.textContent = BUTTONS[this.job.value];
-    const options = this.options?.[this.table];
-    if (options) this.controls.replaceChildren(options.element);
-    this.view?.draw();
+    this.makeButton.textContent = JOBS[this.job.value][1];
+    if (this.options) this.controls.replaceChildren(this.jobOptions.element);
+    this.view.draw();
   }
 
-  toFill() {
+  startHole() {
     this.tool.value = "hole";
     this.root.querySelector(".paint").open = true;
-    if (this.shown === null && !this.running) this.look("sample");
+    if (this.shown === null && !this.running) this.showLayer("sample");
     this.view.draw();
   }
 
   reset() {
-    this.options[this.table].values = {};
+    this.jobOptions.values = {};
     this.changed();
   }
 
-  another() {
+  newSeed() {
     this.seed.value = Math.floor(Math.random() * 2 ** 32);
     this.make();
   }
@@ -959,59 +935,55 @@ class Page {
 
   make() {
     if (!this.picture) {
-      this.tell("There is no picture yet; drop one, or choose a file.");
+      this.warn("There is no picture yet; drop one, or choose a file.");
       return;
     }
     const job = this.job.value;
     const [width, height, seed] = [this.width, this.height, this.seed].map((input) => Number(input.value));
-    const message = { kind: "make", job, method: this.method.value, width, height, seed, options: this.options[this.table].values };
-    if (job !== "fill") message.part = this.part;
+    const message = { kind: "make", job, method: this.method.value, width, height, seed, options: this.jobOptions.values };
+    if (job === "fill") Object.assign(message, { hole: this.hole, of: this.seen === "sample" ? null : this.shown });
+    else message.part = this.part;
     if (job === "synth" && this.guide.output.length) message.guide = this.guide;
-    if (job === "fill") {
-      message.hole = this.hole;
-      message.of = this.seen === "sample" ? null : this.shown;
-    }
     this.last = message;
     this.send(message);
   }
 
-  /** Show the settings that a result was made with. */
-  restore(asked) {
-    this.job.value = asked.job;
-    if (asked.job === "synth") {
-      this.method.value = asked.method;
-      [this.width.value, this.height.value] = [asked.width, asked.height];
+  /** Show the settings of a result. */
+  restore(settings) {
+    this.job.value = settings.job;
+    if (settings.job === "synth") {
+      this.method.value = settings.method;
+      [this.width.value, this.height.value] = [settings.width, settings.height];
     }
-    this.seed.value = asked.seed;
-    this.options[this.table].values = asked.options;
-    if (asked.job !== "fill") this.setPart(asked.part ?? null, false);
-    if (asked.guide) this.guide = structuredClone(asked.guide);
-    this.settle();
+    this.seed.value = settings.seed;
+    this.jobOptions.values = settings.options;
+    if (settings.job !== "fill") this.setPart(settings.part ?? null, false);
+    if (settings.guide) this.guide = structuredClone(settings.guide);
+    this.showJob();
   }
 
-  // -- what is said
+  // -- the connection
 
   on_hello(message) {
     this.bytes = message.bytes;
     this.device.textContent = message.device;
     if (!this.options) {
-      this.options = Object.fromEntries(Object.entries(message.controls).map(([name, controls]) => [name, new Options(controls, () => this.changed())]));
-      this.method.replaceChildren(...Object.entries(message.methods).map(([value, text]) => make("option", { value }, text)));
-      const example = (name) => make("button", { type: "button", onclick: () => this.example(name) }, name);
-      this.examples.replaceChildren("or try ", ...message.examples.map(example));
-      this.settle();
+      const options = ([name, controls]) => [name, new Options(controls, () => this.changed())];
+      this.options = Object.fromEntries(Object.entries(message.controls).map(options));
+      this.method.replaceChildren(...choices(Object.entries(message.methods)));
+      this.examples.replaceChildren("or try ", ...message.examples.map((name) => button(name, () => this.example(name))));
+      this.showJob();
     }
     this.say("Ready.");
     this.strip.replaceChildren(this.currentItem);
     this.results.clear();
-    this.running = this.stopped = false;
     this.shown = null;
-    this.showRunning();
+    this.setRunning(false);
     this.view.ask();
     if (!message.fresh || !this.given) return;
-    this.again = this.last?.job === "fill" ? null : this.last; // the server is another: it is given all anew
+    this.again = this.last?.job === "fill" ? null : this.last; // the server was started anew, and is given all again
     if (this.given.bytes) this.send({ kind: "open", name: this.given.name }, [this.given.bytes]);
-    else this.send({ kind: "example", name: this.given.name });
+    else this.example(this.given.name);
   }
 
   example(name) {
@@ -1020,7 +992,7 @@ class Page {
   }
 
   on_error({ text }) {
-    this.tell(text);
+    this.warn(text);
   }
 
   connected(state, reason) {
@@ -1030,9 +1002,8 @@ class Page {
       this.send({ kind: "hello" });
       return;
     }
-    this.running = false;
-    this.showRunning();
-    this.tell(`${reason ? `${reason}.` : "The connection to simdtex is lost."} The page tries again, and goes on when it is back.`);
+    this.setRunning(false);
+    this.warn(`${reason ? `${reason}.` : "The connection to simdtex is lost."} The page tries to connect again.`);
     this.say("Not connected.");
   }
 
@@ -1040,7 +1011,7 @@ class Page {
     this.status.textContent = text;
   }
 
-  tell(text) {
+  warn(text) {
     this.alert.textContent = text;
     this.alert.hidden = false;
   }

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The frames of the live page: layers of a run or a result, and the window of a layer that the page shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.io.image import to_display
+from simdtex.model.colours import heat, source_colours, use_colours
+from simdtex.options import true_or_false, whole
+
+Array = NDArray[Any]
+
+MAX_PIXELS = 2**22
+"""Pixels of a frame, at most."""
+
+MAX_OFFSET = 2**20
+"""Rows or columns between a window's corner and the layer's, at most."""
+
+CHUNK = 2**22
+"""Pixels of a layer that are averaged at a time, which bounds the memory."""
+
+
+class Window(NamedTuple):
+    """The part of a layer that the page shows.
+
+    ``left`` and ``top`` are the layer's first column and row, ``width`` and ``height`` the pixels of the frame, each
+    the mean of ``step`` x ``step`` pixels of the layer; ``tiled`` repeats the layer without end.
+    """
+
+    layer: str = "picture"
+    left: int = 0
+    top: int = 0
+    width: int = 256
+    height: int = 256
+    step: int = 1
+    tiled: bool = False
+
+
+class Layer(NamedTuple):
+    """What a frame is taken from.
+
+    ``shape`` are its rows and columns on the page; ``values`` may have fewer, as those of a coarse level, and are
+    (rows, cols) or (rows, cols, channels); ``colours`` turns a part of them into 8-bit pixels.
+    """
+
+    shape: tuple[int, int]
+    values: Array
+    colours: Callable[[Array], NDArray[np.uint8]]
+
+
+class Frame(NamedTuple):
+    """The part of a window that lies within its layer: its corner in the layer, its size in pixels, and RGBA bytes."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+    pixels: bytes
+
+
+def parse_window(message: Mapping[str, Any]) -> Window:
+    """Return the window that a message describes.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A number is missing, of another type, or out of range.
+    """
+    window = Window(**{name: message[name] for name in Window._fields if name in message})
+    if not isinstance(window.layer, str):
+        raise TypeError("the layer must be a name")
+    for name in ("left", "top"):
+        whole(name, getattr(window, name), -MAX_OFFSET, MAX_OFFSET)
+    for name in ("width", "height", "step"):
+        whole(name, getattr(window, name), 1, MAX_OFFSET)
+    true_or_false("tiled", window.tiled)
+    if window.width * window.height > MAX_PIXELS:
+        raise ValueError(f"a window has at most {MAX_PIXELS} pixels; make it smaller")
+    return window
+
+
+def picture(pixels: Array, sample: Array, shape: tuple[int, int] | None = None) -> Layer:
+    """Return a picture as a layer; black and white are the sample's least and largest value, unless it has 8 bits.
+
+    Parameters
+    ----------
+    pixels : (rows, cols) or (rows, cols, channels) array
+    sample : array
+        The sample that the picture was made from.
+    shape : (rows, cols), optional
+        The size on the page, if the picture is of a coarse level.
+    """
+    limits = None if sample.dtype == np.uint8 else (float(sample.min()), float(sample.max()))
+    return Layer(shape or (pixels.shape[0], pixels.shape[1]), pixels, partial(to_display, limits=limits))
+
+
+def layers(
+    sample: Array,
+    shape: tuple[int, int],
+    image: Callable[[], Array],
+    source: Callable[[], Array] | None = None,
+    temperature: Callable[[], Array] | None = None,
+) -> dict[str, Callable[[], Layer]]:
+    """Return functions that make the layers of a run or a result, by name.
+
+    Parameters
+    ----------
+    sample : array
+        The sample.
+    shape : (rows, cols)
+        The size of the output, whatever the level.
+    image, source, temperature : callable
+        Return the arrays of the present level; None if the method has none.
+    """
+    found = {"picture": lambda: picture(image(), sample, shape)}
+    if source:
+        colours = partial(source_colours, sample_shape=sample.shape)
+        found["arrangement"] = lambda: Layer(shape, source()[..., :2], colours)
+        used = (sample.shape[0], sample.shape[1])
+        found["use"] = lambda: Layer(used, use_colours(source()[..., :2], sample.shape), np.asarray)
+    if temperature:
+        found["temperature"] = lambda: Layer(shape, temperature(), heat)
+    return found
+
+
+def render(layer: Layer, window: Window, *, smooth: bool = True) -> Frame:
+    """Return a window of a layer as RGBA; without `smooth`, the first of step x step pixels stands for their mean."""
+    fine = np.arange(window.step if smooth else 1)
+    top, rows, row = _axis(window.top, window.height, window, fine, layer.shape[0], layer.values.shape[0])
+    left, cols, col = _axis(window.left, window.width, window, fine, layer.shape[1], layer.values.shape[1])
+    pixels = np.full((rows, cols, 4), 255, np.uint8)
+    chunk = max(1, CHUNK // max(1, len(fine) * len(col)))
+    for first in range(0, rows, chunk):
+        part = pixels[first : first + chunk]
+        taken = np.ix_(row[first * len(fine) : (first + chunk) * len(fine)], col)
+        colours = layer.colours(layer.values[taken])
+        colours = colours if colours.ndim == 3 else colours[..., None]
+        colours = colours[..., :3] if colours.shape[2] > 2 else colours[..., :1]
+        if len(fine) > 1:
+            blocks = colours.reshape(len(part), len(fine), cols, len(fine), colours.shape[2])
+            colours = np.round(blocks.mean(axis=(1, 3), dtype=np.float32))
+        part[..., :3] = colours
+    return Frame(left, top, cols, rows, pixels.tobytes())
+
+
+def thumbnail(layer: Layer, side: int) -> Frame:
+    """Return all of a layer, reduced by a whole number so that no side is longer than `side` pixels."""
+    rows, cols = layer.shape
+    step = -(-max(rows, cols) // side)
+    return render(layer, Window(width=-(-cols // step), height=-(-rows // step), step=step))
+
+
+def _axis(
+    begin: int, count: int, window: Window, fine: NDArray[np.intp], size: int, stored: int
+) -> tuple[int, int, NDArray[np.intp]]:
+    """Return where the frame begins on an axis of the layer, its pixels, and the indices of the values they average."""
+    places = begin + window.step * np.arange(count)
+    if not window.tiled:
+        places = places[(places > -window.step) & (places < size)]
+    index = (places[:, None] + fine).reshape(-1)
+    index = index % size if window.tiled else index.clip(0, size - 1)
+    return int(places[0]) if len(places) else begin, len(places), index * stored // size

@@ -1,0 +1,306 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What the page asks for: the call of a public function, and the command line and Python lines that repeat it."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+import numpy as np
+import PIL.Image
+import PIL.ImageDraw
+from numpy.typing import NDArray
+
+from simdtex.driver import Keep
+from simdtex.io.image import suitable_suffix
+from simdtex.jobs.filling import extend, fill
+from simdtex.live.words import controls
+from simdtex.machine import Machine
+from simdtex.options import one_of, real, shown, whole
+from simdtex.run import Output
+from simdtex.synthesis import METHODS, synthesize
+
+Array = NDArray[Any]
+
+FUNCTIONS: dict[str, Callable[..., Any]] = {"synth": synthesize, "extend": extend, "fill": fill}
+"""The functions behind the page's jobs, by command: more of a texture, a seamless picture, and a filled hole."""
+
+MAX_SIDE = 2**14
+"""Rows or columns of an output, at most."""
+
+MIN_REGION = 8
+"""Rows and columns of a region of the picture, at least."""
+
+MAX_POINTS = 2**16
+"""Points of all strokes together, at most."""
+
+MAX_LABEL = 8
+"""The largest label of a stroke; 0 erases."""
+
+RESERVED = ("", "texture", "hole", "guide-sample", "guide-texture")
+"""Names that a picture's files cannot have, since other files of a package have them."""
+
+READ_GUIDE = """own = image.read('guide-sample.png').pixels
+wanted, left_open = image.split_alpha(image.read('guide-texture.png').pixels)
+guide = own, np.where(left_open, np.nan, wanted)"""
+
+
+class Picture(NamedTuple):
+    """A picture that was given: the name of its file, its pixels, and their channel axis or None."""
+
+    name: str
+    pixels: Array
+    channel_axis: int | None
+
+
+class Part(NamedTuple):
+    """A region of a picture, pixels."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+
+
+class Job:
+    """A run that the page asks for, checked.
+
+    Parameters
+    ----------
+    message : mapping
+        ``job`` (``synth``, ``extend`` or ``fill``) and ``seed``; ``width``, ``height`` and ``method`` of ``synth``;
+        ``options``; ``part``, the region ``[left, top, width, height]`` of the picture that is the sample; ``guide``,
+        with strokes on the ``sample`` and the ``output``; ``hole``, strokes; ``of``, the number of the result to fill.
+    picture : Picture
+    maps : mapping
+        Further maps of the picture, by name.
+    result : callable
+        Returns the result of a number; its ``image`` and ``maps`` are used.
+
+    Attributes
+    ----------
+    sample : array
+        What the output is made from.
+    maps : dict
+        Further maps of the sample, by name.
+    shape : (rows, cols)
+        Of the output.
+    options : dict
+        Of the method, those that differ from their defaults.
+    files : dict
+        The pictures that the lines read, by file name.
+    output : str
+        The file that the lines write.
+    carried : dict
+        The files that they write of the further maps, by the map's name.
+
+    Raises
+    ------
+    ValueError, TypeError
+        The message is wrong; the sentence says how.
+    """
+
+    def __init__(
+        self,
+        message: Mapping[str, Any],
+        picture: Picture,
+        maps: Mapping[str, Array],
+        result: Callable[[int], Any],
+    ) -> None:
+        self.message = message
+        one_of("job", message.get("job"), FUNCTIONS)
+        self.kind: str = message["job"]
+        self.method: str = message.get("method", "mrf") if self.kind == "synth" else "mrf"
+        one_of("method", self.method, METHODS)
+        seed: Any = message.get("seed")
+        whole("seed", seed, 0, 2**32 - 1)
+        self.files: dict[str, Array] = {}
+        self._keywords: dict[str, Any] = {}
+        self._arguments = ["picture.pixels"]
+        self._flags: list[str] = []
+        part = _part(message.get("part"), picture.pixels.shape) if self.kind != "fill" else None
+        number = message.get("of") if self.kind == "fill" else None
+        if number is None:
+            name = file_stem(picture.name, "sample") + ("-part" if part else "")
+            self._read(name, _cut(picture.pixels, part), {one: _cut(values, part) for one, values in maps.items()})
+        else:
+            before = result(number)
+            self._read(f"result-{number}", before.image, before.maps)
+        self.shape: tuple[int, int] = self.sample.shape[:2]
+        if self.kind == "synth":
+            self._synthesize(message, picture, part)
+        elif self.kind == "extend":
+            self._add("seamless", True, "--seamless")
+        else:
+            self._fill(message.get("hole", []))
+        self._add("rng", seed, "--seed", str(seed))
+        self._add("channel_axis", picture.channel_axis, text="picture.channel_axis")
+        self.options = _options(message.get("options", {}), self.method if self.kind == "synth" else self.kind)
+        for name, value in self.options.items():
+            self._add(name, value, f"--{name.replace('_', '-')}", *([] if value is True else [str(value)]))
+
+    def run(self, machine: Machine, callback: Callable[[Any], None], keep: Keep) -> tuple[Array, Output]:
+        """Make the output on a machine; the run starts from the state of `keep`, which is offered every other one."""
+        keywords = {**self._keywords, "device": machine, "callback": callback, "full_output": True, "checkpoint": keep}
+        made: tuple[Array, Output] = FUNCTIONS[self.kind](self.sample, **keywords)
+        return made
+
+    @property
+    def command(self) -> str:
+        """The command line that makes the same bytes from the files."""
+        words = ["simdtex", self.kind, next(iter(self.files)), "-o", self.output, *self._flags]
+        words += [word for read, write in self._also for word in ("--also", f"{read}={write}")]
+        return shlex.join(words) + "\n"
+
+    @property
+    def python(self) -> str:
+        """The lines of Python that make the same bytes from the files."""
+        guided = "guide" in self._keywords
+        arguments = ", ".join([*self._arguments, *["full_output=True"] * bool(self.maps)])
+        lines = ["import numpy as np\n"] if guided else []
+        lines += ["import simdtex", "from simdtex.io import image"]
+        lines += ["from simdtex.model.source_map import apply_source_map"] if self.maps else []
+        lines += ["", f"picture = image.read({next(iter(self.files))!r})", *[READ_GUIDE] * guided]
+        lines += [f"texture{', output' * bool(self.maps)} = simdtex.{FUNCTIONS[self.kind].__name__}({arguments})"]
+        lines += [f"image.write({self.output!r}, texture)"]
+        for read, write in self._also:
+            lines += [f"image.write({write!r}, apply_source_map(output.source, image.read({read!r}).pixels))"]
+        return "\n".join(lines) + "\n"
+
+    def _read(self, name: str, sample: Array, maps: Mapping[str, Array]) -> None:
+        """Take the sample and its maps, whose files begin with `name`."""
+        self.sample, self.maps = sample, dict(maps)
+        self.output, self.carried = f"texture{_suffix(sample)}", {}
+        self.files[f"{name}{_suffix(sample)}"] = sample
+        self._also: list[tuple[str, str]] = []
+        for one, pixels in maps.items():
+            self.carried[one] = f"texture-{one}{_suffix(pixels)}"
+            self.files[f"{name}-{one}{_suffix(pixels)}"] = pixels
+            self._also.append((f"{name}-{one}{_suffix(pixels)}", self.carried[one]))
+
+    def _add(self, name: str, value: Any, *flags: str, text: str = "") -> None:
+        """Add an argument to the call, to the command line, and to the lines of Python, where it is `text`."""
+        self._keywords[name] = value
+        self._arguments.append(f"{name}={text or repr(value)}")
+        self._flags += flags
+
+    def _synthesize(self, message: Mapping[str, Any], picture: Picture, part: Part | None) -> None:
+        for name in ("width", "height"):
+            whole(name, message.get(name), 1, MAX_SIDE)
+        rows, cols = self.shape = (message["height"], message["width"])
+        self._add("shape", self.shape, "--size", f"{cols}x{rows}")
+        self._add("method", self.method, "--method", self.method)
+        guide = message.get("guide") or {}
+        if not isinstance(guide, dict):
+            raise TypeError("a guide is painted on the sample and on the output; paint both")
+        own = _cut(paint(guide.get("sample", []), picture.pixels.shape[:2]), part)
+        wanted = paint(guide.get("output", []), self.shape)
+        if not wanted.any():
+            return
+        if missing := sorted(set(np.unique(wanted)) - {0} - set(np.unique(own))):
+            raise ValueError(f"label {missing[0]} is on the output and not on the sample; paint it on the sample too")
+        transparent = np.stack([wanted, np.where(wanted > 0, 255, 0)], -1).astype(np.uint8)
+        self.files |= {"guide-sample.png": own, "guide-texture.png": transparent}
+        flags = ("--guide", "guide-sample.png=guide-texture.png")
+        self._add("guide", (own, np.where(wanted == 0, np.nan, wanted)), *flags, text="guide")
+        self._add("labels", True)
+
+    def _fill(self, strokes: Any) -> None:
+        hole = paint(strokes, self.shape) > 0
+        if not hole.any():
+            raise ValueError("there is no hole to fill; paint over what is to be replaced")
+        if hole.all():
+            raise ValueError("the hole covers the whole picture; leave some of it")
+        self.files["hole.png"] = hole * np.uint8(255)
+        self._add("mask", hole, "--mask", "hole.png", text="image.read_mask('hole.png', picture.pixels.shape)")
+
+
+def paint(strokes: Any, shape: tuple[int, ...]) -> NDArray[np.uint8]:
+    """Return the labels that strokes of a round brush leave, (rows, cols), 0 where there are none.
+
+    Parameters
+    ----------
+    strokes : list of dict
+        Each has a ``label``, 0 to erase, a ``width`` in pixels, and ``points``, a list of [x, y] in pixels. A later
+        stroke covers an earlier one.
+    shape : (rows, cols)
+
+    Raises
+    ------
+    ValueError, TypeError
+        `strokes` is something else.
+    """
+    if not isinstance(strokes, list):
+        raise TypeError("strokes must be a list; paint again")
+    labels = PIL.Image.new("L", (shape[1], shape[0]))
+    draw = PIL.ImageDraw.Draw(labels)
+    count = 0
+    for stroke in strokes:
+        if not isinstance(stroke, dict) or not isinstance(stroke.get("points"), list) or not stroke["points"]:
+            raise TypeError("a stroke has no points; paint again")
+        label: Any = stroke.get("label")
+        width: Any = stroke.get("width")
+        whole("the label of a stroke", label, 0, MAX_LABEL)
+        real("the width of a stroke", width, 0, MAX_SIDE, above=True)
+        if (count := count + len(stroke["points"])) > MAX_POINTS:
+            raise ValueError(f"there are more than {MAX_POINTS} points; paint with a wider brush")
+        points = _points(stroke["points"])
+        if len(points) > 1:
+            draw.line(points, fill=label, width=max(1, round(width)))
+        for x, y in points:  # round ends and corners
+            draw.ellipse((x - width / 2, y - width / 2, x + width / 2, y + width / 2), fill=label)
+    return np.array(labels)
+
+
+def _points(given: list[Any]) -> list[tuple[float, float]]:
+    with suppress(ValueError, TypeError, OverflowError):
+        points = np.array(given, np.float64)
+        if points.shape == (len(given), 2) and np.isfinite(points).all() and abs(points).max() < 2**20:
+            return [(x, y) for x, y in points.tolist()]
+    raise TypeError("a point of a stroke must be two numbers; paint again")
+
+
+def _options(given: Any, table: str) -> dict[str, Any]:
+    """Return the options that differ from their defaults; only those with a control are taken."""
+    if not isinstance(given, dict):
+        raise TypeError(f"options must be names and values, not {shown(given)}")
+    defaults = {control["name"]: control["default"] for control in controls(table)}
+    for name in given:
+        if name not in defaults:
+            raise ValueError(f"there is no control for {shown(name)}; choose one of: {', '.join(defaults)}")
+    return {name: value for name, value in given.items() if value is not None and value != defaults[name]}
+
+
+def _part(given: Any, shape: tuple[int, ...]) -> Part | None:
+    """Return a region, None if it is the whole picture."""
+    if given is None:
+        return None
+    if not isinstance(given, list) or len(given) != 4:
+        raise TypeError("a part of the picture is four numbers: left, top, width and height")
+    rows, cols = shape[:2]
+    for name, value, most in zip(Part._fields, given, (cols, rows, cols, rows), strict=True):
+        least = min(MIN_REGION, most) if name in ("width", "height") else 0
+        whole(f"the {name} of the part", value, least, most)
+    part = Part(*given)
+    if part.left + part.width > cols or part.top + part.height > rows:
+        raise ValueError(f"the part reaches beyond the picture of {cols}x{rows}; choose one within it")
+    return None if part == (0, 0, cols, rows) else part
+
+
+def _cut(pixels: Array, part: Part | None) -> Array:
+    if part is None:
+        return pixels
+    return np.ascontiguousarray(pixels[part.top : part.top + part.height, part.left : part.left + part.width])
+
+
+def file_stem(name: str, otherwise: str) -> str:
+    """Return a file's name without its ending, in lower case letters, digits and dashes."""
+    found = re.sub(r"[^a-z0-9]+", "-", name.rpartition(".")[0].lower() or name.lower()).strip("-")[:40]
+    return otherwise if found in RESERVED else found
+
+
+def _suffix(pixels: Array) -> str:
+    return suitable_suffix(pixels.dtype, 1 if pixels.ndim == 2 else pixels.shape[2])
