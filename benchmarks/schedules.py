@@ -5,7 +5,7 @@
                                    [--device TEXT]
 
 Writes docs/study/schedules.csv (mean and standard deviation over the seeds) and, into docs/schedules, pictures and
-plots for each sample, and prints a table. The options are those of ``simdtex synth`` but for the free sweeps: with
+plots for each sample, and prints tables. The options are those of ``simdtex synth`` but for the free sweeps: with
 more of them, what oscillates is told from what still settles.
 """
 
@@ -15,12 +15,12 @@ import time
 from pathlib import Path
 
 import samples
-from rich.console import Console
 
 import simdtex
 from simdtex.experiments.comparison import FIGURES, compare
-from simdtex.report import schedule_plots as plots
-from simdtex.report.schedules import reading, terminal_tables
+from simdtex.report.page import Figure
+from simdtex.report.schedules import reading, sections, tables
+from simdtex.report.tables import print_table
 
 DOCS = Path(__file__).parent.parent / "docs"
 
@@ -51,21 +51,15 @@ def main():
             free_sweeps=options.free_sweeps,
         )
         print(f"\n{name}, {time.perf_counter() - began:.0f} s\n")
-        console = Console(width=220)
-        for table in terminal_tables(found, console.width):
-            console.print(table)
+        for table in tables(found):
+            print_table(table, 220)
         print(f"\n{reading(found)}", flush=True)
-        pictures = {
-            "pictures": plots.first_seed(found),
-            "temperature": plots.temperature(found),
-            "costs": plots.costs(found),
-            "changed": plots.per_sweep(found, "changed", "Share of pixels that changed"),
-            "oscillation": plots.per_sweep(found, "returned", "Oscillation index"),
-            "quality": plots.qualities(found),
-        }
-        for what, png in pictures.items():
-            # temperatures follow the schedule and the seed, never the pixels: one plot is every sample's
-            (options.out / (f"{what}.png" if what == "temperature" else f"{name}-{what}.png")).write_bytes(png)
+        figures = [part for section in sections(found) for part in section.parts if isinstance(part, Figure)]
+        for figure in figures:
+            # temperatures depend on the schedule and the seed, not on the pixels: one plot is every sample's
+            if figure.file in ("pictures.png", "oscillation.png", "temperature.png"):
+                prefix = "" if figure.file == "temperature.png" else f"{name}-"
+                (options.out / f"{prefix}{figure.file}").write_bytes(figure.png)
         for entry in found.entries:
             figures = {figure: entry.figure(figure) for figure in FIGURES}
             cells = [cell for figure in FIGURES for cell in written(figures[figure])]

@@ -18,7 +18,7 @@ from rich.table import Table
 
 from simdtex.bench.results import compared, load
 from simdtex.report.bench import times
-from simdtex.report.profile import seconds_text
+from simdtex.report.tables import seconds_text
 
 
 def main():

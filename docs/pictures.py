@@ -244,7 +244,7 @@ def main():
         path = HERE / folder / f"{name}.png"
         pictures = make()
         columns = {"novelty": 2, "methods": 3}.get(name, len(pictures))
-        sheet = contact_sheet(pictures, columns=columns, one_to_one=True)
+        sheet = contact_sheet(pictures, columns=columns, scale=1)
         write(path, sheet if np.ptp(sheet, axis=2).any() else sheet[..., 0])
         print(f"{path.relative_to(HERE.parent)}: {path.stat().st_size / 1000:.0f} kB")
 

@@ -19,7 +19,7 @@ from volumes import loaded
 from simdtex.io import atomic, image, realisations, volume
 from simdtex.io.atomic import Damaged, NotWritten, atomic_folder, atomic_path, read_checked, write_checked
 from simdtex.model.source_map import save_source_map
-from simdtex.report.page import Section, Text, write_report
+from simdtex.report.page import Section, write_report
 from simdtex.report.sheet import animation
 from simdtex.report.stages import StageWriter
 
@@ -38,7 +38,7 @@ def many(seed):
 
 
 def page(path, seed):
-    write_report(path, f"Report {seed}", "What it is.", [Section("One", [Text("words " * 2000)])], {"seed": seed})
+    write_report(path, f"Report {seed}", "What it is.", [Section("One", ["words " * 2000])], {"seed": seed})
 
 
 WRITERS = {

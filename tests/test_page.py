@@ -1,4 +1,4 @@
-"""A report is one page that needs nothing beside itself, its pictures as files, and valid numbers."""
+"""Reports: a self-contained page, its pictures as files, valid numbers; tables of pages and terminals."""
 
 import base64
 import io
@@ -10,8 +10,10 @@ import numpy as np
 import PIL.Image
 import pytest
 
-from simdtex.report.page import Figure, Section, Table, Text, check_folder, write_report
+import simdtex
+from simdtex.report.page import Figure, Section, check_folder, write_report
 from simdtex.report.plots import figure_png, new_figure, styles, tidy
+from simdtex.report.tables import Table, duration_text, number_text, print_table
 
 
 class Reader(HTMLParser):
@@ -68,24 +70,36 @@ def png(side=5):
     return buffer.getvalue()
 
 
+def picture(side=5):
+    return np.arange(side * 3 * 3, dtype=np.uint8).reshape(side, 3, 3)
+
+
+NUMBERS = Table(
+    "Numbers",
+    [
+        {"Name": "<a>", "Mark": "breaks (14)", "Figure": "1.5 ± 0.2"},
+        {"Name": "b", "Mark": "keeps (14)", "Figure": "2"},
+    ],
+    "note",
+)
+
+
 def report(folder, **results):
-    parts = [
-        Text("First & <b>last</b>.\n\n$ simdtex schedules -o <there>"),
-        Table(
-            "Numbers",
-            ["Name", "Mark", "Figure"],
-            [["<a>", "breaks (14)", "1.5 ± 0.2"], ["b", "keeps (14)", "2"]],
-            "note",
-        ),
-        Figure("A picture.", png(), 'what "it" shows', "picture.png"),
-    ]
-    sections = [Section("One <i>", parts), Section("Two", [Figure("Another.", png(9), "more", "more.png")])]
+    figures = [Figure("picture.png", picture(), 'What "it" shows: more.'), Figure("more.png", picture(9), "Another.")]
+    text = "First & <b>last</b>.\n\n$ simdtex schedules -o <there>"
+    sections = [Section("One <i>", [text, NUMBERS, figures[0]]), Section("Two", figures[1:])]
     write_report(folder, "A title", "A lead.", sections, results)
 
 
-def test_the_page_is_well_formed_and_stands_alone(tmp_path):
-    report(tmp_path / "r")
-    reader = read_page(tmp_path / "r" / "index.html")
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page") / "r"
+    report(folder)
+    return read_page(folder / "index.html"), folder
+
+
+def test_the_page_is_well_formed_and_self_contained(page):
+    reader, _ = page
     assert_needs_nothing_else(reader)
     assert [a["charset"] for a in reader.of("meta") if "charset" in a] == ["utf-8"]
     assert any(a.get("name") == "viewport" for a in reader.of("meta"))
@@ -94,34 +108,42 @@ def test_the_page_is_well_formed_and_stands_alone(tmp_path):
     assert anchors == [a["id"] for a in reader.of("section")]
 
 
-def test_pictures_are_in_the_page_and_beside_it(tmp_path):
-    report(tmp_path / "r")
-    reader = read_page(tmp_path / "r" / "index.html")
-    beside = [(tmp_path / "r" / name).read_bytes() for name in ("picture.png", "more.png")]
-    assert embedded(reader) == beside == [png(), png(9)]
-    sizes = [PIL.Image.open(io.BytesIO(data)).size for data in embedded(reader)]
-    assert sizes == [(int(a["width"]), int(a["height"])) for a in reader.of("img")]
-    assert [a["alt"] for a in reader.of("img")] == ['what "it" shows', "more"]
+def test_pictures_are_in_the_page_and_beside_it(page):
+    reader, folder = page
+    beside = [(folder / name).read_bytes() for name in ("picture.png", "more.png")]
+    assert embedded(reader) == beside
+    for data, expected in zip(beside, (picture(), picture(9)), strict=True):
+        np.testing.assert_array_equal(np.asarray(PIL.Image.open(io.BytesIO(data))), expected)
+    assert [a["alt"] for a in reader.of("img")] == ['What "it" shows', "Another"]
 
 
-def test_text_is_text(tmp_path):
-    report(tmp_path / "r")
-    reader = read_page(tmp_path / "r" / "index.html")
-    assert (
-        "First & <b>last</b>." in reader.text and "<a>" in reader.text and "simdtex schedules -o <there>" in reader.text
-    )
+def test_text_is_escaped(page):
+    reader, _ = page
+    for text in ("First & <b>last</b>.", "<a>", "simdtex schedules -o <there>", "note", "A lead."):
+        assert text in reader.text
     assert not {"b", "i", "there"} & {tag for tag, _ in reader.tags}
 
 
-def test_tables(tmp_path):
-    report(tmp_path / "r")
-    reader = read_page(tmp_path / "r" / "index.html")
+def test_tables(page):
+    reader, _ = page
     assert [a.get("class") for a in reader.of("td")] == ["warn", "right", None, "right"]
     assert [a["scope"] for a in reader.of("th")] == ["col"] * 3 + ["row"] * 2
 
 
+def test_a_wide_table_is_printed_in_parts(capsys):
+    print_table(NUMBERS, 200)
+    whole = capsys.readouterr().out.splitlines()
+    assert whole[0].strip() == "Numbers" and whole[1].split() == ["Name", "Mark", "Figure"]
+    assert whole[2].split("  ")[0] == "<a>" and whole[3].rstrip().endswith("        2")
+    print_table(NUMBERS, 20)
+    parts = capsys.readouterr().out.splitlines()
+    assert [line.split() for line in parts if "Name" in line] == [["Name", "Mark"], ["Name", "Figure"]]
+    assert max(map(len, parts)) <= 20
+
+
 def test_results_are_valid_json(tmp_path):
-    report(tmp_path / "r", b=float("nan"), a=[np.float32(1.5), np.int64(2), np.bool_(True), np.arange(2)], c={1: None})
+    numbers = {"b": float("nan"), "a": [np.float32(1.5), np.int64(2), np.bool_(True), np.arange(2)], "c": {1: None}}
+    write_report(tmp_path / "r", "A title", "A lead.", [], numbers, "simdtex ising")
     text = (tmp_path / "r" / "results.json").read_text(encoding="utf-8")
 
     def refuse(constant):
@@ -132,10 +154,13 @@ def test_results_are_valid_json(tmp_path):
         "a": [1.5, 2, True, [0, 1]],
         "b": None,
         "c": {"1": None},
-        "files": ["index.html", "more.png", "picture.png", "results.json"],
+        "command": "simdtex ising",
+        "files": ["index.html", "results.json"],
+        "version": simdtex.__version__,
     }
     assert list(found) == sorted(found)
     assert found["files"] == sorted(os.listdir(tmp_path / "r"))
+    assert "$ simdtex ising" in read_page(tmp_path / "r" / "index.html").text
 
 
 def test_a_report_replaces_an_earlier_one_and_nothing_else(tmp_path):
@@ -190,7 +215,7 @@ def test_nothing_is_left_of_a_report_that_fails(tmp_path, monkeypatch):
 def test_names_of_figures(tmp_path):
     for names in (["a.png", "a.png"], ["../a.png"], ["a.jpg"]):
         with pytest.raises(ValueError, match="cannot name a figure"):
-            write_report(tmp_path / "r", "", "", [Section("", [Figure("", png(), "", name) for name in names])], {})
+            write_report(tmp_path / "r", "", "", [Section("", [Figure(name, picture(), "") for name in names])], {})
     assert os.listdir(tmp_path) == []
 
 
@@ -206,8 +231,31 @@ def test_plots_have_the_same_bytes_every_time():
     assert PIL.Image.open(io.BytesIO(drawn())).info.keys() == {"dpi"}
 
 
-def test_a_schedule_looks_the_same_wherever_it_appears():
+def test_a_schedule_has_the_same_style_in_every_plot():
     few, many = styles({"luby": True}), styles({"own": True, "block:8x8": False, "coloring": True, "luby": True})
     assert few["luby"] == many["luby"]
-    assert len({look[:2] for look in many.values()}) == 4
-    assert [look.line for look in many.values()] == ["-", "--", "-", "-"]
+    assert len({(style["color"], style["marker"]) for style in many.values()}) == 4
+    assert [style["linestyle"] for style in many.values()] == ["-", "--", "-", "-"]
+    assert [style["markerfacecolor"] == "white" for style in many.values()] == [False, True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ((None,), "n/a"),
+        ((1234567.0,), "1,234,567"),
+        ((5.0,), "5"),
+        ((5.0, 0.25), "5.00 ± 0.25"),
+        ((0.0, 0.25), "0.00 ± 0.25"),
+        ((0.012345,), "0.0123"),
+        ((123.45, 1.0), "123 ± 1"),
+        ((12.345, None, 2, " %"), "12.35 %"),
+    ],
+)
+def test_numbers_have_three_significant_digits(given, text):
+    assert number_text(*given) == text
+
+
+def test_durations():
+    durations = {0.3: "0.3 s", 150: "2.5 min", 9.6 * 3600: "9.6 h", 12 * 86400: "12.0 d"}
+    assert {seconds: duration_text(seconds) for seconds in durations} == durations

@@ -16,7 +16,8 @@ from simdtex.machine.opencl import OpenCL
 from simdtex.machine.reference import Reference
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.ops.noise import noise
-from simdtex.report.profile import rate_text, rows, seconds_text, summary
+from simdtex.report.tables import rate_text, seconds_text
+from simdtex.report.terminal import profile_summary, profile_table
 
 
 class Event:
@@ -140,16 +141,16 @@ def test_numbers_are_written_with_three_digits():
 
 def test_the_table_and_the_sentence():
     entry = {"name": "a", "calls": 1234, "min": 1e-6, "median": 2e-6, "max": 3e-3, "seconds": 0.5, "share": 0.25}
-    assert rows([entry | {"fma_rate": 2e9, "byte_rate": None}]) == [
-        ("a", "1,234", "1.00 us", "2.00 us", "3.00 ms", "500 ms", "25.0%", "2.00 G", "-")
-    ]
+    table = profile_table({"device": "d", "kernels": [entry | {"fma_rate": 2e9, "byte_rate": None}]})
+    cells = ["a", "1,234", "1.00 us", "2.00 us", "3.00 ms", "500 ms", "25.0%", "2.00 G", "-"]
+    assert list(table.rows[0].values()) == cells and all(table.numeric[1:])
     gaps = {"calls": 7, "min": 0, "median": 1e-3, "max": 0.2, "seconds": 0.5}
-    text = summary({"seconds": 2.0, "device_seconds": 1.0, "gaps": gaps})
+    text = profile_summary({"seconds": 2.0, "device_seconds": 1.0, "gaps": gaps})
     assert text == (
         "wall time 2.00 s: kernels 1.00 s (50.0%); between them 500 ms (25.0%) in 7 gaps, median 1.00 ms, longest "
         "200 ms; before the first and after the last 500 ms"
     )
-    assert summary({"seconds": 2.0, "device_seconds": 1.0, "gaps": gaps | {"calls": 0}}).endswith("(50.0%)")
+    assert profile_summary({"seconds": 2.0, "device_seconds": 1.0, "gaps": gaps | {"calls": 0}}).endswith("(50.0%)")
 
 
 @pytest.mark.parametrize(

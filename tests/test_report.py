@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from simdtex.io import image
 from simdtex.model import colours
-from simdtex.report import sheet
+from simdtex.report import sheet, stages
 from simdtex.report.stages import StageWriter
 from simdtex.run import Relaxing, Sampling
 
@@ -41,13 +41,15 @@ def test_contact_sheet_shows_every_picture_at_its_own_size(tmp_path):
     assert os.listdir(tmp_path) == ["sheet.png"]
 
 
-def test_one_to_one_neither_enlarges_nor_reduces():
+def test_a_scale_neither_fits_nor_smooths():
     rng = np.random.default_rng(1)
     small, large = (rng.integers(0, 256, (3, side, 3), dtype=np.uint8) for side in (20, 1100))
-    as_they_are = sheet.contact_sheet([("small", small), ("large", large)], columns=1, one_to_one=True)
+    pictures = [("small", small), ("large", large)]
+    as_they_are = sheet.contact_sheet(pictures, columns=1, scale=1)
     assert contains(as_they_are, small) and contains(as_they_are, large)
-    fitting = sheet.contact_sheet([("small", small), ("large", large)], columns=1)
+    fitting = sheet.contact_sheet(pictures, columns=1)
     assert not contains(fitting, small) and not contains(fitting, large)
+    assert contains(sheet.contact_sheet(pictures, scale=2), sheet.magnified(small, 2))
 
 
 def test_encoded_is_a_png_of_the_picture():
@@ -97,31 +99,19 @@ def test_animation(tmp_path, suffix):
     assert os.listdir(tmp_path) == [path.name]
 
 
-def test_animation_is_bounded_and_checked(tmp_path):
+def test_an_animation_is_bounded_and_checked(tmp_path):
     sheet.animation([np.zeros((1030, 600), np.uint8)] * 2, tmp_path / "a.gif")
     with PIL.Image.open(tmp_path / "a.gif") as film:
         assert max(film.size) <= 512
-    kept = sheet.thinned(np.full((1, 1, 3), n % 256, np.uint8) for n in range(1003))
-    assert len(kept) <= 201
-    assert kept[-1][0, 0, 0] == 1002 % 256
     frame = np.zeros((4, 4), np.uint8)
     for frames, name, ms, words in [
         ([], "b.gif", 50, "no frames"),
-        ([frame, frame[1:]], "b.gif", 50, "differ in shape"),
         ([frame], "b.jpg", 50, r"\.gif"),
         ([frame], "b.gif", 0, "ms is 0"),
     ]:
         with pytest.raises(ValueError, match=words):
             sheet.animation(frames, tmp_path / name, ms=ms)
     assert os.listdir(tmp_path) == ["a.gif"]
-
-
-@pytest.mark.parametrize("count", [1, 2, 199, 200, 201, 399, 400, 401])
-def test_thinned_keeps_first_and_last(count):
-    frames = [np.array([n]) for n in range(count)]
-    kept = [int(f[0]) for f in sheet.thinned(iter(frames))]
-    assert (kept[0], kept[-1]) == (0, count - 1)
-    assert len(set(np.diff(kept)[:-1])) <= 1
 
 
 def test_heat_grows_in_lightness():
@@ -228,6 +218,34 @@ def test_stages_of_a_large_or_interrupted_run(tmp_path):
     writer.finish()
     with PIL.Image.open(tmp_path / "a" / "animation.gif") as film:
         assert max(film.size) <= 512
+
+
+def test_long_runs_have_a_short_animation_with_the_last_stage(tmp_path, monkeypatch):
+    monkeypatch.setattr(stages, "FRAMES", 5)
+    writer = StageWriter(tmp_path / "a")
+    for sweep in range(1, 13):
+        writer(moment(0, sweep, np.full((6, 8), 20 * sweep, np.uint8)))
+    writer.finish()
+    with PIL.Image.open(tmp_path / "a" / "animation.gif") as film:
+        assert film.n_frames == 4
+        film.seek(3)
+        assert np.asarray(film.convert("L"))[0, 0] == 240
+
+
+def test_a_resumed_run_keeps_the_stages_before(tmp_path):
+    full = np.random.default_rng(0).integers(0, 256, (20, 24), dtype=np.uint8)
+    writer = StageWriter(tmp_path / "a")
+    for level, sweep in ((1, 1), (1, 2), (0, 1), (0, 2)):
+        writer(moment(level, sweep, full // sweep))
+    writer.finish()
+    resumed = StageWriter(tmp_path / "a", resumed=lambda: True)
+    resumed(moment(0, 1, full))
+    names = {path.name for path in (tmp_path / "a").iterdir()}
+    stems = ("level1-sweep01", "level1-sweep02", "level0-sweep01")
+    assert names == {f"{kind}{stem}.png" for kind in ("", "temperature-") for stem in stems}
+    resumed.finish()
+    with PIL.Image.open(tmp_path / "a" / "animation.gif") as film:
+        assert film.n_frames == 3
 
 
 def test_stage_folder_is_checked_and_cleared(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from test_page import assert_needs_nothing_else, read_page
 
 from simdtex.experiments import ensemble
-from simdtex.report import ensemble_plots as plots
+from simdtex.report import ensemble as report
 from simdtex.report.ensemble import write_ensemble
 
 ALWAYS = {
@@ -19,7 +19,7 @@ ALWAYS = {
     "variograms.png",
     "distances.png",
 }
-OF_CATEGORIES = {"connectivity.png", "figures.png", "dead-ends.png"}
+OF_CATEGORIES = {"connectivity.png", "dead-ends.png"}
 
 
 def test_a_report_of_categories(tmp_path):
@@ -30,7 +30,7 @@ def test_a_report_of_categories(tmp_path):
     assert {path.name for path in (tmp_path / "r").iterdir()} == ALWAYS | OF_CATEGORIES
     page = read_page(tmp_path / "r" / "index.html")
     assert_needs_nothing_else(page)
-    assert "3 realisations of 60 x 48 pixels, 2 categories, beside a training image of 56 x 64" in page.text
+    assert "3 realisations of 60 x 48 pixels, 2 categories, and a training image of 56 x 64" in page.text
     assert "$ simdtex simulate <ti>" in page.text
     results = json.loads((tmp_path / "r" / "results.json").read_text(encoding="utf-8"))
     assert results["shape"] == [3, 48, 60] and results["training_shape"] == [64, 56]
@@ -53,7 +53,7 @@ def test_a_report_of_continuous_values(tmp_path):
 
 
 def test_a_single_small_realisation_of_many_categories_has_a_report(tmp_path, monkeypatch):
-    monkeypatch.setattr(plots, "MOST_PANELS", 2)
+    monkeypatch.setattr(report, "MOST_PANELS", 2)
     training = np.arange(144).reshape(12, 12) % 9
     write_ensemble(tmp_path / "r", training, training[np.newaxis, :10, :11])
     assert {path.name for path in (tmp_path / "r").iterdir()} == (ALWAYS | OF_CATEGORIES) - {"dead-ends.png"}
@@ -71,14 +71,14 @@ def test_nothing_is_written_where_the_input_is_bad(tmp_path):
 
 
 def test_the_two_most_common_categories_are_drawn(monkeypatch):
-    monkeypatch.setattr(plots, "MOST_PANELS", 2)
+    monkeypatch.setattr(report, "MOST_PANELS", 2)
     image = np.repeat([0, 1, 2, 3], [4, 1, 3, 8]).reshape(4, 4)
-    assert plots.drawn(ensemble.summary(image[np.newaxis], image)) == [0, 3]
+    assert report._drawn(ensemble.summary(image[np.newaxis], image)) == [0, 3]
 
 
 def test_dead_ends_have_a_ring_around_them():
     picture = np.zeros((60, 60, 3), np.uint8)
-    ring = (plots.marked(picture, np.array([[10, 20]]), 2) == plots.END).all(axis=-1)
+    ring = (report._ringed(picture, np.array([[10, 20]]), 2) == report.END).all(axis=-1)
     rows, cols = np.nonzero(ring)
     assert (rows.min() + rows.max()) / 2 == 21 and (cols.min() + cols.max()) / 2 == 41
     assert not ring[21, 41] and not picture.any()
@@ -87,6 +87,6 @@ def test_dead_ends_have_a_ring_around_them():
 def test_the_map_of_distances_keeps_them():
     places = np.array([[0.0, 0], [3, 0], [0, 4], [1, 1]])
     table = np.linalg.norm(places[:, None] - places, axis=-1)
-    found = plots.scaled(table)
+    found = report._scaled(table)
     np.testing.assert_allclose(np.linalg.norm(found[:, None] - found, axis=-1), table, atol=1e-9)
-    np.testing.assert_allclose(plots.scaled(np.zeros((3, 3))), 0)
+    np.testing.assert_allclose(report._scaled(np.zeros((3, 3))), 0)

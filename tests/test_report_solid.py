@@ -143,7 +143,7 @@ def test_slices_stand_below_in_whole_pixels(size):
     block = noise((6, 5, 8, 3))
     sheet = solid.view(block, size=size)
     factor, width = size // 8, (sheet.shape[1] - GAP) // 3
-    top = sheet.shape[0] - GAP - factor * 6  # the tallest slices have 6 rows
+    top = TOP + size + TOP
     for number, picture in enumerate((block[3], block[:, 2], block[:, :, 4])):
         large = picture.repeat(factor, 0).repeat(factor, 1)
         left = GAP + number * width

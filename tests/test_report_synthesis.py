@@ -16,7 +16,7 @@ from simdtex.io import image
 from simdtex.model.colours import heat, source_colours, use_colours
 from simdtex.model.use import counts, effective_use
 from simdtex.report.page import Figure
-from simdtex.report.synthesis import FRAME, _frame, _use, words_of_use
+from simdtex.report.synthesis import FRAME, _frame, _use, use_sentences
 from simdtex.run import Output
 
 OPTIONS = {"mrf": {"order": 2}, "multires": {"alpha": 0.5}}
@@ -85,9 +85,9 @@ def test_the_map_of_use():
         use_colours(source, (2, 2))
 
 
-def test_words_of_use():
+def test_use_in_words():
     most = {"times_fair_share": 7.26, "row": 16, "col": 40, "rows": 8, "cols": 9}
-    words = words_of_use({"effective_share": 0.434, "most_used": most})
+    words = use_sentences({"effective_share": 0.434, "most_used": most})
     assert "effective share of the sample is 0.43" in words and "43% of it would do" in words
     assert "9 x 8 pixels from row 16 and column 40 on, is taken 7.3 times as often" in words
 
@@ -98,7 +98,7 @@ def test_pictures_of_use_show_the_map_the_frame_and_the_arrangement():
     use = effective_use(source, (130, 132))
     sample, made = (rng.integers(0, 256, shape).astype(np.uint8) for shape in ((130, 132), (150, 160)))
     text, used, arranged = _use(sample, made, Output(source, statistics={"use": use.as_dict()}))
-    assert text.text == words_of_use(use.as_dict())
+    assert text == use_sentences(use.as_dict())
     assert isinstance(used, Figure) and used.file == "use.png" and arranged.file == "arrangement.png"
     most = int(counts(source, (130, 132)).max())
     assert f"to {most} times" in used.caption
@@ -142,7 +142,7 @@ def test_a_report(folder, method):
     assert_needs_nothing_else(page)
     results = json.loads((folder / "r" / "results.json").read_text(encoding="utf-8"))
     assert results["shape"] == [48, 40] and results["sample_shape"] == [24, 20, 3]
-    assert words_of_use(results["statistics"]["use"]) in page.text
+    assert use_sentences(results["statistics"]["use"]) in page.text
     assert results["command"] in page.text and f"--method {method}" in results["command"]
     assert results["statistics"]["seed"] == 5
     again = synth(folder, "--method", method, *options, "--report", folder / "r", "-q", sample="deep.png")

@@ -82,9 +82,9 @@ def _versions(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     """Print the versions that a result may depend on, and the device that would be chosen."""
     if not wanted or ctx.resilient_parsing:
         return
-    from simdtex.report.versions import lines
+    from simdtex.report.terminal import version_lines
 
-    for line in lines():
+    for line in version_lines():
         click.echo(line)
     ctx.exit()
 

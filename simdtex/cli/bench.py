@@ -46,7 +46,7 @@ def bench(device: str | None, quick: bool, path: Path | None, folder: Path | Non
     if path:
         check_writable(path, suffixes=(".json",))
     if folder:
-        earlier_files(folder, "the plots", lambda folder: {found.name for found in folder.glob("*.png")})
+        earlier_files(folder, "the plots", lambda name: name.endswith(".png"))
     infos = benchmark.chosen(device)
 
     def tell(what: str) -> None:

@@ -164,15 +164,6 @@ def opened(device: str | None, profile: bool) -> Any:
     return machine
 
 
-def print_profile(statistics: dict[str, Any]) -> None:
-    """Print the profile of a run, in lines of full length where no terminal breaks them."""
-    from rich.console import Console
-
-    from simdtex.report.profile import render
-
-    render(statistics, Console(width=None if sys.stdout.isatty() else 200))
-
-
 def given(options: dict[str, Any]) -> dict[str, Any]:
     """The options that were given; lists of numbers, alpha and a table of thresholds as numbers."""
     chosen = {name: value for name, value in options.items() if value is not None}
@@ -327,7 +318,7 @@ def watching(
 
         context = click.get_current_context(silent=True)
         keeper = context.obj if context else None  # of the checkpoint, where there is one
-        writer = StageWriter(stages, limits=limits, onward=(lambda: bool(keeper.resumed)) if keeper else None)
+        writer = StageWriter(stages, limits=limits, resumed=lambda: bool(keeper and keeper.resumed))
     try:
         with progress_bar(quiet) as show:
 

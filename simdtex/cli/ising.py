@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -66,8 +65,6 @@ def ising(
     quiet: bool,
 ) -> None:
     """Relax Ising spins by each schedule and compare with the exact energy and magnetisation."""
-    from rich.console import Console
-
     from simdtex import schedules as known
     from simdtex.experiments.estimates import findings
     from simdtex.experiments.ising import check, ising
@@ -77,6 +74,7 @@ def ising(
     from simdtex.random import as_seed
     from simdtex.report import ising as report
     from simdtex.report.page import check_folder
+    from simdtex.report.tables import print_table
 
     if output:
         check_folder(output)
@@ -106,9 +104,8 @@ def ising(
                 pictures.append(ising(machine, shape, lowest, schedule, seed=seed, **once))
     found = findings(runs)
     if not quiet:
-        console = Console(width=None if sys.stdout.isatty() else 160)
-        for table in report.terminal_tables(found, console.width):
-            console.print(table)
+        for table in report.tables(found):
+            print_table(table)
         for sentence in report.conclusion(found):
             click.echo(sentence)
     if output:

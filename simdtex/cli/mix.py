@@ -16,7 +16,6 @@ from simdtex.cli.common import (
     opened,
     output_shape,
     plainly,
-    print_profile,
     settle,
     watching,
 )
@@ -119,6 +118,8 @@ def mix(
         )
         click.echo(last_iteration(run.statistics))
     if profile:
+        from simdtex.report.terminal import print_profile
+
         print_profile(run.statistics)
 
 

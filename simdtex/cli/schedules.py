@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -76,14 +75,13 @@ def schedules(
 
     Without SAMPLE it is 128x128 pixels of the brick of scikit-image.
     """
-    from rich.console import Console
-
     from simdtex import schedules as known
     from simdtex.experiments.comparison import compare
     from simdtex.io import image
     from simdtex.options import whole
     from simdtex.report.page import check_folder
-    from simdtex.report.schedules import terminal_tables, write_comparison
+    from simdtex.report.schedules import tables, write_comparison
+    from simdtex.report.tables import print_table
 
     check_folder(output)
     shape = image.parse_size(size)
@@ -111,9 +109,8 @@ def schedules(
         write_comparison(output, found, command_line(click.get_current_context()))
     if quiet:
         return
-    console = Console(width=None if sys.stdout.isatty() else 200)
-    for table in terminal_tables(found, console.width):
-        console.print(table)
+    for table in tables(found):
+        print_table(table)
     click.echo(
         f"{output / 'index.html'}: {len(chosen)} schedules, {seeds} {'seed' if seeds == 1 else 'seeds'}, "
         f"{time.perf_counter() - began:.0f} s on {found.device}"

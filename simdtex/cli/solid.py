@@ -11,7 +11,7 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.common import afterwards, given, last_iteration, opened, plainly, print_profile, settle, watching
+from simdtex.cli.common import afterwards, given, last_iteration, opened, plainly, settle, watching
 from simdtex.cli.helping import command
 from simdtex.cli.keeping import kept
 from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, option, pyramid_options, stages_option
@@ -126,6 +126,8 @@ def solid(
         )
         click.echo(last_iteration(run.statistics))
     if profile:
+        from simdtex.report.terminal import print_profile
+
         print_profile(run.statistics)
 
 

@@ -18,7 +18,6 @@ from simdtex.cli.common import (
     opened,
     output_shape,
     plainly,
-    print_profile,
     settle,
     watching,
 )
@@ -232,10 +231,10 @@ def synth(
         if method == "pyramid":
             click.echo(last_iteration(run.statistics))
     if profile:
+        from simdtex.report.terminal import print_profile
+
         print_profile(run.statistics)
     if accounting:
-        from rich.console import Console
+        from simdtex.report.terminal import print_accounting
 
-        from simdtex.report.accounting import render
-
-        render(run.statistics["accounting"], Console())
+        print_accounting(run.statistics["accounting"])

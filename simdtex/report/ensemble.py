@@ -1,21 +1,43 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The report of an ensemble: realisations beside their training image, what they leave open, how like it they are."""
+"""The report of an ensemble: realisations and their training image, the uncertainty of pixels, and likeness."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
 from dataclasses import fields
+from typing import Any
 
+import matplotlib
 import numpy as np
-from numpy.typing import ArrayLike
+import PIL.Image
+import PIL.ImageDraw
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure as Plot
+from numpy.typing import ArrayLike, NDArray
 
-from simdtex import __version__
-from simdtex.experiments.ensemble import Summary, summary
-from simdtex.report import ensemble_parts as parts
-from simdtex.report.page import Section, Text, check_folder, write_report
+from simdtex.experiments.ensemble import Summary, dead_end_places, summary
+from simdtex.experiments.ensemble.ends import MARGIN
+from simdtex.io.image import to_display
+from simdtex.report.page import Figure, Part, Section, check_folder, write_report
+from simdtex.report.plots import FAINT, INK, legend, new_figure, tidy
+from simdtex.report.sheet import contact_sheet, magnified
+from simdtex.report.tables import Table, number_text
 
 __all__ = ["write_ensemble"]
+
+Array = NDArray[Any]
+Floats = NDArray[np.float64]
+
+SHOWN = 5  # realisations shown with the training image
+MARKED = 2  # realisations shown with their dead ends
+MOST_PANELS = 6  # categories drawn, those with the largest shares of the training image
+SHOWN_SIDE = 300  # smaller images are enlarged by a whole factor, pixels
+SIDE = 3.4  # of a map's longer side, inches
+THEIRS, OWN = "#0072B2", "#D55E00"  # realisations, and the training image
+END = (214, 0, 110)  # the mark of a dead end, sRGB; no category has it
+# From light to dark in turn, so that neighbours differ in grey too; later categories begin again.
+_COLOURS = ["#f2ead3", "#1f4e79", "#8fbf9f", "#d08c3a", "#7a5195", "#4a4a4a", "#b8d4e8", "#5c7a29"]
 
 
 def write_ensemble(
@@ -42,7 +64,7 @@ def write_ensemble(
         The values that stand for categories; by default the training image's own if they are integers and at most
         16. An empty one says that the values are continuous.
     command : str
-        The command line to show, where there was one.
+        The command line, if there is one.
 
     Raises
     ------
@@ -59,32 +81,29 @@ def write_ensemble(
     images, own = np.asarray(ensemble), np.asarray(training)
     categorical = len(found.categories) > 0
     sections = [
-        Section("The realisations", parts.pictures(images, own, found)),
-        Section("What they leave open", parts.left_open(found)),
-        Section("Variograms", [parts.variograms(found)]),
-        *([Section("How the categories hang together", parts.connected(images, own, found))] if categorical else []),
-        Section("Variety and likeness", parts.distances(found)),
-        *([Section("The command", [Text(f"$ {command}")])] if command else []),
+        Section("The realisations", [_realisations(images, own, found)]),
+        Section("Uncertainty", _uncertainty(found)),
+        Section("Variograms", [_variograms(found)]),
+        *([Section("Connectivity of the categories", _connectivity(images, own, found))] if categorical else []),
+        Section("Variety and likeness", _distances(found)),
     ]
     kind = f"{len(found.categories)} categories" if categorical else "continuous values"
     lead = (
-        f"{len(images)} realisations of {images.shape[2]} x {images.shape[1]} pixels, {kind}, beside a training image "
+        f"{len(images)} realisations of {images.shape[2]} x {images.shape[1]} pixels, {kind}, and a training image "
         f"of {own.shape[1]} x {own.shape[0]}.\n\n{_kept(found)}"
     )
     results = {
         **{one.name: getattr(found, one.name) for one in fields(Summary) if one.name not in ("maps", "open", "anodi")},
         "anodi": found.anodi._asdict(),
-        "mean_open": float(found.open.mean()),
-        "shape": list(images.shape),
-        "training_shape": list(own.shape),
-        "command": command,
-        "version": __version__,
+        "mean_open": found.open.mean(),
+        "shape": images.shape,
+        "training_shape": own.shape,
     }
-    write_report(folder, "An ensemble of realisations", lead, sections, results)
+    write_report(folder, "An ensemble of realisations", lead, sections, results, command)
 
 
 def _kept(found: Summary) -> str:
-    """Whether the hard data are kept, in words."""
+    """Return a sentence on whether the hard data are kept."""
     number, realisations = len(found.data), len(found.misses)
     data = "hard datum" if number == 1 else f"{number} hard data"
     if number == 0:
@@ -92,8 +111,276 @@ def _kept(found: Summary) -> str:
     if not found.misses.any():
         return f"Every realisation keeps the {data}."
     if len(found.categories) == 0:
-        worst = f"{found.misses.max():.3g}"
-        return f"Not every realisation keeps the {data}: one is off by {worst}, the root of the mean square."
-    share = found.misses.sum() / (number * realisations)
-    bad = np.count_nonzero(found.misses)
+        return (
+            f"Not every realisation keeps the {data}: the largest root mean square error is {found.misses.max():.3g}."
+        )
+    share, bad = found.misses.sum() / (number * realisations), np.count_nonzero(found.misses)
     return f"Of the {data}, {share:.1%} are missed on average, in {bad} of the {realisations} realisations."
+
+
+def _drawn(found: Summary) -> list[int]:
+    """Return the numbers of the categories that are drawn: all, or those of the largest shares."""
+    return sorted(np.argsort(-found.shares[:, -1], kind="stable")[:MOST_PANELS].tolist())
+
+
+def _mapped(found: Summary) -> list[int]:
+    """Return the categories that have a map; of two, the second is enough."""
+    return [1] if len(found.categories) == 2 else _drawn(found)
+
+
+def _labelled(
+    images: Array, own: Array, found: Summary, number: int
+) -> tuple[list[tuple[str, Array, NDArray[np.uint8]]], int]:
+    """Return the training image and some realisations with their labels and pictures, and the factor to enlarge by."""
+    limits, palette = (float(own.min()), float(own.max())), np.array([to_rgb(colour) for colour in _COLOURS])
+    shown = []
+    for label, image in [("the training image", own), *((f"realisation {i}", images[i]) for i in range(number))]:
+        if len(found.categories) == 0:
+            picture = to_display(image.astype(np.float64), limits)
+        else:
+            place = (image[..., np.newaxis] == found.categories).argmax(axis=-1)
+            picture = np.rint(palette[place % len(_COLOURS)] * 255).astype(np.uint8)
+        shown.append((label, image, picture))
+    return shown, -(-SHOWN_SIDE // max(*own.shape, *images.shape[1:]))
+
+
+def _realisations(images: Array, own: Array, found: Summary) -> Figure:
+    number = min(SHOWN, len(images))
+    shown, factor = _labelled(images, own, found, number)
+    return Figure(
+        "realisations.png",
+        contact_sheet([(label, picture) for label, _, picture in shown], columns=3, scale=factor),
+        f"The training image and the first {number} of {len(images)} realisations, in one scale. No "
+        "figure below replaces this look: shapes, widths and directions should be those of the training image, and no "
+        "realisation should repeat a piece of it, or of another, as a whole.",
+    )
+
+
+# ---------------------------------------------------------------- maps
+
+
+def _uncertainty(found: Summary) -> list[Part]:
+    """Return maps of the mean or of the shares of categories, and of the entropy or the standard deviation."""
+    dots = " The dots are the hard data in the colours of the map: one that is kept has the colour of its pixel."
+    if len(found.categories) == 0:
+        values = found.data[:, 2]
+        limits = min([found.maps.min(), *values]), max([found.maps.max(), *values])
+        maps = _maps(found, {"mean of the realisations": (found.maps[0], values)}, "viridis", limits)
+        spread = _maps(found, {"standard deviation": (found.open, None)}, "magma", (0.0, found.open.max() or 1.0))
+        what = "The mean of the realisations at every pixel."
+        how = "The standard deviation of the realisations at every pixel, in the unit of the values"
+    else:
+        panels = {}
+        for k in _mapped(found):
+            category = found.categories[k]
+            panels[f"share of category {category}"] = found.maps[k], (found.data[:, 2] == category).astype(float)
+        maps = _maps(found, panels, "viridis", (0.0, 1.0))
+        most = float(np.log2(max(2, len(found.categories))))
+        spread = _maps(found, {"entropy, bits": (found.open, None)}, "magma", (0.0, most))
+        what = "The share of the realisations in which a pixel has the category: its probability there."
+        how = f"The entropy of every pixel over the categories, {found.open.mean():.2f} bits on average"
+    return [
+        Figure(
+            "maps.png",
+            maps,
+            f"{what}{dots if len(found.data) else ''} Around data the map follows them; far from them it should be "
+            "even, for nothing is known there. Structure far from any datum means that realisations repeat each other.",
+        ),
+        Figure(
+            "entropy.png",
+            spread,
+            f"{how}: dark where all realisations agree, light where they differ most. It should be dark at hard data "
+            "only, and grow with the distance from them over about the range of the variogram.",
+        ),
+    ]
+
+
+def _maps(
+    found: Summary, panels: dict[str, tuple[Floats, Floats | None]], colours: str, limits: tuple[float, float]
+) -> Plot:
+    """Plot maps by title, each with the hard data as dots in the colours of their values, or hollow if None."""
+    rows, cols = found.open.shape
+    across = 2 if len(panels) == 4 else min(3, len(panels))
+    down = -(-len(panels) // across)
+    wide, high = SIDE * cols / max(rows, cols), SIDE * rows / max(rows, cols)
+    figure = new_figure(across * max(wide, 1.6) + 1.2, down * (max(high, 1.0) + 0.45))
+    grid = figure.subplots(down, across, squeeze=False).ravel()
+    for axes in grid[len(panels) :]:
+        axes.set_axis_off()
+    x, y = found.data[:, 0], found.data[:, 1]
+    low, high = limits
+    for axes, (title, (picture, values)) in zip(grid, panels.items(), strict=False):
+        image = axes.imshow(picture, cmap=colours, vmin=low, vmax=high, interpolation="nearest")
+        axes.set_title(title, loc="left", fontsize=10, color=INK)
+        axes.tick_params(colors=FAINT, labelcolor=INK, labelsize=8)
+        inside: Any = "none"
+        if values is not None:
+            inside = matplotlib.colormaps[colours](np.clip((values - low) / ((high - low) or 1.0), 0, 1))
+        axes.scatter(x, y, s=26, c=inside, edgecolors="white", linewidths=1.8)
+        axes.scatter(x, y, s=34, c="none", edgecolors="black", linewidths=0.7)
+    figure.colorbar(image, ax=list(grid[: len(panels)]), shrink=0.85, pad=0.02)
+    return figure
+
+
+# ---------------------------------------------------------------- functions of the lag, and figures of categories
+
+
+def _variograms(found: Summary) -> Figure:
+    if len(found.categories) == 0:
+        table, names, of = found.variograms, [""], "the values"
+    else:
+        shown = _mapped(found)
+        table, names = found.variograms[:, shown], [f"category {found.categories[k]}" for k in shown]
+        of = "each category's indicator" + (" (of two categories both are the same)" if len(shown) == 1 else "")
+    return Figure(
+        "variograms.png",
+        _lagged(found, table, names, "variogram"),
+        f"Variograms of {of} along both axes: half the mean squared difference of two pixels at a lag. The training "
+        "image's line should run inside the band of the realisations. A band that rises later means bodies that are "
+        "too large, one that rises earlier bodies that are too small or noise; waves are regular distances.",
+    )
+
+
+def _lagged(found: Summary, table: Floats, names: Sequence[str], label: str) -> Plot:
+    """Plot functions of the lag, (2, K, n + 1, L): a row for each name, a column for each axis."""
+    figure = new_figure(8.2, 0.5 + 2.35 * len(names))
+    grid = figure.subplots(len(names), 2, sharey="row", sharex=True, squeeze=False)
+    for row, (name, panels) in enumerate(zip(names, grid, strict=True)):
+        for axis, way, axes in zip((1, 0), ("to the right", "down"), panels, strict=True):
+            theirs, own = table[axis, row, :-1], table[axis, row, -1]
+            known = np.isfinite(theirs).any(axis=0)
+            lags = found.lags[known]
+            low, middle, high = (how(theirs[:, known], axis=0) for how in (np.nanmin, np.nanmedian, np.nanmax))
+            axes.fill_between(lags, low, high, color=THEIRS, alpha=0.22, linewidth=0, label="realisations, all")
+            axes.plot(lags, middle, color=THEIRS, linewidth=1.3, label="realisations, median")
+            axes.plot(found.lags, own, color=OWN, linewidth=1.8, linestyle="--", label="training image")
+            title = f"{name}, {way}" if name else way
+            tidy(axes, title, "lag, pixels" if row == len(names) - 1 else "", label if axis == 1 else "")
+        panels[0].set_ylim(0, 1.05 * (np.nanmax(table[:, row]) or 1.0) if np.isfinite(table[:, row]).any() else 1.0)
+    legend(figure, grid[0, 0])
+    return figure
+
+
+def _connectivity(images: Array, own: Array, found: Summary) -> list[Part]:
+    shown = _drawn(found)
+    names = [f"category {found.categories[k]}" for k in shown]
+    figures = {
+        "Share": found.shares,
+        "Components in 10,000 pixels": found.components,
+        "Share of the largest": found.largest,
+        "Dead ends in 10,000 pixels": found.dead_ends,
+    }
+    rows = [
+        {"Category": f"{category}, {name}"} | {head: _spread(table[k, column]) for head, table in figures.items()}
+        for k, category in enumerate(found.categories)
+        for name, column in (("training image", slice(-1, None)), ("realisations", slice(0, -1)))
+    ]
+    note = (
+        "Realisations: mean ± standard deviation. Many components are specks, and many dead ends are channels that "
+        "break off."
+    )
+    parts: list[Part] = [
+        Figure(
+            "connectivity.png",
+            _lagged(found, found.connectivity[:, shown], names, "connectivity"),
+            "The connectivity function: of two pixels at a lag that both have the category, the share that lies in one "
+            "connected component (pixels are connected by their sides). A variogram cannot tell whole channels from "
+            "broken ones; here, a band below the line of the training image means that its bodies are broken, one "
+            "above that they merge. A smaller image cuts bodies apart, so compare images of one size if you can.",
+        ),
+        Table(
+            "Figures of the categories",
+            rows,
+            note,
+        ),
+    ]
+    return [*parts, _ends(images, own, found)] if np.isfinite(found.dead_ends).all() else parts
+
+
+def _spread(values: Floats) -> str:
+    known = values[np.isfinite(values)]
+    if len(known) == 0:
+        return "n/a"
+    return number_text(known.mean(), known.std(ddof=1) if len(known) > 1 else None, 3)
+
+
+def _ends(images: Array, own: Array, found: Summary) -> Figure:
+    category = found.categories[found.shares[:, -1].argmin()]
+    shown, factor = _labelled(images, own, found, min(MARKED, len(images)))
+    pictures = []
+    for label, image, picture in shown:
+        places = dead_end_places(image, category)
+        pictures.append((f"{label}: {len(places)}", _ringed(magnified(picture, factor), places, factor)))
+    return Figure(
+        "dead-ends.png",
+        contact_sheet(pictures, columns=3),
+        f"The dead ends of category {category} that are counted, in rings: free ends of its skeleton, without short "
+        f"spurs and without those within {MARGIN} pixels of the border.",
+    )
+
+
+def _ringed(picture: NDArray[np.uint8], places: NDArray[np.intp], factor: int) -> NDArray[np.uint8]:
+    """Return an enlarged picture with a ring around places of the original."""
+    image = PIL.Image.fromarray(picture)
+    draw, radius = PIL.ImageDraw.Draw(image), 4 * factor + 4
+    for row, col in (places * factor + factor // 2).tolist():
+        draw.ellipse((col - radius, row - radius, col + radius, row + radius), outline=END, width=3)
+    return np.array(image)
+
+
+# ---------------------------------------------------------------- distances
+
+
+def _distances(found: Summary) -> list[Part]:
+    """Return the analysis of distance."""
+    one = found.anodi
+    scales = {"all, weighted": (one.variety, one.likeness)}
+    scales |= {f"{1 << level}": (variety, likeness) for level, (variety, likeness) in enumerate(one.by_level)}
+    rows = [
+        {
+            "Pixels apart": scale,
+            "Between realisations": _decimal(variety),
+            "From the training image": _decimal(likeness),
+            "Ratio": _decimal(variety / likeness if likeness > 0 else np.nan),
+        }
+        for scale, (variety, likeness) in scales.items()
+    ]
+    note = (
+        "Mean Jensen-Shannon distances between histograms of small patterns, 0 (the same patterns as often) to 1 (none "
+        "in common): between two realisations, and between a realisation and the training image. The first column is "
+        "how far apart the pixels of a pattern are; each doubling weighs half. After the analysis of distance of Tan, "
+        "Tahmasebi and Caers (2014), simplified."
+    )
+    words = (
+        "Variety should be large and the distance from the training image small. A ratio of about 1 is that of images "
+        "that are as different from one another as from the training image, as other images of the same kind are; far "
+        "below 1 the realisations are more alike than that, or all of them lack something."
+    )
+    caption = (
+        "The same distances as a map: two images are about as far apart as their patterns differ. The training image "
+        "should lie within the cloud; a cloud beside it means a fault that all realisations share, and a narrow cloud "
+        "little variety."
+    )
+    places = _scaled(one.distances)
+    plot = new_figure(4.6, 4.2)
+    axes = plot.subplots()
+    axes.plot(*places[:-1].T, "o", color=THEIRS, alpha=0.75, markersize=6, label="realisations")
+    axes.plot(*places[-1:].T, "D", color=OWN, markersize=9, label="training image")
+    axes.set_aspect("equal", adjustable="datalim")
+    tidy(axes)
+    legend(plot, axes)
+    figure = Figure("distances.png", plot, caption)
+    return [words, Table("Distances", rows, note), figure]
+
+
+def _decimal(value: float) -> str:
+    return f"{value:.3f}" if np.isfinite(value) else "n/a"
+
+
+def _scaled(table: Floats) -> Floats:
+    """Return places (n, 2) for a table of distances (n, n), by classical multidimensional scaling."""
+    centre = np.eye(len(table)) - 1.0 / len(table)
+    values, vectors = np.linalg.eigh(-0.5 * centre @ table**2 @ centre)
+    places = vectors[:, :-3:-1] * np.sqrt(np.clip(values[:-3:-1], 0.0, None))
+    signs = np.sign(places[np.abs(places).argmax(axis=0), [0, 1]])
+    return np.asarray(places * np.where(signs == 0, 1.0, signs))

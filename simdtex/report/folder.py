@@ -4,28 +4,28 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from pathlib import Path
 
 from simdtex.io.atomic import is_leftover
 
 
-def earlier_files(folder: Path, what: str, own: Callable[[Path], Collection[str]]) -> list[Path]:
-    """What an earlier run has left in a folder that is about to be written; raises before the work, not after it.
+def earlier_files(folder: Path, what: str, own: Callable[[str], bool]) -> list[Path]:
+    """Check before long work that files can be written into a folder, and return the files of an earlier run.
 
     Parameters
     ----------
     folder : Path
-        It may exist if it is empty or holds files of its own kind only; its parent must.
+        It may exist if it is empty or holds files of its own kind only; its parent must exist.
     what : str
-        Is to be written there, for the sentence: ``"the report"``.
+        What is written there, as messages name it: ``"the report"``.
     own : callable
-        The names, of those in the folder, that an earlier run may have written.
+        Returns whether an earlier run may have written the file of a name.
 
     Returns
     -------
     list of Path
-        All files there, by name, but for those that a killed process has not finished; writing removes them.
+        All files of the folder, by name, except unfinished ones of a killed process, which the atomic writer removes.
 
     Raises
     ------
@@ -43,8 +43,7 @@ def earlier_files(folder: Path, what: str, own: Callable[[Path], Collection[str]
             found = []
     except OSError as error:
         raise ValueError(f"{folder} cannot be used ({error.strerror}): give another folder") from None
-    ours = own(folder) if found else ()
-    others = [path.name for path in found if path.name not in ours or not path.is_file()]
+    others = [path.name for path in found if not (own(path.name) and path.is_file())]
     if others:
         raise ValueError(f"the folder {folder} holds other files ({others[0]}): give an empty or a new one")
     if not os.access(folder if folder.is_dir() else folder.parent, os.W_OK | os.X_OK):

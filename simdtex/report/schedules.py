@@ -1,106 +1,101 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The report of a comparison of schedules: pictures, plots and tables, on a page and on the terminal."""
+"""The report of a comparison of schedules."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from math import floor, log10
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-import rich.table
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Plot
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from simdtex import __version__
-from simdtex.experiments.comparison import Comparison, Entry, Spread
-from simdtex.report import schedule_plots as plots
-from simdtex.report.page import Figure, Section, Table, Text, write_report
+from simdtex.experiments.comparison import Comparison, Entry, Run, Spread
+from simdtex.io.image import to_display
+from simdtex.report.page import Figure, Part, Section, write_report
+from simdtex.report.plots import legend, new_figure, styles, tidy
+from simdtex.report.sheet import contact_sheet
+from simdtex.report.tables import Table, number_text
 
-__all__ = ["mark", "sections", "terminal_tables", "write_comparison"]
+__all__ = ["reading", "sections", "tables", "write_comparison"]
 
-LEAST_FREE = 6  # free sweeps from which on an oscillation can be told from settling
-
-
-class Form(NamedTuple):
-    """How a number is written: ``digits`` behind the point, None for three figures in all; a factor and a unit."""
-
-    digits: int | None = None
-    factor: float = 1.0
-    unit: str = ""
-
-    def __call__(self, value: float, deviation: float | None = None) -> str:
-        """The number, and its standard deviation to as many digits."""
-        value *= self.factor
-        digits = self.digits
-        if digits is None:
-            exact = value == int(value) and not deviation
-            digits = 0 if value >= 99.5 or exact else 2 - min(2, max(-2, floor(log10(abs(value))) if value else 0))
-        spread = "" if deviation is None else f" ± {deviation * self.factor:,.{digits}f}"
-        return f"{value:,.{digits}f}{spread}{self.unit}"
+LEAST_FREE = 6  # free sweeps from which on oscillation can be told from settling
+SHOWN_SIDE = 256  # smaller pictures are enlarged by a whole factor, pixels
 
 
-FIGURES, PERCENT, THREE, TWO = Form(), Form(2, 100, " %"), Form(3), Form(2)
+PERCENT = ("utilisation", "changed_cooling", "oscillation_cooling", "changed_free", "oscillation_free")
+"""Figures written in percent."""
+
+DECIMALS = dict.fromkeys(PERCENT, 2) | {
+    "plausibility": 3,
+    "coverage": 3,
+    "histogram_distance": 3,
+    "copying": 3,
+    "seam": 2,
+}
+"""Decimals of figures; the others are written with three significant digits."""
 
 
-class Column(NamedTuple):
-    """A column of the tables: a figure of `FIGURES` of the comparison, its heads on the page and the terminal."""
+class Topic(NamedTuple):
+    """A section of the page with a table; `columns` are headings and names of figures of the comparison."""
 
-    figure: str
-    head: str
-    short: str
-    form: Form = FIGURES
+    title: str
+    columns: dict[str, str]
+    note: str
 
 
-EQUILIBRIUM = (
-    Column("steps", "Steps", "steps"),
-    Column("sweeps", "Sweeps", "sweeps"),
-    Column("relaxations_per_site", "Relaxations per site", "relax. per site"),
-    Column("all_steps", "Steps, all levels", "steps, all levels"),
-    Column("all_sweeps", "Sweeps, all levels", "sweeps, all levels"),
-    Column("all_relaxations_per_site", "Relaxations per site, all levels", "relax., all levels"),
+EQUILIBRIUM = Topic(
+    "Until equilibrium",
+    {
+        "Steps": "steps",
+        "Sweeps": "sweeps",
+        "Relaxations per site": "relaxations_per_site",
+        "Steps, all levels": "all_steps",
+        "Sweeps, all levels": "all_sweeps",
+        "Relaxations per site, all levels": "all_relaxations_per_site",
+    },
+    "A sweep relaxes as many sites as had a temperature above 0 when it began. Free sweeps are not counted.",
 )
-TIMES = (
-    Column("seconds", "Wall time, s", "wall s"),
-    Column("device_seconds", "Device time, s", "device s"),
-    Column("passes", "SIMD steps", "passes"),
-    Column("utilisation", "Utilisation", "utilis.", PERCENT),
-    Column("model_seconds", "MP-1 by the model, s", "MP-1 s"),
+TIME = Topic(
+    "Time and the processor array",
+    {
+        "Wall time, s": "seconds",
+        "Device time, s": "device_seconds",
+        "SIMD steps": "passes",
+        "Utilisation": "utilisation",
+        "MP-1 by the model, s": "model_seconds",
+    },
+    "Wall time excludes the time of observing the run; device time is spent in kernels. Utilisation is the mean share "
+    "of PEs with a site to relax, over the SIMD steps. The model counts the arithmetic of the distances and the "
+    "fetching of neighbourhoods only.",
 )
-MOVES = (
-    Column("changed_cooling", "Changed a sweep, cooling", "changed, cooling", PERCENT),
-    Column("oscillation_cooling", "Oscillation, cooling", "oscill., cooling", PERCENT),
-    Column("changed_free", "Changed, last free sweep", "changed, free", PERCENT),
-    Column("oscillation_free", "Oscillation, last free sweep", "oscill., free", PERCENT),
-)
-QUALITY = (
-    Column("plausibility", "Plausibility", "plausib.", THREE),
-    Column("coverage", "Coverage", "coverage", THREE),
-    Column("histogram_distance", "Histogram distance", "histogram", THREE),
-    Column("copying", "Copying", "copying", THREE),
-    Column("seam", "Seam", "seam", TWO),
-)
-
-
-ABOUT_EQUILIBRIUM = "A sweep relaxes as many sites as were still warm when it began. Free sweeps are not counted."
-ABOUT_TIMES = (
-    "Wall time is without what watching the run took; device time is that spent in kernels. Utilisation is the mean "
-    "share of PEs with a site to relax, over the SIMD steps. The model counts the arithmetic of the distances and the "
-    "fetching of neighbourhoods only."
-)
-ABOUT_MOVES = (
+MOVEMENT = Topic(
+    "Movement of the picture",
+    {
+        "Changed a sweep, cooling": "changed_cooling",
+        "Oscillation, cooling": "oscillation_cooling",
+        "Changed, last free sweep": "changed_free",
+        "Oscillation, last free sweep": "oscillation_free",
+    },
     "Changed: another value than a sweep ago. Oscillation: another value than a sweep ago, and the same as two sweeps "
-    "ago. Cooling: mean over the sweeps until equilibrium. In a free sweep all sites relax, those long cold too."
+    "ago. Cooling: mean over the sweeps until equilibrium. In a free sweep all sites relax, at temperature 0 too.",
 )
-ABOUT_QUALITY = (
+LIKENESS = Topic(
+    "Likeness to the sample",
+    {
+        "Plausibility": "plausibility",
+        "Coverage": "coverage",
+        "Histogram distance": "histogram_distance",
+        "Copying": "copying",
+        "Seam": "seam",
+    },
     "Plausibility, coverage and histogram distance are in sample standard deviations, 0 is best. Copying is the share "
-    "of 9 x 9 patches that stand in the sample to the last bit. A seam of 1 does not show."
+    "of 9 x 9 patches that are in the sample bit for bit. A seam of 1 is invisible.",
 )
-
-
-def mark(entry: Entry) -> str:
-    """What every table says of a schedule and equation (14)."""
-    if entry.caught:
-        return "breaks (14), against its claim"
-    return "keeps (14)" if entry.independent else "breaks (14)"
 
 
 def write_comparison(folder: str | os.PathLike[str], comparison: Comparison, command: str = "") -> None:
@@ -112,7 +107,7 @@ def write_comparison(folder: str | os.PathLike[str], comparison: Comparison, com
         See `simdtex.report.page.check_folder`.
     comparison : Comparison
     command : str
-        The command line to show, where there was one.
+        The command line, if there is one.
 
     Raises
     ------
@@ -120,141 +115,147 @@ def write_comparison(folder: str | os.PathLike[str], comparison: Comparison, com
         The folder cannot be written.
     """
     height, width = comparison.shape
-    rows, cols = plots.channels_last(comparison, comparison.sample).shape[:2]
+    rows, cols = _channels_last(comparison, comparison.sample).shape[:2]
     seeds = len(comparison.seeds)
     lead = (
         f"{len(comparison.entries)} schedules do the same job, {width} x {height} pixels from a sample of "
-        f"{cols} x {rows}, with {seeds} {'seeds' if seeds > 1 else 'seed'} each. A schedule says which sites relax "
-        "together. Equation (14) asks that no two of them are neighbours; every table says who breaks it."
+        f"{cols} x {rows}, with {seeds} {'seeds' if seeds > 1 else 'seed'} each. A schedule decides which sites relax "
+        "together. Equation (14) demands that no two of them are neighbours; every table says which schedules break it."
     )
-    results = {**comparison.results(), "version": __version__, "command": command}
-    write_report(folder, "Parallel schedules compared", lead, sections(comparison, command), results)
+    write_report(folder, "Parallel schedules compared", lead, sections(comparison), comparison.results(), command)
 
 
-def sections(comparison: Comparison, command: str = "") -> list[Section]:
-    """The parts of the page."""
-    entries = comparison.entries
-    note = "Hollow markers and dashed lines: breaks (14)."
-    seeds = f" Mean ± standard deviation over {len(comparison.seeds)} seeds." if len(comparison.seeds) > 1 else ""
-    array = entries[0].runs[0].accounting
-    pictures: list[Text | Table | Figure] = [
-        Figure(
-            "The sample, and what each schedule makes of it with the first seed.",
-            plots.first_seed(comparison),
-            "The sample and one picture for each schedule",
-            "pictures.png",
-        )
-    ]
-    if len(comparison.seeds) > 1:
-        every = Figure(
-            "All seeds, one a row.", plots.all_seeds(comparison), "A picture for each seed and schedule", "seeds.png"
-        )
-        pictures.append(every)
+def sections(comparison: Comparison) -> list[Section]:
+    """Return the sections of the page."""
+    hollow = "Hollow markers and dashed lines: breaks (14)."
+    equilibrium, time, movement, likeness = tables(comparison)
+    temperature = Figure(
+        "temperature.png",
+        _temperature(comparison),
+        f"Mean temperature left at the finest level after every sweep, against steps. {hollow}",
+    )
+    changed = Figure(
+        "changed.png",
+        _per_sweep(comparison, "changed", "Share of pixels that changed"),
+        f"Pixels that change, sweep by sweep; markers are free sweeps. {hollow}",
+    )
+    oscillation = Figure(
+        "oscillation.png",
+        _per_sweep(comparison, "returned", "Oscillation index"),
+        f"Pixels that return to their value before last, sweep by sweep; markers are free sweeps. {hollow}",
+    )
     return [
-        Section("What to look at", [Text(reading(comparison))]),
-        Section("Pictures", pictures),
-        Section(
-            "Until equilibrium",
-            [
-                _table(
-                    comparison,
-                    "Of the finest level, and of all levels together, until no temperature was left",
-                    EQUILIBRIUM,
-                    f"{ABOUT_EQUILIBRIUM}{_by_level(entries)}{seeds}",
-                ),
-                Figure(
-                    f"Mean temperature left at the finest level after every sweep, against steps. {note}",
-                    plots.temperature(comparison),
-                    "Curves of the temperature left against step",
-                    "temperature.png",
-                ),
-            ],
-        ),
-        Section(
-            "Time and the processor array",
-            [
-                _table(
-                    comparison,
-                    f"Whole runs, on {comparison.device} and by a model of the {_array_name(array)}",
-                    TIMES,
-                    f"{ABOUT_TIMES}{seeds}",
-                ),
-                Figure(
-                    f"Parallelism and what it costs. Short strokes are single seeds. {note}",
-                    plots.costs(comparison),
-                    "Steps, wall time, utilisation and model time of each schedule",
-                    "costs.png",
-                ),
-            ],
-        ),
-        Section(
-            "How the picture moves",
-            [
-                _table(
-                    comparison,
-                    "Share of the finest level's pixels, a sweep",
-                    MOVES,
-                    f"{ABOUT_MOVES}{_few_free(comparison)}{seeds}",
-                ),
-                Figure(
-                    f"Pixels that change, sweep by sweep; markers are free sweeps. {note}",
-                    plots.per_sweep(comparison, "changed", "Share of pixels that changed"),
-                    "Curves of the share of pixels that changed in each sweep",
-                    "changed.png",
-                ),
-                Figure(
-                    f"Pixels that return to their value before last; markers are free sweeps. {note}",
-                    plots.per_sweep(comparison, "returned", "Oscillation index"),
-                    "Curves of the oscillation index of each sweep",
-                    "oscillation.png",
-                ),
-            ],
-        ),
-        Section(
-            "Against the sample",
-            [
-                _table(
-                    comparison,
-                    "Figures of merit of the outputs",
-                    QUALITY,
-                    f"{ABOUT_QUALITY}{seeds}",
-                ),
-                Figure(
-                    f"Mean and standard deviation over the seeds. Short strokes are single seeds. {note}",
-                    plots.qualities(comparison),
-                    "Figures of merit of each schedule with their spread",
-                    "quality.png",
-                ),
-            ],
-        ),
-        Section("The job", _job(comparison, command)),
+        Section("Reading", [reading(comparison)]),
+        Section("Pictures", _pictures(comparison)),
+        Section(EQUILIBRIUM.title, [equilibrium, temperature]),
+        Section(TIME.title, [time]),
+        Section(MOVEMENT.title, [movement, changed, oscillation]),
+        Section(LIKENESS.title, [likeness]),
+        Section("The job", [_job(comparison)]),
     ]
 
 
-# ---------------------------------------------------------------- text and tables
+def tables(comparison: Comparison) -> list[Table]:
+    """Return four tables with a row for each schedule: equilibrium, time, movement and likeness."""
+    array = comparison.entries[0].runs[0].accounting
+    how = "active sites packed" if array["mapping"] == "packed" else array["mapping"]
+    model = f"Whole runs, on {comparison.device} and by a model of {array['array']} PEs of a MasPar MP-1, {how}"
+    seeds = f" Mean ± standard deviation over {len(comparison.seeds)} seeds." if len(comparison.seeds) > 1 else ""
+
+    def table(topic: Topic, caption: str, remark: str = "") -> Table:
+        rows = [
+            {"Schedule": entry.name, "Equation (14)": _verdict(entry)}
+            | {heading: _text(name, entry.figure(name)) for heading, name in topic.columns.items()}
+            for entry in comparison.entries
+        ]
+        return Table(caption, rows, f"{topic.note}{remark}{seeds}")
+
+    return [
+        table(
+            EQUILIBRIUM,
+            "Until no temperature was left: the finest level, and all levels together",
+            "".join(map(_kept_levels, comparison.entries)),
+        ),
+        table(TIME, model),
+        table(
+            MOVEMENT,
+            "Share of the finest level's pixels, a sweep",
+            _few_free(int(comparison.options["free_sweeps"])),
+        ),
+        table(LIKENESS, "Figures of merit of the outputs"),
+    ]
+
+
+def _text(name: str, found: Spread | None) -> str:
+    """Return the mean of a figure over the seeds and its standard deviation as text."""
+    if found is None:
+        return "n/a"
+    factor, unit = (100, " %") if name in PERCENT else (1, "")
+    deviation = None if found.deviation is None else factor * found.deviation
+    return number_text(factor * found.mean, deviation, DECIMALS.get(name), unit)
+
+
+def _verdict(entry: Entry) -> str:
+    if entry.caught:
+        return "breaks (14), against its claim"
+    return "keeps (14)" if entry.independent else "breaks (14)"
+
+
+def _kept_levels(entry: Entry) -> str:
+    """Return a sentence on a schedule that keeps equation (14) at some levels only, else nothing."""
+    kept = [str(level) for level, claim in enumerate(reversed(entry.claims)) if claim]
+    if not kept or len(kept) == len(entry.claims) or entry.caught:
+        return ""
+    return f" At level {_listed(kept)} {entry.name} keeps equation (14)."
+
+
+def _few_free(free: int) -> str:
+    if free >= LEAST_FREE:
+        return ""
+    return (
+        f" With {free} free sweep{'s' * (free != 1)} settling is not distinguished from oscillation; give {LEAST_FREE} "
+        "or more."
+    )
+
+
+def _job(comparison: Comparison) -> Table:
+    about = {
+        "simdtex": __version__,
+        "device": comparison.device,
+        "seeds": ", ".join(map(str, comparison.seeds)),
+        "sample": " x ".join(map(str, comparison.sample.shape)) + f", {comparison.sample.dtype}",
+        "output": " x ".join(map(str, comparison.shape)) + " (rows x columns)",
+        **comparison.options,
+    }
+    return Table("The same for every schedule", [{"What": k, "Value": str(v)} for k, v in about.items()])
+
+
+# ---------------------------------------------------------------- the text
 
 
 def reading(comparison: Comparison) -> str:
-    """What to look at: a few sentences with their numbers from the results."""
+    """Return a few paragraphs on the most important differences between the schedules."""
     entries = comparison.entries
     keeps = [entry.name for entry in entries if entry.independent]
     breaks = [entry.name for entry in entries if not entry.independent]
     said = []
     if keeps:
-        verb = "keep" if len(keeps) > 1 else "keeps"
-        said.append(f"{_listed(keeps)} {verb} equation (14), which was checked at every step.")
+        said.append(f"{_listed(keeps)} keep{'s' * (len(keeps) == 1)} equation (14), which was checked at every step.")
     if breaks:
-        verb = "break" if len(breaks) > 1 else "breaks"
-        said.append(f"{_listed(breaks)} {verb} it: neighbours relax at once, or one sees an old value of the other.")
-    still = ("oscillation_cooling", "Pixels that flip back in a sweep, until equilibrium")
-    if comparison.options["free_sweeps"] >= LEAST_FREE:
-        still = ("oscillation_free", "Pixels that still flip back in the last free sweep")
+        said.append(
+            f"{_listed(breaks)} break{'s' * (len(breaks) == 1)} it: neighbours relax at once, or one sees an old value "
+            "of the other."
+        )
+    free = comparison.options["free_sweeps"] >= LEAST_FREE
     parts = [
         " ".join(said),
-        _extremes(entries, "steps", "Parallelism: steps until equilibrium at the finest level"),
-        _extremes(entries, "seconds", "Wall time of a run on this device, in seconds"),
-        _extremes(entries, *still, PERCENT),
-        *(_gap(entries, key, what) for key, what in (("plausibility", "Plausibility"), ("coverage", "Coverage"))),
+        _range(entries, "steps", "Parallelism, steps until equilibrium at the finest level"),
+        _range(entries, "seconds", "Wall time of a run on this device in seconds"),
+        _range(entries, "oscillation_free", "Pixels that still flip back in the last free sweep")
+        if free
+        else _range(entries, "oscillation_cooling", "Pixels that flip back in a sweep, until equilibrium"),
+        _range(entries, "plausibility", "Plausibility, 0 is best"),
+        _range(entries, "coverage", "Coverage, 0 is best"),
     ]
     return "\n\n".join(part for part in parts if part)
 
@@ -263,131 +264,91 @@ def _listed(names: Sequence[str]) -> str:
     return ", ".join(names[:-1]) + " and " * (len(names) > 1) + names[-1]
 
 
-def _ranked(entries: Sequence[Entry], figure: str) -> list[tuple[str, Spread]]:
+def _range(entries: Sequence[Entry], figure: str, what: str) -> str:
+    """Return the lowest and the highest mean of a figure, and how much of the difference may be chance."""
     found = [(entry.name, entry.figure(figure)) for entry in entries]
-    return sorted(((name, spread) for name, spread in found if spread), key=lambda pair: pair[1].mean)
-
-
-def _extremes(entries: Sequence[Entry], figure: str, what: str, form: Form = FIGURES) -> str:
-    ranked = _ranked(entries, figure)
+    ranked = sorted(((name, spread) for name, spread in found if spread), key=lambda pair: pair[1].mean)
     if len(ranked) < 2:
         return ""
-    (low, least), (high, most) = ranked[0], ranked[-1]
-    return f"{what}: least with {low} ({form(least.mean)}), most with {high} ({form(most.mean)})."
+    (low, least), (high, most) = ([name, _text(figure, spread)] for name, spread in (ranked[0], ranked[-1]))
+    return f"{what}: from {least} with {low} to {most} with {high}."
 
 
-def _gap(entries: Sequence[Entry], figure: str, what: str) -> str:
-    """The best and the worst, and whether seeds differ as much."""
-    ranked = _ranked(entries, figure)
-    if len(ranked) < 2:
-        return ""
-    (low, least), (high, most) = ranked[0], ranked[-1]
-    said = f"{what}: best with {low} ({least.mean:.3f}), worst with {high} ({most.mean:.3f})."
-    deviations = [spread.deviation for _, spread in ranked if spread.deviation is not None]
-    if not deviations:
-        return f"{said} One seed does not say how much of that is chance."
-    gap, chance = most.mean - least.mean, max(deviations)
-    verdict = "no more than seeds of one schedule differ" if gap <= 2 * chance else "more than seeds of one schedule do"
-    return f"{said} They differ by {gap:.3f}, {verdict} (standard deviation up to {chance:.3f})."
+# ---------------------------------------------------------------- pictures and plots
 
 
-def _cell(entry: Entry, column: Column, *, spread: bool = True) -> str:
-    found = entry.figure(column.figure)
-    if found is None:
-        return "n/a"
-    return column.form(found.mean, found.deviation if spread else None)
+def _channels_last(comparison: Comparison, image: NDArray[Any]) -> NDArray[Any]:
+    return image if comparison.channel_axis is None else np.moveaxis(image, comparison.channel_axis, -1)
 
 
-def _table(comparison: Comparison, caption: str, columns: Sequence[Column], note: str) -> Table:
-    header = ["Schedule", "Equation (14)", *(column.head for column in columns)]
-    rows = [[entry.name, mark(entry), *(_cell(entry, column) for column in columns)] for entry in comparison.entries]
-    return Table(caption, header, rows, note)
+def _label(entry: Entry) -> str:
+    return entry.name if entry.independent else f"{entry.name}, breaks (14)"
 
 
-def _by_level(entries: Sequence[Entry]) -> str:
-    """Who keeps equation (14) at some levels only."""
-    said = []
-    for entry in entries:
-        kept = [str(level) for level, claim in enumerate(reversed(entry.claims)) if claim]
-        if kept and len(kept) < len(entry.claims) and not entry.caught:
-            said.append(f" At level {_listed(kept)} {entry.name} keeps equation (14).")
-    return "".join(said)
+def _pictures(comparison: Comparison) -> list[Part]:
+    limits = float(comparison.sample.min()), float(comparison.sample.max())
+
+    def shown(image: NDArray[Any]) -> NDArray[np.uint8]:
+        return to_display(_channels_last(comparison, image), limits)
+
+    first = [("the sample", shown(comparison.sample))]
+    first += [(_label(entry), shown(entry.runs[0].image)) for entry in comparison.entries]
+    sheet = contact_sheet(first, columns=min(4, len(first)), scale=max(1, SHOWN_SIDE // max(comparison.shape)))
+    parts: list[Part] = [Figure("pictures.png", sheet, "The sample, and the output of each schedule with one seed.")]
+    if len(comparison.seeds) > 1:
+        turns = zip(*(entry.runs for entry in comparison.entries), strict=True)
+        every = [(f"{run.schedule}, {run.seed}", shown(run.image)) for runs in turns for run in runs]
+        sheet = contact_sheet(every, columns=len(comparison.entries))
+        parts.append(Figure("seeds.png", sheet, "The outputs of all seeds, one seed a row."))
+    return parts
 
 
-def _few_free(comparison: Comparison) -> str:
-    free = int(comparison.options["free_sweeps"])
-    if free >= LEAST_FREE:
-        return ""
-    return (
-        f" With {free} free sweep{'s' * (free != 1)} what still settles is not told from what oscillates; "
-        f"{LEAST_FREE} or more tell."
-    )
+Points = tuple[list[float], list[float], list[int]]
+"""The x and y of a curve, and which of its points have a marker."""
 
 
-def _array_name(accounting: dict[str, Any]) -> str:
-    if accounting["mapping"] == "packed":
-        return f"{accounting['array']} PEs of a MasPar MP-1, active sites packed"
-    return f"{accounting['array']} PEs of a MasPar MP-1, {accounting['mapping']}"
+def _curves(comparison: Comparison, points: Callable[[Run], Points], title: str, x: str, y: str) -> tuple[Plot, Axes]:
+    """Plot a curve for each run, those of the first seed on top and labelled."""
+    entries = comparison.entries
+    plot = new_figure(9.2, 4.4)
+    axes = plot.subplots()
+    tidy(axes, title, x, y)
+    for entry, style in zip(entries, styles({e.name: e.independent for e in entries}).values(), strict=True):
+        for run in entry.runs[:0:-1]:
+            axes.plot(*points(run)[:2], **style | {"marker": None, "linewidth": 0.8, "alpha": 0.35})
+        *curve, marked = points(entry.runs[0])
+        axes.plot(*curve, markevery=marked, linewidth=1.7, markersize=6, label=_label(entry), **style)
+    legend(plot, axes, "outside right upper", 1)
+    return plot, axes
 
 
-def _job(comparison: Comparison, command: str) -> list[Text | Table | Figure]:
-    about = {
-        "simdtex": __version__,
-        "device": comparison.device,
-        "seeds": ", ".join(map(str, comparison.seeds)),
-        "sample": " x ".join(map(str, comparison.sample.shape)) + f", {comparison.sample.dtype}",
-        "output": " x ".join(map(str, comparison.shape)) + " (rows x columns)",
-        **{name: str(value) for name, value in comparison.options.items()},
-    }
-    shown: list[Text | Table | Figure] = [Text(f"$ {command}")] if command else []
-    return [*shown, Table("The same for every schedule", ["What", "Value"], [[k, v] for k, v in about.items()])]
+def _temperature(comparison: Comparison) -> Plot:
+    """Plot the temperature left at the finest level against its steps, until equilibrium."""
+
+    def points(run: Run) -> Points:
+        sweeps = [sweep for sweep in run.finest if sweep.phase == "relax"]
+        x = [0.0, *(float(sweep.steps) for sweep in sweeps)]
+        return x, [sweep.before for sweep in sweeps[:1]] + [sweep.left for sweep in sweeps], list(range(len(x)))
+
+    plot, axes = _curves(comparison, points, "Temperature left", "Step of the finest level", "Mean temperature")
+    axes.set_xscale("symlog", linthresh=1.0, linscale=0.3)
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.set_xlim(left=0.0)
+    axes.set_ylim(bottom=0.0)
+    return plot
 
 
-COMPACT = (
-    *EQUILIBRIUM[:4],
-    EQUILIBRIUM[5],
-    *(column for column in TIMES if column.figure != "passes"),
-    *MOVES[1:],
-    *QUALITY[:4],
-)
+def _per_sweep(comparison: Comparison, what: str, title: str) -> Plot:
+    """Plot a share of the finest level's pixels, ``"changed"`` or ``"returned"``, against its sweeps."""
 
+    def points(run: Run) -> Points:
+        known = [(sweep, getattr(sweep, what)) for sweep in run.finest if getattr(sweep, what) is not None]
+        free = [place for place, (sweep, _) in enumerate(known) if sweep.phase == "free"]
+        return [float(sweep.sweep) for sweep, _ in known], [100 * share for _, share in known], free
 
-def terminal_tables(comparison: Comparison, width: int) -> list[rich.table.Table]:
-    """One line for each schedule: in one table where the terminal is wide enough, else in several.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    width : int
-        Of the terminal, characters.
-    """
-    spread = {column.figure for column in QUALITY}
-    names = [entry.name for entry in comparison.entries]
-    marks = ["yes" if e.independent else "NO, but claims to" if e.caught else "NO" for e in comparison.entries]
-    room = width - max(map(len, ["schedule", *names])) - max(map(len, ["keeps (14)", *marks])) - 4
-    pages: list[list[tuple[Column, list[str]]]] = [[]]
-    used = 0
-    for column in COMPACT:
-        cells = [_cell(entry, column, spread=column.figure in spread) for entry in comparison.entries]
-        wide = 2 + _width(column, cells)
-        if pages[-1] and used + wide > room:
-            pages.append([])
-            used = 0
-        pages[-1].append((column, cells))
-        used += wide
-    tables = []
-    for page in pages:
-        table = rich.table.Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
-        table.add_column("schedule", no_wrap=True)
-        table.add_column("keeps (14)", no_wrap=True)
-        for column, cells in page:
-            table.add_column(column.short, justify="right", width=_width(column, cells))
-        for place, name in enumerate(names):
-            style = None if marks[place] == "yes" else "yellow"
-            table.add_row(name, marks[place], *(cells[place] for _, cells in page), style=style)
-        tables.append(table)
-    return tables
-
-
-def _width(column: Column, cells: Sequence[str]) -> int:
-    return max(map(len, [*cells, *column.short.split()]))  # heads wrap, cells do not
+    plot, axes = _curves(comparison, points, title, "Sweep of the finest level", "Pixels, %")
+    axes.set_yscale("symlog", linthresh=0.1, linscale=0.3)
+    axes.set_ylim(bottom=0.0)
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    return plot

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a solid texture looks like: a cube, a cube without an octant, a sphere, and its middle slices, on one sheet.
+"""Pictures of a solid texture on one sheet: a cube, a cube without an octant, a sphere, and its middle slices.
 
 Directions are (z, y, x) as the axes of a block: x to the right, y down and z away from the viewer of its first slice.
 """
@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 
-from simdtex.io.image import check_writable, to_display, write
-from simdtex.report.sheet import GAP, LEAST_SIDE, MOST_SIDE, contact_sheet, fitted
+from simdtex.io.image import check_writable, to_display
+from simdtex.report.sheet import LEAST_SIDE, MOST_SIDE, contact_sheet, fitted, magnified, rgb
 
 __all__ = ["view"]
 
@@ -23,10 +23,11 @@ Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 PathLike = str | os.PathLike[str]
 Hits = tuple[NDArray[np.bool_], Floats, Floats]
-"""Which rays meet a body; where; and the normals there, outward. Only those that do are in the last two."""
+"""Whether each ray meets the body; of those that do, the points and the outward normals there."""
 
 YAW, PITCH = radians(40.0), radians(28.0)  # how far the camera stands to the right of the first slice, and above it
 AHEAD = np.array([cos(YAW) * cos(PITCH), sin(PITCH), -sin(YAW) * cos(PITCH)])
+TOWARDS = -np.sign(AHEAD)  # the octant nearest to the camera
 RIGHT = np.array([sin(YAW), 0.0, cos(YAW)])
 DOWN = np.array([-sin(PITCH) * cos(YAW), cos(PITCH), sin(PITCH) * sin(YAW)])
 LIGHT = np.array([-0.55, -0.80, 0.24])  # towards the lamp: above, before the first slice, a little to the right
@@ -38,7 +39,7 @@ SIZES = range(LEAST_SIDE, MOST_SIDE + 1)  # what a sheet shows as it is
 
 
 def view(volume: ArrayLike, path: PathLike | None = None, size: int = 360) -> Picture:
-    """Show a solid texture as one sees a block of stone.
+    """Show a solid texture as a block of stone.
 
     Parameters
     ----------
@@ -69,7 +70,7 @@ def view(volume: ArrayLike, path: PathLike | None = None, size: int = 360) -> Pi
     if size not in SIZES:
         raise ValueError(f"size is {size}: give {SIZES[0]} to {SIZES[-1]} pixels")
     if path is not None:
-        check_writable(path, np.uint8, 3)
+        check_writable(path, np.uint8, 3)  # before the work
     block = block[..., np.newaxis] if block.ndim == 3 else block
     block = to_display(block[..., : 3 if block.shape[3] >= 3 else 1])
     half = np.array(block.shape[:3]) / 2
@@ -82,36 +83,23 @@ def view(volume: ArrayLike, path: PathLike | None = None, size: int = 360) -> Pi
     ]
     pictures = [(name, _rendered(block, body, size, step)) for name, body in bodies]
     z, y, x = (n // 2 for n in block.shape[:3])
-    slices = [
-        (f"x-y slice, z = {z}", block[z]),
-        (f"x-z slice, y = {y}", block[:, y]),
-        (f"y-z slice, x = {x}", block[:, :, x]),
-    ]
+    slices = {
+        f"x-y slice, z = {z}": block[z],
+        f"x-z slice, y = {y}": block[:, y],
+        f"y-z slice, x = {x}": block[:, :, x],
+    }
     longest = max(block.shape[:3])
-    bodies_sheet = contact_sheet(pictures, columns=3)
-    width = (bodies_sheet.shape[1] - GAP) // 3 - GAP  # a label may be wider than the pictures
-    slices_sheet = contact_sheet([(name, _sized(p, size, longest, width)) for name, p in slices], columns=3)
-    sheet = np.vstack([bodies_sheet, slices_sheet])
-    if path is not None:
-        write(path, sheet)
-    return sheet
-
-
-def _sized(picture: Picture, size: int, longest: int, width: int) -> Picture:
-    """A slice by the whole factor that brings the block's longest side up or down to a size, on white of a width."""
-    factor, reduced = size // longest, -(-longest // size)
-    if factor > 1:
-        picture = picture.repeat(factor, axis=0).repeat(factor, axis=1)
-    elif reduced > 1:
-        picture = fitted(picture, -(-max(picture.shape[:2]) // reduced))
-    return np.pad(picture, ((0, 0), (0, width - picture.shape[1]), (0, 0)), constant_values=255)
+    for name, picture in slices.items():  # all by the whole factor that fits the longest side
+        small = fitted(rgb(picture), -(-max(picture.shape[:2]) // -(-longest // size)))
+        pictures.append((name, magnified(small, max(1, size // longest))))
+    return contact_sheet(pictures, path, columns=3, scale=1)
 
 
 # ---------------------------------------------------------------- rays
 
 
 def _rendered(block: Picture, body: Callable[[Floats], Hits], size: int, step: float) -> Picture:
-    """A body out of a block, seen from a corner in parallel rays, `step` voxels of the block to a pixel."""
+    """Return a body cut out of a block, seen from a corner in parallel rays, `step` voxels of the block to a pixel."""
     samples = max(SAMPLES, min(4, ceil(step)))
     place = ((np.arange(size * samples) + 0.5) / samples - size / 2) * step
     rays = place[:, np.newaxis, np.newaxis] * DOWN + place[:, np.newaxis] * RIGHT
@@ -128,36 +116,27 @@ def _rendered(block: Picture, body: Callable[[Floats], Hits], size: int, step: f
 
 
 def _cube(rays: Floats, half: Floats) -> Hits:
-    """Where rays enter a box around the origin."""
-    near, far = _slabs(rays, -half, half)
+    """Return where rays enter a box around the origin."""
+    faces = (-half - rays) / AHEAD, (half - rays) / AHEAD
+    near, far = np.minimum(*faces), np.maximum(*faces)
     enter = near.max(-1)
     hit = enter < far.min(-1)
-    return hit, *_on_face(rays[hit], enter[hit], near[hit].argmax(-1), -np.sign(AHEAD))
+    normals = np.eye(3)[near[hit].argmax(-1)] * TOWARDS
+    return hit, rays[hit] + enter[hit][:, np.newaxis] * AHEAD, normals
 
 
 def _cube_without_octant(rays: Floats, half: Floats) -> Hits:
-    """The same where the octant before the origin is cut out: rays in it go on to one of its inner faces."""
+    """Return the same for a box without its nearest octant: rays that enter there end on one of its inner faces."""
     hit, points, normals = _cube(rays, half)
-    towards = -np.sign(AHEAD)
-    inside = (points * towards > 0).all(-1)
+    inside = (points * TOWARDS > 0).all(-1)
     far = -points[inside] / AHEAD
-    points[inside], normals[inside] = _on_face(points[inside], far.min(-1), far.argmin(-1), towards)
+    points[inside] += far.min(-1)[:, np.newaxis] * AHEAD
+    normals[inside] = np.eye(3)[far.argmin(-1)] * TOWARDS
     return hit, points, normals
 
 
-def _slabs(rays: Floats, low: Floats, high: Floats) -> tuple[Floats, Floats]:
-    """How far along each ray the two faces of every direction are, the near and the far one."""
-    near, far = ((face - rays) / AHEAD for face in (low, high))
-    return np.minimum(near, far), np.maximum(near, far)
-
-
-def _on_face(rays: Floats, way: Floats, axis: NDArray[np.intp], towards: Floats) -> tuple[Floats, Floats]:
-    """The points so far along rays, and the normals of the faces of these axes there."""
-    return rays + way[:, np.newaxis] * AHEAD, np.eye(3)[axis] * towards
-
-
 def _sphere(rays: Floats, radius: float) -> Hits:
-    """Where rays meet a sphere around the origin; the rays start in the plane through it."""
+    """Return where rays meet a sphere around the origin; the rays start in the plane through it."""
     depth = radius**2 - (rays**2).sum(-1)
     hit = depth > 0
     points = rays[hit] - np.sqrt(depth[hit])[:, np.newaxis] * AHEAD

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The stages of a run as pictures: every level, every sweep, and what each has beside its picture."""
+"""The stages of a run as pictures: every level, sweep or iteration."""
 
 from __future__ import annotations
 
@@ -9,31 +9,20 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+import PIL.Image
 
-from simdtex.io.image import read, to_display, write
+from simdtex.io.image import to_display, write
 from simdtex.model.colours import heat
 from simdtex.report.folder import earlier_files
-from simdtex.report.sheet import (
-    FRAME_SIDE,
-    FRAMES,
-    animation,
-    contact_sheet,
-    enlarged,
-    fitted,
-    reduction,
-)
+from simdtex.report.sheet import FRAME_SIDE, Picture, animation, contact_sheet, enlarged, fitted, reduction
 from simdtex.run import Progress
 
 __all__ = ["StageWriter"]
 
-Picture = NDArray[np.uint8]
+FRAMES = 200  # most frames of the animation
 
-_STAGE = re.compile(
-    r"((temperature|candidates)-)?level\d+(-sweep\d+)?\.png|iteration\d+\.png|sheet\.png|animation\.gif"
-)
-
-_NUMBERS = re.compile(r"level(?P<level>\d+)(-sweep(?P<sweep>\d+))?|iteration(?P<iteration>\d+)")
+_STAGE = re.compile(r"level(?P<level>\d+)(-sweep(?P<sweep>\d+))?|iteration(?P<iteration>\d+)")
+_FILE = re.compile(rf"((temperature|candidates)-)?({_STAGE.pattern})\.png|sheet\.png|animation\.gif")
 
 
 class StageWriter:
@@ -42,21 +31,21 @@ class StageWriter:
     Of ``mrf`` it writes ``level{l}-sweep{k}.png`` and ``temperature-level{l}-sweep{k}.png`` at the
     end of each sweep; of ``multires``, ``level{l}.png`` and ``candidates-level{l}.png`` at the end
     of each level, brighter where a pixel had more candidates, on a logarithmic scale from 1; of
-    ``pyramid``, ``iteration{k}.png``, of a block its middle slice. On `finish` it writes
-    ``sheet.png``, the last picture of each level or iteration at one size, and ``animation.gif``.
-    Pictures are 8-bit previews; each file is written whole or not at all.
+    ``pyramid``, ``iteration{k}.png``, of a block its middle slice. `finish` writes ``sheet.png``,
+    the last picture of each level or iteration at one size, and ``animation.gif``. Pictures are
+    8-bit previews; each file is written whole or not at all.
 
     Parameters
     ----------
     folder : path
         Made at the first picture. It may exist if it is empty or holds only the stages of an
-        earlier run; those are removed at the first picture, but for what `onward` keeps.
+        earlier run; those are removed at the first picture unless `resumed` keeps them.
     limits : (low, high), optional
-        The values shown as black and white where pixels are not uint8: the sample's smallest and
+        The values shown as black and white if pixels are not uint8: the sample's smallest and
         largest. By default those of the first picture.
-    onward : callable, optional
-        Says, at the first picture, whether the run goes on from a checkpoint: the stages before that picture then stay
-        and have their places on the sheet and in the animation.
+    resumed : callable, optional
+        Returns, at the first picture, whether the run continues from a checkpoint. If so, the stages before that
+        picture stay, and are shown on the sheet and in the animation.
 
     Raises
     ------
@@ -65,7 +54,7 @@ class StageWriter:
 
     Notes
     -----
-    Holds at most 200 frames of at most 512 pixels a side for the animation, 160 MB in colour.
+    `finish` holds at most 200 frames of at most 512 pixels a side, 160 MB.
     """
 
     def __init__(
@@ -73,103 +62,78 @@ class StageWriter:
         folder: str | os.PathLike[str],
         *,
         limits: tuple[float, float] | None = None,
-        onward: Callable[[], bool] | None = None,
+        resumed: Callable[[], bool] = lambda: False,
     ) -> None:
         self.folder = Path(folder)
-        self._onward = onward
-        self._limits = limits
-        self._earlier = earlier_files(self.folder, "the stages", _stages_in)
+        self._limits, self._resumed = limits, resumed
+        self._earlier = earlier_files(self.folder, "the stages", lambda name: bool(_FILE.fullmatch(name)))
         self._started = False
-        self._frames: list[tuple[int, Picture]] = []
-        self._every = 1
-        self._seen = 0
-        self._last: dict[str, tuple[int, Picture]] = {}
-        self._shapes: dict[int, tuple[int, ...]] = {}
 
     def __call__(self, progress: Progress) -> None:
         """Write one stage if it is complete; else do nothing."""
         name = progress.stage
         if name is None:
             return
-        self._start(name)
+        if not self._started:
+            self._start(name)
         values = progress.picture()
         if self._limits is None and values.dtype.kind != "b":
             self._limits = float(values.min()), float(values.max())
         picture = to_display(values, self._limits)
-        write(self.folder / f"{name}.png", _savable(picture))
+        write(self.folder / f"{name}.png", picture if picture.ndim == 2 else picture[..., :4])
         for kind, values in progress.maps().items():
             write(self.folder / f"{kind}-{name}.png", heat(values))
-        self._keep(progress.level, progress.caption, picture)
-
-    def finish(self) -> None:
-        """Write the sheet and the animation of what was seen; nothing if nothing was."""
-        if not self._last:
-            return
-        finest, reference = list(self._last.values())[-1]
-
-        def shown(level: int, picture: Picture) -> Picture:
-            # a frame's pixel stands for a block of its own level's sites, 2^level pixels apart
-            step = 2.0 ** (level - finest) * self._reduction(level) / self._reduction(finest)
-            return enlarged(picture, (reference.shape[0], reference.shape[1]), step)
-
-        sheet = [
-            ("{}: {} x {}".format(caption, *self._shapes[level]), shown(level, picture))
-            for caption, (level, picture) in self._last.items()
-        ]
-        contact_sheet(sheet, self.folder / "sheet.png")
-        frames = [shown(level, frame) for level, frame in self._frames]
-        animation([*frames, reference], self.folder / "animation.gif")
-
-    def _reduction(self, level: int) -> int:
-        return reduction(self._shapes[level], FRAME_SIDE)
 
     def _start(self, name: str) -> None:
-        if self._started:
-            return
-        self._started = True
-        onward = self._onward is not None and self._onward()
-        before = [path for path in self._earlier if onward and _precedes(path.stem, name)]
+        """Make the folder, and remove the files of an earlier run."""
+        resumed, self._started = self._resumed(), True
         try:
             self.folder.mkdir(exist_ok=True)
             for path in self._earlier:
-                if path not in before:
+                if not (resumed and _STAGE.search(path.stem) and _order(path.stem) < _order(name)):
                     path.unlink(missing_ok=True)
-            for path in sorted(before, key=lambda path: _turn(path.stem)):
-                if found := _NUMBERS.fullmatch(path.stem):
-                    level = int(found["level"] or 0)
-                    caption = f"iteration {int(found['iteration'])}" if found["iteration"] else f"level {level}"
-                    self._keep(level, caption, read(path).pixels)
         except OSError as error:
             raise ValueError(f"the folder {self.folder} cannot be written ({error.strerror}): choose another") from None
 
-    def _keep(self, level: int, caption: str, picture: Picture) -> None:
-        small = fitted(picture, FRAME_SIDE)
-        self._last[caption] = level, small
-        self._shapes[level] = picture.shape[:2]
-        if self._seen % self._every == 0:
-            self._frames.append((level, small))
-        if len(self._frames) == FRAMES:  # every other one from here on
-            self._frames, self._every = self._frames[::2], self._every * 2
-        self._seen += 1
+    def finish(self) -> None:
+        """Write the sheet and the animation of the pictures in the folder; nothing if there was no stage."""
+        found = [path for path in self.folder.glob("*.png") if _STAGE.fullmatch(path.stem)] if self._started else []
+        if not found:
+            return
+        paths = sorted(found, key=lambda path: _order(path.stem))
+        finest, shape = _level(paths[-1]), _read(paths[-1]).shape[:2]
+        reference = fitted(_read(paths[-1]), FRAME_SIDE).shape[:2]
+
+        def shown(path: Path) -> Picture:
+            # a pixel stands for 2^(level - finest) pixels each way, less the reductions of both pictures
+            picture = _read(path)
+            step = 2.0 ** (_level(path) - finest) * reduction(picture.shape, FRAME_SIDE) / reduction(shape, FRAME_SIDE)
+            return enlarged(fitted(picture, FRAME_SIDE), reference, step)
+
+        last = {_caption(path): path for path in paths}
+        sheet = [("{}: {} x {}".format(caption, *_read(path).shape), shown(path)) for caption, path in last.items()]
+        contact_sheet(sheet, self.folder / "sheet.png")
+        every = -(-len(paths) // FRAMES)
+        animation(map(shown, paths[::-every][::-1]), self.folder / "animation.gif")
 
 
-def _turn(stem: str) -> tuple[int, int]:
-    """Where a stage of this name comes among the others: coarse levels first."""
-    found = _NUMBERS.search(stem)
-    if found is None:
-        return 1, 0
+def _order(stem: str) -> tuple[int, int]:
+    """The place of a stage among the others, coarse levels first."""
+    found = _STAGE.search(stem)
+    assert found
     return -int(found["level"] or 0), int(found["sweep"] or found["iteration"] or 0)
 
 
-def _precedes(stem: str, name: str) -> bool:
-    """Whether a file is of a stage before another."""
-    return _NUMBERS.search(stem) is not None and _turn(stem) < _turn(name)
+def _level(path: Path) -> int:
+    return -_order(path.stem)[0]
 
 
-def _stages_in(folder: Path) -> list[str]:
-    return [path.name for path in folder.iterdir() if _STAGE.fullmatch(path.name)]
+def _caption(path: Path) -> str:
+    """The name of the level or iteration of a stage."""
+    level, number = _order(path.stem)
+    return f"iteration {number}" if path.stem.startswith("iteration") else f"level {-level}"
 
 
-def _savable(picture: Picture) -> Picture:
-    # a PNG has at most four channels
-    return picture if picture.ndim == 2 or picture.shape[2] <= 4 else picture[..., :3]
+def _read(path: Path) -> Picture:
+    with PIL.Image.open(path) as picture:
+        return np.array(picture.convert("RGB"))

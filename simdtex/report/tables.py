@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Tables of text for pages and terminals, and numbers as text."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import floor, log10
+
+import rich.table
+from rich.console import Console
+
+__all__ = ["Table", "duration_text", "number_text", "print_table", "rate_text", "seconds_text", "warns"]
+
+_NUMBER = re.compile(r"[-+\u2212]?\d.*|[-\u2013]|n/a|inf")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of texts.
+
+    Parameters
+    ----------
+    caption : str
+    rows : sequence of dict
+        Heading -> cell, one dict for each row, all with the same headings. The first cell names the row. A cell that
+        begins with ``breaks`` or ``differs`` is set as a warning.
+    note : str
+        A remark below the table; shown on pages only.
+    """
+
+    caption: str
+    rows: Sequence[Mapping[str, str]]
+    note: str = ""
+
+    @property
+    def header(self) -> list[str]:
+        """The headings."""
+        return list(self.rows[0]) if self.rows else []
+
+    @property
+    def numeric(self) -> list[bool]:
+        """Whether each column holds numbers, which are aligned to the right; always False for the first column."""
+        return [n > 0 and all(_NUMBER.fullmatch(row[name]) for row in self.rows) for n, name in enumerate(self.header)]
+
+
+def warns(cell: str) -> bool:
+    """Return whether a cell is set as a warning."""
+    return cell.startswith(("breaks", "differs"))
+
+
+def print_table(table: Table, width: int | None = None) -> None:
+    """Print a table; if it is too wide, its columns in several parts, each with the first column.
+
+    Parameters
+    ----------
+    table : Table
+    width : int, optional
+        Characters of a line; by default those of the terminal, and 200 if the output is no terminal.
+    """
+    console = Console(width=width or (None if sys.stdout.isatty() else 200))
+    header, numeric = table.header, table.numeric
+    widths = [max(map(len, [*name.split(), *(row[name] for row in table.rows)])) for name in header]
+    console.print(table.caption, style="italic", highlight=False)
+    first = 1
+    while first < len(header):
+        last = first + 1
+        while last < len(header) and sum(2 + widths[k] for k in (0, *range(first, last + 1))) <= console.width:
+            last += 1
+        columns = [0, *range(first, last)]
+        shown = rich.table.Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
+        for k in columns:  # headings may wrap, cells may not
+            shown.add_column(header[k], justify="right" if numeric[k] else "left", width=widths[k])
+        for row in table.rows:
+            style = "yellow" if any(map(warns, row.values())) else None
+            shown.add_row(*(row[header[k]] for k in columns), style=style)
+        console.print(shown)
+        first = last
+    console.print()
+
+
+def number_text(
+    value: float | None, deviation: float | None = None, decimals: int | None = None, unit: str = ""
+) -> str:
+    """Return a number as text, ``"12.3 ± 0.4"``, with thousands separated by commas.
+
+    Parameters
+    ----------
+    value : float or None
+        None gives ``"n/a"``.
+    deviation : float, optional
+        Written with as many decimals.
+    decimals : int, optional
+        By default as many as make three significant digits, none for a whole number without a deviation.
+    unit : str
+        Appended.
+    """
+    if value is None:
+        return "n/a"
+    if decimals is None:
+        magnitude = floor(log10(abs(value))) if value else 0
+        decimals = 0 if value == int(value) and not deviation else 2 - min(2, max(-2, magnitude))
+    spread = "" if deviation is None else f" ± {deviation:,.{decimals}f}"
+    return f"{value:,.{decimals}f}{spread}{unit}"
+
+
+def seconds_text(seconds: float) -> str:
+    """Return a duration with three digits: ``"1.23 s"``, ``"45.6 ms"``, ``"789 us"``."""
+    return _prefixed(seconds, {" s": 1.0, " ms": 1e-3, " us": 1e-6})
+
+
+def rate_text(rate: float | None) -> str:
+    """Return a rate with three digits and a prefix, ``"12.3 G"``; ``"-"`` if unknown."""
+    return "-" if rate is None else _prefixed(rate, {" T": 1e12, " G": 1e9, " M": 1e6, " k": 1e3, "": 1.0})
+
+
+def _prefixed(value: float, units: Mapping[str, float]) -> str:
+    unit = next((unit for unit, size in units.items() if value >= size), list(units)[-1])
+    value /= units[unit]
+    return f"{value:.{0 if value >= 99.95 else 1 if value >= 9.995 else 2}f}{unit}"
+
+
+def duration_text(seconds: float) -> str:
+    """Return a duration for people: ``"0.3 s"``, ``"2.5 min"``, ``"9.6 h"``, ``"12.0 d"``."""
+    units = {"d": 86400.0, "h": 3600.0, "min": 60.0}
+    unit = next((unit for unit, length in units.items() if seconds >= 2 * length), "s")
+    return f"{seconds / units.get(unit, 1.0):.1f} {unit}"

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What commands print of a run: its profile, its accounting, and the versions that it depends on."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import version
+from typing import Any
+
+from simdtex.machine.devices import DeviceError, find
+from simdtex.report.tables import Table, duration_text, print_table, rate_text, seconds_text
+
+__all__ = ["print_accounting", "print_profile", "profile_summary", "profile_table", "version_lines"]
+
+
+def print_profile(statistics: dict[str, Any]) -> None:
+    """Print the profile in the statistics of a run, see `simdtex.run.Output`."""
+    print_table(profile_table(statistics))
+    print(profile_summary(statistics))
+
+
+def profile_table(statistics: dict[str, Any]) -> Table:
+    """Return a table of the kernels of a run."""
+    rows = [
+        {
+            "kernel": kernel["name"],
+            "calls": f"{kernel['calls']:,}",
+            **{name: seconds_text(kernel[name]) for name in ("min", "median", "max")},
+            "total": seconds_text(kernel["seconds"]),
+            "share": f"{kernel['share']:.1%}",
+            "fma/s": rate_text(kernel["fma_rate"]),
+            "bytes/s": rate_text(kernel["byte_rate"]),
+        }
+        for kernel in statistics["kernels"]
+    ]
+    return Table(f"Kernels on {statistics['device']}", rows)
+
+
+def profile_summary(statistics: dict[str, Any]) -> str:
+    """Return a sentence on the wall time, the time in kernels and the gaps between them."""
+    wall, busy, gaps = statistics["seconds"], statistics["device_seconds"], statistics["gaps"]
+    text = f"wall time {seconds_text(wall)}: kernels {seconds_text(busy)} ({busy / wall:.1%})"
+    if not gaps["calls"]:
+        return text
+    return (
+        f"{text}; between them {seconds_text(gaps['seconds'])} ({gaps['seconds'] / wall:.1%}) in {gaps['calls']:,} "
+        f"gaps, median {seconds_text(gaps['median'])}, longest {seconds_text(gaps['max'])}; "
+        f"before the first and after the last {seconds_text(max(0.0, wall - busy - gaps['seconds']))}"
+    )
+
+
+def print_accounting(accounting: dict[str, Any]) -> None:
+    """Print the cost of a run on a processor array, ``accounting`` of `simdtex.run.Output.statistics`."""
+    shifts = accounting["shifts"] if accounting["mapping"] != "packed" else {}
+    rows = {
+        "steps: sites that relax together": f"{accounting['steps']:,}",
+        "SIMD steps: passes over a virtual layer": f"{accounting['passes']:,}",
+        "virtual layers": f"{accounting['layers']:,}",
+        "active PEs per SIMD step, mean": f"{accounting['active']:,.0f}",
+        "utilisation of the array": f"{accounting['utilisation']:.1%}",
+        **{f"X-Net shifts for all neighbourhoods, {name}": f"{count:,}" for name, count in shifts.items()},
+        "words shifted by the X-Net, per PE": f"{accounting['moved']:,}",
+        "words through the router": f"{accounting['routed']:,}",
+        "floating-point operations": f"{accounting['flop']:.3g}",
+        "launches on this device": f"{accounting['launches']:,}",
+        "MasPar MP-1 of this size, by the model": duration_text(accounting["model_seconds"]),
+    }
+    caption = f"On an array of {accounting['array']} PEs ({accounting['mapping']})"
+    print_table(Table(caption, [{"What": what, "How much": much} for what, much in rows.items()]))
+
+
+def version_lines() -> list[str]:
+    """Return the versions of simdtex and of what it computes with, and the default device or why none works."""
+    found = [
+        f"simdtex {version('simdtex')}",
+        f"Python {platform.python_version()}, NumPy {version('numpy')}, pyopencl {version('pyopencl')}",
+    ]
+    try:
+        device = find()
+    except DeviceError as error:
+        return [*found, str(error)]
+    driver = f", {device.version}, driver {device.driver}" if device.version else ""
+    return [*found, f"{device}{driver}"]
