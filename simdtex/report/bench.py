@@ -12,7 +12,7 @@ from rich.table import Table
 
 from simdtex.bench import results as worked_out
 from simdtex.io.atomic import atomic_path
-from simdtex.report.tables import number_text, rate_text, seconds_text
+from simdtex.report.tables import rate_text, seconds_text, three_digits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,12 +22,12 @@ DASH = "-"
 
 def percent(share: float | None) -> str:
     """A share as text, ``"85 %"``."""
-    return DASH if share is None else number_text(100 * share, unit=" %")
+    return DASH if share is None else three_digits(100 * share, " %")
 
 
 def times(ratio: float | None) -> str:
     """A ratio as text, ``"8.1 x"``."""
-    return DASH if ratio is None else number_text(ratio, unit=" x")
+    return DASH if ratio is None else three_digits(ratio, " x")
 
 
 def render(results: dict[str, Any], console: Console) -> None:

@@ -12,7 +12,7 @@ from math import floor, log10
 import rich.table
 from rich.console import Console
 
-__all__ = ["Table", "duration_text", "number_text", "print_table", "rate_text", "seconds_text", "warns"]
+__all__ = ["Table", "duration_text", "number_text", "print_table", "rate_text", "seconds_text", "three_digits", "warns"]
 
 _NUMBER = re.compile(r"[-+\u2212]?\d.*|[-\u2013]|n/a|inf")
 
@@ -106,6 +106,13 @@ def number_text(
     return f"{value:,.{decimals}f}{spread}{unit}"
 
 
+def three_digits(value: float | None, unit: str = "") -> str:
+    """Return a number with three digits, or as many as are before its point; ``"-"`` if unknown."""
+    if value is None:
+        return "-"
+    return f"{value:.{0 if value >= 99.95 else 1 if value >= 9.995 else 2}f}{unit}"
+
+
 def seconds_text(seconds: float) -> str:
     """Return a duration with three digits: ``"1.23 s"``, ``"45.6 ms"``, ``"789 us"``."""
     return _prefixed(seconds, {" s": 1.0, " ms": 1e-3, " us": 1e-6})
@@ -118,8 +125,7 @@ def rate_text(rate: float | None) -> str:
 
 def _prefixed(value: float, units: Mapping[str, float]) -> str:
     unit = next((unit for unit, size in units.items() if value >= size), list(units)[-1])
-    value /= units[unit]
-    return f"{value:.{0 if value >= 99.95 else 1 if value >= 9.995 else 2}f}{unit}"
+    return three_digits(value / units[unit], unit)
 
 
 def duration_text(seconds: float) -> str:
