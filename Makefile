@@ -38,7 +38,7 @@ define install
 endef
 
 # A usable device already here (a GPU, PoCL) is used; else the Intel CPU runtime is installed, once.
-ENSURE := $(PY) -c 'import sys; from simdtex.machine.devices import main; sys.exit(main(["--ensure"]))'
+ENSURE := $(PY) -c 'import sys; from simdtex.machine.devices import main; sys.exit(main())'
 define device
 	@$(ENSURE) 2>/dev/null || \
 	    { echo "No OpenCL device works here yet: installing a CPU runtime from the package index (about 250 MB) ..." && \

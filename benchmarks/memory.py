@@ -10,7 +10,6 @@ do, the device's arrays are in it. The second is what `simdtex.machine.memory.re
 
 import argparse
 import json
-import os
 import subprocess
 import sys
 
@@ -76,7 +75,6 @@ def main():
     parser.add_argument("--quick", action="store_true", help="small sizes")
     parser.add_argument("--sides", default="", help="two sides, as 512,1024")
     options = parser.parse_args()
-    os.environ.setdefault("SIMDTEX_TUNE", "0")
     for name, (kind, chosen) in CASES.items():
         if options.only and not name.startswith(tuple(options.only.split(","))):
             continue

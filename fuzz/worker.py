@@ -364,7 +364,7 @@ def serve(root):
     questions = os.fdopen(os.dup(0), "rb", buffering=0)  # so that nothing asked is lost with a process
     environment = {"HOME": "home", "TMPDIR": "tmp", "XDG_CACHE_HOME": "home/.cache", "MPLCONFIGDIR": "home/mpl"}
     os.environ.update({name: str(Path(root, value)) for name, value in environment.items()})
-    os.environ.update(SIMDTEX_TUNE="0", SIMDTEX_DEVICE=os.environ.get("FUZZ_DEVICE", "reference"), COLUMNS="100")
+    os.environ.update(SIMDTEX_DEVICE=os.environ.get("FUZZ_DEVICE", "reference"), COLUMNS="100")
     os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
     reference = os.environ["SIMDTEX_DEVICE"] == "reference"
     worker = Worker(root)

@@ -4,7 +4,6 @@ import os
 
 # PoCL then gives two devices, one thread and many; it reads this when first asked for platforms.
 os.environ.setdefault("POCL_DEVICES", "basic pthread")
-os.environ["SIMDTEX_TUNE"] = "0"  # no test measures, or touches the user's cache
 
 import functools
 
@@ -64,7 +63,7 @@ def pytest_generate_tests(metafunc):
 def _take(info: DeviceInfo | None) -> DeviceInfo:
     """Hand a device to a test; where there is none, fail if one is required, else skip."""
     if info is None:
-        message = "no usable OpenCL device here; `python -m simdtex.machine.devices` says why"
+        message = "no usable OpenCL device here; `simdtex devices` says why"
         if os.environ.get(REQUIRE):
             pytest.fail(message)
         pytest.skip(message)

@@ -291,7 +291,7 @@ def test_a_command_that_is_killed(place, tmp_path):
     image.write(place / "sample.png", texture((64, 64)))
     words = ["synth", "sample.png", "-o", "out.png", "--size", "256x256", "--order", "4", "--seed", "1", "-q"]
     words += ["--device", "reference", "--checkpoint", "kept"]
-    environment = os.environ | {"PYTHONPATH": str(Path(simdtex.__file__).parent.parent), "SIMDTEX_TUNE": "0"}
+    environment = os.environ | {"PYTHONPATH": str(Path(simdtex.__file__).parent.parent)}
 
     def process(*words):
         return subprocess.Popen([sys.executable, "-m", "simdtex", *words], env=environment, cwd=place)

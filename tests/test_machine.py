@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import simdtex
+from simdtex.machine import runtimes
 from simdtex.machine.devices import DeviceError
 from simdtex.machine.interface import Operation
 from simdtex.machine.opencl import OpenCL
@@ -54,6 +55,23 @@ def test_a_device_cannot_be_two_things():
         simdtex.open_machine("no such device")
 
 
+OPEN = """
+import sys
+import numpy as np
+import simdtex
+print(simdtex.synthesize(np.eye(8), (4, 4), order=1, rng=1, levels=1, device=sys.argv[1]).shape)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="caches of Windows are in other folders")
+@pytest.mark.parametrize("environment", [{"HOME": "FILE", "XDG_CACHE_HOME": ""}, {"XDG_CACHE_HOME": "/proc/nowhere"}])
+def test_a_device_opens_if_no_cache_can_be_written(cl_device, tmp_path, environment):
+    (tmp_path / "FILE").touch()
+    environment = {key: value.replace("FILE", str(tmp_path / "FILE")) for key, value in environment.items()}
+    assert python(OPEN, str(cl_device.index), TMPDIR=str(tmp_path), **environment) == ["(4,", "4)"]
+    assert os.listdir(tmp_path) == ["FILE"], "the temporary cache is removed"
+
+
 # Threads and forks: in processes of their own, since a race may end in a crash, and a fork may wait for ever
 
 
@@ -61,7 +79,7 @@ def python(code, *words, **environment):
     """What a process of its own prints; at most 100 seconds."""
     result = subprocess.run(
         [sys.executable, "-c", code, *words],
-        env=os.environ | {"SIMDTEX_TUNE": "0"} | environment,
+        env=os.environ | environment,
         capture_output=True,
         text=True,
         timeout=100,
@@ -167,7 +185,7 @@ def test_what_is_no_device_is_a_type_error_of_one_sentence(wrong):
     with pytest.raises(TypeError, match=sentence):
         simdtex.open_machine(wrong)
     with pytest.raises(TypeError, match=sentence):
-        simdtex.synthesize(np.eye(8), (4, 4), device=wrong)
+        simdtex.synthesize(np.eye(8), (4, 4), order=1, device=wrong)
 
 
 def test_a_line_of_the_listing_opens_its_device(any_device):
@@ -176,9 +194,7 @@ def test_a_line_of_the_listing_opens_its_device(any_device):
 
 
 def test_the_compilers_warnings_are_not_printed(cl_device, capfd):
-    from simdtex.machine import programs
-
     machine = OpenCL(cl_device)
     source = f"__kernel void f(__global int *a) {{ int b; a[0] = b; 7; }} // {uuid.uuid4()}"
-    programs.compiled(machine.context, source, [])
+    runtimes.build(machine.context, source, [])
     assert capfd.readouterr() == ("", "")

@@ -1,10 +1,11 @@
 """What a run may take of the device's memory and of the host's, and that it takes no more."""
 
 import importlib.util
-import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
+import psutil
 import pytest
 
 import simdtex
@@ -14,83 +15,44 @@ from simdtex.machine.reference import Reference
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLE = np.random.default_rng(1).integers(0, 256, (16, 16), dtype=np.uint8)
-FREE = "MemTotal: 9000 kB\nMemAvailable: 5000 kB\n"
+MEBIBYTE = 2**20
 
 
-def system(folder, **files):
-    """A folder as Linux has it, of files by name with ``/`` written ``__``."""
-    for name, text in files.items():
-        path = folder / name.replace("__", "/").replace("_dot_", ".")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-    return folder
+@pytest.fixture
+def limits(monkeypatch, tmp_path):
+    """Set the free memory, the memory of this process and the texts of the limits of its control group, in files."""
+    files = (tmp_path / "memory.max", tmp_path / "memory.limit_in_bytes")
+    monkeypatch.setattr(memory, "LIMITS", files)
+
+    def set_to(free, used, *texts):
+        monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=free))
+        process = SimpleNamespace(memory_info=lambda: SimpleNamespace(rss=used))
+        monkeypatch.setattr(psutil, "Process", lambda: process)
+        for path, text in zip(files, texts, strict=False):
+            if text is not None:
+                path.write_text(text)
+
+    return set_to
 
 
-V2 = {"sys__fs__cgroup__a__b__memory_dot_max": "max\n", "sys__fs__cgroup__a__b__memory_dot_current": "1000\n"}
-LIMITS = {
-    "nothing set": ({}, 5000 * 1024),
-    "version 2": (
-        {
-            "proc__self__cgroup": "0::/a/b\n",
-            "sys__fs__cgroup__a__b__memory_dot_max": "3000000\n",
-            "sys__fs__cgroup__a__b__memory_dot_current": "1000000\n",
-            "sys__fs__cgroup__a__b__memory_dot_stat": "anon 5\ninactive_file 400000\n",
-        },
-        2_400_000,
-    ),
-    "version 2, of the group above": (
-        V2
-        | {
-            "proc__self__cgroup": "0::/a/b\n",
-            "sys__fs__cgroup__a__memory_dot_max": "2000000\n",
-            "sys__fs__cgroup__a__memory_dot_current": "500000\n",
-        },
-        1_500_000,
-    ),
-    "version 2, of a container": (
-        {
-            "proc__self__cgroup": "0::/\n",
-            "sys__fs__cgroup__memory_dot_max": "1000000\n",
-            "sys__fs__cgroup__memory_dot_current": "999000\n",
-        },
-        1000,
-    ),
-    "version 1": (
-        {
-            "proc__self__cgroup": "5:cpu,cpuacct:/a\n4:memory:/a\n",
-            "sys__fs__cgroup__memory__a__memory.limit_in_bytes": "2500000\n",
-            "sys__fs__cgroup__memory__a__memory.usage_in_bytes": "500000\n",
-        },
-        2_000_000,
-    ),
-    "more used than there is": (
-        {
-            "proc__self__cgroup": "0::/\n",
-            "sys__fs__cgroup__memory_dot_max": "10\n",
-            "sys__fs__cgroup__memory_dot_current": "20\n",
-        },
-        0,
-    ),
-}
+@pytest.mark.parametrize(
+    ("texts", "expected"),
+    [
+        ((), 5000),
+        (("max\n",), 5000),
+        (("4000\n",), 3000),
+        ((None, "4500\n"), 3500),
+        ((None, "9223372036854771712\n"), 5000),
+        (("900\n",), 0),
+    ],
+)
+def test_the_available_memory_is_what_is_free_within_the_limit_of_the_control_group(limits, texts, expected):
+    limits(5000, 1000, *texts)
+    assert memory.available() == expected
 
 
-@pytest.mark.parametrize("case", LIMITS)
-def test_the_least_of_all_limits_counts(case, tmp_path):
-    files, expected = LIMITS[case]
-    assert memory.available(system(tmp_path, proc__meminfo=FREE, **files)) == expected
-
-
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="of Linux")
-def test_a_limit_of_addresses_counts(monkeypatch):
-    import resource
-
-    monkeypatch.setattr(resource, "getrlimit", lambda _: (2**20, resource.RLIM_INFINITY))
-    assert memory.available() == 0, "this process has more than a mebibyte"
-
-
-def test_this_system_says_what_it_has():
-    there = memory.available()
-    assert there is not None and 2**20 < there < 2**50
+def test_the_available_memory_of_this_computer():
+    assert 2**20 < memory.available() <= psutil.virtual_memory().total
 
 
 class Gpu(Reference):
@@ -110,9 +72,19 @@ def test_arrays_of_a_cpu_count_for_the_host(machine, wanted, monkeypatch):
         memory.require(machine, 20, 10)
 
 
-def test_nothing_is_refused_where_nobody_knows(monkeypatch):
-    monkeypatch.setattr(memory, "available", lambda: None)
-    memory.require(Reference(), 2**60, 2**60)
+def test_the_limits_are_exact_and_named(monkeypatch):
+    monkeypatch.setattr(memory, "available", lambda: 3 * MEBIBYTE)
+    memory.require_host(3 * MEBIBYTE)
+    with pytest.raises(simdtex.DeviceError) as caught:
+        memory.require_host(3 * MEBIBYTE + 1, "do less")
+    assert str(caught.value) == "this needs about 3 MiB of this computer's memory and 3 MiB is available; do less"
+    machine = Gpu()
+    machine.memory = 2 * MEBIBYTE
+    memory.require(machine, 2 * MEBIBYTE)
+    with pytest.raises(simdtex.DeviceError) as caught:
+        memory.require(machine, 2 * MEBIBYTE + 1)
+    sentence = "this needs about 2 MiB and reference (NumPy) has 2; give a smaller size or another --device"
+    assert str(caught.value) == sentence
 
 
 JOBS = {

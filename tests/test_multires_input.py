@@ -11,7 +11,7 @@ from cases import REFERENCE, assert_same_bits, opencl, texture
 
 import simdtex
 from simdtex.driver import drive
-from simdtex.machine.reference import Reference
+from simdtex.machine import memory
 from simdtex.methods import multires
 from simdtex.methods.multires.analysis import analyse
 
@@ -287,27 +287,27 @@ def test_what_a_callback_raises_gets_through_and_the_next_run_works(error, any_d
 # -- memory ---------------------------------------------------------------------------------------------------
 
 
-class Asked(Reference):
-    """A machine that notes what memory it is asked for, and has only so much."""
+def noted(monkeypatch, most=INF):
+    """Note the bytes of device memory that runs ask for, of which there are so many."""
+    sizes = []
 
-    def __init__(self, most=INF):
-        super().__init__()
-        self.sizes, self.most = [], most
-
-    def require(self, size):
-        self.sizes.append(size)
-        if size > self.most:
+    def require(machine, device, *_):
+        sizes.append(device)
+        if device > most:
             raise simdtex.DeviceError("too little memory")
+
+    monkeypatch.setattr(memory, "require", require)
+    return sizes
 
 
 @pytest.mark.parametrize("channels", [None, 3])
-def test_memory_grows_with_the_output_and_with_nothing_else(channels):
-    sample, asked = texture((13, 7), channels), {}
+def test_memory_grows_with_the_output_and_with_nothing_else(channels, monkeypatch):
+    sample, asked, sizes = texture((13, 7), channels), {}, noted(monkeypatch)
     for cols in (14, 28, 42, 70):  # whole tiles
         for options in ({"alpha": 0}, {"alpha": INF}, {"alpha": INF, "parity": "free"}):
-            machine = Asked()
-            synthesize(sample, (40, cols), device=machine, **options)
-            asked.setdefault(cols, set()).add(tuple(machine.sizes))
+            sizes.clear()
+            synthesize(sample, (40, cols), device=REFERENCE, **options)
+            asked.setdefault(cols, set()).add(tuple(sizes))
     assert all(len(sizes) == 1 for sizes in asked.values()), "whatever the candidates"
     analysis, synthesis = zip(*(sizes.pop() for sizes in asked.values()), strict=True)
     assert len(set(analysis)) == 1
@@ -315,10 +315,11 @@ def test_memory_grows_with_the_output_and_with_nothing_else(channels):
     assert np.ptp(steps) == 0 and steps[0] <= 4 + 2 * (12 + 4 * (channels or 1)), "bytes for each pixel"
 
 
-def test_too_little_memory_ends_a_run_before_anything_is_sampled():
-    calls, machine = [], Asked(200_000)
+def test_too_little_memory_ends_a_run_before_anything_is_sampled(monkeypatch):
+    calls = []
+    noted(monkeypatch, 200_000)
     with pytest.raises(simdtex.DeviceError, match="too little memory"):
-        synthesize(texture((13, 7)), (400, 300), device=machine, callback=calls.append)
+        synthesize(texture((13, 7)), (400, 300), device=REFERENCE, callback=calls.append)
     assert not calls
 
 

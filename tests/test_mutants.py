@@ -9,6 +9,7 @@ import pytest
 from cases import REFERENCE, laid_out, sweeps, texture
 
 import simdtex
+from simdtex.machine import memory
 from simdtex.methods import mrf
 from simdtex.methods.mrf import record as record_module
 from simdtex.methods.mrf.level import Active, check_fit, number_of_levels, parts
@@ -160,16 +161,16 @@ def test_which_sites_are_active():
 
 def test_the_memory_that_is_asked_for(monkeypatch):
     asked = []
-    monkeypatch.setattr(type(REFERENCE), "require", lambda self, needed: asked.append(needed))
+    monkeypatch.setattr(memory, "require", lambda machine, device, host, remedy: asked.append((device, host)))
     prepared()
     prepared(similar=3, schedule="block", levels=1, structure=0)
     laid_out(REFERENCE, texture((24, 25), 3), (20, 23), mrf.Options(order=2, levels=1), 5)
     coarse, fine = (24 + 8) * (25 + 8), (24 + 2) * (25 + 2)  # with the margin of the coarsest level
     each = 14, 159  # for every channel and pixel of the sample; the structure channel is one
     assert asked == [
-        460 * (12 + 10) + coarse * (2 * each[0] + each[1]),
-        460 * (12 + 16) + fine * (each[0] + each[1] + 3 * 4),
-        460 * (12 + 14) + fine * (4 * each[0] + each[1]),
+        (460 * (12 + 10) + coarse * (2 * each[0] + each[1]), 460 * (84 + 2 * 11) + 64 * coarse),
+        (460 * (12 + 16) + fine * (each[0] + each[1] + 3 * 4), 460 * (100 + 11) + 64 * fine),
+        (460 * (12 + 14) + fine * (4 * each[0] + each[1]), 460 * (84 + 4 * 11) + 64 * fine),
     ]
 
 

@@ -2,7 +2,6 @@
 
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from cases import opencl, texture
 from click.testing import CliRunner
@@ -11,7 +10,7 @@ import simdtex
 from simdtex.cli import main
 from simdtex.io.image import write
 from simdtex.machine.interface import Work, touching
-from simdtex.machine.log import KEPT, PENDING, Log, Times
+from simdtex.machine.log import PENDING, Log, Times
 from simdtex.machine.opencl import OpenCL
 from simdtex.machine.reference import Reference
 from simdtex.model.lattice import neighbourhood_offsets
@@ -35,28 +34,20 @@ def kernel(name):
     return SimpleNamespace(function_name=name)
 
 
-def test_times_are_exact_but_for_a_median_of_some_of_many():
+def test_times_are_summed_up():
     times = Times()
-    values = np.random.default_rng(1).integers(1, 10**6, 5 * KEPT)
-    for value in values.tolist():
+    for value in (5, 1, 2):
         times.add(value)
-    report = times.report()
-    assert (times.count, times.nanoseconds) == (values.size, values.sum())
-    assert (times.least, times.most) == (values.min(), values.max())
-    assert len(times._kept) <= KEPT
-    assert report["median"] == pytest.approx(np.median(values) * 1e-9, rel=0.02)
-    few = Times()
-    for value in (5, 1, 3):
-        few.add(value)
-    assert few.report() == pytest.approx({"calls": 3, "min": 1e-9, "median": 3e-9, "max": 5e-9, "seconds": 9e-9})
+    assert times.nanoseconds == 8
+    assert times.report() == pytest.approx({"calls": 3, "min": 1e-9, "median": 2e-9, "max": 5e-9, "seconds": 8e-9})
     assert Times().report() == {"calls": 0, "min": 0, "median": 0, "max": 0, "seconds": 0}
 
 
 def test_a_log_tells_kernels_shares_rates_and_gaps():
     log = Log(True)
-    log.add(8, Event(100, 200), kernel("fast"), Work(1000, 50))
-    log.add(8, Event(250, 550), kernel("slow"), Work(None, 600))
-    log.add(8, Event(550, 650), kernel("fast"), Work(500, 50))
+    log.add(Event(100, 200), kernel("fast"), Work(1000, 50))
+    log.add(Event(250, 550), kernel("slow"), Work(None, 600))
+    log.add(Event(550, 650), kernel("fast"), Work(500, 50))
     log.settle()
     taken = log.take()
     slow, fast = taken["kernels"]
@@ -74,8 +65,8 @@ def test_a_log_tells_kernels_shares_rates_and_gaps():
 
 def test_a_kernel_that_does_not_always_say_what_it_does_has_no_rate():
     log = Log(True)
-    log.add(8, Event(0, 10), kernel("a"), Work(1, 1))
-    log.add(8, Event(10, 20), kernel("a"))
+    log.add(Event(0, 10), kernel("a"), Work(1, 1))
+    log.add(Event(10, 20), kernel("a"))
     log.settle()
     (only,) = log.take()["kernels"]
     assert only["fma"] is only["bytes"] is only["fma_rate"] is None
@@ -85,7 +76,7 @@ def test_events_do_not_pile_up():
     log = Log(True)
     events = [Event(2 * i, 2 * i + 1) for i in range(3 * PENDING)]
     for event in events:
-        log.add(1, event, kernel("a"))
+        log.add(event, kernel("a"))
         assert len(log._pending) < PENDING
     assert any(event.waited for event in events)
     log.settle()
@@ -94,11 +85,11 @@ def test_events_do_not_pile_up():
 
 def test_without_profiling_nothing_is_kept():
     log = Log(False)
-    log.add(1, Event(0, 1), kernel("a"))
+    log.add(Event(0, 1), kernel("a"))
     assert (log.launches, log.seconds, log.take(), log._pending) == (1, None, None, [])
     log = Log(True)
     with log.paused():
-        log.add(1, Event(0, 1), kernel("a"))
+        log.add(Event(0, 1), kernel("a"))
         assert log.seconds is None
     assert log.take()["kernels"] == []
 

@@ -18,7 +18,6 @@ from click.testing import CliRunner
 import simdtex
 from simdtex import cli
 from simdtex.io.image import write
-from simdtex.machine import cache, programs, runtimes
 
 HEAVY = {"pyopencl", "scipy", "skimage", "matplotlib", "tifffile", "imagecodecs", "jinja2", "nrrd", "emcee", "rich"}
 HEAVY |= {"xarray", "zarr", "h5netcdf", "pandas"}
@@ -100,44 +99,6 @@ def test_the_list_of_commands_says_what_their_own_help_says(name):
     assert isinstance(command, click.Command)
     assert command.name == name
     assert cli.main.commands[name].get_short_help_str(200) == command.get_short_help_str(200)
-
-
-@pytest.fixture
-def kept(tmp_path, monkeypatch):
-    """A cache folder of the test's own, and a device forgotten."""
-    monkeypatch.setenv(cache.FOLDER, str(tmp_path))
-    monkeypatch.delenv(cache.SWITCH)
-    runtimes.failure.cache_clear()
-    yield tmp_path / programs.FOLDER
-    runtimes.failure.cache_clear()
-
-
-@pytest.mark.parametrize("content", [None, b"", b"\0" * 100])
-def test_the_program_of_the_probe_is_kept_for_pocl(cl_device, kept, monkeypatch, content):
-    on_pocl = cl_device.platform == programs.POCL
-    assert runtimes.failure(cl_device.handle) == ""
-    files = list(kept.glob("*"))
-    assert len(files) == on_pocl
-    for path in files:
-        whole = path.read_bytes()
-        if content is not None:
-            path.write_bytes(content)
-        runtimes.failure.cache_clear()
-        assert runtimes.failure(cl_device.handle) == ""
-        assert len(path.read_bytes()) == len(whole), "what was broken is written anew"
-
-
-def test_a_kept_program_must_give_the_right_bits_all_the_same(cl_device, kept, monkeypatch):
-    monkeypatch.setattr(runtimes, "_SOURCE", runtimes._SOURCE.replace("fma(a[i], a[i], -", "(a[i] * 2.0f -"))
-    for _ in range(2):
-        runtimes.failure.cache_clear()
-        assert "wrong answer" in runtimes.failure(cl_device.handle)
-
-
-def test_nothing_is_kept_where_the_folder_is_to_be_left_alone(cl_device, kept, monkeypatch):
-    monkeypatch.setenv(cache.SWITCH, "0")
-    assert runtimes.failure(cl_device.handle) == ""
-    assert not kept.exists()
 
 
 # Ctrl-C while the command line is starting

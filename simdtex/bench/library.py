@@ -80,10 +80,11 @@ class Library(Reference):
         """Run the library's way of it, or the twin."""
         own = self._by.get(operation)
         if own is None:
-            return super().run(operation, *args, **kwargs)
+            result: R = super().run(operation, *args, **kwargs)
+            return result
         self.launches += 1
         self.used[own.__name__] += 1
-        result: R = own(*args, **kwargs)
+        result = own(*args, **kwargs)
         return result
 
     def chunk(self, candidates: int, neighbours: int, channels: int, stored: bool = True) -> int:

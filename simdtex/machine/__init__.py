@@ -9,23 +9,23 @@ __all__ = ["Machine", "open_machine"]
 
 
 def open_machine(device: str | Machine | None = None, *, profile: bool = False, skip: bool = True) -> Machine:
-    """The machine for a device text.
+    """Open a device.
 
     Parameters
     ----------
     device : str, int, DeviceInfo, Machine or None
-        Part of a name or platform, an index of ``simdtex devices``, or ``"reference"``; None takes
-        SIMDTEX_DEVICE, else a GPU, else a CPU. A machine is returned as it is.
+        Part of a name or platform, an index of ``simdtex devices``, or ``"reference"``; None takes the device that
+        SIMDTEX_DEVICE names, else a GPU, else a CPU. A machine is returned as it is.
     profile : bool
-        Whether an OpenCL machine measures how long its device works.
+        Whether an OpenCL machine measures the time of every kernel.
     skip : bool
-        Whether an OpenCL machine skips candidates that it proves to lose. It changes no bit of any result.
+        Whether an OpenCL machine skips candidates that a bound rules out. It changes no bit of any result.
 
     Raises
     ------
     simdtex.machine.devices.DeviceError
         No device matches, several do, or none is usable; or OpenCL was in use before this process was forked. The
-        sentence names the remedy.
+        message names the remedy.
     TypeError
         `device` is none of these.
     """
@@ -39,8 +39,5 @@ def open_machine(device: str | Machine | None = None, *, profile: bool = False, 
 
         return Reference()
     from simdtex.machine.opencl import OpenCL
-    from simdtex.machine.tuner import tune
 
-    machine = OpenCL(info, profile=profile, skip=skip)
-    tune(machine)
-    return machine
+    return OpenCL(info, profile=profile, skip=skip)

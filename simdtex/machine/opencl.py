@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The machine on an OpenCL device: compiles kernels, holds arrays, launches."""
+"""The machine on an OpenCL device: compiles kernels, allocates arrays, launches."""
 
 from __future__ import annotations
 
@@ -16,16 +16,12 @@ import pyopencl as cl
 import pyopencl.tools as cl_tools
 from numpy.typing import NDArray
 
-from simdtex.machine import programs, runtimes
-from simdtex.machine.buffers import DeviceArray
+from simdtex.machine import runtimes
 from simdtex.machine.devices import DeviceError, DeviceInfo
-from simdtex.machine.forms import Form, default
-from simdtex.machine.interface import Array, Operation, P, R, Work
-from simdtex.machine.log import Log
-from simdtex.machine.tally import Tally
+from simdtex.machine.log import Log, Work
 from simdtex.model.sample import BLOCK
 
-LITTLE = 2**16
+SMALL_COPY = 2**16
 """Bytes that are copied to a device without waiting."""
 
 OUT_OF_MEMORY = (
@@ -36,47 +32,81 @@ OUT_OF_MEMORY = (
 )
 
 SMALL_GROUP = 4
-"""Work-items to a work-group of a CPU where each has much to do: a small group of sites still feeds all cores."""
+"""Work-group size on a CPU for kernels with much work in each item: few sites still occupy all cores."""
 
 TOGETHER = ("active", "start")
-"""Files whose kernels need no -D constant and serve every run of ``mrf``: one program, since each costs some 50 ms to
+"""Kernel files without -D constants that every run of ``mrf`` needs, compiled as one program: each takes about 50 ms to
 load on PoCL."""
 
 LONGEST = 2**17
-"""Work-items of a launch over a group: a multiple of every work-group size, and no long launch."""
+"""Work-items of one launch of `OpenCL.launch_groups`: a multiple of every work-group size, and no long launch."""
 
 
 def kernel_folder() -> Path:
-    """Where the .cl files are: inside the package in a wheel, beside it in a checkout."""
+    """Return the folder of the .cl files: inside the package in a wheel, next to it in a checkout."""
     package = Path(__file__).resolve().parent.parent
     inside = package / "kernels"
     return inside if inside.is_dir() else package.parent / "kernels"
 
 
-class OpenCL:
-    """One OpenCL device, which threads may share: the bytes of each are those of a run alone.
+class DeviceArray:
+    """A contiguous array on a device: a buffer, a shape and a type.
 
-    Operations of several threads take turns, so that sharing saves compilation, but no time; figures of work, as
-    `launches` and `seconds`, count what all of them asked for. In a process that was forked it raises DeviceError.
+    Parameters
+    ----------
+    data : pyopencl.Buffer or pyopencl.tools.PooledBuffer
+    shape : tuple of int
+    dtype : numpy.dtype
+    event : pyopencl.Event, optional
+        Event of the copy that fills the buffer; it keeps the source alive.
+
+    Notes
+    -----
+    Creating a `pyopencl.array.Array` takes tens of microseconds, and a step of ten small kernels creates a dozen.
+    """
+
+    __slots__ = ("data", "dtype", "event", "nbytes", "shape", "size")
+
+    def __init__(self, data: Any, shape: tuple[int, ...], dtype: np.dtype[Any], event: Any = None) -> None:
+        self.data, self.shape, self.dtype, self.event = data, shape, dtype, event
+        self.size = prod(shape)
+        self.nbytes = self.size * dtype.itemsize
+
+    def __len__(self) -> int:
+        """Return the size of the first axis."""
+        return self.shape[0]
+
+    def reshape(self, shape: int | tuple[int, ...]) -> DeviceArray:
+        """Return an array of another shape in the same memory."""
+        wanted = shape if isinstance(shape, tuple) else (shape,)
+        assert prod(wanted) == self.size
+        return DeviceArray(self.data, wanted, self.dtype, self.event)
+
+
+class OpenCL:
+    """One OpenCL device. Threads may share it; each gets the bytes of a run alone.
+
+    Operations of several threads run one after another, so that sharing saves compilation, but no time. Figures of
+    work, such as `launches` and `seconds`, cover all threads. In a forked process it raises DeviceError.
 
     Parameters
     ----------
     info : DeviceInfo
         From `simdtex.machine.devices.find`.
     work_group : int, optional
-        Forces the work-group size of every launch; changes no bit of any result.
+        Forces the work-group size of every launch. This and the other options change no bit of any result.
     scratch : int, optional
-        Bytes that distances may take at a time; changes no bit of any result.
+        Bytes available for distances at a time.
     vector : int, optional
-        Sites side by side in a work-item (1, 4, 8 or 16); changes no bit of any result.
+        Sites in a vector: 1, 4, 8 or 16.
     step : int, optional
-        Candidates kept in registers together, a divisor of 64; changes no bit of any result.
+        Candidates kept in registers at a time, a divisor of 64.
     split : int, optional
-        Work-items that share a site's candidates; changes no bit of any result.
+        Work-items that share a site's candidates.
     skip : bool
-        Whether candidates that are proved to lose are skipped; changes no bit of any result.
+        Whether to skip candidates that a bound rules out.
     profile : bool
-        Whether to measure how long the device works.
+        Whether to measure the time of every kernel.
     """
 
     def __init__(
@@ -91,90 +121,90 @@ class OpenCL:
         skip: bool = True,
         profile: bool = False,
     ) -> None:
-        runtimes.alive()
-        self.info = info
-        # The arguments of a kernel object, the pool and the log are one for all threads; copies of a machine share it.
-        self._turn = RLock()
+        runtimes.check_fork()
+        self.info, self.kind, self.memory = info, info.kind, float(info.memory)
         self.name = f"{info.name.strip()} ({info.platform})"
         self.context = cl.Context([info.handle])  # type: ignore[list-item]
         timed: dict[str, Any] = {"properties": cl.command_queue_properties.PROFILING_ENABLE} if profile else {}
         self.queue = cl.CommandQueue(self.context, **timed)
         self.log = Log(profile)
         on_gpu = info.kind == "gpu"
-        self.forced = work_group is not None
-        self.scratch = scratch or (2**28 if on_gpu else 2**24)
-        form = default(info)  # a fixed group size: PoCL compiles once per size
-        self.take(Form(vector or form.vector, step or form.step, work_group or form.group))
+        # PoCL compiles once for each work-group size, so there is only one.
+        self._group, self._forced = work_group or (64 if on_gpu else 16), work_group is not None
+        self.tile = (self._group, 1) if on_gpu else (1, 8)
+        self.vector = vector or (1 if on_gpu else 16)
+        self.step = step or 4
         if BLOCK % self.step:
             raise ValueError(f"step is {self.step}; give a divisor of {BLOCK}")
+        self.scratch = scratch or (2**28 if on_gpu else 2**24)
         self.skip = skip
-        self.tally = Tally(self)
         self._split = split
-        self._crowd = info.compute_units * (2048 if on_gpu else 64)  # work-items that keep the device busy
+        self._occupied = info.compute_units * (2048 if on_gpu else 64)  # work-items that keep the device busy
         self._abreast = 64 if on_gpu else 1  # of a site: neighbours in a row of the sample
+        self._lock = RLock()  # threads share the arguments of kernel objects, the pool and the log
         self._pool = cl_tools.MemoryPool(cl_tools.ImmediateAllocator(self.queue))
         self._pending, self._burst, self._synced = 0, 1e8, time.perf_counter()
-        self._constants: dict[tuple[str, bytes], Array] = {}
-        self._programs: dict[tuple[str, str], Any] = {}
-        self._kernels: dict[tuple[str, str, str], Any] = {}
+        self._counters: DeviceArray | None = None
+        self._spared = 0
+        self._constants: dict[tuple[str, bytes], DeviceArray] = {}
+        self._programs: dict[tuple[tuple[str, ...], str], Any] = {}
+        self._kernels: dict[tuple[tuple[str, ...], str, str], Any] = {}
 
-    @property
-    def kind(self) -> str:
-        """Of the device."""
-        return self.info.kind
-
-    def take(self, form: Form) -> None:
-        """Take this form of the inner loop."""
-        self.vector, self.step, self.group = form
-        self.tile = (self.group, 1) if self.info.kind == "gpu" else (1, 8)
-
-    def run(self, operation: Operation[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+    def run(self, operation: Any, *args: Any, **kwargs: Any) -> Any:
         """Launch the operation's kernels, while no other thread launches any."""
-        with self._use(), self._turn:
+        with self._plain_errors(), self._lock:
             return operation.launch(self, *args, **kwargs)
 
-    def put(self, array: Any) -> Array:
-        """Copy to the device."""
+    def put(self, array: Any) -> Any:
+        """Copy to the device; a small array is copied in the queue's order, without waiting."""
         array = np.array(array, order="C")
-        with self._use():  # little comes in turn, and is not waited for: its event keeps the copy
-            later = array.nbytes <= LITTLE
-            result = self._pooled(array.shape, array.dtype) if later else self._alone(array.shape, array.dtype)
+        with self._plain_errors():
+            if array.nbytes > SMALL_COPY:  # without the pool, which would round the size up and keep the memory
+                buffer = cl.Buffer(self.context, cl.mem_flags.READ_WRITE, array.nbytes)
+                cl.enqueue_copy(self.queue, buffer, array)
+                return DeviceArray(buffer, array.shape, array.dtype)
+            result = self.empty(array.shape, array.dtype)
             if array.size:
-                event = cl.enqueue_copy(self.queue, result.data, array, is_blocking=not later)
-                result.event = event if later else None
+                result.event = cl.enqueue_copy(self.queue, result.data, array, is_blocking=False)
             return result
 
-    def get(self, array: Array) -> Any:
-        """Copy from the device."""
-        with self._use():
-            return array.get(self.queue)
+    def get(self, array: DeviceArray) -> Any:
+        """Wait for the queue, and copy to NumPy."""
+        result = np.empty(array.shape, array.dtype)
+        with self._plain_errors():
+            if result.size:
+                cl.enqueue_copy(self.queue, result, array.data)
+        return result
 
-    def empty(self, shape: Any, dtype: Any) -> Array:
-        """An array whose contents do not matter yet, from a pool."""
-        return self._pooled((int(shape),) if isinstance(shape, (int, np.integer)) else tuple(shape), np.dtype(dtype))
+    def part(self, array: DeviceArray, begin: int, end: int) -> Any:
+        """Copy elements ``begin`` to ``end`` - 1 of the first axis on the device."""
+        with self._plain_errors():
+            result = self.empty((end - begin, *array.shape[1:]), array.dtype)
+            if result.size:
+                offset = begin * (array.nbytes // len(array))
+                cl.enqueue_copy(self.queue, result.data, array.data, byte_count=result.nbytes, src_offset=offset)
+            return result
 
-    def _pooled(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> DeviceArray:
-        with self._turn:
-            return DeviceArray(self._pool.allocate(max(1, prod(shape) * dtype.itemsize)), shape, dtype)
+    def empty(self, shape: Any, dtype: Any) -> DeviceArray:
+        """Return an uninitialised array, from a pool."""
+        wanted = tuple(shape) if isinstance(shape, tuple | list) else (int(shape),)
+        kind = np.dtype(dtype)
+        with self._lock:
+            return DeviceArray(self._pool.allocate(max(1, prod(wanted) * kind.itemsize)), wanted, kind)
 
-    def _alone(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> DeviceArray:
-        """The same from no pool: large arrays that come once."""
-        size = max(1, prod(shape) * dtype.itemsize)
-        return DeviceArray(cl.Buffer(self.context, cl.mem_flags.READ_WRITE, size), shape, dtype)
-
-    def constant(self, array: Any) -> Array:
-        """A small table on the device, uploaded once."""
+    def constant(self, array: Any) -> DeviceArray:
+        """Return a small table as a device array, uploaded once."""
         key = (array.dtype.str, array.tobytes())
         if key not in self._constants:
             self._constants[key] = self.put(array)
         return self._constants[key]
 
     def sync(self, work: int = 0) -> None:
-        """Wait until the queue is empty; given the fma just asked for, only when a tenth of a second is due."""
+        """Wait until the queue is empty; given the multiply-adds just enqueued, only every tenth of a second."""
         self._pending += work
         if work and self._pending < self._burst:
             return
-        with self._use(), self._turn:  # nothing is launched between the end of the queue and the reading of its times
+        with self._plain_errors(), self._lock:  # no launch between the end of the queue and the reading of its times
             self.queue.finish()
             self.log.settle()
             seconds = time.perf_counter() - self._synced
@@ -190,43 +220,40 @@ class OpenCL:
 
     @property
     def seconds(self) -> float | None:
-        """Seconds the device has worked, None without ``profile``."""
+        """Seconds spent in kernels so far, None without ``profile``."""
         self.sync()
         return self.log.seconds
 
     def profile(self) -> dict[str, Any] | None:
-        """What was launched since this was called last, see `simdtex.machine.log.Log.take`."""
-        with self._turn:
+        """Return the times of the kernels launched since the last call, see `simdtex.machine.log.Log.take`."""
+        with self._lock:
             self.sync()
             return self.log.take()
 
+    def fma_counters(self, count: int, expected: int) -> DeviceArray:
+        """Return `count` or more uint64 to which kernels add the multiply-adds done, of the `expected` number."""
+        if self._counters is None or self._counters.size < count:
+            self._read_counters()
+            self._counters = self.put(np.zeros(count, np.uint64))
+        self._spared += expected
+        return self._counters
+
+    def _read_counters(self) -> None:
+        if self._counters is not None:
+            self._spared -= int(self.get(self._counters).sum())
+            self._counters = None
+
     @property
     def spared(self) -> int:
-        """Fma of distances that a bound has spared so far."""
-        with self._turn:
-            return self.tally.spared
-
-    def part(self, array: Array, begin: int, end: int) -> Array:
-        """Some elements of an array of one axis, copied on the device."""
-        result = self.empty((end - begin,), array.dtype)
-        if result.size:
-            item = array.dtype.itemsize
-            size, offset = result.size * item, begin * item
-            cl.enqueue_copy(self.queue, result.data, array.data, byte_count=size, src_offset=offset)
-        return result
-
-    def require(self, size: int) -> None:
-        """Raise DeviceError where this many bytes are more than the device has."""
-        if size > self.info.memory:
-            raise DeviceError(
-                f"this needs about {size / 2**20:.0f} MiB and {self.name} has {self.info.memory / 2**20:.0f}; "
-                "give a smaller size or another --device"
-            )
+        """Multiply-adds of distances that a bound has made needless so far; waits for the device."""
+        with self._lock:
+            self._read_counters()
+            return self._spared
 
     @contextmanager
-    def _use(self) -> Iterator[None]:
-        """Say in one sentence that the device ran out of memory, or was lost in a fork."""
-        runtimes.alive()
+    def _plain_errors(self) -> Iterator[None]:
+        """Raise DeviceError if the process was forked, or if the device runs out of memory."""
+        runtimes.check_fork()
         try:
             yield
         except cl.Error as error:
@@ -237,12 +264,15 @@ class OpenCL:
             ) from error
 
     def split(self, items: int, most: int) -> int:
-        """How many work-items are to share each of so many: enough to keep the device busy, up to `most`."""
-        wanted = self._split or -(-self._crowd // (items * self._abreast)) * self._abreast
+        """Return how many work-items, at most ``most``, share each of so many items, to keep the device busy."""
+        wanted = self._split or -(-self._occupied // (items * self._abreast)) * self._abreast
         return max(1, min(wanted, most))
 
     def chunk(self, candidates: int, neighbours: int, channels: int, stored: bool = True) -> int:
-        """Whole vectors of sites: bounded by scratch memory, and by 4e9 fma so that no launch is long."""
+        """Return how many sites fit the scratch memory and 4e9 multiply-adds, which bound a launch's time.
+
+        The number is a multiple of the vector width.
+        """
         padded = -(-candidates // BLOCK) * BLOCK
         per_site = 4 * (padded + padded // BLOCK + neighbours * (1 + channels))
         if not stored:
@@ -251,24 +281,17 @@ class OpenCL:
         return max(1, fit // self.vector) * self.vector
 
     def kernel(self, file: str, function: str, /, **defines: int | str) -> Any:
-        """A kernel of ``kernels/FILE.cl``, compiled once for these -D constants."""
+        """Return a kernel of ``kernels/FILE.cl``, compiled once for these -D constants."""
         options = " ".join(f"-D {key}={value}" for key, value in sorted(defines.items()))
         files = TOGETHER if file in TOGETHER and not defines else (file,)
-        key = (" ".join(files), function, options)
+        key = (files, function, options)
         if key not in self._kernels:
-            if key[::2] not in self._programs:
-                self._programs[key[::2]] = self._build(files, options)
-            self._kernels[key] = cl.Kernel(self._programs[key[::2]], function)
+            if (files, options) not in self._programs:
+                source = "\n".join((kernel_folder() / f"{name}.cl").read_text(encoding="utf-8") for name in files)
+                include = ["-I", str(kernel_folder())]
+                self._programs[files, options] = runtimes.build(self.context, source, [*options.split(), *include])
+            self._kernels[key] = cl.Kernel(self._programs[files, options], function)
         return self._kernels[key]
-
-    @property
-    def include(self) -> list[str]:
-        """The compiler option that finds the kernels' headers."""
-        return ["-I", str(kernel_folder())]
-
-    def _build(self, files: tuple[str, ...], options: str) -> Any:
-        source = "\n".join((kernel_folder() / f"{file}.cl").read_text(encoding="utf-8") for file in files)
-        return programs.compiled(self.context, source, [*options.split(), *self.include])
 
     def launch(
         self,
@@ -278,27 +301,25 @@ class OpenCL:
         local: tuple[int, ...] | None = None,
         work: Work | None = None,
     ) -> None:
-        """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels guard.
+        """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels check the range.
 
         `work` is the work of the launch, for profiles.
         """
-        one_dimensional = (self.group,) + (1,) * (len(size) - 1)
-        local = local if local and not self.forced else one_dimensional
+        local = local if local and not self._forced else (self._group,) + (1,) * (len(size) - 1)
         size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
         data = [a.data if type(a) is DeviceArray else a for a in args]
-        self.log.add(prod(size), kernel(self.queue, size, local, *data), kernel, work)
+        self.log.add(kernel(self.queue, size, local, *data), kernel, work)
 
     def launch_groups(self, kernel: Any, groups: NDArray[np.int64], *args: Any) -> None:
-        """Enqueue a kernel over groups of work-items one after another, from ``groups[g, 0]`` up to ``groups[g, 1]``.
+        """Enqueue a kernel for one range of work-items after another, from ``groups[g, 0]`` up to ``groups[g, 1]``.
 
-        The kernel's second argument is the end of the group that it is launched for. The others are set once, so that a
-        launch costs a few microseconds.
+        The kernel's second argument is the end of the range. The other arguments are set once, so that a launch takes a
+        few microseconds.
         """
         kernel.set_args(*(a.data if type(a) is DeviceArray else a for a in args))
-        group = self.group if self.forced or self.info.kind == "gpu" else SMALL_GROUP
+        group = self._group if self._forced or self.kind == "gpu" else SMALL_GROUP
         for begin, end in groups.tolist():
             kernel.set_arg(1, np.int32(end))
             for first in range(begin, end, LONGEST):
                 size = -(-min(end - first, LONGEST) // group) * group
-                event = cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (group,), (first,))
-                self.log.add(size, event, kernel)
+                self.log.add(cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (group,), (first,)), kernel)

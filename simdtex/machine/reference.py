@@ -3,56 +3,51 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any
 
 import numpy as np
 
-from simdtex.machine.interface import Array, Operation, P, R
-
 
 class Reference:
-    """Runs the NumPy twin of every operation.
+    """Runs the NumPy twin of every operation; the interface is that of `simdtex.machine.opencl.OpenCL`.
 
     Parameters
     ----------
     scratch : int
-        Bytes that distances may take at a time.
+        Bytes available for distances at a time.
     """
 
     name, kind = "reference (NumPy)", "reference"
+    memory, seconds, spared = inf, None, 0
 
     def __init__(self, scratch: int = 2**24) -> None:
         self.scratch = scratch
         self.launches = 0
-        self.seconds = None
-        self.spared = 0
 
-    def run(self, operation: Operation[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
-        """Run the twin."""
+    def run(self, operation: Any, *args: Any, **kwargs: Any) -> Any:
+        """Run the twin of an operation."""
         self.launches += 1
         return operation.reference(*args, **kwargs)
 
-    def put(self, array: Any) -> Array:
-        """A copy, so that nobody else's array is changed."""
+    def put(self, array: Any) -> Any:
+        """Return a copy, so that the caller's array is never changed."""
         return np.array(array)
 
-    def get(self, array: Array) -> Any:
-        """A copy."""
+    def get(self, array: Any) -> Any:
+        """Return a copy."""
         return np.array(array)
 
-    def part(self, array: Array, begin: int, end: int) -> Array:
-        """A view."""
+    def part(self, array: Any, begin: int, end: int) -> Any:
+        """Return a view of elements ``begin`` to ``end`` - 1 of the first axis."""
         return array[begin:end]
 
     def sync(self, work: int = 0) -> None:
-        """Nothing runs behind one's back here."""
+        """Do nothing: every operation is done when it returns."""
 
     def profile(self) -> None:
-        """Nothing is timed here."""
-
-    def require(self, size: int) -> None:
-        """Nothing is known of the memory here."""
+        """Return None: nothing is timed."""
 
     def chunk(self, candidates: int, neighbours: int, channels: int, stored: bool = True) -> int:
-        """Sites whose distances and neighbourhoods fit the scratch memory."""
+        """Return the number of sites whose distances and neighbourhoods fit the scratch memory."""
         return max(1, self.scratch // (8 * (candidates + neighbours * (1 + channels))))

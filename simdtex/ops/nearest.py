@@ -178,7 +178,6 @@ def _launch(
             *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach, price),
             *(slack(neighbours * channels), i(split), i(leaves is None), wanted, i(row), found, at, work),
         )
-        machine.tally.expect(2 * count * candidates.size * neighbours * channels)
     else:
         blocks = candidates.positions.size // BLOCK
         around = neighbourhood.neighbourhood(machine, sites, field, offsets, grid)
@@ -194,7 +193,8 @@ def _launch(
             *(candidates.reach, price, i(blocks), i(parts), found, at),
             local=machine.tile,
         )
-    tally = machine.tally.slots(count)
+    expected = 2 * count * candidates.size * neighbours * channels if machine.skip else 0
+    tally = machine.fma_counters(count, expected)
     out = Relaxed(machine.empty((count,), np.int32), machine.empty((channels, count), np.uint16))
     machine.launch(
         machine.kernel("nearest", "nearest_end", **defines),

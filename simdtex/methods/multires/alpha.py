@@ -161,6 +161,6 @@ def _mean_candidates(machine: Machine, analysis: Analysis, itself: Sampled, opti
         for first in [0] if few else [i * n // STRETCHES for i in range(STRETCHES)]:
             end = n if few else first + STRETCH
             candidates(machine, structure, itself, level, first, end, options.parity == "match", 0, draw=False)
-            counts.append(machine.get(itself.counts[begin + first : begin + end])[:, 0])
+            counts.append(machine.get(machine.part(itself.counts, begin + first, begin + end))[:, 0])
         means.append(float(np.concatenate(counts).mean()))
     return float(np.mean(means)) if means else inf

@@ -92,7 +92,7 @@ def read_sources(
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """A level's source (rows, cols) and counts (rows, cols, 2)."""
     begin, end = pixels(shapes[:level]), pixels(shapes[: level + 1])
-    source, counts = machine.get(sampled.source[begin:end]), machine.get(sampled.counts[begin:end])
+    source, counts = (machine.get(machine.part(a, begin, end)) for a in (sampled.source, sampled.counts))
     return source.reshape(shapes[level]), counts.reshape(*shapes[level], 2)
 
 
