@@ -87,7 +87,7 @@ def made(folder, *args):
 
 
 def pixels(folder, name):
-    return image.read(folder / name, unknown=True).pixels
+    return image.read(folder / name).pixels
 
 
 def listing(folder):
@@ -134,7 +134,7 @@ def test_a_sample_may_be_unknown_in_parts(folder):
     assert np.array_equal(out, simdtex.synthesize(unknown, (20, 24), unsure=0.5, **OPTIONS))
     assert (out == 7.5).all()
     refused = synth(folder, "unknown.tif", "-o", "again.tif", "--method", "multires")
-    assert refused.exit_code == 2 and "fill them first" in refused.output
+    assert refused.exit_code == 2 and "known everywhere" in refused.output
 
 
 # ---------------------------------------------------------------- known values
@@ -226,7 +226,7 @@ OUT = ["-o", "out.tif"]
 ONE, TWO = ["sample.png", *OUT], ["sample.png", "second.png", *OUT]
 CATEGORIES = ["facies.tif", *OUT, "--categorical"]
 BAD = {
-    "samples of two kinds": (["sample.png", "colour.png", *OUT], "colour.png has 3 channels of uint8"),
+    "samples of two kinds": (["sample.png", "colour.png", *OUT], "the samples have 2 and 3 axes"),
     "samples of another method": ([*TWO, "--method", "pyramid"], "takes one sample"),
     "known values of another method": ([*ONE, "--method", "multires", "--known", "known.png"], "no known values"),
     "an option of another method": ([*ONE, "--method", "multires", "--unsure", 1], "unknown option 'unsure'"),
@@ -235,7 +235,7 @@ BAD = {
     "a mask too few": ([*TWO, "--sample-mask", "left.png"], "once for each sample"),
     "a mask too many": ([*ONE, "--sample-mask", "left.png", "--sample-mask", "all.png"], "once for each sample"),
     "a mask of another size": ([*ONE, "--sample-mask", "all.png"], "20 x 24"),
-    "a mask of nothing": ([*ONE, "--sample-mask", "none.png"], "nothing of the sample may be used"),
+    "a mask of nothing": ([*ONE, "--sample-mask", "none.png"], "leaves nothing of the sample"),
     "a map too few": ([*TWO, "--also", "normal.png=n.png"], "MAP0,MAP1=OUT"),
     "maps of two kinds": ([*TWO, "--also", "normal.png,second.png=n.png"], "convert them to one type"),
     "maps of another size": ([*TWO, "--also", "normal.png,normal.png=n.png"], "28x16"),
@@ -244,21 +244,24 @@ BAD = {
     "data outside": ([*ONE, "--known", "outside.csv"], "outside of a picture"),
     "data that disagree": ([*ONE, "--known", "disagree.csv"], "line 2 and line 3"),
     "data beyond the type": ([*ONE, "--known", "beyond.csv"], "uint8 cannot hold"),
-    "data of two variables": ([*ONE, "--known", "two.csv"], "2 values to a datum"),
+    "data of two variables": ([*ONE, "--known", "two.csv"], "a datum has 2 values"),
     "an unknown category": ([*CATEGORIES, "--known", "strange.csv"], "has the category 1"),
-    "known in 16 bits": ([*ONE, "--known", "known16.png"], "convert them to one type"),
-    "known in colour": ([*ONE, "--known", "colourful.png"], "4 channels of uint8"),
-    "known everywhere": ([*ONE, "--known", "second.png"], "nothing is left to do"),
-    "known nowhere": ([*ONE, "--known", "unknown.png"], "known nowhere"),
-    "known of another size": ([*ONE, "--known", "known.png", "--size", "20x20"], "20x14"),
+    "known in 16 bits": ([*ONE, "--known", "known16.png"], "which the sample's type uint8 does not"),
+    "known in colour": ([*ONE, "--known", "colourful.png"], "known is 3-dimensional"),
+    "known everywhere": ([*ONE, "--known", "second.png"], "leaves nothing to do"),
+    "known has no value": ([*ONE, "--known", "unknown.png"], "known has no value"),
+    "known of another size": (
+        [*ONE, "--known", "known.png", "--size", "20x20"],
+        "known is 14x20x1 and the output 20x20x1",
+    ),
     "maps of what is known": ([*ONE, "--known", "known.png", "--also", "normal.png=n.png"], "leave --also out"),
     "a report of what is known": ([*ONE, "--known", "known.png", "--report", "report"], "leave it out"),
     "a source map that holds no -1": ([*ONE, "--known", "known.png", "--source-map", "s.png"], ".npz"),
     "one guide alone": ([*ONE, "--guide", "labels.png"], "SAMPLE-GUIDE=OUTPUT-GUIDE"),
     "a guide too few": ([*TWO, "--guide", "labels.png=wanted.png"], "GUIDE0,GUIDE1"),
-    "a guide of another size": ([*ONE, "--guide", "labels2.png=wanted.png"], "28x16"),
+    "a guide of another size": ([*ONE, "--guide", "wanted.png=wanted.png"], "is 16x18 and the sample 24x20"),
     "a size beside a guide": ([*ONE, "--guide", "labels.png=wanted.png", "--size", 20], "16x18"),
-    "guides of two kinds": ([*ONE, "--guide", "grey.png=wanted.png"], "as many channels"),
+    "guides of two kinds": ([*ONE, "--guide", "grey.png=wanted.png"], "1 channels and that of the output 3"),
     "a strange colour": ([*ONE, "--guide", "labels.png=strange.png"], "the colour (0, 255, 0)"),
     "a strange label": ([*ONE, "--guide", "grey.png=grey-strange.png"], "asks for the label 127"),
     "weights of too many": ([*ONE, "--weights", "1,2"], "2 weights and 1 variables"),

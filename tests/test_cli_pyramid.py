@@ -372,8 +372,8 @@ def test_bad_mixtures_get_one_sentence_and_write_nothing(folder, case):
     [
         (("grey.png", "none.png"), "none.png does not exist"),
         (("grey.png", "."), ". is a folder"),
-        (("colour.png", "wide.png"), "wide.png is of uint16 and colour.png of uint8; convert them to one type"),
-        (("four.png", "colour.png"), "colour.png has 3 channels and four.png 4; give all the same, or grey ones"),
+        (("colour.png", "wide.png"), "sample 1 is of uint16 and the first of uint8; convert them to one type"),
+        (("four.png", "colour.png"), "sample 1 has 3 channels and another 4; give all the same, or grey ones"),
     ],
 )
 def test_samples_that_do_not_mix(folder, samples, words, monkeypatch):

@@ -89,7 +89,7 @@ def made(folder, *args, out="out.npz"):
 
 
 def pixels(folder, name):
-    return image.read(folder / name, unknown=True).pixels
+    return image.read(folder / name).pixels
 
 
 def contents(folder):
@@ -217,12 +217,15 @@ BAD = {
     "data outside": ([*GREY, "--known", "outside.csv"], "line 3 of the hard data is at x 40"),
     "data that disagree": ([*GREY, "--known", "disagree.csv"], "keep one of them"),
     "data beyond the type": ([*GREY, "--known", "beyond.csv"], "uint8 cannot hold"),
-    "data of two variables": ([*GREY, "--known", "two.csv"], "has 2 values to a datum"),
+    "data of two variables": ([*GREY, "--known", "two.csv"], "a datum has 2 values"),
     "data in words": ([*GREY, "--known", "words.csv"], "'sand' in column 3"),
     "no such data": ([*GREY, "--known", "none.csv"], "does not exist"),
-    "data everywhere": (["float.tif", "-o", "out.npz", "--known", "full.tif"], "known everywhere"),
-    "data of another size": (["grey.png", "-o", "out.npz", "--known", "known.tif", "--size", "9x9"], "14x12"),
-    "a colour picture of data": ([*GREY, "--known", "colour.png"], "convert them to one type"),
+    "data everywhere": (["float.tif", "-o", "out.npz", "--known", "full.tif"], "leaves nothing to do"),
+    "data of another size": (
+        ["grey.png", "-o", "out.npz", "--known", "known.tif", "--size", "9x9"],
+        "known is 12x14x1",
+    ),
+    "a colour picture of data": ([*GREY, "--known", "colour.png"], "known is 3-dimensional"),
     "an unknown category": ([*FACIES, "--known", "strange.csv"], "the category 1 and the sample has 0, 3"),
     "an unknown suffix": (["grey.png", "-o", "out.xyz"], "names no format of realisations"),
     "a picture as output": (["grey.png", "-o", "out.png"], "names no format of realisations"),
@@ -231,7 +234,7 @@ BAD = {
     "first": ([*GREY, "--first", -1], "first is -1"),
     "jobs": ([*GREY, "--jobs", 0], "jobs is 0"),
     "no such picture": (["none.png", "-o", "out.npz"], "does not exist"),
-    "two types": (["grey.png", "colour.png", "-o", "out.npz"], "convert them to one type"),
+    "two types": (["grey.png", "colour.png", "-o", "out.npz"], "the samples have 2 and 3 axes"),
     "a size in words": (["grey.png", "-o", "out.npz", "--size", "large"], "large"),
     "a size of nothing": (["grey.png", "-o", "out.npz", "--size", "0x5"], "0"),
     "a mask of nothing": ([*GREY, "--sample-mask", "black.png"], "nothing of"),

@@ -523,10 +523,10 @@ def holding(value):
 
 
 BAD_FILL = {
-    "nothing to fill": ({"mask": np.zeros(SHAPE, bool)}, ValueError, "leaves nothing to fill; set it True"),
-    "no NaN": ({"mask": None}, ValueError, "leaves nothing to fill"),
-    "nothing known": ({"mask": np.ones(SHAPE, bool)}, ValueError, "leaves nothing known; set it False"),
-    "NaN everywhere": ({"image": np.full(SHAPE, np.nan), "mask": None}, ValueError, "leaves nothing known"),
+    "nothing to fill": ({"mask": np.zeros(SHAPE, bool)}, ValueError, "nothing to fill; give a mask that is True"),
+    "no NaN": ({"mask": None}, ValueError, "there is nothing to fill"),
+    "nothing known": ({"mask": np.ones(SHAPE, bool)}, ValueError, "nothing of the picture is known; give a mask"),
+    "NaN everywhere": ({"image": np.full(SHAPE, np.nan), "mask": None}, ValueError, "nothing of the picture is known"),
     "a mask of numbers": ({"mask": MIDDLE.astype(np.uint8)}, TypeError, "mask holds uint8 values; give True and False"),
     "another size": ({"mask": MIDDLE[:-1]}, ValueError, "mask is 15x20 and the picture 16x20 .*; give one size"),
     "a mask with channels": ({"mask": MIDDLE[..., None]}, ValueError, "give one size"),

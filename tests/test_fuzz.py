@@ -45,7 +45,7 @@ def test_valid_files_are_valid(tmp_path):
         path = tmp_path / name
         path.write_bytes(data)
         try:
-            image.read(path, unknown=True)
+            image.read(path)
             read += 1
         except (ValueError, TypeError) as error:
             assert name.partition(".")[0].partition("-")[0] in (

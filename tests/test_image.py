@@ -242,11 +242,8 @@ def test_files_that_are_no_images(tmp_path):
     with pytest.raises(ValueError, match="cannot be decoded"):
         image.read(tmp_path / "o.npy")
     np.save(tmp_path / "line.npy", np.zeros(4))
-    with pytest.raises(ValueError, match=r"line\.npy: the sample is 1-dimensional"):
+    with pytest.raises(ValueError, match=r"line\.npy: the picture has the shape \(4,\)"):
         image.read(tmp_path / "line.npy")
-    tifffile.imwrite(tmp_path / "nan.tif", np.array([[0, np.nan], [np.inf, 1]], np.float32))
-    with pytest.raises(ValueError, match=r"nan\.tif: .* 2 values .* row 0, column 1"):
-        image.read(tmp_path / "nan.tif")
     with pytest.raises(ValueError, match="null"):
         image.read("a\0b")
 
@@ -262,22 +259,19 @@ def test_no_bytes_escape_the_errors(tmp_path_factory, data, start):
 # ---------------------------------------------------------------- unknown pixels, alpha, masks
 
 
-def test_unknown_pixels_are_let_through_where_asked_for(tmp_path):
+def test_unknown_pixels_are_read_and_for_the_function_to_judge(tmp_path):
     pixels = noise((5, 4, 3), np.float32)
     pixels[1, 2, 0] = np.nan
     for name in ("a.tif", "a.npy"):
         image.write(tmp_path / name, pixels)
-        with pytest.raises(ValueError, match="1 value that is NaN or infinite, the first at row 1, column 2: fill"):
-            image.read(tmp_path / name)
-        np.testing.assert_array_equal(image.read(tmp_path / name, unknown=True).pixels, pixels)
+        np.testing.assert_array_equal(image.read(tmp_path / name).pixels, pixels)
+    with pytest.raises(ValueError, match="1 value that is NaN or infinite, the first at row 1, column 2: fill"):
+        image.check_sample(pixels, -1)
     np.testing.assert_array_equal(image.check_sample(pixels, -1, unknown=True), pixels)
     np.testing.assert_array_equal(image.check_sample([[1, 2]], None, unknown=True), [[[1], [2]]])
     pixels[3, 1, 2] = -np.inf
-    np.save(tmp_path / "b.npy", pixels)
-    with pytest.raises(
-        ValueError, match=r"b\.npy: .* 1 value that is infinite, the first at row 3, column 1: give NaN"
-    ):
-        image.read(tmp_path / "b.npy", unknown=True)
+    with pytest.raises(ValueError, match="1 value that is infinite, the first at row 3, column 1: give NaN"):
+        image.check_sample(pixels, -1, unknown=True)
 
 
 @pytest.mark.parametrize(
@@ -345,7 +339,7 @@ def test_read_mask(tmp_path, name, pixels, expected):
         (np.array([[0, 1, 1, 0]], np.uint8), "0 and 1 of 255: save it as bool, or multiply it by 255"),
         (np.array([[0, 0.5, 2, 0]]), r"holds 0\.0 to 2\.0: bring"),
         (np.array([[0, 0.5, -1, 0]]), r"holds -1\.0 to 0\.5: bring"),
-        (np.array([[0, np.nan, 1, 0]]), "NaN"),
+        (np.array([[0, np.nan, 1, 0]]), "holds nan"),
     ],
 )
 def test_read_mask_errors(tmp_path, pixels, words):

@@ -370,7 +370,7 @@ BAD = {
     "colour": ({"training": texture((9, 9), 3)}, ValueError, "or channel_axis=-1"),
     "infinite": ({"training": np.full((9, 9), np.inf)}, ValueError, "infinite"),
     "nothing known": ({"training": np.full((9, 9), np.nan)}, ValueError, "no known pixel"),
-    "data of another size": ({"known": holed(shape=(12, 13))}, ValueError, "known is 12x13 .* the output 12x14"),
+    "data of another size": ({"known": holed(shape=(12, 13))}, ValueError, "known is 12x13x1 and the output 12x14"),
     "data of no value": ({"known": NOTHING}, ValueError, "known has no value"),
     "data everywhere": ({"known": TRAINING[:12, :14]}, ValueError, "known leaves nothing to do"),
     "ragged data": ({"known": [[1, 2], [3]]}, ValueError, "known is ragged; give rows of equal length"),
@@ -401,7 +401,7 @@ TABLES = {
     "outside": ("x,y,value\n3,4,20\n14,2,9\n", "line 3 .* outside of a picture of 14 x 12"),
     "disagree": ("x,y,value\n3,4,20\n3.2,4.1,9\n", "line 3 and line 2 .* keep one|line 2 and line 3 .* keep one"),
     "beyond the type": ("x,y,value\n3,4,300\n", "which uint8 cannot hold"),
-    "of two variables": ("x,y,a,b\n3,4,1,2\n", "2 values and a pixel of the training image 1"),
+    "of two variables": ("x,y,a,b\n3,4,1,2\n", "2 values and a pixel of the sample 1"),
     "empty": ("", "the table is empty"),
     "words": ("x,y,value\n3,4,high\n", "'high' in column 3"),
 }

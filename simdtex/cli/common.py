@@ -266,7 +266,7 @@ def output_shape(size: str | None, pixels: Any, *like: Any) -> tuple[int, int]:
     if size is not None:
         return parse_size(size)
     for picture in like:
-        if picture is not None:
+        if hasattr(picture, "shape"):  # a table has none
             return (picture.shape[0], picture.shape[1])
     return (2 * pixels.shape[0], 2 * pixels.shape[1])
 

@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 from simdtex.cli.common import given, plainly, settle, watching
 from simdtex.cli.helping import command
 from simdtex.cli.inputs import (
-    Material,
     channels,
-    check_alike,
     check_source_map,
     read_also,
     read_material,
@@ -97,13 +95,11 @@ def fill(
     from simdtex import fill as make
     from simdtex.io import image
 
-    whole = read_material([picture], unknown=True)
-    pixels, hole = _hole(picture, whole.pixels[0], mask)
-    texture = read_material(samples, unknown=True) if samples else None
-    if texture:
-        _check_texture(texture, picture, pixels)
-        if also:
-            raise ValueError("with --sample no pixel comes from the picture, nor from its maps; leave --also out")
+    whole = read_material([picture])
+    pixels, hole = _hole(whole.pixels[0], mask)
+    texture = read_material(samples) if samples else None
+    if texture and also:
+        raise ValueError("with --sample no pixel comes from the picture, nor from its maps; leave --also out")
     others = read_also(also, whole)
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, texture or whole, everywhere=not texture)
@@ -133,26 +129,14 @@ def fill(
         )
 
 
-def _hole(path: Path, pixels: NDArray[Any], mask: Path | None) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+def _hole(pixels: NDArray[Any], mask: Path | None) -> tuple[NDArray[Any], NDArray[np.bool_]]:
     """The picture, and where it is to be made: where the mask is white or, without one, it is transparent; or NaN."""
     from simdtex.io.image import read_mask, split_alpha
 
     if mask:
-        hole, what = read_mask(mask, pixels.shape), f"{mask} is white"
+        hole = read_mask(mask, pixels.shape)
     else:
         pixels, hole = split_alpha(pixels)
-        what = f"{path} is transparent or NaN"
     if pixels.dtype.kind == "f":
         hole = hole | np.isnan(pixels).reshape(*hole.shape, -1).any(-1)
-    if not hole.any():
-        remedy = "paint white what is to be made" if mask else "say with --mask what is to be made"
-        raise ValueError(f"nothing of {what}, so there is nothing to fill; {remedy}")
-    if hole.all():
-        raise ValueError(f"all of {what}, so nothing of the picture is known; leave some of it")
     return pixels, hole
-
-
-def _check_texture(texture: Material, picture: Path, pixels: NDArray[Any]) -> None:
-    """Raise unless the samples are of the picture's type, and bring them to its axes."""
-    check_alike(texture.paths[0], texture.pixels[0], picture, pixels)
-    texture.pixels[:] = [one.reshape(*one.shape[:2], *pixels.shape[2:]) for one in texture.pixels]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.inputs import Material, channels, kind, size
+from simdtex.cli.inputs import Material, channels
 
 
 class Guides(NamedTuple):
@@ -45,17 +45,9 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> Guides:
         )
     paths = tuple(Path(one) for one in names)
     own = [image.read(path).pixels for path in paths]
-    for path, pixels, of, sample in zip(paths, own, samples.paths, samples.pixels, strict=True):
-        if pixels.shape[:2] != sample.shape[:2]:
-            raise ValueError(f"{path} is {size(pixels)} and {of} {size(sample)}; give a guide of the sample's size")
-    wanted, open_ = _opened(image.read(out, unknown=True).pixels, channels(own[0]))
-    for path, pixels in zip(paths, own, strict=True):
-        if channels(pixels) != channels(wanted):
-            raise ValueError(f"{path} has {kind(pixels)} and {out} {kind(wanted)}; give guides with as many channels")
-    if wanted[~open_].size == 0:
-        raise ValueError(f"{out} says nothing, for all of it is transparent or NaN; leave --guide out")
+    wanted, open_ = _opened(image.read(out).pixels, channels(own[0]))
     few = _few(own)
-    colours = all(one.dtype == np.uint8 and channels(one) > 1 for one in (*own, wanted))
+    colours = all(one.dtype == np.uint8 and channels(one) == channels(wanted) > 1 for one in (*own, wanted))
     if labels is not False and colours and (labels or few):
         own, wanted, labels = _numbered(own, wanted, open_, paths, out)
     elif labels is None and open_.any():  # in floats, that they are whole numbers would no longer be seen

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,7 +14,6 @@ from simdtex.cli.common import afterwards
 
 if TYPE_CHECKING:
     from simdtex.io.hard_data import HardData
-    from simdtex.io.image import Image
 
 TABLES = (".csv", ".tsv", ".txt", ".dat")
 """How the name of a table of known values ends; a file of any other name is a picture."""
@@ -46,7 +44,8 @@ class Material(NamedTuple):
     @property
     def limits(self) -> tuple[float, float]:
         """The smallest and the largest value that is known."""
-        return min(float(np.nanmin(a)) for a in self.pixels), max(float(np.nanmax(a)) for a in self.pixels)
+        low, high = ([extreme.reduce(a, None) for a in self.pixels] for extreme in (np.fmin, np.fmax))
+        return float(np.fmin.reduce(low)), float(np.fmax.reduce(high))
 
     @property
     def known(self) -> bool:
@@ -89,25 +88,17 @@ def check_alike(path: Path, pixels: NDArray[Any], other: Path, like: NDArray[Any
         raise ValueError(f"{path} has {kind(pixels)} and {other} {kind(like)}; convert them to one type")
 
 
-def read_material(paths: Sequence[Path], *, unknown: bool = False) -> Material:
-    """Read pictures that must be of one type; ``unknown`` is that of `simdtex.io.image.read`."""
+def read_material(paths: Sequence[Path]) -> Material:
+    """Read pictures; one of a single channel gets two axes."""
     from simdtex.io import image
 
-    pictures = [image.read(path, unknown=unknown) for path in paths]
-    first = pictures[0].pixels
-    for path, picture in zip(paths, pictures, strict=True):
-        if picture.pixels.dtype.kind == "f" and np.isnan(picture.pixels).all():
-            raise ValueError(f"{path} is NaN everywhere, so nothing of it is known; leave it out")
-        check_alike(path, picture.pixels, paths[0], first)
-    return Material(
-        tuple(paths),
-        [p.pixels.reshape(*p.pixels.shape[:2], *first.shape[2:]) for p in pictures],
-        pictures[0].channel_axis,
-    )
+    pictures = [image.read(path).pixels for path in paths]
+    pixels = [one[..., 0] if channels(one) == 1 and one.ndim == 3 else one for one in pictures]
+    return Material(tuple(paths), pixels, None if pixels[0].ndim == 2 else -1)
 
 
 def read_masks(paths: Sequence[Path], samples: Material) -> list[NDArray[np.bool_]] | None:
-    """The masks of ``--sample-mask``, one for each sample, True where pixels may be taken from; or None."""
+    """Read the masks of ``--sample-mask``, one for each sample, True where pixels may be taken from; or None."""
     from simdtex.io import image
 
     if not paths:
@@ -117,11 +108,7 @@ def read_masks(paths: Sequence[Path], samples: Material) -> list[NDArray[np.bool
             f"--sample-mask is given {len(paths)} times and the number of samples is {len(samples.pixels)}; "
             "give it once for each sample"
         )
-    masks = [image.read_mask(path, shape) for path, shape in zip(paths, samples.sizes, strict=True)]
-    if not any(mask.any() for mask in masks):
-        named = " and ".join(map(str, paths))
-        raise ValueError(f"nothing of {named} is white, so nothing of the sample may be used; paint white what may")
-    return masks
+    return [image.read_mask(path, shape) for path, shape in zip(paths, samples.sizes, strict=True)]
 
 
 def read_also(texts: Sequence[str], samples: Material) -> list[Also]:
@@ -141,8 +128,9 @@ def _other_map(text: str, samples: Material) -> Also:
             f"--also {text} names {len(names)} of the maps that the {len(samples.pixels)} samples have; "
             "give a map of each, parted by commas, as MAP0,MAP1=OUT"
         )
-    maps = read_material([Path(one) for one in names], unknown=True)
+    maps = read_material([Path(one) for one in names])
     for path, pixels, of, sample in zip(maps.paths, maps.pixels, samples.paths, samples.pixels, strict=True):
+        check_alike(path, pixels, maps.paths[0], maps.pixels[0])
         if pixels.shape[:2] != sample.shape[:2]:
             raise ValueError(
                 f"{path} is {size(pixels)} and {of} {size(sample)}; give --also a map of the sample's size"
@@ -183,56 +171,21 @@ def check_source_map(path: Path | None, samples: Material, *, everywhere: bool =
         raise ValueError(f"{path} cannot hold {what}; end its name in .npz instead")
 
 
-def read_known(path: Path) -> Image | HardData:
-    """Read the known values of an output: a table, told by its name, or a picture."""
+def read_known(path: Path, like: NDArray[Any]) -> HardData | np.ma.MaskedArray[Any, Any]:
+    """Read the known values of an output: a table, recognised by its name, or a picture.
+
+    A picture is unknown where it is transparent, if it has alpha and the sample ``like`` has none.
+    """
     from simdtex.io import image
     from simdtex.io.hard_data import read_hard_data
 
-    return read_hard_data(path) if path.suffix.lower() in TABLES else image.read(path, unknown=True)
-
-
-def known_size(known: Image | HardData | None) -> NDArray[Any] | None:
-    """The picture of known values, which says how large the output is; None where it is a table."""
-    from simdtex.io.image import Image
-
-    return known.pixels if isinstance(known, Image) else None
-
-
-def known_values(
-    known: Image | HardData, path: Path, shape: tuple[int, int], samples: Material
-) -> np.ma.MaskedArray[Any, Any]:
-    """The known values of an output of this shape as a masked array that `simdtex.synthesize` takes.
-
-    Of a picture unknown is what is NaN and, if it has alpha and the sample none, what is transparent.
-    """
-    from simdtex.io.hard_data import HardData, place_hard_data
-    from simdtex.io.image import split_alpha
-    from simdtex.machine import memory
-
-    like = samples.pixels[0]
-    if isinstance(known, HardData):
-        memory.require_host(prod(shape) * channels(like) * (like.itemsize + 1))  # values and a mask
-        if len(known.names) != channels(like):
-            raise ValueError(
-                f"{path} has {len(known.names)} values to a datum and {samples.paths[0]} has {kind(like)}; give as many"
-            )
-        try:
-            return place_hard_data(known, shape, like.dtype).reshape(*shape, *like.shape[2:])
-        except ValueError as error:
-            raise ValueError(f"{path}: {error}") from None
-    values, gone = known.pixels, np.zeros(known.pixels.shape[:2], bool)
+    if path.suffix.lower() in TABLES:
+        return read_hard_data(path)
+    values, gone = image.read(path).pixels, None
     if channels(values) == channels(like) + 1:
-        values, gone = split_alpha(values)
-    if channels(values) != channels(like) or values.dtype not in (like.dtype, np.float32, np.float64):
-        raise ValueError(f"{path} has {kind(values)} and {samples.paths[0]} {kind(like)}; convert them to one type")
-    if values.shape[:2] != shape:
-        raise ValueError(
-            f"{path} is {size(values)} and the output {shape[1]}x{shape[0]}; give a picture of the output's size"
-        )
-    mask = np.broadcast_to(gone.reshape(*shape, *[1] * (values.ndim - 2)), values.shape)
-    mask = mask | np.isnan(values) if values.dtype.kind == "f" else mask
-    if not mask.any():
-        raise ValueError(f"{path} is known everywhere, so nothing is left to do; make transparent, or NaN, what is not")
-    if mask.all():
-        raise ValueError(f"{path} is known nowhere; leave --known out, or give a picture that has something")
-    return np.ma.MaskedArray(values, mask).reshape(*shape, *like.shape[2:])
+        values, gone = image.split_alpha(values)
+    if channels(values) == 1:
+        values = values.reshape(values.shape[:2])
+    if gone is None:
+        return np.ma.MaskedArray(values)
+    return np.ma.MaskedArray(values, np.broadcast_to(gone.reshape(*gone.shape, *[1] * (values.ndim - 2)), values.shape))

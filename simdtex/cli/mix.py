@@ -20,6 +20,7 @@ from simdtex.cli.common import (
     watching,
 )
 from simdtex.cli.helping import command
+from simdtex.cli.inputs import channels
 from simdtex.cli.keeping import kept
 from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
 from simdtex.cli.places import READ, WRITE
@@ -88,12 +89,11 @@ def mix(
     chosen = {name: sample_number(name, options.pop(name), samples) for name in CHOSEN}
     weights = None if average is None else numbers("--average", average)
     pictures = [image.read(path) for path in samples]
-    channels = check_alike(samples, pictures)
     arrays = [picture.pixels for picture in pictures]
     begin = image.read(start).pixels if start else None
     shape = output_shape(size, arrays[0], begin)
     colour = any(picture.channel_axis is not None for picture in pictures)
-    image.check_writable(output, arrays[0].dtype, channels)
+    image.check_writable(output, arrays[0].dtype, max(channels(array) for array in arrays))
 
     began = time.perf_counter()
     limits = min(float(array.min()) for array in arrays), max(float(array.max()) for array in arrays)
@@ -135,20 +135,3 @@ def sample_number(name: str, text: str | None, samples: tuple[Path, ...]) -> int
         f"--{name} {text} is none of the samples; give the path of one as it stands in the command, "
         f"or its number, 1 to {len(samples)}"
     )
-
-
-def check_alike(samples: tuple[Path, ...], pictures: list[Any]) -> int:
-    """The channels of the pictures, of which some may be grey; raises where they do not go together."""
-    counts = [1 if picture.channel_axis is None else picture.pixels.shape[-1] for picture in pictures]
-    most = counts.index(max(counts))
-    for path, picture, count in zip(samples, pictures, counts, strict=True):
-        if picture.pixels.dtype != pictures[0].pixels.dtype:
-            raise ValueError(
-                f"{path} is of {picture.pixels.dtype} and {samples[0]} of {pictures[0].pixels.dtype}; "
-                "convert them to one type"
-            )
-        if count not in (1, counts[most]):
-            raise ValueError(
-                f"{path} has {count} channels and {samples[most]} {counts[most]}; give all the same, or grey ones"
-            )
-    return counts[most]

@@ -15,7 +15,7 @@ import numpy as np
 from simdtex.cli.common import afterwards, command_line, given, output_shape, plainly, settle, watching
 from simdtex.cli.guides import read_guides
 from simdtex.cli.helping import command
-from simdtex.cli.inputs import known_size, known_values, read_known, read_masks, read_material
+from simdtex.cli.inputs import read_known, read_masks, read_material
 from simdtex.cli.keeping import kept
 from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, simulate_options
 from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
@@ -102,15 +102,14 @@ def simulate(
     from simdtex import simulate as make
     from simdtex.io.realisations import check_realisations_path, write_realisations
 
-    material = read_material(training_image, unknown=True)
+    material = read_material(training_image)
     masks = read_masks(sample_mask, material)
-    table = read_known(known) if known else None
+    values = read_known(known, material.pixels[0]) if known else None
     guides = read_guides(guide, material, options["labels"]) if guide is not None else None
-    shape = output_shape(size, material.pixels[0], known_size(table), material.pixels[0])
-    values = known_values(table, known, shape, material) if table is not None and known else None
+    shape = output_shape(size, material.pixels[0], values, material.pixels[0])
     check_realisations_path(output)
     if report:
-        _check_report(report, material.pixels, shape, values)
+        _check_report(report, material.pixels, shape, getattr(values, "values", values))
     if guides:
         options["labels"] = guides.labels
 
@@ -143,7 +142,7 @@ def simulate(
                 report,
                 material.pixels[0],
                 made.values,
-                data=None if values is None else _rows(values),
+                data=None if values is None else _rows(values, shape),
                 categories=None if categorical else [],
                 command=command_line(click.get_current_context()),
             )
@@ -165,16 +164,20 @@ def _check_report(folder: Path, pictures: list[Any], shape: tuple[int, int], kno
         raise ValueError("--report is of one training image of one variable; leave it out")
     if pictures[0].dtype.kind == "f" and np.isnan(pictures[0]).any():
         raise ValueError("--report is of a training image that is known everywhere; leave it out")
+    given = [pictures[0]] if known is None else [pictures[0], known]
     if min(*shape, *pictures[0].shape) < LEAST:
         raise ValueError(f"--report is of {LEAST}x{LEAST} pixels or more; give a larger size, or leave it out")
-    if any(np.abs(one.astype(np.float64)).max() > LARGEST for one in (pictures[0], known) if one is not None):
+    if any(np.fmax.reduce(np.abs(np.ma.getdata(one), dtype=np.float64), None) > LARGEST for one in given):
         raise ValueError(f"--report is of values up to {LARGEST:g}; give them in a larger unit, or leave it out")
     if find_spec("gstools") is None:
         raise ValueError("gstools is not installed; pip install 'simdtex[simulate]', or leave --report out")
     check_folder(folder)
 
 
-def _rows(known: np.ma.MaskedArray[Any, Any]) -> Any:
+def _rows(known: Any, shape: tuple[int, int]) -> Any:
     """Hard data as x, y, value."""
+    from simdtex.io.hard_data import HardData, place_hard_data
+
+    known = place_hard_data(known, shape) if isinstance(known, HardData) else np.ma.masked_invalid(known)
     row, col = np.nonzero(~np.ma.getmaskarray(known))
     return np.stack([col, row, known.data[row, col].astype(np.float64)], -1)

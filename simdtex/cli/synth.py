@@ -26,8 +26,6 @@ from simdtex.cli.helping import command
 from simdtex.cli.inputs import (
     channels,
     check_source_map,
-    known_size,
-    known_values,
     read_also,
     read_known,
     read_masks,
@@ -164,20 +162,19 @@ def synth(
         raise ValueError(f"--accounting is of the method mrf, not {method}; leave it out")
     if method == "pyramid" and (source_map or also):
         raise ValueError("the method pyramid takes no pixel from the sample; leave --source-map and --also out")
-    material = read_material(samples, unknown=method == "mrf")
+    material = read_material(samples)
     pixels = material.pixels[0]
     masks = read_masks(sample_mask, material)
-    table = read_known(known) if known else None
+    values = read_known(known, pixels) if known else None
     guides = read_guides(guide, material, options["labels"]) if guide else None
     begin = image.read(start).pixels if start else None
-    shape = output_shape(size, pixels, known_size(table), guides and guides.output, begin)
-    told = known_values(table, known, shape, material) if known and table else None
+    shape = output_shape(size, pixels, values, guides and guides.output, begin)
     if guides:
         options["labels"] = guides.labels
     inputs = {
         "channel_axis": material.channel_axis,
         "mask": masks and (masks if material.several else masks[0]),
-        "known": told,
+        "known": values,
         "guide": guides and guides.pair,
         "rng": seed,
     }
@@ -186,14 +183,14 @@ def synth(
         synthesize_in_tiles(click.get_current_context(), material.array, shape, more)
         return
     image.check_writable(output, pixels.dtype, channels(pixels))
-    check_source_map(source_map, material, everywhere=told is None)
+    check_source_map(source_map, material, everywhere=known is None)
     others = read_also(also, material)
-    if others and told is not None:
+    if others and known:
         raise ValueError("known pixels are from no sample, and nothing says what a map has there; leave --also out")
     if report:
         from simdtex.report.page import check_folder
 
-        if material.several or told is not None or not material.known:
+        if material.several or known or not material.known:
             raise ValueError("--report shows one sample, all of it known, and what is taken from it; leave it out")
         check_folder(report)
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from simdtex.io.image import cast
 from simdtex.io.limits import BYTES, TooLarge, check_file, max_pixels_or_default, read_npy
 
 __all__ = ["HardData", "place_hard_data", "read_hard_data"]
@@ -296,9 +297,8 @@ def _sites(data: HardData, rows: int, cols: int) -> NDArray[np.intp]:
 def _cast(data: HardData, kind: np.dtype[Any]) -> NDArray[Any]:
     """Return the values in another type; unknown ones are 0."""
     values = np.where(np.isnan(data.values), 0.0, data.values)
-    with np.errstate(over="ignore", invalid="ignore"):
-        found = values.astype(kind)
-        wrong = np.isinf(found) if kind.kind == "f" else found.astype(np.float64) != values
+    found, wrong = cast(values, kind)
+    wrong |= np.isinf(values)
     if kind.kind in "iu":
         wrong |= np.abs(values) >= 2**53  # float64, which the table was read as, may have rounded these
     if wrong.any():

@@ -28,6 +28,7 @@ from simdtex.options import unmasked
 __all__ = [
     "Image",
     "as_array",
+    "cast",
     "check_sample",
     "check_writable",
     "parse_size",
@@ -63,16 +64,14 @@ class Image:
 # ---------------------------------------------------------------- reading
 
 
-def read(path: PathLike, *, unknown: bool = False, max_pixels: int | None = None) -> Image:
-    """Read a picture file as a sample; the format is recognised by its content and not by its name.
+def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
+    """Read a picture file, whose format is recognised by its content and not by its name.
 
     Parameters
     ----------
     path : path
         PNG, JPEG, TIFF (first page), BMP, WebP, GIF (first frame), or a NumPy ``.npy`` of shape (rows, cols) or
         (rows, cols, channels). No other format is tried.
-    unknown : bool
-        Whether float pixels may be NaN, which means that they are unknown.
     max_pixels : int, optional
         The most pixels that are read, with 8 bytes for each. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else
         2**27. The file's header is checked before anything is decoded.
@@ -87,8 +86,7 @@ def read(path: PathLike, *, unknown: bool = False, max_pixels: int | None = None
     Raises
     ------
     ValueError
-        The file is missing, a folder, empty, truncated, not an image, too large, or has infinite pixels, or NaN unless
-        `unknown` is true.
+        The file is missing, a folder, empty, truncated, not an image, or too large.
 
     Notes
     -----
@@ -101,10 +99,10 @@ def read(path: PathLike, *, unknown: bool = False, max_pixels: int | None = None
         data = Path(name).read_bytes()
     except OSError as error:
         raise ValueError(f"{name} cannot be read ({error.strerror}): check the path of the image") from None
-    return read_bytes(name, data, unknown=unknown, max_pixels=most)
+    return read_bytes(name, data, max_pixels=most)
 
 
-def read_bytes(name: str, data: bytes, *, unknown: bool = False, max_pixels: int | None = None) -> Image:
+def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None) -> Image:
     """Read a picture from the bytes of its file, as `read` does; messages call it `name`."""
     most = max_pixels_or_default(max_pixels)
     if not data:
@@ -124,12 +122,11 @@ def read_bytes(name: str, data: bytes, *, unknown: bool = False, max_pixels: int
             f"{name} cannot be decoded, it is truncated, damaged or of an unknown kind ({text}): save it again as PNG "
             "or TIFF"
         ) from None
-    channel_axis = -1 if pixels.ndim == 3 else None
     try:
-        check_sample(pixels, channel_axis, unknown=unknown)
+        pixels = native(_picture(pixels))
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: {error}") from None
-    return Image(native(pixels), channel_axis)
+    return Image(pixels, -1 if pixels.ndim == 3 else None)
 
 
 def split_alpha(pixels: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
@@ -229,11 +226,22 @@ def as_array(name: str, values: Any) -> Array:
     ValueError
         Rows have unequal lengths.
     """
+    if hasattr(values, "compute"):  # dask, which NumPy would convert without its mask
+        values = values.compute()
     try:
         array = np.asanyarray(values)
     except ValueError:
         raise ValueError(f"{name} is ragged; give rows of equal length") from None
     return array if isinstance(array, np.ma.MaskedArray) else np.asarray(array)
+
+
+def cast(values: Array, dtype: DTypeLike) -> tuple[Array, NDArray[np.bool_]]:
+    """Return values in another type, and where it cannot hold them: integers must be exact, floats finite."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        found = values.astype(dtype)
+    if found.dtype.kind == "f":
+        return found, np.isinf(found) & np.isfinite(values)
+    return found, found != values
 
 
 def check_sample(array: Any, channel_axis: int | None, *, unknown: bool = False) -> Array:
@@ -275,9 +283,10 @@ def check_sample(array: Any, channel_axis: int | None, *, unknown: bool = False)
         if isinstance(channel_axis, bool) or not isinstance(channel_axis, (int, np.integer)):
             raise TypeError(f"channel_axis is {channel_axis!r}: give None or an integer")
         if pixels.ndim != 3:
+            grey = " (grey)" * (pixels.ndim == 2)
             raise ValueError(
-                f"the sample is {pixels.ndim}-dimensional: give three axes for "
-                f"channel_axis={channel_axis}, one of them the channels"
+                f"the sample is {pixels.ndim}-dimensional{grey}: give three axes for channel_axis={channel_axis}, "
+                "one of them the channels"
             )
         if not -3 <= channel_axis < 3:
             raise ValueError(f"channel_axis is {channel_axis}: give one of -3 to 2")

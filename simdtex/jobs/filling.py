@@ -15,13 +15,13 @@ from scipy import ndimage
 from simdtex.checkpoint import Checkpoint
 from simdtex.driver import NOTHING, Keep, PlannedJob, drive, execute
 from simdtex.io.image import check_sample
-from simdtex.jobs.inputs import check_mask, check_samples, masked_in
+from simdtex.jobs.inputs import check_mask, check_picture, check_samples
 from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given
 from simdtex.model.lattice import neighbourhood_offsets
-from simdtex.model.pictures import Mask, Pictures, unknown_in
+from simdtex.model.pictures import Mask, Pictures
 from simdtex.options import resolve, whole, within_32_bits
 from simdtex.run import Callback, Output
 
@@ -146,13 +146,12 @@ def fill(
     >>> bool((filled[~hole] == gravel[~hole]).all())
     True
     """
-    pixels = check_sample(image, channel_axis, unknown=True)
-    hole = unknown_in(pixels) | masked_in(image, channel_axis)
-    hole = hole if mask is None else hole | check_mask("mask", mask, pixels.shape[:2])
+    pixels, hole = check_picture(image, channel_axis)
+    hole = hole if mask is None else hole | check_mask(mask, pixels.shape[:2])
     if not hole.any():
-        raise ValueError("the mask leaves nothing to fill; set it True where the picture is to be made")
+        raise ValueError("there is nothing to fill; give a mask that is True (white) where the picture is to be made")
     if hole.all():
-        raise ValueError("the mask leaves nothing known; set it False where the picture is to be kept")
+        raise ValueError("nothing of the picture is known; give a mask that is False (black) where it is to be kept")
     if reach is not None:
         whole("reach", reach, 1)
     given = None if sample is None else _check_sample(sample, channel_axis, pixels)

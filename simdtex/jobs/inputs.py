@@ -1,26 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What users give beside a sample: several samples, masks, known values, guides; checked, and brought into one form."""
+"""The arrays of a job, each checked once, where it enters the Python API: samples, masks, known values, guides."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.io.image import check_sample
+from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
+from simdtex.io.image import as_array, cast, check_sample
+from simdtex.machine import memory
 from simdtex.model.given import Given
-from simdtex.model.pictures import Mask, Pictures
+from simdtex.model.guide import GuidePair
+from simdtex.model.pictures import Mask, Pictures, unknown_in
 from simdtex.options import unmasked
 
 
 class Inputs(NamedTuple):
-    """A job's arrays: the sample's ``pictures``, what is ``given`` of the output, and the ``guide`` as two arrays."""
+    """The arrays of a job: the sample's ``pictures``, what is ``given`` of the output, and the ``guide`` of both."""
 
     pictures: Pictures
     given: Given | None = None
-    guide: tuple[tuple[NDArray[Any], ...], NDArray[Any]] | None = None
+    guide: GuidePair | None = None
 
     @property
     def plain(self) -> bool:
@@ -28,7 +33,7 @@ class Inputs(NamedTuple):
         return self.pictures.clean and self.given is None and self.guide is None
 
     def identity(self) -> dict[str, Any]:
-        """Return everything, by the names that users give it, as what identifies a run."""
+        """Return all arrays by the names of the arguments, as the identity of a run."""
         given = self.given
         values = given and (np.where(given.known, given.values, 0), given.known)
         return {
@@ -38,7 +43,7 @@ class Inputs(NamedTuple):
 
 
 def check_inputs(
-    sample: ArrayLike | Sequence[ArrayLike],
+    sample: ArrayLike | Sequence[ArrayLike] | Pictures,
     shape: tuple[int, int],
     channel_axis: int | None = None,
     mask: Any = None,
@@ -46,91 +51,104 @@ def check_inputs(
     known_source: Any = None,
     guide: Any = None,
 ) -> Inputs:
-    """Check a job's arrays against one another; the arguments are those of `simdtex.synthesize`."""
-    pictures = check_samples(sample, channel_axis, mask)
+    """Check the arrays of a job; the arguments are those of `simdtex.synthesize`, or a sample already checked."""
+    pictures = sample if isinstance(sample, Pictures) else check_samples(sample, channel_axis, mask)
     given = None if known is None else check_known(known, shape, channel_axis, pictures, known_source)
     return Inputs(pictures, given, None if guide is None else check_guide(guide, shape, pictures))
 
 
-def check_samples(sample: ArrayLike | Sequence[ArrayLike], channel_axis: int | None, mask: Any = None) -> Pictures:
-    """The pictures of a sample: one array, or a list or tuple of arrays; ``mask`` says what may be used, likewise."""
+# ---------------------------------------------------------------- samples
+
+
+def check_samples(sample: Any, channel_axis: int | None, mask: Any = None) -> Pictures:
+    """Check a sample, or a list or tuple of samples, and ``mask``, which says likewise what may be used."""
     several = is_several(sample, channel_axis)
-    arrays: list[Any] = list(sample) if several else [sample]  # type: ignore[arg-type]
-    pixels = [check_sample(array, channel_axis, unknown=True) for array in arrays]
+    arrays: list[Any] = list(sample) if several else [sample]
+    if several and len(axes := {one.ndim for one in arrays}) > 1:
+        raise ValueError(f"the samples have {min(axes)} and {max(axes)} axes; give samples of one type, grey or colour")
+    pixels, unknown = zip(*(check_picture(one, channel_axis) for one in arrays), strict=True)
     for number, picture in enumerate(pixels[1:], 1):
         if picture.dtype != pixels[0].dtype or picture.shape[2] != pixels[0].shape[2]:
             raise ValueError(
                 f"sample {number} has {_kind(picture)} and sample 0 {_kind(pixels[0])}; give samples of one type"
             )
-    gaps = tuple(masked_in(array, channel_axis) for array in arrays)
-    unknown = gaps if any(gap.any() for gap in gaps) else None
     if mask is None:
-        return Pictures(tuple(pixels), unknown)
+        return Pictures(pixels, unknown)
     masks = list(mask) if several and np.iterable(mask) else [mask]
     if len(masks) != len(pixels):
         raise ValueError(f"there are {len(pixels)} samples and {len(masks)} masks; give one mask for each")
-    usable = [check_mask("mask", one, picture.shape[:2]) for one, picture in zip(masks, pixels, strict=True)]
+    usable = tuple(check_mask(one, picture.shape[:2]) for one, picture in zip(masks, pixels, strict=True))
     if not any(one.any() for one in usable):
         raise ValueError("the mask leaves nothing of the sample to be used; set it True where pixels may be taken from")
-    return Pictures(tuple(pixels), unknown, tuple(usable))
+    return Pictures(pixels, unknown, usable)
 
 
-def masked_in(array: Any, channel_axis: int | None) -> Mask:
-    """Where a masked array (rows, cols) is masked in any channel; nowhere where it is no masked array."""
-    mask = np.ma.getmaskarray(array) if np.ma.isMaskedArray(array) else np.zeros(np.shape(array), bool)
-    return mask if channel_axis is None else np.asarray(mask.any(channel_axis))
+def check_picture(image: Any, channel_axis: int | None) -> tuple[NDArray[Any], Mask]:
+    """Check a picture that may be unknown in part.
+
+    Returns
+    -------
+    pixels : (rows, cols, channels) array
+    unknown : (rows, cols) bool array
+        Where a channel is NaN or masked.
+    """
+    array = as_array("the sample", image)
+    pixels = check_sample(array, channel_axis, unknown=True)
+    hidden = np.ma.getmaskarray(array)
+    return pixels, unknown_in(pixels) | (hidden if channel_axis is None else hidden.any(channel_axis))
 
 
 def is_several(sample: Any, channel_axis: int | None) -> bool:
-    """Whether a sample is a list or tuple of samples, and not one array written as a list."""
-    if not isinstance(sample, (list, tuple)) or not sample:
+    """Return whether a sample is a list or tuple of samples, and not one array written as a list."""
+    if not isinstance(sample, (list, tuple)):
         return False
-    axes = 2 if channel_axis is None else 3
-    return all(isinstance(one, np.ndarray) and one.ndim == axes for one in sample)
+    axes = [getattr(one, "ndim", 0) for one in sample]
+    return (2 if channel_axis is None else 3) in axes and min(axes) >= 2
 
 
-def check_array(name: str, values: Any) -> NDArray[Any]:
-    """An array, or one clear sentence."""
-    unmasked(name, values)
-    try:
-        return np.asarray(values)
-    except ValueError:
-        raise ValueError(f"{name} is ragged; give rows of equal length") from None
-
-
-def check_mask(name: str, mask: Any, shape: tuple[int, int]) -> Mask:
-    """A bool array of a shape, or one clear sentence."""
-    found = check_array(name, mask)
+def check_mask(mask: Any, shape: tuple[int, int]) -> Mask:
+    """Return a mask as a bool array of a shape."""
+    found = _unmasked("mask", mask)
     if found.dtype != np.bool_:
-        raise TypeError(f"{name} holds {found.dtype} values; give True and False")
-    if found.shape != shape:
-        raise ValueError(
-            f"{name} is {_size(found)} and the picture {shape[0]}x{shape[1]} (rows x columns); give one size"
-        )
+        raise TypeError(f"mask holds {found.dtype} values; give True and False")
+    _check_size("mask", found.shape, "the picture", shape)
     return found
+
+
+# ---------------------------------------------------------------- known values
+
+
+def as_known(known: Any) -> HardData | NDArray[Any]:
+    """Return known values as a table, which a path is read to, or as an array."""
+    if isinstance(known, (str, os.PathLike)):
+        return read_hard_data(known)
+    return known if isinstance(known, HardData) else as_array("known", known)
 
 
 def check_known(
     known: Any, shape: tuple[int, int], channel_axis: int | None, pictures: Pictures, source: Any = None
 ) -> Given:
-    """What is given of an output: a masked array, or an array of floats with NaN for unknown."""
-    array = known if isinstance(known, np.ma.MaskedArray) else np.ma.asarray(check_array("known", known))
-    axes = 2 if channel_axis is None else 3
-    if array.dtype.kind not in "buif":
-        raise TypeError(f"known holds {array.dtype} values; give integers or real floats")
-    if array.ndim != axes:
-        raise ValueError(
-            f"known is {array.ndim}-dimensional; give {'(rows, cols)' if axes == 2 else 'the channel axis too'}"
-        )
-    array = array[..., None] if channel_axis is None else np.moveaxis(array, channel_axis, -1)
+    """Check the known values of an output: a masked array, floats with NaN for unknown, a table or its path."""
+    known = as_known(known)
     variables, dtype = pictures.pixels[0].shape[2], pictures.pixels[0].dtype
-    if array.shape != (*shape, variables):
-        raise ValueError(
-            f"known is {_size(array)} with {array.shape[2]} channels and the output {shape[0]}x{shape[1]} (rows x "
-            f"columns) with {variables}; give one size"
-        )
-    there = ~np.ma.getmaskarray(array)
-    values = array.data
+    if isinstance(known, HardData):
+        if len(known.names) != variables:
+            raise ValueError(
+                f"a datum has {len(known.names)} values and a pixel of the sample {variables}; give as many"
+            )
+        memory.require_host(prod(shape) * variables * (dtype.itemsize + 1))  # values and a mask
+        array = place_hard_data(known, shape, dtype).reshape(*shape, variables)
+    else:
+        axes = 2 if channel_axis is None else 3
+        if known.dtype.kind not in "buif":
+            raise TypeError(f"known holds {known.dtype} values; give integers or real floats")
+        if known.ndim != axes:
+            raise ValueError(
+                f"known is {known.ndim}-dimensional; give {'(rows, cols)' if axes == 2 else 'the channel axis too'}"
+            )
+        array = known[..., None] if channel_axis is None else np.moveaxis(known, channel_axis, -1)
+    _check_size("known", array.shape, "the output", (*shape, variables))
+    there, values = ~np.ma.getmaskarray(array), np.ma.getdata(array)
     if values.dtype.kind == "f":
         there &= ~np.isnan(values)
         if np.isinf(values[there]).any():
@@ -139,14 +157,18 @@ def check_known(
         raise ValueError("known has no value; leave it out, or give numbers where something is known")
     if there.all():
         raise ValueError("known leaves nothing to do; give NaN or a masked array where the output is to be made")
-    return Given(
-        _cast("known", values, there, dtype), there, None if source is None else check_place(source, there, pictures)
-    )
+    kept = np.where(there, values, np.zeros((), values.dtype))
+    found, wrong = cast(kept, dtype)
+    if wrong.any():
+        raise ValueError(
+            f"known holds {kept[wrong][0]}, which the sample's type {dtype} does not; give values of that type"
+        )
+    return Given(found, there, None if source is None else _check_source(source, there, pictures))
 
 
-def check_place(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.int32]:
-    """Where in the sample known pixels are from, (rows, cols, 2 or 3)."""
-    place = check_array("known_source", source)
+def _check_source(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.int32]:
+    """Return the positions in the sample that known pixels are from, (rows, cols, 2 or 3)."""
+    place = _unmasked("known_source", source)
     columns = 2 if len(pictures.pixels) == 1 else 3
     if place.dtype.kind not in "iu" or place.shape != (*there.shape[:2], columns):
         raise ValueError(
@@ -158,49 +180,45 @@ def check_place(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.int3
     inside = (number >= 0) & (number < len(pictures.pixels))
     sizes = np.array([picture.shape[:2] for picture in pictures.pixels])
     rows, cols = sizes[np.where(inside, number, 0).astype(np.intp)].T
-    if not (inside & (row < rows) & (col >= 0) & (col < cols)).all():  # as they are given: a cast would wrap
+    if not (inside & (row < rows) & (col >= 0) & (col < cols)).all():  # before a cast, which would wrap
         raise ValueError("known_source points outside the sample; give -1 where a pixel is not from there")
     found = np.full(place.shape, -1, np.int32)
     found[used] = place[used]
     return found
 
 
-def check_guide(
-    guide: Any, shape: tuple[int, int], pictures: Pictures
-) -> tuple[tuple[NDArray[Any], ...], NDArray[Any]]:
-    """A guide, ``(of the sample, of the output)``: arrays (rows, cols) or (rows, cols, G)."""
+# ---------------------------------------------------------------- guides
+
+
+def check_guide(guide: Any, shape: tuple[int, int], pictures: Pictures) -> GuidePair:
+    """Check a guide, ``(of the sample, of the output)``: arrays (rows, cols) or (rows, cols, G)."""
     if not isinstance(guide, (tuple, list)) or len(guide) != 2:
         raise TypeError("guide is no pair; give (guide of the sample, guide of the output)")
     first, second = guide
-    several = len(pictures.pixels) > 1
-    if several and not (isinstance(first, (list, tuple)) and len(first) == len(pictures.pixels)):
-        raise ValueError(f"there are {len(pictures.pixels)} samples; give a list of a guide for each")
-    listed = several or (isinstance(first, (list, tuple)) and len(first) == 1 and isinstance(first[0], np.ndarray))
-    samples = [_guide("the guide of the sample", one) for one in (first if listed else [first])]
+    count = len(pictures.pixels)
+    if count > 1 and not (isinstance(first, (list, tuple)) and len(first) == count):
+        raise ValueError(f"there are {count} samples; give a list of a guide for each")
+    listed = count > 1 or (isinstance(first, (list, tuple)) and len(first) == 1 and hasattr(first[0], "ndim"))
+    samples = tuple(_guide("the guide of the sample", one) for one in (first if listed else [first]))
     output = _guide("the guide of the output", second)
     for number, (one, picture) in enumerate(zip(samples, pictures.pixels, strict=True)):
-        if one.shape[:2] != picture.shape[:2]:
-            which = f"sample {number}" if several else "the sample"
-            raise ValueError(f"the guide of {which} is {_size(one)} and {which} {_size(picture)}; give one size")
+        which = f"sample {number}" if count > 1 else "the sample"
+        _check_size(f"the guide of {which}", one.shape[:2], which, picture.shape[:2])
         if one.shape[2] != output.shape[2]:
             raise ValueError(
                 f"the guide of the sample has {one.shape[2]} channels and that of the output {output.shape[2]}; "
                 "give as many"
             )
-        if one.dtype.kind == "f" and np.isnan(one).any():
+        if unknown_in(one).any():
             raise ValueError(
                 "the guide of the sample has NaN; give a number everywhere, and NaN in that of the output alone"
             )
-    if output.shape[:2] != shape:
-        raise ValueError(
-            f"the guide of the output is {_size(output)} and the output {shape[0]}x{shape[1]} (rows x columns); "
-            "give one size"
-        )
-    return tuple(samples), output
+    _check_size("the guide of the output", output.shape[:2], "the output", shape)
+    return samples, output
 
 
 def _guide(name: str, array: Any) -> NDArray[Any]:
-    found = check_array(name, array)
+    found = _unmasked(name, array)
     if found.dtype.kind not in "buif":
         raise TypeError(f"{name} holds {found.dtype} values; give integers or real floats")
     if found.ndim not in (2, 3) or not found.size:
@@ -211,24 +229,17 @@ def _guide(name: str, array: Any) -> NDArray[Any]:
     return found[..., None] if found.ndim == 2 else found
 
 
-def _cast(name: str, values: NDArray[Any], there: Mask, dtype: np.dtype[Any]) -> NDArray[Any]:
-    """Values as a type that must hold those that are there exactly; 0 elsewhere."""
-    kept = np.where(there, values, np.zeros((), values.dtype))
-    with np.errstate(invalid="ignore", over="ignore"):
-        found = kept.astype(dtype)
-        wrong = there & (found.astype(np.float64) != kept.astype(np.float64))
-    if dtype.kind == "f":
-        wrong &= ~np.isfinite(found)
-    if wrong.any():
-        raise ValueError(
-            f"{name} holds {kept[wrong][0]}, which the sample's type {dtype} does not; give values of that type"
-        )
-    return np.asarray(found)
+def _unmasked(name: str, values: Any) -> NDArray[Any]:
+    array = as_array(name, values)
+    unmasked(name, array)
+    return np.asarray(array)
 
 
 def _kind(picture: NDArray[Any]) -> str:
     return f"{picture.shape[2]} channels of {picture.dtype}"
 
 
-def _size(array: NDArray[Any]) -> str:
-    return "x".join(str(n) for n in array.shape[:2])
+def _check_size(name: str, shape: tuple[int, ...], other: str, wanted: tuple[int, ...]) -> None:
+    if shape != wanted:
+        sizes = ["x".join(map(str, sides)) for sides in (shape, wanted)]
+        raise ValueError(f"{name} is {sizes[0]} and {other} {sizes[1]} (rows x columns); give one size")

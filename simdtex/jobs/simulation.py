@@ -9,18 +9,17 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 from math import prod
-from pathlib import Path
 from queue import SimpleQueue
 from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from simdtex.checkpoint import Checkpoint, digest, opened
 from simdtex.driver import Keep, check_shape, drive, restored
-from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
-from simdtex.jobs.inputs import Inputs, check_array, check_inputs, check_samples
+from simdtex.io.hard_data import HardData
+from simdtex.jobs.inputs import Inputs, as_known, check_inputs, check_samples
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
 from simdtex.options import resolve, whole, within_32_bits
@@ -117,8 +116,12 @@ def simulate(
         whole("jobs", jobs, 1)
     if shape is not None:
         within_32_bits(check_shape(shape), 1)
-    data, size = _known(known, shape, check_samples(training, channel_axis, mask).pixels[0], channel_axis)
-    inputs = check_inputs(training, size, channel_axis, mask, data, None, guide)
+    pictures = check_samples(training, channel_axis, mask)
+    known = None if known is None else as_known(known)
+    size = check_shape(pictures.pixels[0].shape[:2] if shape is None else shape)
+    if shape is None and isinstance(known, np.ndarray) and known.ndim == (2 if channel_axis is None else 3):
+        size = known.shape if channel_axis is None else np.moveaxis(known, channel_axis, -1).shape[:2]
+    inputs = check_inputs(pictures, size, channel_axis, None, known, None, guide)
     chosen = resolve(mrf.Options, "simulate", options)
     plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
     pixels = inputs.pictures.pixels[0]
@@ -209,29 +212,6 @@ def _in_turn(one: Callable[[int, Machine], None], numbers: list[int], machines: 
         except BaseException:
             workers.shutdown(wait=False, cancel_futures=True)
             raise
-
-
-def _known(
-    known: Any, shape: tuple[int, int] | None, training: NDArray[Any], channel_axis: int | None
-) -> tuple[NDArray[Any] | None, tuple[int, int]]:
-    """Hard data as an array, and the size of a realisation."""
-    if isinstance(known, (str, Path, os.PathLike)):
-        known = read_hard_data(known)
-    if known is None or isinstance(known, HardData):
-        size = check_shape(training.shape[:2] if shape is None else shape)
-        placed = None if known is None else place_hard_data(known, size, training.dtype)
-        variables = 1 if channel_axis is None else training.shape[2]
-        if known is not None and len(known.names) != variables:
-            raise ValueError(
-                f"a datum has {len(known.names)} values and a pixel of the training image {variables}; give as many"
-            )
-        if placed is not None and channel_axis is not None:
-            placed = np.moveaxis(placed[..., None] if placed.ndim == 2 else placed, -1, channel_axis)
-        return placed, size
-    array = known if isinstance(known, np.ma.MaskedArray) else check_array("known", known)
-    if shape is None and array.ndim == (2 if channel_axis is None else 3):
-        shape = array.shape if channel_axis is None else np.moveaxis(array, channel_axis, -1).shape[:2]
-    return array, check_shape(training.shape[:2] if shape is None else shape)
 
 
 def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) -> dict[str, Any]:

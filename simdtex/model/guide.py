@@ -22,6 +22,9 @@ UNKNOWN = 2**16 - 1
 """The working level of what nobody knows: it counts for nothing (kernels/common/level.h)."""
 
 
+GuidePair = tuple[tuple[NDArray[Any], ...], NDArray[Any]]
+"""A guide: (rows, cols, G) arrays, one for each picture of the sample, and (H, W, G) of the output."""
+
 MOST = 16
 """Channels of working levels that a variable has, at most: one for each category."""
 

@@ -16,7 +16,7 @@ from simdtex.methods.mrf.level import Input, number_of_levels
 from simdtex.methods.mrf.options import CATEGORIES as MOST
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given, planes
-from simdtex.model.guide import Beside, Guide
+from simdtex.model.guide import Beside, Guide, GuidePair
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import NothingUsable, Sample
@@ -28,9 +28,6 @@ TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.distributed"
 
 LABELS = 64
 """The most labels of a guide: each is a channel."""
-
-GuidePair = tuple[tuple[NDArray[Any], ...], NDArray[Any]]
-"""A guide: (rows, cols, G) arrays, one for each picture of the sample, and (H, W, G) of the output."""
 
 
 class Plan(Input):
