@@ -1,29 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The jobs that a benchmark runs, and how they are timed."""
+"""The jobs of a benchmark, and how they are timed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass
 from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simdtex.machine import Machine
 from simdtex.methods import mrf
 from simdtex.model.lattice import neighbourhood_offsets
-from simdtex.model.sample import Sample
 from simdtex.synthesis import synthesize, synthesize_solid
-
-METHODS = ("mrf", "multires", "pyramid", "solid")
 
 
 @dataclass(frozen=True)
 class Case:
-    """One job: more of gravel, a grey picture that scikit-image carries.
+    """A synthesis from gravel, a grey picture of scikit-image.
 
     Parameters
     ----------
@@ -31,9 +27,9 @@ class Case:
     sample, output : int
         Pixels a side; of a solid, voxels.
     order : int
-        Of the neighbourhood, of ``mrf``; 0 otherwise.
+        Of the neighbourhood, for ``mrf``; 0 otherwise.
     search : str
-        Of ``mrf``, where it has this option; else empty.
+        For ``mrf``; empty otherwise.
     """
 
     method: str
@@ -44,133 +40,168 @@ class Case:
 
     @property
     def name(self) -> str:
-        """What it is called in tables; unique."""
-        kind = " ".join([self.method, *([self.search] if self.search else [])])
-        order = f", order {self.order}" if self.order else ""
-        return f"{kind}{order}, {self.sample} -> {self.output}{'^3' if self.method == 'solid' else ''}"
+        """A unique name."""
+        order = f" {self.search}, order {self.order}" if self.order else ""
+        return f"{self.method}{order}, {self.sample} -> {self.output}{'^3' if self.method == 'solid' else ''}"
 
     @property
-    def cost(self) -> float:
-        """Roughly how much there is to do, to put the small before the large."""
-        return float(self.sample**2 * self.output**2 * max(1, self.order))
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """What the method is given."""
-        chosen: dict[str, Any] = {"order": self.order} if self.order else {}
-        return chosen | ({"search": self.search} if self.search else {})
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self) | {"name": self.name}
+    def size(self) -> dict[str, int]:
+        """Quantities that the time may grow with."""
+        return {
+            "output pixels": self.output**2,
+            "voxels": self.output**3,
+            "sample pixels": self.sample**2,
+            "neighbours": len(neighbourhood_offsets(max(1, self.order))),
+        }
 
 
-def case_of(entry: dict[str, Any]) -> Case:
-    """The case that `Case.as_dict` made a dict of."""
-    return Case(**{f.name: entry[f.name] for f in fields(Case)})
+@dataclass(frozen=True)
+class Sizes:
+    """The cases of a benchmark.
 
-
-def searches() -> tuple[str, ...]:
-    """The searches of ``mrf`` that are measured."""
-    return ("exact", "coherent")
-
-
-def picture(side: int) -> NDArray[np.uint8]:
-    """The sample."""
-    from skimage import data
-
-    read: Any = data.gravel
-    return np.ascontiguousarray(read()[:side, :side])
-
-
-def brute_force(case: Case, relaxations: list[int]) -> list[float]:
-    """Multiply-adds that weighing every candidate takes, 2 for each neighbour and channel.
-
-    ``relaxations`` are those of the levels of a run, the coarsest first.
+    Parameters
+    ----------
+    name : str
+    repeats : int
+        Timed runs of each case; the fastest counts.
+    budget : float
+        Seconds of a case after which no other run begins.
+    seconds : float
+        Time to measure each limit, at each vector width.
+    jobs : tuple of Case
+        Jobs that are reported one by one.
+    reference : tuple of Case
+        Those of them that the NumPy reference does too.
+    growth : dict
+        What grows, a key of `Case.size` -> cases that differ in nothing else, one sequence for each method and search.
     """
-    offsets, options = neighbourhood_offsets(case.order), mrf.Options()
-    sample = Sample(picture(case.sample)[..., None], len(offsets))
-    counts = [
-        sample.positions(offsets, 2**level, options.phases, options.edges).size
-        for level in reversed(range(len(relaxations)))
-    ]
-    channels = 1 + bool(options.structure)
-    return [2.0 * count * len(offsets) * channels * many for count, many in zip(counts, relaxations, strict=True)]
+
+    name: str
+    repeats: int
+    budget: float
+    seconds: float
+    jobs: tuple[Case, ...]
+    reference: tuple[Case, ...]
+    growth: dict[str, Sequence[Sequence[Case]]]
+
+    @property
+    def cases(self) -> list[Case]:
+        """Every case once."""
+        return list(
+            dict.fromkeys([*self.jobs, *(case for rows in self.growth.values() for row in rows for case in row)])
+        )
 
 
-@contextmanager
-def untimed(machine: Machine) -> Iterator[None]:
-    """No kernel is timed in here, on a machine that could."""
-    log = getattr(machine, "log", None)
-    if log is None:
-        yield
-        return
-    with log.paused():
-        yield
+def _both(sample: int, output: int, *orders: int) -> tuple[Case, ...]:
+    return tuple(Case("mrf", sample, output, order, search) for order in orders for search in ("exact", "coherent"))
+
+
+def _growth(
+    sample: int, outputs: Sequence[int], samples: Sequence[int], orders: Sequence[int], large: int
+) -> dict[str, Sequence[Sequence[Case]]]:
+    """Return growth of ``mrf`` with output, sample and order, and of others with outputs `large` times as large."""
+    least, searches = outputs[0], ("exact", "coherent")
+    return {
+        "output pixels": [
+            *([Case("mrf", sample, n, 8, search) for n in outputs] for search in searches),
+            *([Case(method, sample, large * n) for n in outputs] for method in ("multires", "pyramid")),
+        ],
+        "sample pixels": [[Case("mrf", n, least, 8, search) for n in samples] for search in searches],
+        "neighbours": [[Case("mrf", sample, least, n, search) for n in orders] for search in searches],
+        "voxels": [[Case("solid", sample, n // 2) for n in outputs]],
+    }
+
+
+_QUICK = Case("mrf", 32, 32, 8, "exact"), Case("multires", 32, 64), Case("pyramid", 64, 64), Case("solid", 32, 16)
+_FULL = (
+    *(Case("mrf", 32, 32, 8, "exact"), Case("mrf", 32, 32, 18, "exact")),
+    *(Case("multires", 64, 128), Case("pyramid", 128, 256), Case("solid", 64, 32)),
+)
+
+SIZES = {
+    "quick": Sizes(
+        "quick",
+        repeats=2,
+        budget=0.5,
+        seconds=0.15,
+        jobs=(
+            *_both(64, 64, 8, 18, 32),
+            *(Case("multires", 64, 128), Case("pyramid", 64, 128), Case("solid", 64, 32)),
+            *_QUICK,
+        ),
+        reference=_QUICK,
+        growth=_growth(64, (32, 48, 64), (32, 48, 64), (2, 4, 8), 2),
+    ),
+    "full": Sizes(
+        "full",
+        repeats=3,
+        budget=2.0,
+        seconds=0.5,
+        jobs=(
+            *_both(128, 256, 8, 18, 32),
+            *(Case("multires", 128, 256), Case("multires", 256, 1024)),
+            *(Case("pyramid", 256, 1024), Case("solid", 128, 64)),
+            *_FULL,
+        ),
+        reference=_FULL,
+        growth=_growth(128, (64, 128, 256), (48, 64, 96, 128), (2, 8, 18, 32), 4),
+    ),
+}
 
 
 class Sweeps:
-    """A callback that notes when the sweeps of the finest level of ``mrf`` end."""
+    """A callback that sums the times of the sweeps of the finest level of ``mrf``, by phase: [seconds, in kernels]."""
 
     def __init__(self, machine: Machine) -> None:
         self._machine = machine
-        self.seconds = {"relax": 0.0, "free": 0.0}
-        self.busy = {"relax": 0.0, "free": 0.0}
+        self.times = {"relax": np.zeros(2), "free": np.zeros(2)}
         self._last = self._now()
 
-    def _now(self) -> tuple[float, float]:
+    def _now(self) -> Any:
         self._machine.sync()
-        return perf_counter(), self._machine.seconds or 0.0
+        return np.array([perf_counter(), self._machine.seconds or 0.0])
 
     def __call__(self, progress: Any) -> None:
-        """Take what `simdtex.run.Relaxing` tells."""
-        if not progress.end_of_sweep:
-            return
-        now = self._now()
-        if progress.level == 0:
-            self.seconds[progress.phase] += now[0] - self._last[0]
-            self.busy[progress.phase] += now[1] - self._last[1]
-        self._last = now
+        """See the progress of a run, `simdtex.run.Relaxing`."""
+        if progress.end_of_sweep:
+            before, self._last = self._last, self._now()
+            if progress.level == 0:
+                self.times[progress.phase] += self._last - before
 
 
 def once(machine: Machine, case: Case) -> dict[str, Any]:
-    """Run a case: its statistics, and of ``mrf`` the phases of its finest level.
+    """Run a case and return its statistics, of ``mrf`` with ``brute_force`` and ``phases``, see `measure`."""
+    from skimage import data
 
-    ``phases`` are ``"warm"``, the sweeps of its cooling, its setting up included, and ``"cold"``, its free sweeps, when
-    all temperatures are 0: dicts with ``seconds``, ``busy`` (of kernels, 0 where not measured), ``relaxations`` and
-    ``brute_force``, the multiply-adds that weighing every candidate takes.
-    """
-    sample = picture(case.sample)
+    gravel: Any = data.gravel
+    sample = np.ascontiguousarray(gravel()[: case.sample, : case.sample])
     given: dict[str, Any] = {"rng": 1, "device": machine, "full_output": True}
     if case.method == "solid":
         return dict(synthesize_solid(sample, (case.output,) * 3, **given)[1].statistics)
-    sweeps = Sweeps(machine) if case.method == "mrf" else None
-    options = case.options | given | {"method": case.method, "callback": sweeps}
+    given |= {"method": case.method}
+    sweeps = Sweeps(machine)
+    if case.method == "mrf":
+        given |= {"order": case.order, "search": case.search, "callback": sweeps}
     began = perf_counter()
-    statistics = dict(synthesize(sample, (case.output, case.output), **options)[1].statistics)
+    statistics = dict(synthesize(sample, (case.output, case.output), **given)[1].statistics)
     statistics["seconds"] = perf_counter() - began
-    if sweeps:
+    if case.method == "mrf":
         levels = statistics["levels"]
-        statistics["brute_force"] = sum(brute_force(case, [level["relaxations"] for level in levels]))
+        each = 2.0 * case.size["neighbours"] * (1 + bool(mrf.Options().structure))  # multiply-adds for a candidate
+        statistics["brute_force"] = sum(each * level["candidates"] * level["relaxations"] for level in levels)
         warm = levels[-1]["equilibrium"]["relaxations"]
-        statistics["phases"] = {
-            name: {
-                "seconds": sweeps.seconds[phase],
-                "busy": sweeps.busy[phase],
-                "relaxations": many,
-                "brute_force": brute_force(case, [0] * (len(levels) - 1) + [many])[-1],
+        counts = {"relax": warm, "free": levels[-1]["relaxations"] - warm}
+        statistics["phases"] = [
+            {
+                "phase": {"relax": "warm", "free": "cold"}[phase],
+                "relaxations": count,
+                "seconds": float(sweeps.times[phase][0]),
+                "busy": float(sweeps.times[phase][1]),
+                "brute_force": each * levels[-1]["candidates"] * count,
             }
-            for name, phase, many in (
-                ("warm", "relax", warm),
-                ("cold", "free", levels[-1]["relaxations"] - warm),
-            )
-        }
+            for phase, count in counts.items()
+        ]
     return statistics
-
-
-def _done(levels: list[dict[str, Any]]) -> float:
-    """Multiply-adds of the distances that were done in a run; ``skipped`` ones were proved to be needless."""
-    return float(sum(level["fma"] - level.get("skipped", 0) for level in levels))
 
 
 def measure(machine: Machine, case: Case, repeats: int = 1, budget: float = 3.0) -> dict[str, Any]:
@@ -181,7 +212,7 @@ def measure(machine: Machine, case: Case, repeats: int = 1, budget: float = 3.0)
     machine : Machine
     case : Case
     repeats : int
-        Timed runs at most, beside a profiled one before them where the machine times kernels.
+        Timed runs at most, after a profiled one if the machine times kernels.
     budget : float
         Seconds after which no other run begins. A profiled run that took longer is the only one: what profiling costs,
         some microseconds a launch, is then too little to matter.
@@ -189,25 +220,30 @@ def measure(machine: Machine, case: Case, repeats: int = 1, budget: float = 3.0)
     Returns
     -------
     dict
-        The `Case`, and ``seconds``, of the fastest run; ``busy``, seconds in kernels, and ``kernels`` of
-        `simdtex.machine.log.Log.take`, of the profiled one (None where not measured); ``fma``, what the run says it
-        did, of ``mrf``; ``brute_force`` and ``phases``, see `once`.
+        The `Case` and its ``name``; ``seconds``, of the fastest run; ``busy``, seconds in kernels, and ``kernels`` of
+        `simdtex.machine.log.Log.take`, of the profiled run (None if not measured). Of ``mrf``, else None: ``fma``, the
+        multiply-adds that the run says it did; ``brute_force``, those of weighing every candidate; and ``phases`` of
+        the finest level, ``"warm"``, the sweeps of its cooling with its setting up, and ``"cold"``, its free sweeps at
+        temperature 0: dicts with ``phase``, ``seconds``, ``busy``, ``relaxations`` and ``brute_force``.
     """
-    profiled = once(machine, case) if machine.seconds is not None else {}
+    profiled = once(machine, case) if machine.seconds is not None else None
     runs = [profiled] if profiled and profiled["seconds"] > budget else []
-    began = perf_counter() - sum(run["seconds"] for run in runs)
-    with untimed(machine):
-        while len(runs) < max(1, repeats) and (not runs or perf_counter() - began < budget):
+    began, log = perf_counter(), getattr(machine, "log", None)
+    with log.paused() if log else nullcontext():
+        while not runs or (len(runs) < repeats and perf_counter() - began < budget and runs[0] is not profiled):
             runs.append(once(machine, case))
     best = min(runs, key=lambda run: float(run["seconds"]))
-    phases = best.get("phases")
-    for name, phase in (phases or {}).items():
-        phase["busy"] = profiled["phases"][name]["busy"] if profiled else None
-    return case.as_dict() | {
+    own = profiled.get("phases", []) if profiled else []
+    busy = {phase["phase"]: phase["busy"] for phase in own}
+    phases = [phase | {"busy": busy.get(phase["phase"])} for phase in best.get("phases", [])]
+    skipped = {"fma": sum(level["fma"] - level["skipped"] for level in best["levels"])} if phases else {"fma": None}
+    return {
+        **asdict(case),
+        "name": case.name,
         "seconds": best["seconds"],
-        "busy": profiled.get("device_seconds"),
-        "kernels": profiled.get("kernels"),
-        "fma": _done(best["levels"]) if case.method == "mrf" else None,
+        "busy": profiled and profiled["device_seconds"],
+        "kernels": profiled and profiled["kernels"],
+        **skipped,
         "brute_force": best.get("brute_force"),
-        "phases": phases,
+        "phases": phases or None,
     }

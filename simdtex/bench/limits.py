@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a device can do at most, as measured: multiply-adds and bytes a second."""
+"""Limits of a device, measured: multiply-adds and bytes a second."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -13,65 +14,59 @@ from simdtex.machine.opencl import OpenCL
 from simdtex.ops.limits import CHAINS, WIDTHS, copy, peak
 
 CACHES = 2**28
-"""Bytes of each of the two arrays of a copy, at most: far more than caches hold."""
+"""Bytes of each of the two arrays of a copy at most: far more than caches hold."""
 
 
 def measure_peak(machine: OpenCL, seconds: float = 0.4, widths: Sequence[int] = WIDTHS) -> dict[str, Any]:
-    """Multiply-adds a second in independent chains, for every vector width or some.
+    """Measure multiply-adds a second in independent chains.
 
     Parameters
     ----------
     machine : OpenCL
     seconds : float
-        How long about each width is tried.
+        Time to try each width, about.
     widths : sequence of int
-        Of `simdtex.ops.limits.WIDTHS`.
+        Vector widths, of `simdtex.ops.limits.WIDTHS`.
 
     Returns
     -------
     dict
-        ``fma``, the most a second; ``width``, at which; ``by_width``, the most at each, by its text.
+        ``fma``, the highest rate; ``width``, at which; ``by_width``, the rate at each, by its text.
     """
-    items = _items(machine)
+    items = (2048 if machine.info.kind == "gpu" else 64) * max(1, machine.info.compute_units)  # several for each unit
     rates = {}
     for width in widths:
         values = machine.put(np.linspace(0, 1, items * width, dtype=np.float32))
         rounds = 64
-        peak(machine, values, rounds, width)  # compiled
-        machine.sync()
-        while _fastest(machine, lambda: peak(machine, values, rounds, width), 0.0) < seconds / 20:  # noqa: B023
+        while _fastest(machine, partial(peak, machine, values, rounds, width), 0.0) < seconds / 20:
             rounds *= 2
-        took = _fastest(machine, lambda: peak(machine, values, rounds, width), seconds)  # noqa: B023
+        took = _fastest(machine, partial(peak, machine, values, rounds, width), seconds)
         rates[width] = CHAINS * float(rounds) * values.size / took
-    best = max(rates, key=lambda width: rates[width])
-    return {"fma": rates[best], "width": best, "by_width": {str(width): rate for width, rate in rates.items()}}
+    return _best("fma", rates)
 
 
 def measure_copy(machine: OpenCL, seconds: float = 0.4) -> dict[str, Any]:
-    """Bytes read plus bytes written a second, of arrays that no cache holds; as `measure_peak`, ``bytes`` the most."""
+    """Measure bytes read plus bytes written a second, of arrays that no cache holds; as `measure_peak`, ``bytes``."""
     size = min(CACHES, machine.info.memory // 16) // 4 // max(WIDTHS) * max(WIDTHS)
     values = machine.put(np.ones(size, np.float32))
-    rates = {}
-    for width in WIDTHS:
-        copy(machine, values, width)
-        took = _fastest(machine, lambda: copy(machine, values, width), seconds)  # noqa: B023
-        rates[width] = 8.0 * size / took
-    best = max(rates, key=lambda width: rates[width])
-    return {"bytes": rates[best], "width": best, "by_width": {str(width): rate for width, rate in rates.items()}}
+    rates = {width: 8.0 * size / _fastest(machine, partial(copy, machine, values, width), seconds) for width in WIDTHS}
+    return _best("bytes", rates)
 
 
-def _items(machine: OpenCL) -> int:
-    """Work-items that fill the device several times over."""
-    return (2048 if machine.info.kind == "gpu" else 64) * max(1, machine.info.compute_units)
+def _best(what: str, rates: dict[int, float]) -> dict[str, Any]:
+    width = max(rates, key=lambda width: rates[width])
+    return {what: rates[width], "width": width, "by_width": {str(width): rate for width, rate in rates.items()}}
 
 
 def _fastest(machine: OpenCL, call: Callable[[], Any], seconds: float) -> float:
-    """Seconds of the fastest of some calls: three, or as many more as fit."""
+    """Return seconds of the fastest of some calls after the first: three, or as many more as fit."""
+    call()  # compiles
     machine.sync()
-    began, best, count = perf_counter(), float("inf"), 0
-    while count < 3 or perf_counter() - began < seconds:
+    began = perf_counter()
+    times: list[float] = []
+    while len(times) < 3 or perf_counter() - began < seconds:
         before = perf_counter()
         call()
         machine.sync()
-        best, count = min(best, perf_counter() - before), count + 1
-    return best
+        times.append(perf_counter() - before)
+    return min(times)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import click
@@ -31,13 +30,11 @@ from simdtex.cli.places import FOLDER, WRITE
 def bench(device: str | None, quick: bool, path: Path | None, folder: Path | None, quiet: bool) -> None:
     """Measure what devices can do at most, and what the methods take.
 
-    Everything is measured in one run and compared in ratios: with the device's own limits, with the NumPy reference,
-    and with a program of library code (BLAS, FFTs, k-d trees) on as many threads. Leave the machine alone meanwhile.
+    Everything is measured in one run and compared in ratios: with the device's own limits and with the NumPy
+    reference. Leave the machine alone meanwhile.
     """
-    from rich.console import Console
-
     from simdtex.bench import run as benchmark
-    from simdtex.bench import sizes
+    from simdtex.bench.cases import SIZES
     from simdtex.io.atomic import atomic_path
     from simdtex.io.image import check_writable
     from simdtex.report.bench import plot, render
@@ -53,7 +50,7 @@ def bench(device: str | None, quick: bool, path: Path | None, folder: Path | Non
         if not quiet:
             click.echo(what, err=True)
 
-    found = benchmark.run(sizes.QUICK if quick else sizes.FULL, infos, tell)
+    found = benchmark.run(SIZES["quick" if quick else "full"], infos, tell)
     if path:
         with afterwards(), atomic_path(path) as whole:
             whole.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
@@ -62,6 +59,6 @@ def bench(device: str | None, quick: bool, path: Path | None, folder: Path | Non
         with afterwards():
             pictures = plot(found, folder)
     if not quiet:
-        render(found, Console(width=None if sys.stdout.isatty() else 200))
+        render(found)
         for picture in [*([path] if path else []), *pictures]:
             click.echo(picture)

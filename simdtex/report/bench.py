@@ -1,196 +1,140 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The results of a benchmark: tables on the terminal, a roofline and curves of growth as pictures."""
+"""The results of a benchmark: tables for the terminal, a roofline and curves of growth as plots."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
+from matplotlib.figure import Figure
 
-from simdtex.bench import results as worked_out
 from simdtex.io.atomic import atomic_path
-from simdtex.report.tables import rate_text, seconds_text, three_digits
+from simdtex.report.plots import figure_png, new_figure, tidy
+from simdtex.report.tables import Table, print_table, rate_text, seconds_text, three_digits
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-DASH = "-"
+__all__ = ["plot", "render", "tables"]
 
 
-def percent(share: float | None) -> str:
-    """A share as text, ``"85 %"``."""
-    return DASH if share is None else three_digits(100 * share, " %")
-
-
-def times(ratio: float | None) -> str:
-    """A ratio as text, ``"8.1 x"``."""
-    return DASH if ratio is None else three_digits(ratio, " x")
-
-
-def render(results: dict[str, Any], console: Console) -> None:
-    """Print all tables of a benchmark."""
+def render(results: dict[str, Any]) -> None:
+    """Print the results of `simdtex.bench.run.run`."""
     host = results["host"]
-    console.print(
-        f"{host['cpu']}, {host['cores']} cores; {host['system']}; simdtex {results['simdtex']}, "
-        f"numpy {host['numpy']} with {host['blas']}, scipy {host['scipy']}; "
-        f"{results['date']}, sizes {results['sizes']}, {results['seconds']:.0f} s",
-        highlight=False,
+    print(
+        f"{host['cpu']}, {host['cores']} cores; {host['system']}; simdtex {results['simdtex']}, numpy {host['numpy']}; "
+        f"{results['date']}, sizes {results['sizes']}, {results['seconds']:.0f} s"
     )
     for entry in results["devices"]:
         device, peak, copied = entry["device"], entry["peak"], entry["copy"]
-        console.print(
-            f"\n{device['name']}, {device['units']} compute units, {device['version']}, driver {device['driver']}",
-            highlight=False,
-        )
-        console.print(
+        print(f"\n{device['name']}, {device['units']} compute units, {device['version']}, driver {device['driver']}")
+        print(
             f"measured: {rate_text(peak['fma'])} fma/s (vectors of {peak['width']}), copy {rate_text(copied['bytes'])} "
-            f"bytes/s (vectors of {copied['width']}), {device['threads']} threads for library code",
-            highlight=False,
+            f"bytes/s (vectors of {copied['width']})"
         )
-        console.print(_steps(worked_out.steps(results, entry)))
-        console.print(_jobs(worked_out.jobs(results, entry)))
-        console.print(_growth(worked_out.growth(entry)))
+        for table in tables(entry):
+            print_table(table)
 
 
-def _table(title: str, left: int, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left")
-    for number, column in enumerate(columns):
-        table.add_column(column, justify="left" if number < left else "right", no_wrap=True)
-    return table
+def tables(entry: dict[str, Any]) -> list[Table]:
+    """Return three tables of a device: LCPDF steps, whole jobs and growth."""
+    jobs = [case for case in entry["cases"] if case["job"]]
+    steps = [
+        {
+            "job": case["name"],
+            "phase": phase["phase"],
+            "relaxations": f"{phase['relaxations']:,}",
+            "time": seconds_text(phase["seconds"]),
+            "fma/s": rate_text(phase["rate"]),
+            "of peak": _percent(phase["of_peak"]),
+            "by wall time": _percent(phase["effective"]),
+            "vs reference": three_digits(phase["reference"], " x"),
+        }
+        for case in jobs
+        for phase in case["phases"] or []
+    ]
+    whole = [
+        {
+            "job": case["name"],
+            "time": seconds_text(case["seconds"]),
+            "in kernels": _percent(case["busy"] / case["seconds"]),
+            "fma/s done": rate_text(case["fma_rate"]),
+            "of peak": _percent(case["of_peak"]),
+            "bytes, of copy": _percent(case["of_copy"]),
+            "effective, of peak": _percent(case["effective"]),
+            "vs reference": three_digits(case["reference"], " x"),
+        }
+        for case in jobs
+    ]
+    growth = [
+        {
+            "method": curve["name"],
+            "with": curve["what"],
+            "from": f"{curve['sizes'][0]:,}: {seconds_text(curve['seconds'][0])}",
+            "to": f"{curve['sizes'][-1]:,}: {seconds_text(curve['seconds'][-1])}",
+            "exponent": "-" if curve["exponent"] is None else f"{curve['exponent']:.2f}",
+        }
+        for curve in entry["growth"]
+    ]
+    return [
+        Table("LCPDF step at the finest level: fma of weighing every candidate, over time in kernels", steps),
+        Table("Whole jobs", whole),
+        Table("Growth of the time", growth),
+    ]
 
 
-def _steps(rows: list[dict[str, Any]]) -> Table:
-    columns = ("job", "phase", "relaxations", "time", "fma/s", "of peak", "by wall time", "vs reference", "vs library")
-    table = _table("LCPDF step at the finest level: fma of weighing every candidate, over time in kernels", 2, *columns)
-    for row in rows:
-        table.add_row(
-            row["case"],
-            row["phase"],
-            f"{row['relaxations']:,}",
-            seconds_text(row["seconds"]),
-            rate_text(row["rate"]),
-            percent(row["of_peak"]),
-            percent(row["effective"]),
-            times(row["reference"]),
-            times(row["library"]),
-        )
-    return table
-
-
-def _jobs(rows: list[dict[str, Any]]) -> Table:
-    columns = (
-        *("job", "time", "in kernels", "fma/s done", "of peak", "bytes, of copy"),
-        *("effective, of peak", "vs reference", "vs library"),
-    )
-    table = _table("Whole jobs", 1, *columns)
-    for row in rows:
-        table.add_row(
-            row["case"],
-            seconds_text(row["seconds"]),
-            percent(row["busy"]),
-            rate_text(row["fma_rate"]),
-            percent(row["of_peak"]),
-            percent(row["of_copy"]),
-            percent(row["effective"]),
-            times(row["reference"]),
-            times(row["library"]),
-        )
-    return table
-
-
-def _growth(curves: list[dict[str, Any]]) -> Table:
-    table = _table("Growth of the time", 2, "method", "with", "from", "to", "exponent")
-    for curve in curves:
-        fitted = DASH if curve["exponent"] is None else f"{curve['exponent']:.2f}"
-        ends = [f"{curve['sizes'][i]:,.0f}: {seconds_text(curve['seconds'][i])}" for i in (0, -1)]
-        table.add_row(curve["name"], curve["what"], *ends, fitted)
-    return table
-
-
-# -- pictures -------------------------------------------------------------------------------------------------
+def _percent(share: float | None) -> str:
+    return "-" if share is None else three_digits(100 * share, " %")
 
 
 def plot(results: dict[str, Any], folder: Path) -> list[Path]:
-    """Draw ``roofline.png`` and ``growth.png``, for a device each, into a folder that is made; return their paths."""
+    """Write ``roofline.png`` and ``growth.png``, for each device, into a folder that is made; return their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for number, entry in enumerate(results["devices"]):
         suffix = f"-{number}" if len(results["devices"]) > 1 else ""
-        for name, draw in (("roofline", _roofline), ("growth", _curves)):
+        for name, draw in (("roofline", roofline), ("growth", growth)):
             written.append(folder / f"{name}{suffix}.png")
-            draw(entry, written[-1])
+            figure = draw(entry)
+            figure.suptitle(entry["device"]["name"], fontsize="medium")
+            with atomic_path(written[-1]) as whole:
+                whole.write_bytes(figure_png(figure))
     return written
 
 
-def _figure(entry: dict[str, Any], path: Path, panels: int) -> tuple[Any, list[Axes]]:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.0 * panels if panels > 1 else 8.0, 5.0), layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(entry["device"]["name"], fontsize="medium")
-    found = figure.subplots(1, panels, squeeze=False)[0]
-    return figure, list(found)
-
-
-def _write(figure: Any, path: Path) -> None:
-    from simdtex.report.plots import figure_png
-
-    figure.set_dpi(120)
-    with atomic_path(path) as whole:
-        whole.write_bytes(figure_png(figure))
-
-
-def _roofline(entry: dict[str, Any], path: Path) -> None:
-    """Fma a second against fma per byte, log-log: the device's roofs as measured, kernels as points."""
-    figure, (axes,) = _figure(entry, path, 1)
+def roofline(entry: dict[str, Any]) -> Figure:
+    """Plot fma a second against fma per byte: the measured limits, and each kernel where it worked longest."""
+    figure = new_figure(8.0, 5.0)
+    axes = figure.subplots()
     peak, copied = entry["peak"]["fma"], entry["copy"]["bytes"]
-    points = worked_out.points(entry)
-    ridge = peak / copied
-    intensities = [point["intensity"] for point in points] + [ridge]
-    x = np.geomspace(min(intensities) / 3, max(intensities) * 3, 200)
-    axes.loglog(x, np.minimum(peak, copied * x), color="black")
-    axes.annotate(f"peak, {rate_text(peak)} fma/s", (x[-1], peak), (-4, 4), textcoords="offset points", ha="right")
-    axes.annotate(
-        f"copy, {rate_text(copied)} bytes/s", (x[60], copied * x[60]), (6, -14), textcoords="offset points", ha="left"
+    longest: dict[tuple[str, str], dict[str, Any]] = {}
+    for case in entry["cases"]:
+        for kernel in case["kernels"]:
+            key = case["method"], kernel["name"]
+            if kernel["fma"] and kernel["bytes"] and kernel["seconds"] > longest.get(key, {"seconds": 0})["seconds"]:
+                longest[key] = kernel
+    shares = [kernel["fma"] / kernel["bytes"] for kernel in longest.values()]
+    x = np.geomspace(min([peak / copied, *shares]) / 3, max([peak / copied, *shares]) * 3, 200)
+    axes.loglog(
+        x, np.minimum(peak, copied * x), color="black", label=f"{rate_text(peak)} fma/s, {rate_text(copied)} B/s"
     )
-    for number, method in enumerate(dict.fromkeys(point["method"] for point in points)):
-        own = [point for point in points if point["method"] == method]
-        axes.plot(
-            [point["intensity"] for point in own],
-            [point["rate"] for point in own],
-            linestyle="none",
-            marker="osD^"[number % 4],
-            label=method,
-        )
-        for point in own:
-            axes.annotate(
-                point["name"], (point["intensity"], point["rate"]), (4, -9), textcoords="offset points", fontsize=7
-            )
-    axes.set_xlabel("multiply-adds per byte that has to be moved")
-    axes.set_ylabel("multiply-adds a second")
-    axes.grid(True, which="major", alpha=0.3)
-    if points:
-        axes.legend(loc="lower right")
-    _write(figure, path)
+    for method, marker in zip(("mrf", "multires", "pyramid", "solid"), "osD^", strict=True):
+        own = {name: kernel for (of, name), kernel in longest.items() if of == method}
+        points = [(kernel["fma"] / kernel["bytes"], kernel["fma_rate"]) for kernel in own.values()]
+        axes.plot(*np.reshape(points, (-1, 2)).T, marker, label=method)
+        for name, point in zip(own, points, strict=True):
+            axes.annotate(name, point, (4, -9), textcoords="offset points", fontsize=7)
+    tidy(axes, "", "multiply-adds per byte that has to be moved", "multiply-adds a second")
+    axes.legend(loc="lower right")
+    return figure
 
 
-def _curves(entry: dict[str, Any], path: Path) -> None:
-    """Seconds against size, log-log, a panel for each thing that grows."""
-    curves = worked_out.growth(entry)
-    kinds: dict[str, list[dict[str, Any]]] = {}
-    for curve in curves:
-        kinds.setdefault(curve["what"].replace("voxels", "output pixels"), []).append(curve)
-    figure, panels = _figure(entry, path, max(1, len(kinds)))
-    for axes, (what, own) in zip(panels, kinds.items(), strict=False):
-        for curve in own:
-            fitted = "" if curve["exponent"] is None else f", exponent {curve['exponent']:.2f}"
-            axes.loglog(curve["sizes"], curve["seconds"], marker="o", label=f"{curve['name']}{fitted}")
-        axes.set_xlabel(what if what != "output pixels" else "output pixels (solid: voxels)")
-        axes.set_ylabel("seconds")
-        axes.grid(True, which="major", alpha=0.3)
+def growth(entry: dict[str, Any]) -> Figure:
+    """Plot seconds against size, a panel for each quantity that grows."""
+    kinds = list(dict.fromkeys(curve["what"] for curve in entry["growth"]))
+    figure = new_figure(5.0 * len(kinds), 5.0)
+    for axes, what in zip(figure.subplots(1, len(kinds), squeeze=False)[0], kinds, strict=True):
+        for curve in entry["growth"]:
+            if curve["what"] == what:
+                axes.loglog(curve["sizes"], curve["seconds"], marker="o", label=curve["name"])
+        tidy(axes, "", what, "seconds")
         axes.legend(fontsize="small")
-    _write(figure, path)
+    return figure
