@@ -110,11 +110,3 @@ their covariances relative to the largest: channels are matched one by one and m
 MIXED_BANDS = 0.2
 """As SLICE_SUBBANDS, of a mixture of low and high frequencies, whose pixels and subbands come from different pictures:
 0.162 is the most."""
-
-MATRIX_PRODUCT = 1e-6
-"""Of a squared distance as a matrix product in float32, relative to the largest that there can be: some hundred
-products up to the square of half the range, each rounded to 2**-24, which partly cancel: 8e-8 seen."""
-
-FFT = 2e-6
-"""Of filters by FFT in float32, relative to the range of the picture: a few roundings to 2**-24 for each of the ten or
-so stages, at values up to ten times as large: 3e-7 seen."""
