@@ -1,4 +1,4 @@
-"""Listing, probing and choosing devices, with broken platforms among them."""
+"""The listing, the check and the choice of devices, also with broken platforms."""
 
 import os
 import subprocess
@@ -75,7 +75,7 @@ def test_choose_prefers_the_whole_name():
         ("e", "matches several devices; give the index of one of: 1 = Slow 10 (Acme OpenCL), 2 ="),
     ],
 )
-def test_choose_says_what_there_is(text, words):
+def test_a_failed_choice_lists_the_devices(text, words):
     with pytest.raises(DeviceError) as caught:
         device.choose(text, LISTING)
     assert words in str(caught.value)
@@ -162,17 +162,19 @@ def test_find_takes_a_line_of_the_listing():
         device.find(LISTING[0])
 
 
-@pytest.mark.parametrize("wrong", [True, 1.5, ["0"], b"0"])
-def test_find_refuses_other_types(wrong):
-    with pytest.raises(TypeError, match="device must be a text, an index"):
-        device.find(wrong)
+def test_ensure_accepts_a_simulator_only_by_name(monkeypatch):
+    simulator = fake(0, "Oclgrind")
+    monkeypatch.setattr(device, "find", lambda: simulator)
+    assert device.main() == 1
+    monkeypatch.setenv(device.VARIABLE, "oclgrind")
+    assert device.main() == 0
 
 
 # Broken platforms
 
 
 class Broken:
-    """A platform, or a device, that raises whatever it is asked."""
+    """A platform or device of which every attribute raises."""
 
     def __getattr__(self, name):
         raise RuntimeError(f"broken {name}\nlog:\nerror: unknown target CPU")
@@ -185,7 +187,7 @@ class NoDevices(SimpleNamespace):
 
 @pytest.fixture
 def platforms(monkeypatch):
-    """Let a test say which platforms there are."""
+    """Set the platforms of the loader."""
     device._enumerate.cache_clear()
     yield lambda *found: monkeypatch.setattr(runtimes, "platforms", lambda: list(found))
     device._enumerate.cache_clear()
@@ -207,7 +209,7 @@ def test_a_broken_platform_does_not_stop_the_working_one(any_device, platforms):
     assert device.find().kind != "reference"
 
 
-def test_a_device_that_says_nothing_is_passed_over(any_device, platforms):
+def test_a_device_without_properties_is_passed_over(any_device, platforms):
     sick = SimpleNamespace(name="AAA", get_devices=lambda: [Broken()])
     platforms(sick, any_device.handle.platform)
     line = next(info for info in device.devices(probe=False) if info.platform == "AAA")
@@ -296,7 +298,7 @@ def test_an_icd_that_names_no_library(tmp_path):
 
 @pytest.fixture
 def intel(monkeypatch, tmp_path):
-    """Pretend that the runtime lies in this environment."""
+    """Pretend that the runtime is installed in this environment."""
     library = tmp_path / "lib" / "libintelocl.so"
     library.parent.mkdir()
     library.touch()
@@ -307,7 +309,7 @@ def intel(monkeypatch, tmp_path):
     return library
 
 
-def test_intel_is_added_to_what_the_loader_reads(intel, tmp_path):
+def test_the_intel_runtime_is_added_to_the_icd_files(intel, tmp_path):
     conda = tmp_path / "etc" / "OpenCL" / "vendors"
     conda.mkdir(parents=True)
     (conda / "named.icd").write_text("libnamed.so.1\n")
@@ -324,13 +326,13 @@ def test_intel_is_added_to_what_the_loader_reads(intel, tmp_path):
     assert not folder.exists()
 
 
-def test_a_folder_of_the_users_own_wins(intel, monkeypatch):
+def test_a_folder_that_the_user_has_set_is_used(intel, monkeypatch):
     monkeypatch.setenv("OCL_ICD_VENDORS", "/my/own")
     with runtimes._icd_folder():
         assert os.environ["OCL_ICD_VENDORS"] == "/my/own"
 
 
-def test_other_systems_are_left_alone(intel, monkeypatch):
+def test_no_folder_is_set_on_windows(intel, monkeypatch):
     monkeypatch.setattr(runtimes.sys, "platform", "win32")
     with runtimes._icd_folder():
         assert "OCL_ICD_VENDORS" not in os.environ

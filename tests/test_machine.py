@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The machines: bounds on memory, and what is said when a device has too little."""
+"""Machines: memory, caches, threads, forked processes and arguments of `open_machine`."""
 
 import dataclasses
 import os
@@ -21,13 +21,13 @@ from simdtex.machine.reference import Reference
 from simdtex.model.sample import BLOCK
 
 
-def test_a_machine_is_its_own_device():
+def test_an_open_machine_is_returned_as_it_is():
     machine = Reference()
     assert simdtex.open_machine(machine) is machine
 
 
 @given(st.integers(1, 200_000), st.integers(1, 300), st.integers(1, 4))
-def test_a_piece_of_a_step_keeps_to_the_scratch_memory(candidates, neighbours, channels):
+def test_a_chunk_of_sites_fits_the_scratch_memory(candidates, neighbours, channels):
     machine = OpenCL.__new__(OpenCL)
     machine.scratch, machine.vector = 2**24, 16
     sites = machine.chunk(candidates, neighbours, channels)
@@ -37,22 +37,17 @@ def test_a_piece_of_a_step_keeps_to_the_scratch_memory(candidates, neighbours, c
     assert sites == 16 or (sites * per_site <= 2**24 and sites * padded * neighbours * channels <= 2e9)
 
 
-def test_too_little_memory_is_said_before_the_work(any_device):
+def test_a_run_that_does_not_fit_the_device_is_refused(any_device):
     machine = OpenCL(dataclasses.replace(any_device, memory=10_000))
     with pytest.raises(DeviceError, match=r"needs about \d+ MiB.*smaller size"):
         simdtex.synthesize(np.eye(16), (64, 64), order=1, device=machine)
 
 
-def test_memory_that_runs_out_is_said_in_one_sentence(any_device):
+def test_running_out_of_device_memory_is_a_device_error(any_device):
     machine = OpenCL(any_device)
     greedy = Operation("greedy", lambda: None, lambda machine: machine.empty((2**46,), np.uint8))
     with pytest.raises(DeviceError, match="ran out of memory; give a smaller size"):
         greedy(machine)
-
-
-def test_a_device_cannot_be_two_things():
-    with pytest.raises(DeviceError):
-        simdtex.open_machine("no such device")
 
 
 OPEN = """
@@ -72,11 +67,11 @@ def test_a_device_opens_if_no_cache_can_be_written(cl_device, tmp_path, environm
     assert os.listdir(tmp_path) == ["FILE"], "the temporary cache is removed"
 
 
-# Threads and forks: in processes of their own, since a race may end in a crash, and a fork may wait for ever
+# Threads and forks, in processes of their own: a race may crash, and a forked process may hang
 
 
 def python(code, *words, **environment):
-    """What a process of its own prints; at most 100 seconds."""
+    """Return the words that a process prints within 100 seconds."""
     result = subprocess.run(
         [sys.executable, "-c", code, *words],
         env=os.environ | environment,
@@ -102,7 +97,7 @@ def run(i):
     return simdtex.synthesize(sample, (16, 17), rng=i, device=machine, **METHODS[i % 3]).tobytes()
 
 alone = [run(i) for i in range(6)]
-sys.setswitchinterval(1e-5)  # threads change places in the middle of everything
+sys.setswitchinterval(1e-5)  # threads are switched often
 with ThreadPoolExecutor(6) as pool:
     together = list(pool.map(run, [*range(6)] * 3))
 print([bytes == alone[i % 6] for i, bytes in enumerate(together)].count(False), len(set(alone)))
@@ -121,7 +116,7 @@ import simdtex
 
 SAMPLE = np.arange(64).reshape(8, 8)
 
-def told(device):
+def result(device):
     try:
         return simdtex.synthesize(SAMPLE, (5, 6), order=1, rng=1, levels=1, device=device).tobytes()
     except simdtex.DeviceError as error:
@@ -134,18 +129,18 @@ def child(work):
     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
 device = sys.argv[1]
-early = child(lambda: len(told(device)) == 5 * 6 * 8)  # before OpenCL is in use a child may use it
+early = child(lambda: len(result(device)) == 5 * 6 * 8)  # before OpenCL is in use a child may use it
 machine = simdtex.open_machine(device)
-right = told(machine)
+right = result(machine)
 waiting = machine.put(np.zeros(10))
-lost = [child(lambda: told(which) is True) for which in (machine, device, None)]
+lost = [child(lambda: result(which) is True) for which in (machine, device, None)]
 listed = child(lambda: [line.usable for line in simdtex.devices()] == [False] * (len(simdtex.devices()) - 1) + [True])
-print(early, *lost, listed, child(lambda: told("reference") == right), told(machine) == right)
+print(early, *lost, listed, child(lambda: result("reference") == right), result(machine) == right)
 """
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing is forked here")
-def test_a_forked_child_says_at_once_that_opencl_is_lost(cl_device):
+def test_a_forked_process_raises_instead_of_hanging(cl_device):
     assert python(FORK, str(cl_device.index)) == [*"111111", "True"]
 
 
@@ -168,19 +163,19 @@ if __name__ == "__main__":
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing is forked here")
-def test_a_pool_of_forked_processes_gets_the_error_and_may_use_the_reference(any_device):
+def test_a_pool_of_forked_processes_may_use_the_reference(any_device):
     assert "".join(python(MULTIPROCESSING)) == "True;(4,4)"
 
 
-class Mute:
-    """Neither a name nor a machine."""
+class Other:
+    """Neither a text nor a machine."""
 
     def __repr__(self):
-        return "something mute"
+        return "another object"
 
 
-@pytest.mark.parametrize("wrong", [1.0, b"0", [], (), {}, True, Mute()], ids=repr)
-def test_what_is_no_device_is_a_type_error_of_one_sentence(wrong):
+@pytest.mark.parametrize("wrong", [1.0, b"0", [], (), {}, True, Other()], ids=repr)
+def test_another_type_of_device_is_a_type_error(wrong):
     sentence = r"^device must be a text, an index, a DeviceInfo, an open machine or None, but it is a \w+\.$"
     with pytest.raises(TypeError, match=sentence):
         simdtex.open_machine(wrong)

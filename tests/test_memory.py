@@ -1,4 +1,4 @@
-"""What a run may take of the device's memory and of the host's, and that it takes no more."""
+"""The memory that is available, the checks before a run, and that a run takes no more than checked."""
 
 import importlib.util
 from pathlib import Path
@@ -56,12 +56,20 @@ def test_the_available_memory_of_this_computer():
 
 
 class Gpu(Reference):
-    """A machine with memory of its own."""
+    """A machine with its own memory."""
 
     kind = "gpu"
 
 
-@pytest.mark.parametrize("machine, wanted", [(Reference(), 30 + memory.TEMPORARY), (Gpu(), 10)])
+class Cpu(Reference):
+    """A device that shares the host's memory."""
+
+    kind = "cpu"
+
+
+@pytest.mark.parametrize(
+    ("machine", "wanted"), [(Reference(), 30 + memory.TEMPORARY), (Cpu(), 30 + memory.TEMPORARY), (Gpu(), 10)]
+)
 def test_arrays_of_a_cpu_count_for_the_host(machine, wanted, monkeypatch):
     monkeypatch.setattr(memory, "available", lambda: wanted)
     memory.require(machine, 20, 10)

@@ -1,4 +1,4 @@
-"""Profiles: what each kernel took, what it said it does, and what was left to the host."""
+"""Profiles: the times, the work and the gaps of kernels, and their table."""
 
 from types import SimpleNamespace
 
@@ -43,7 +43,7 @@ def test_times_are_summed_up():
     assert Times().report() == {"calls": 0, "min": 0, "median": 0, "max": 0, "seconds": 0}
 
 
-def test_a_log_tells_kernels_shares_rates_and_gaps():
+def test_a_log_reports_kernels_shares_rates_and_gaps():
     log = Log(True)
     log.add(Event(100, 200), kernel("fast"), Work(1000, 50))
     log.add(Event(250, 550), kernel("slow"), Work(None, 600))
@@ -63,7 +63,7 @@ def test_a_log_tells_kernels_shares_rates_and_gaps():
     assert log.seconds == pytest.approx(500e-9)
 
 
-def test_a_kernel_that_does_not_always_say_what_it_does_has_no_rate():
+def test_a_kernel_with_unknown_work_has_no_rate():
     log = Log(True)
     log.add(Event(0, 10), kernel("a"), Work(1, 1))
     log.add(Event(10, 20), kernel("a"))
@@ -94,7 +94,7 @@ def test_without_profiling_nothing_is_kept():
     assert log.take()["kernels"] == []
 
 
-def test_a_machine_tells_what_launches_state(any_device):
+def test_a_launch_states_its_work(any_device):
     machine = OpenCL(any_device, profile=True)
     values = noise(machine, 4, 100, 1, 0)
     (only,) = machine.profile()["kernels"]

@@ -98,9 +98,9 @@ class OpenCL:
     scratch : int, optional
         Bytes available for distances at a time.
     vector : int, optional
-        Sites in a vector: 1, 4, 8 or 16.
+        Sites or candidates in a vector: 1, 4, 8 or 16.
     step : int, optional
-        Candidates kept in registers at a time, a divisor of 64.
+        Vectors kept in registers at a time, a divisor of 64.
     split : int, optional
         Work-items that share a site's candidates.
     skip : bool
