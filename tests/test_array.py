@@ -122,8 +122,11 @@ def test_an_unknown_mapping(text):
 def account(array, packed, grid, steps, order=1, candidates=10, channels=1, words=2):
     counted = Account(array, packed)
     counted.begin(grid, neighbourhood_offsets(order), candidates, channels, words)
-    for sites in steps:
-        counted.step(np.array(sites, np.int32))
+    if packed:
+        counted.packed_steps(np.array([len(sites) for sites in steps]))
+    else:
+        for sites in steps:
+            counted.step(np.array(sites, np.int32))
     return counted.report()
 
 

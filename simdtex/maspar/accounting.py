@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a run costs on a processor array, and how long the MasPar MP-1 would have taken: a model.
+"""The cost of a run on a processor array, and a model of the time on a MasPar MP-1.
 
-The figures of the full MP-1 are the published ones; the time leaves out all but the distances of equation (12) and the
-fetching of neighbourhoods.
+The figures of the full MP-1 are the published ones; the model counts the distances of equation (12) and the fetching of
+neighbourhoods only.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ FLOP = 4
 
 
 class Account:
-    """Counts SIMD passes, and what they do.
+    """Counts SIMD passes and their work.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Account:
 
     Notes
     -----
-    Per step: one pass for each virtual layer with an active site, or ceil(sites / PEs) passes where packed. The model's
+    Per step: one pass for each virtual layer with an active site, or ceil(sites / PEs) passes if packed. The model's
     seconds are ::
 
         passes candidates |N| channels 4 / FLOPS  +  shifts words 4 / XNET             on the array
@@ -52,65 +52,43 @@ class Account:
 
     def __init__(self, array: ProcessorArray, packed: bool) -> None:
         self.array, self.packed = array, packed
-        self.levels: list[dict[str, Any]] = []
-        self._shifts: NDArray[np.int64] = np.zeros(0, np.int64)
-        self._neighbours = 0
+        keys = ("steps", "passes", "sites", "moved", "routed", "flop", "model_seconds")
+        self.total: dict[str, Any] = dict.fromkeys(keys, 0)
 
     def begin(self, grid: Grid, offsets: NDArray[np.int32], candidates: int, channels: int, words: int) -> None:
         """Begin a level: its lattice, neighbourhood and candidates."""
-        self._grid, self._offsets, self._neighbours = grid, offsets, len(offsets)
+        self._grid, self._offsets, self._words = grid, offsets, words
         self._shifts = np.zeros(0, np.int64) if self.packed else self.array.shifts(grid, offsets)
         self._flop = FLOP * candidates * len(offsets) * channels
-        self._words = words
-        self.levels.append(
-            {
-                "layers": -(-grid.plane // self.array.size) if self.packed else int(np.prod(self.array.layers(grid))),
-                **dict.fromkeys(("steps", "passes", "sites", "moved", "routed", "flop"), 0),
-                "model_seconds": 0.0,
-            }
-        )
+        rows, cols = self.array.layers(grid)
+        self._layers = -(-grid.plane // self.array.size) if self.packed else rows * cols
 
     def step(self, sites: NDArray[np.int32]) -> None:
         """Count the sites of one step."""
-        if self.packed:
-            self.packed_steps(np.array([sites.size]))
-            return
-        layers = np.unique(self.array.place(sites, self._grid).layer)
-        self._add(1, sites.size, layers.size, int(self._shifts[layers].sum()) * self._words, 0)
+        layers = np.unique(self.array.place(sites, self._grid)[0])
+        self._add(steps=1, sites=sites.size, passes=layers.size, moved=int(self._shifts[layers].sum()) * self._words)
 
     def packed_steps(self, sizes: NDArray[np.int64]) -> None:
-        """Count steps of so many sites, where sites are packed."""
-        sites = int(sizes.sum())
-        routed = sites * self._neighbours * self._words
-        self._add(sizes.size, sites, int((-(-sizes // self.array.size)).sum()), 0, routed)
+        """Count steps by their numbers of sites, if sites are packed."""
+        sites, passes = int(sizes.sum()), int((-(-sizes // self.array.size)).sum())
+        self._add(steps=sizes.size, sites=sites, passes=passes, routed=sites * len(self._offsets) * self._words)
 
-    def _add(self, steps: int, sites: int, passes: int, moved: int, routed: int) -> None:
-        report = self.levels[-1]
-        report["steps"] += steps
-        report["passes"] += passes
-        report["sites"] += sites
-        report["moved"] += moved
-        report["routed"] += routed
-        report["flop"] += sites * self._flop
-        report["model_seconds"] += passes * self._flop / FLOPS + WORD * (moved / XNET + routed / ROUTER)
+    def _add(self, *, steps: int, sites: int, passes: int, moved: int = 0, routed: int = 0) -> None:
+        seconds = passes * self._flop / FLOPS + WORD * (moved / XNET + routed / ROUTER)
+        work = {"steps": steps, "passes": passes, "sites": sites, "moved": moved, "routed": routed}
+        for key, more in (work | {"flop": sites * self._flop, "model_seconds": seconds}).items():
+            self.total[key] += more
 
     def report(self) -> dict[str, Any]:
-        """The totals, as `simdtex.run.Output` describes them."""
-        total = {
-            key: sum(level[key] for level in self.levels)
-            for key in ("steps", "passes", "sites", "moved", "routed", "flop", "model_seconds")
-        }
-        active = total["sites"] / max(1, total["passes"])
-        finest = self.levels[-1]
+        """Return the totals, as `simdtex.run.Output` describes them."""
+        active = self.total["sites"] / max(1, self.total["passes"])
+        arrays = {mapping: ProcessorArray(self.array.rows, self.array.cols, mapping) for mapping in MAPPINGS}
         return {
             "array": f"{self.array.rows}x{self.array.cols}",
             "mapping": "packed" if self.packed else self.array.mapping,
-            "layers": finest["layers"],
-            "shifts": {
-                m: int(ProcessorArray(self.array.rows, self.array.cols, m).shifts(self._grid, self._offsets).sum())
-                for m in MAPPINGS
-            },
+            "layers": self._layers,
+            "shifts": {name: int(array.shifts(self._grid, self._offsets).sum()) for name, array in arrays.items()},
             "active": active,
             "utilisation": active / self.array.size,
-            **total,
+            **self.total,
         }

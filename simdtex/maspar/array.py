@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A processor array such as the MasPar MP-1: one instruction stream, one processing element (PE) per pixel.
 
-Where a picture has more pixels than the array has PEs, each PE holds several, one in each virtual layer. A SIMD pass
-works on one layer; PEs without a site to relax idle under the mask.
+If a picture has more pixels than the array has PEs, each PE holds several, one in each virtual layer. A SIMD pass works
+on one layer; PEs without a site to relax are masked.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,22 +26,15 @@ ARRAYS = {
     "maspar-mp1-8k": (64, 128),
     "maspar-mp1-16k": (128, 128),
 }
-"""Rows and columns of the MP-1 in the sizes that it came in."""
+"""Rows and columns of the models of the MP-1."""
 
 LARGEST = 2**22
-"""PEs of the largest array: a launch has as many work-items."""
-
-
-class Place(NamedTuple):
-    """Where pixels live: ``layer`` the virtual layer, ``pe`` the PE's number, row by row."""
-
-    layer: NDArray[np.int64]
-    pe: NDArray[np.int64]
+"""PEs of the largest array."""
 
 
 @dataclass(frozen=True)
 class ProcessorArray:
-    """The array and how a picture lies on it.
+    """An array, and how pictures are laid onto it.
 
     Parameters
     ----------
@@ -67,17 +60,17 @@ class ProcessorArray:
         return self.rows * self.cols
 
     def layers(self, grid: Grid) -> tuple[int, int]:
-        """Virtual layers by rows and by columns, for the whole picture of a grid."""
+        """Return the virtual layers by rows and by columns, for the whole picture of a grid."""
         return -(-grid.height // self.rows), -(-grid.width // self.cols)
 
-    def place(self, sites: NDArray[np.int32], grid: Grid) -> Place:
-        """Layer and PE of pixel indices."""
+    def place(self, sites: NDArray[np.int32], grid: Grid) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return the virtual layers of pixel indices, and the numbers of their PEs, row by row."""
         row, col = np.divmod(sites.astype(np.int64), grid.width)
         (high, i), (wide, j) = self._axis(row, grid.height, self.rows), self._axis(col, grid.width, self.cols)
-        return Place(high * self.layers(grid)[1] + wide, i * self.cols + j)
+        return high * self.layers(grid)[1] + wide, i * self.cols + j
 
     def _axis(self, at: NDArray[np.int64], length: int, pes: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """(layer, PE) of coordinates along one axis."""
+        """Return (layer, PE) of coordinates along one axis."""
         if self.mapping == "hierarchical":
             pe, layer = np.divmod(at, -(-length // pes))
         else:
@@ -85,44 +78,38 @@ class ProcessorArray:
         return layer, pe
 
     def shifts(self, grid: Grid, offsets: NDArray[np.int32]) -> NDArray[np.int64]:
-        """X-Net shifts that bring each PE one word from every neighbour of its site, per layer (layers,).
+        """Return the X-Net shifts that bring each PE one word from every neighbour of its site, per layer (layers,).
 
         A shift moves one word of every PE to one of the 8 adjacent PEs, around the edges of the array. A neighbour that
-        is d rows and e columns of PEs away takes ``max(|d|, |e|)`` of them; where PEs of a layer need different ways
-        for the same neighbour, at the seam of a picture that does not fill the array say, all go each way in turn.
-        Neighbours that the same PE holds take none. The sites are those of the grid: on a coarser level neighbours are
-        farther apart.
+        is d rows and e columns of PEs away takes ``max(|d|, |e|)`` of them; if PEs of a layer need different ways for
+        the same neighbour, for example at the seam of a picture that does not fill the array, all go each way in turn.
+        Neighbours on the same PE take none. The sites are those of the grid: on a coarser level neighbours are farther
+        apart.
         """
-        down = _moves(self, grid.height, grid.spacing, self.rows, grid.torus, offsets[:, 0])
-        across = _moves(self, grid.width, grid.spacing, self.cols, grid.torus, offsets[:, 1])
-        shifts = np.zeros(self.layers(grid), np.int64)
-        for di, dj in offsets.tolist():
-            u, v = down[di][:, None, :, None], across[dj][None, :, None, :]
-            shifts += np.where((u >= 0) & (v >= 0), np.maximum(u, v), 0).sum((0, 1))
-        return shifts.ravel()
+        pairs = offsets.tolist()
+        down = self._ways(grid, grid.height, self.rows, {i for i, _ in pairs})
+        across = self._ways(grid, grid.width, self.cols, {j for _, j in pairs})
 
+        @cache
+        def total(rows: int, cols: int) -> int:
+            return sum(max(u, v) for i, j in pairs for u in down[rows][i] for v in across[cols][j])
 
-def _moves(
-    array: ProcessorArray, length: int, spacing: int, pes: int, torus: bool, offsets: NDArray[np.int32]
-) -> dict[int, NDArray[np.int64]]:
-    """Offset -> how many PEs away the neighbours along one axis lie, (ways, layers): each different way once, or -1."""
-    count = -(-length // spacing)
-    site = np.arange(count, dtype=np.int64)
-    layer, pe = array._axis(site * spacing, length, pes)
-    moves = {}
-    for d in set(offsets.tolist()):
-        to = site + d
-        there = np.ones(count, bool) if torus else (to >= 0) & (to < count)
-        way = array._axis(to % count * spacing, length, pes)[1] - pe
-        way = (way + pes // 2) % pes - pes // 2  # the shorter way around
-        different = set((layer[there] * (2 * pes) + way[there] + pes).tolist())  # np.unique would load numpy.ma for it
-        pairs = np.stack(np.divmod(np.array(sorted(different), np.int64), 2 * pes))
-        pairs[1] -= pes
-        first = np.searchsorted(pairs[0], pairs[0])  # of the pairs of the same layer
-        number = np.arange(pairs.shape[1]) - first
-        moves[d] = np.full((number.max(initial=0) + 1, -(-length // pes)), -1, np.int64)
-        moves[d][number, pairs[0]] = abs(pairs[1])
-    return moves
+        rows, cols = ([ways.index(each) for each in ways] for ways in (down, across))  # most layers are alike
+        return np.array([total(row, col) for row in rows for col in cols], np.int64)
+
+    def _ways(self, grid: Grid, length: int, pes: int, offsets: set[int]) -> list[dict[int, tuple[int, ...]]]:
+        """Return for each layer along an axis: offset -> distances to the neighbours' PEs, one for each way."""
+        count = -(-length // grid.spacing)
+        site = np.arange(count, dtype=np.int64)
+        layer, pe = self._axis(site * grid.spacing, length, pes)
+        found: list[dict[int, set[int]]] = [{d: set() for d in offsets} for _ in range(-(-length // pes))]
+        for d in offsets:
+            there = np.full(count, True) if grid.torus else (site + d >= 0) & (site + d < count)
+            way = self._axis((site + d) % count * grid.spacing, length, pes)[1] - pe
+            way = (way + pes // 2) % pes - pes // 2  # the shorter way around
+            for number, one in set(zip(layer[there].tolist(), way[there].tolist(), strict=True)):
+                found[number][d].add(one)
+        return [{d: tuple(sorted(map(abs, ways))) for d, ways in each.items()} for each in found]
 
 
 def parse_array(text: str, mapping: str = MAPPINGS[0]) -> ProcessorArray:

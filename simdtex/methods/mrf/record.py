@@ -217,7 +217,7 @@ class Record:
         """Return all that was seen, as plain arrays and numbers."""
         return {
             "stages": [(stage.level, stage.image) for stage in self.stages],
-            **{"meter": self.meter.save(), "account": self.account.levels},
+            **{"meter": self.meter.save(), "account": self.account.total},
             **{"number": self._number, "slots": self._slots, "listed": self._listed},
             **{"weighed": self._total() - self._weighed, "skipped": self._run.machine.spared - self._skipped},
         }
@@ -230,7 +230,7 @@ class Record:
         self._skipped, self._weighed = self._run.machine.spared - saved["skipped"], -saved["weighed"]
         if self._number is not None:
             self.account.begin(*self._costs(self._number))
-        self.account.levels[:] = saved["account"]
+        self.account.total.update(saved["account"])
 
 
 def output(run: Lattices, state: State, source: NDArray[np.int32], record: Record) -> Output:
