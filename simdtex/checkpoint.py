@@ -24,7 +24,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.atomic import Damaged, check_target, lock, read_checked, write_checked
+from simdtex.io.atomic import Damaged, check_target, exclusive, read_checked, write_checked
 from simdtex.options import real
 from simdtex.random import as_seed
 
@@ -173,7 +173,7 @@ class Checkpoint:
         if self._used:
             raise ValueError("a checkpoint keeps one run; give each call a checkpoint of its own")
         self._used = True
-        with _locked(self.path):
+        with exclusive(self.path):
             seed, found = self._open(job, rng, inputs(), device)
             self.running, self.resumed = True, found is not None
             try:
@@ -291,29 +291,6 @@ def opened(
         yield run
     if own:
         kept.remove()
-
-
-@contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """Keep other processes off a checkpoint, by a lock on a file beside it; a process that is killed releases it."""
-    beside = path.with_name(f".{path.name}.lock")
-    try:
-        descriptor = os.open(beside, os.O_RDWR | os.O_CREAT, 0o666)
-    except OSError as error:
-        raise ValueError(f"{path} could not be written ({error.strerror}): choose another path") from None
-    try:
-        try:
-            lock(descriptor)
-        except BlockingIOError:
-            raise ValueError(f"another run keeps its state in {path} now; wait for it, or stop it") from None
-        except OSError:  # a file system without locks
-            pass
-        try:
-            yield
-        finally:
-            beside.unlink(missing_ok=True)
-    finally:
-        os.close(descriptor)
 
 
 def _nothing(info: Any, tree: Callable[[], Any], *, now: bool = False) -> bool:

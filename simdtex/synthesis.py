@@ -69,9 +69,10 @@ def synthesize(
         The axis of the sample that holds channels; None for a grey sample.
     mask : (rows, cols) bool array, or a list of such, optional
         ``mrf``: where pixels of the sample may be taken from; the others are still neighbours.
-    known : array of `shape` (and the channel axis), optional
+    known : array of `shape` (and the channel axis), HardData or path, optional
         ``mrf``: values of the output that are given, and stay as they are to the bit: a masked array, or floats with
-        NaN where nothing is known. Of several variables (channels) some may be known and others not.
+        NaN where nothing is known; or a table (`simdtex.read_hard_data`) or its file. Of several variables (channels)
+        some may be known and others not.
     known_source : (rows, cols, 2) int array, optional
         ``mrf``: the (row, column) of the sample that known pixels are from, -1 for those from elsewhere; of several
         samples (row, column, sample). Such pixels suggest how to go on.

@@ -15,7 +15,7 @@ import simdtex
 from simdtex import checkpoint as checkpoints
 from simdtex import schedules
 from simdtex.checkpoint import Checkpoint, identity, like, pack, read, unpack
-from simdtex.io.atomic import write_checked
+from simdtex.io.atomic import exclusive, write_checked
 from simdtex.methods.mrf import Options
 
 GREY, COLOUR = texture((14, 15)), texture((16, 18), 3)
@@ -333,7 +333,7 @@ def test_one_run_to_a_checkpoint(file):
 
 def test_one_process_at_a_time(file):
     pytest.importorskip("fcntl")
-    with checkpoints._locked(file), pytest.raises(ValueError, match=r"another run keeps its state in .*; wait for it"):
+    with exclusive(file), pytest.raises(ValueError, match=r"another run is at work in .*; wait for it"):
         run(QUICK, checkpoint=file)
 
 

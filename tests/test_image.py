@@ -318,6 +318,8 @@ MASKS = [
     ("colour.png", np.array([[[0, 0, 0], [9, 127, 0], [0, 0, 128], [255, 255, 255]]], np.uint8), [0, 0, 1, 1]),
     ("alpha.png", np.array([[[0, 255], [200, 127], [200, 128], [255, 255]]], np.uint8), [0, 0, 1, 1]),
     ("rgba.png", np.array([[[0] * 4, [255] * 3 + [0], [0, 255, 0, 200], [255] * 4]], np.uint8), [0, 0, 1, 1]),
+    ("ones.png", np.array([[0, 1, 0, 1]], np.uint8), [0, 1, 0, 1]),
+    ("NaN.npy", np.array([[0, np.nan, 1, -1]]), [0, 0, 1, 0]),
     ("none.png", np.zeros((1, 4), np.uint8), [0, 0, 0, 0]),
     ("all.npy", np.ones((1, 4, 1)), [1, 1, 1, 1]),
 ]
@@ -331,22 +333,10 @@ def test_read_mask(tmp_path, name, pixels, expected):
     assert mask.tolist() == [[bool(v) for v in expected]]
 
 
-@pytest.mark.parametrize(
-    ("pixels", "words"),
-    [
-        (np.zeros((4, 1), np.uint8), "is 1 x 4 pixels .* must be 4 x 1: bring"),
-        (np.zeros((1, 4), np.int64), "holds int64 values: save"),
-        (np.array([[0, 1, 1, 0]], np.uint8), "0 and 1 of 255: save it as bool, or multiply it by 255"),
-        (np.array([[0, 0.5, 2, 0]]), r"holds 0\.0 to 2\.0: bring"),
-        (np.array([[0, 0.5, -1, 0]]), r"holds -1\.0 to 0\.5: bring"),
-        (np.array([[0, np.nan, 1, 0]]), "holds nan"),
-    ],
-)
-def test_read_mask_errors(tmp_path, pixels, words):
-    np.save(tmp_path / "mask.npy", pixels)
-    with pytest.raises(ValueError, match=rf"mask\.npy: .*{words}") as caught:
+def test_a_mask_of_another_size(tmp_path):
+    np.save(tmp_path / "mask.npy", np.zeros((4, 1), np.uint8))
+    with pytest.raises(ValueError, match=r"mask\.npy: .*is 1 x 4 pixels .* must be 4 x 1: bring"):
         image.read_mask(tmp_path / "mask.npy", (1, 4))
-    assert "\n" not in str(caught.value)
 
 
 # ---------------------------------------------------------------- check_sample, parse_size

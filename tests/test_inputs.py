@@ -5,6 +5,7 @@ import pytest
 from cases import assert_same_bits, texture
 
 import simdtex
+from simdtex.io.hard_data import HardData
 from simdtex.jobs.inputs import check_inputs, check_samples, is_several
 
 SHAPE = (6, 7)
@@ -125,6 +126,17 @@ def test_forms_of_what_is_known(case):
     assert found.values.dtype == np.uint8 and found.place is None
     assert np.array_equal(found.known[..., 0], THERE)
     assert_same_bits(found.values[..., 0], np.where(THERE, SOME, 0).astype(np.uint8))
+
+
+def test_a_table_of_known_values_or_its_path(tmp_path):
+    (tmp_path / "wells.csv").write_text("x,y,value\n2,1,7\n6.3,4.8,200\n")
+    for known in (tmp_path / "wells.csv", str(tmp_path / "wells.csv"), simdtex.read_hard_data(tmp_path / "wells.csv")):
+        found = check(known=known).given
+        assert np.array_equal(found.known[..., 0], THERE)
+        assert_same_bits(found.values[..., 0], np.where(THERE, SOME, 0).astype(np.uint8))
+    wells = HardData(np.array([[2.0, 1.0]]), np.array([[1.0, np.nan, 3.0]]), ("a", "b", "c"))
+    both = check(COLOUR, channel_axis=-1, known=wells)
+    assert both.given.known[1, 2].tolist() == [True, False, True] and both.given.known.sum() == 2
 
 
 @pytest.mark.parametrize("dtype", [np.bool_, np.int8, np.uint16, np.int64, np.float32, np.float64])
@@ -272,6 +284,8 @@ BAD = {
     "three for two": (TWO | {"mask": [MASK] * 3}, ValueError, "2 samples and 3 masks"),
     "masks turned round": (TWO | {"mask": [MASK[:5, :4], MASK]}, ValueError, "mask is 5x4 and the picture 9x10"),
     # known values
+    "data of another number": ({"known": HardData(np.ones((1, 2)), np.ones((1, 2)), ("a", "b"))}, ValueError,
+                               "a datum has 2 values and a pixel of the sample 1; give as many"),
     "known words": ({"known": SOME.astype(str)}, TypeError, "known holds <U.* give integers or real floats"),
     "known None": ({"known": [[None] * 7] * 6}, TypeError, "known holds object values"),
     "known ragged": ({"known": [[1, 2], [3]]}, ValueError, "known is ragged; give rows of equal length"),

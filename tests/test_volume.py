@@ -70,13 +70,6 @@ def test_an_opaque_alpha_channel_is_kept(tmp_path):
         np.testing.assert_array_equal(loaded(tmp_path / name), values, strict=True)
 
 
-def test_channels_may_stand_anywhere(tmp_path):
-    values = noise((2, 3, 4, 5))
-    for axis in (0, 1, -2, 3):
-        volume.write(tmp_path / "a.npy", np.moveaxis(values, -1, axis), axis)
-        np.testing.assert_array_equal(loaded(tmp_path / "a.npy"), values, strict=True)
-
-
 # -- other programs -------------------------------------------------------------------------------------------
 
 
@@ -193,7 +186,4 @@ def test_write_checks_its_array(tmp_path):
     for shape in [(4, 4), (2, 2, 2, 2, 2), (0, 2, 2)]:
         with pytest.raises(ValueError, match=re.escape(str(shape))):
             volume.write(tmp_path / "a.npy", np.zeros(shape))
-    for shape, axis in [((2, 2, 2), -1), ((2, 2, 2, 2), 4)]:
-        with pytest.raises(ValueError, match="channel_axis"):
-            volume.write(tmp_path / "a.npy", np.zeros(shape), axis)
     assert os.listdir(tmp_path) == []

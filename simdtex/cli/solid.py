@@ -113,7 +113,7 @@ def solid(
     seconds = time.perf_counter() - began
     for output in outputs:
         with afterwards():
-            volume.write(output, block, None if read.channel_axis is None else -1)
+            volume.write(output, block)
     if picture:
         with afterwards():
             view(np.asarray(block), picture)

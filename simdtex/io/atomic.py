@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The one writer: a file or folder is written completely or not at all, and a checked file carries its SHA-256.
 
-What is being written has a hidden name in the target's folder, ``.simdtex-HOST-PROCESS-TARGET-TOKEN`` with the target's
+What is being written has a hidden name in the target's folder, ``.simdtex-HOST-PROCESS-TOKEN`` with the target's
 suffix, and is renamed at the end. HOST and PROCESS identify the writer: the next write into the folder removes what
 killed processes have left, and spares what other processes are writing.
 """
@@ -22,23 +22,9 @@ from functools import cache
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
-__all__ = [
-    "Damaged",
-    "NotWritten",
-    "atomic_folder",
-    "atomic_path",
-    "check_target",
-    "exclusive",
-    "is_leftover",
-    "lock",
-    "read_checked",
-    "write_checked",
-]
-
 PathLike = str | os.PathLike[str]
 
-_HEX = "[0-9a-f]{8}"
-_HIDDEN = re.compile(rf"\.simdtex-({_HEX})-([0-9]+)-({_HEX})-{_HEX}(-old)?(\..*)?")
+_HIDDEN = re.compile(r"\.simdtex-([0-9a-f]{8})-([0-9]+)-[0-9a-f]{8}(\..*)?")
 _HEADER = b"simdtex sha256 %s\n"
 _HEADER_SIZE = len(_HEADER % (b"0" * 64))
 
@@ -51,31 +37,14 @@ class Damaged(ValueError):
     """The content of a checked file differs from what was written."""
 
 
-# ---------------------------------------------------------------- writing
-
-
 @contextmanager
 def atomic_path(path: PathLike) -> Iterator[Path]:
     """Yield a temporary file in the folder of `path`, and rename it to `path` if the block succeeds.
 
     A reader of `path` sees the old file or the complete new one. If the block fails, also by Ctrl-C, the temporary file
-    is removed and `path` is left as it was.
-
-    Parameters
-    ----------
-    path : path
-        The file to write; a symbolic link is followed.
-
-    Yields
-    ------
-    Path
-        An empty file to overwrite, with the same suffix as `path`.
-
-    Raises
-    ------
-    ValueError
-        The folder is missing or not writable, or `path` is a folder; `NotWritten` if the block or the renaming raises
-        OSError, for example because the disk is full.
+    is removed and `path` is left as it was. The temporary file has the suffix of `path`; a symbolic link is followed.
+    Raises ValueError if `check_target` does, and NotWritten if the block or the renaming raises OSError, for example
+    because the disk is full.
     """
     check_target(Path(path))
     target = Path(os.path.realpath(path))
@@ -98,27 +67,16 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
     """Yield a temporary folder in the folder of `path`, and rename it to `path` if the block succeeds.
 
     An existing folder `path` is replaced as a whole at the end; the caller checks whether it may be. If the block
-    fails, also by Ctrl-C, the temporary folder is removed and `path` is left as it was.
-
-    Parameters
-    ----------
-    path : path
-        The folder to write; a symbolic link is followed.
-
-    Yields
-    ------
-    Path
-        An empty folder to fill, with the same suffix as `path`.
-
-    Raises
-    ------
-    NotWritten
-        The block or the renaming raises OSError, for example because the disk is full.
+    fails, also by Ctrl-C, the temporary folder is removed and `path` is left as it was. Errors are those of
+    `atomic_path`.
     """
     target = Path(os.path.realpath(path))
-    temporary, old = _hidden(target), _hidden(target, old=True)
+    temporary = _hidden(target)
+    old = target.with_name(f".simdtex-old-{_digits(target.name)}")
     try:
         _remove_leftovers(target)
+        if old.exists() and not target.exists():  # a process was killed while it replaced the folder
+            old.rename(target)
         temporary.mkdir()
         yield temporary
         for folder, _, names in os.walk(temporary):
@@ -147,17 +105,7 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
 def write_checked(path: PathLike, write: Callable[[BinaryIO], Any]) -> None:
     """Write a file atomically, with a line in front that holds the SHA-256 of its content.
 
-    Parameters
-    ----------
-    path : path
-        The file to write.
-    write : callable
-        Writes the content into a binary file that is open for reading and writing, from its current position on.
-
-    Raises
-    ------
-    ValueError
-        As for `atomic_path`.
+    ``write`` writes the content into a binary file from its current position on. Errors are those of `atomic_path`.
     """
     with atomic_path(path) as temporary, temporary.open("w+b") as file:
         file.write(_HEADER % (b"0" * 64))
@@ -174,19 +122,9 @@ def write_checked(path: PathLike, write: Callable[[BinaryIO], Any]) -> None:
 
 
 def read_checked(path: PathLike) -> BinaryIO:
-    """Open a file that `write_checked` has written, after verifying its SHA-256.
+    """Open a file that `write_checked` has written, at the beginning of its content; the caller closes it.
 
-    Returns
-    -------
-    binary file
-        Positioned at the beginning of the content; the caller closes it.
-
-    Raises
-    ------
-    Damaged
-        The checksum is missing or is not that of the content.
-    OSError
-        The file does not exist or cannot be read.
+    Raises Damaged unless the SHA-256 is that of the content, and OSError if the file cannot be read.
     """
     file = open(path, "rb")  # noqa: SIM115 - the caller closes it
     try:
@@ -219,9 +157,6 @@ def _sync(path: Path, flags: int = os.O_RDWR) -> None:
         os.close(descriptor)
 
 
-# ---------------------------------------------------------------- checking
-
-
 def check_target(target: Path) -> None:
     """Raise ValueError unless a file can be written at `target`."""
     folder = target.parent
@@ -230,10 +165,9 @@ def check_target(target: Path) -> None:
             raise ValueError(f"{target} is a folder: add a file name to it")
         if target.exists() and not target.is_file():
             raise ValueError(f"{target} is not a regular file: give another name")
-        if not folder.exists():
-            raise ValueError(f"the folder {folder} does not exist: create it first")
         if not folder.is_dir():
-            raise ValueError(f"{folder} is not a folder: give another path")
+            remedy = "is not a folder: give another path" if folder.exists() else "does not exist: create it first"
+            raise ValueError(f"the folder {folder} {remedy}")
         os.stat(target)
     except FileNotFoundError:
         pass
@@ -265,50 +199,34 @@ def _not_written(path: PathLike, error: OSError) -> NotWritten:
     return NotWritten(f"{os.fspath(path)} could not be written ({reason}): {remedy}")
 
 
-# ---------------------------------------------------------------- locks
-
-
 @contextmanager
-def exclusive(folder: PathLike) -> Iterator[None]:
-    """Lock a folder against other processes; the lock ends with the block or the process. No effect on Windows.
+def exclusive(path: PathLike) -> Iterator[None]:
+    """Lock a file or folder against other processes, by a hidden file beside it; ValueError if another one holds it.
 
-    Raises
-    ------
-    ValueError
-        Another process holds the lock.
-    """
-    if os.name == "nt":  # Windows cannot open a folder
-        yield
-        return
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        try:
-            lock(descriptor)
-        except BlockingIOError:
-            raise ValueError(f"another run is at work in {os.fspath(folder)} now; wait for it, or stop it") from None
-        except OSError:  # a file system without locks
-            pass
-        yield
-    finally:
-        os.close(descriptor)
-
-
-def lock(descriptor: int) -> None:
-    """Lock an open file or folder for this process until it is closed; no effect on Windows.
-
-    Raises
-    ------
-    OSError
-        BlockingIOError if another process holds the lock; another kind if the file system has no locks.
+    The lock ends with the block or the process. It has no effect on Windows and on file systems without locks.
     """
     try:
         import fcntl
     except ModuleNotFoundError:
+        yield
         return
-    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
-# ---------------------------------------------------------------- leftovers
+    hidden = Path(os.path.realpath(path))
+    hidden = hidden.with_name(f".{hidden.name}.lock")
+    try:
+        file = open(hidden, "wb")  # noqa: SIM115 - an error of the block is not one of this file
+    except OSError as error:
+        raise _not_written(path, error) from None
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise ValueError(f"another run is at work in {os.fspath(path)} now; wait for it, or stop it") from None
+        except OSError:  # a file system without locks
+            pass
+        try:
+            yield
+        finally:
+            hidden.unlink(missing_ok=True)
 
 
 @cache
@@ -325,40 +243,29 @@ def _digits(text: str) -> str:
     return hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()[:8]
 
 
-def _hidden(target: Path, old: bool = False) -> Path:
-    name = f".simdtex-{_host()}-{os.getpid()}-{_digits(target.name)}-{secrets.token_hex(4)}"
-    return target.with_name(f"{name}-old" if old else f"{name}{target.suffix}")
+def _hidden(target: Path) -> Path:
+    return target.with_name(f".simdtex-{_host()}-{os.getpid()}-{secrets.token_hex(4)}{target.suffix}")
 
 
 def is_leftover(name: str) -> bool:
-    """Whether a file name is that of an unfinished write by a process of this host that has ended."""
+    """Return whether a file name is that of an unfinished write by a process of this host that has ended."""
     found = _HIDDEN.fullmatch(name)
-    return found is not None and found[1] == _host() and not _is_alive(int(found[2]))
+    if found is None or found[1] != _host() or os.name != "posix":  # elsewhere os.kill would end the process
+        return False
+    try:
+        os.kill(int(found[2]), 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        pass
+    return False
 
 
 def _remove_leftovers(target: Path) -> None:
-    """Remove the leftovers in the target's folder, and put back the target if a process ended while replacing it."""
-    for name in os.listdir(target.parent):
-        found, entry = _HIDDEN.fullmatch(name), target.with_name(name)
-        if not (found and is_leftover(name)):
-            continue
-        if found[4] and found[3] != _digits(target.name):  # another target, which may have to be put back
-            continue
-        if found[4] and not target.exists():
-            entry.rename(target)
-        elif entry.is_dir() and not entry.is_symlink():
-            shutil.rmtree(entry, ignore_errors=True)
-        else:
-            entry.unlink(missing_ok=True)
-
-
-def _is_alive(process: int) -> bool:
-    if os.name != "posix":  # elsewhere os.kill would end the process
-        return True
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):
-        return True
-    return True
+    """Remove what killed processes have left in the target's folder."""
+    for entry in target.parent.iterdir():
+        if is_leftover(entry.name):
+            if entry.is_dir() and not entry.is_symlink():
+                shutil.rmtree(entry, ignore_errors=True)
+            else:
+                entry.unlink(missing_ok=True)

@@ -16,7 +16,7 @@ import numpy as np
 import PIL.Image
 from numpy.typing import NDArray
 
-from simdtex.io.limits import check_array, check_bytes, check_pixels, read_npy
+from simdtex.io.limits import check_array, check_size, read_npy
 
 Array = NDArray[Any]
 
@@ -30,26 +30,10 @@ _PILLOW = Lock()
 
 
 def decode(data: bytes, most: int) -> Array:
-    """Decode the bytes of a picture file, whose format is recognised by its content.
+    """Decode the bytes of a picture file of at most so many pixels; the format is recognised by its content.
 
-    Parameters
-    ----------
-    data : bytes
-        A whole file.
-    most : int
-        The limit in pixels.
-
-    Returns
-    -------
-    (rows, cols) or (rows, cols, channels) array
-        Upright, palettes and print colours as RGB, without a fully opaque alpha channel.
-
-    Raises
-    ------
-    TooLarge
-        A limit is exceeded; nothing has been decoded.
-    Exception
-        Each decoder's own, for a damaged file.
+    Return a (rows, cols) or (rows, cols, channels) array, upright, palettes and print colours as RGB, without a fully
+    opaque alpha channel. Raise TooLarge before anything is decoded, and each decoder's own errors for a damaged file.
     """
     with _quiet():
         if data.startswith(b"\x93NUMPY"):
@@ -106,7 +90,7 @@ def _read_png16(data: bytes, most: int) -> Array:
     import imagecodecs  # here and below: loaded only for pictures that need it
 
     with _opened(data, most) as picture:  # Pillow has no 16-bit colour, but checks the header and knows EXIF
-        check_bytes(2 * prod(picture.size) * len(picture.getbands()), most)
+        check_size(0, 2 * prod(picture.size) * len(picture.getbands()), most)
         orientation = int(picture.getexif().get(0x0112, 1))
     pixels: Array = imagecodecs.png_decode(data)
     return _finished(pixels, orientation, pixels.ndim == 3 and pixels.shape[2] in (2, 4))
@@ -149,10 +133,10 @@ def _read_tiff(data: bytes, most: int) -> Array:
 
 def _check_page(page: Any, most: int) -> None:
     """Raise TooLarge if a TIFF page, or one of its tiles or strips, exceeds the limits."""
-    check_bytes(prod(page.shape) * (page.dtype.itemsize if page.dtype else 8), most)  # the order of axes varies
-    check_pixels(page.imagewidth * page.imagelength * page.imagedepth, most)
+    size = prod(page.shape) * (page.dtype.itemsize if page.dtype else 8)
+    check_size(page.imagewidth * page.imagelength * page.imagedepth, size, most)
     if page.is_tiled:
-        check_pixels(page.tilewidth * page.tilelength, most)
+        check_size(page.tilewidth * page.tilelength, 0, most)
 
 
 def _finished(pixels: Array, orientation: int, alpha: bool) -> Array:
@@ -162,16 +146,11 @@ def _finished(pixels: Array, orientation: int, alpha: bool) -> Array:
         if (pixels[..., -1] == opaque).all():
             pixels = pixels[..., 0] if pixels.shape[-1] == 2 else pixels[..., :-1]
     # the eight values of the EXIF and TIFF tag 274
-    turned = {
-        2: lambda p: p[:, ::-1],
-        3: lambda p: p[::-1, ::-1],
-        4: lambda p: p[::-1],
-        5: lambda p: p.swapaxes(0, 1),
-        6: lambda p: np.rot90(p, -1),
-        7: lambda p: p[::-1, ::-1].swapaxes(0, 1),
-        8: lambda p: np.rot90(p, 1),
-    }
-    return turned[orientation](pixels) if orientation in turned else pixels
+    if orientation in (5, 6, 7, 8):
+        pixels = pixels.swapaxes(0, 1)
+    if orientation in (3, 4, 7, 8):
+        pixels = pixels[::-1]
+    return pixels[:, ::-1] if orientation in (2, 3, 6, 7) else pixels
 
 
 def native(pixels: Array) -> Array:

@@ -56,9 +56,6 @@ class HardData:
         return f"row {row}" if self.lines is None else f"line {self.lines[row]}"
 
 
-# ---------------------------------------------------------------- reading
-
-
 def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData:
     """Read a table of known values.
 
@@ -94,7 +91,7 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
     try:
         if binary:
             with open(path, "rb") as file:
-                return _table(_numbers(file, os.fstat(file.fileno()).st_size, most))
+                return _table(read_npy(file, os.fstat(file.fileno()).st_size, most))
         with open(path, encoding="utf-8-sig") as text:
             return _parsed(text)
     except TooLarge as error:
@@ -105,15 +102,6 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
         raise ValueError(f"{name} cannot be read ({error.strerror}): check the path") from None
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: {error}") from None
-
-
-def _numbers(file: Any, length: int, most: int) -> Any:
-    try:
-        return read_npy(file, length, most)
-    except TooLarge:
-        raise
-    except (ValueError, EOFError):
-        raise ValueError("it is damaged, or holds no array of numbers: write it with numpy.save") from None
 
 
 def _parsed(text: Iterable[str]) -> HardData:
@@ -196,9 +184,6 @@ def _table(array: Any) -> HardData:
         raise ValueError(f"the hard data has the shape {numbers.shape}: give (data, 3) of x, y, value, or more values")
     found = np.where(np.ma.getmaskarray(numbers), np.nan, numbers.data).astype(np.float64)
     return HardData(found[:, :2], found[:, 2:], _names(numbers.shape[1] - 2))
-
-
-# ---------------------------------------------------------------- placing
 
 
 def place_hard_data(

@@ -61,9 +61,6 @@ class Image:
     channel_axis: int | None
 
 
-# ---------------------------------------------------------------- reading
-
-
 def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
     """Read a picture file, whose format is recognised by its content and not by its name.
 
@@ -163,18 +160,14 @@ def split_alpha(pixels: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
     return values[..., 0] if values.shape[2] == 2 else values[..., :3], ~(values[..., -1] >= _half(values.dtype))
 
 
-def _half(dtype: np.dtype[Any]) -> float:
-    """Return half of full scale; of integers it lies between two of them."""
-    return np.iinfo(dtype).max / 2 if dtype.kind in "iu" else 0.5
-
-
 def read_mask(path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None = None) -> NDArray[np.bool_]:
     """Read a picture as a mask.
 
     Parameters
     ----------
     path : path
-        A picture as for `read`, grey or colour, of bool, 8 bits, 16 bits, or floats from 0 to 1.
+        A picture as for `read`, grey or colour. Full scale is 255 in 8 bits and 65535 in 16, but 1 of bool, of
+        floats, and of integers that are all 0 or 1.
     shape : (rows, cols)
         The size it must have; further axes are ignored.
     max_pixels : int, optional
@@ -188,32 +181,23 @@ def read_mask(path: PathLike, shape: tuple[int, ...], *, max_pixels: int | None 
     Raises
     ------
     ValueError
-        The file cannot be read as by `read`, has another size or type or floats outside 0 to 1, or its largest value
-        is 1 of 255 or 65535, which is a mask of 0 and 1 saved as integers.
+        The file cannot be read as by `read`, or has another size.
     """
-    name = os.fspath(path)
     pixels = read(path, max_pixels=max_pixels).pixels
     rows, cols = shape[:2]
     if pixels.shape[:2] != (rows, cols):
         raise ValueError(
-            f"{name}: the mask is {pixels.shape[1]} x {pixels.shape[0]} pixels (width x height) and must be "
+            f"{os.fspath(path)}: the mask is {pixels.shape[1]} x {pixels.shape[0]} pixels (width x height) and must be "
             f"{cols} x {rows}: bring it to that size"
         )
-    if pixels.dtype.kind != "f" and pixels.dtype not in (bool, np.uint8, np.uint16):
-        raise ValueError(
-            f"{name}: the mask holds {pixels.dtype} values: save it as bool, 8 or 16 bits, or floats 0 to 1"
-        )
     colours, transparent = split_alpha(pixels)
-    if pixels.dtype.kind == "f" and not (colours.min() >= 0 and colours.max() <= 1):
-        raise ValueError(f"{name}: the mask holds {colours.min()} to {colours.max()}: bring its floats to 0 to 1")
-    if pixels.dtype.kind == "u" and colours.max() == 1:
-        full = np.iinfo(pixels.dtype).max
-        raise ValueError(f"{name}: the mask holds 0 and 1 of {full}: save it as bool, or multiply it by {full}")
-    bright = colours > _half(pixels.dtype)
+    bright = colours > (0.5 if colours.max() <= 1 else _half(pixels.dtype))
     return (bright if bright.ndim == 2 else bright.any(axis=2)) & ~transparent
 
 
-# ---------------------------------------------------------------- checking
+def _half(dtype: np.dtype[Any]) -> float:
+    """Return half of full scale; of integers it lies between two of them."""
+    return np.iinfo(dtype).max / 2 if dtype.kind in "iu" else 0.5
 
 
 def as_array(name: str, values: Any) -> Array:
@@ -305,23 +289,7 @@ def check_sample(array: Any, channel_axis: int | None, *, unknown: bool = False)
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Parse the size of a picture, written WIDTHxHEIGHT as in image tools.
-
-    Parameters
-    ----------
-    text : str
-        ``"640x480"`` is 640 columns and 480 rows; ``"512"`` alone is a square.
-
-    Returns
-    -------
-    rows, cols : int
-        In the order of an array's shape: the height first.
-
-    Raises
-    ------
-    ValueError
-        The text is not one or two integers from 1 to 99999999.
-    """
+    """Return rows and columns of WIDTHxHEIGHT, as ``640x480`` for 640 columns and 480 rows, or of a square's side."""
     match = re.fullmatch(r"\s*([0-9]{1,8})(?:\s*[xX\u00d7]\s*([0-9]{1,8}))?\s*", text)
     sides = [int(side) for side in match.groups() if side is not None] if match else []
     if not sides or 0 in sides:
@@ -341,9 +309,6 @@ def _picture(values: Any) -> Array:
     if pixels.ndim not in (2, 3) or pixels.size == 0:
         raise ValueError(f"the picture has the shape {pixels.shape}: give (rows, cols) or (rows, cols, channels)")
     return pixels
-
-
-# ---------------------------------------------------------------- writing
 
 
 class Format(NamedTuple):
@@ -391,25 +356,10 @@ def check_writable(
     *,
     suffixes: Collection[str] | None = None,
 ) -> None:
-    """Check before a long run that its result can be written.
+    """Raise ValueError before a long run unless its result can be written; nothing is created now.
 
-    Parameters
-    ----------
-    path : path
-        The file to be written later; nothing is created now.
-    dtype : dtype, optional
-        The type of the pixels; None is not checked.
-    channels : int, optional
-        The number of channels; None is not checked.
-    suffixes : collection of str, optional
-        The allowed suffixes of a file that is no picture, for example ``{".npz"}``; `dtype` and `channels` are then
-        not checked.
-
-    Raises
-    ------
-    ValueError
-        The path is a folder or a device, its folder is missing or not writable, or its suffix does not name a format
-        that holds such pixels.
+    The file must be writable and its suffix name a format that holds pixels of this type and number of channels; None
+    is not checked. For files that are no pictures, `suffixes` are the allowed ones, and only these are checked.
     """
     target = Path(path)
     suffix = target.suffix.lower()
@@ -513,24 +463,12 @@ def write_tiff(path: Path, pages: Iterable[Array]) -> None:
             )
 
 
-# ---------------------------------------------------------------- display
-
-
 def to_display(array: ArrayLike, limits: tuple[float, float] | None = None) -> NDArray[np.uint8]:
-    """Convert pixels of any type to 8 bits for a preview.
+    """Convert pixels of any shape and type to 8 bits for a preview.
 
-    Parameters
-    ----------
-    array : array_like
-        Any shape. uint8 is returned unchanged, bool as 0 and 255.
-    limits : (low, high), optional
-        The values shown as 0 and 255, for every other type; pass the sample's smallest and largest value so that all
-        previews of a run agree. None: those of `array`.
-
-    Returns
-    -------
-    ndarray of uint8
-        The shape of `array`; values outside the limits are clipped, all are mid-grey if low equals high.
+    uint8 is returned unchanged, bool as 0 and 255. Of other types `limits` are the values shown as 0 and 255, None
+    those of `array`; values outside are clipped, and all are mid-grey if the limits are equal. The sample's smallest
+    and largest value make all previews of a run agree.
     """
     pixels = np.asarray(array)
     if pixels.dtype == np.uint8:

@@ -46,25 +46,17 @@ def max_pixels_or_default(max_pixels: int | None) -> int:
     return int(text)
 
 
-def check_pixels(pixels: int, most: int) -> None:
-    """Raise TooLarge if a file has more pixels than `most`."""
-    if pixels > most:
-        raise TooLarge(f"has {pixels} pixels and no more than {most} are read: crop it, or set {VARIABLE} higher")
-
-
-def check_bytes(unpacked: int, most: int) -> None:
-    """Raise TooLarge if a file unpacks to more bytes than `most` pixels may have."""
-    if unpacked > BYTES * most:
-        raise TooLarge(
-            f"unpacks to {unpacked} bytes and no more than {BYTES * most} are read: crop it, or set {VARIABLE} higher"
-        )
+def check_size(pixels: int, unpacked: int, most: int) -> None:
+    """Raise TooLarge if a file has more pixels than `most`, or unpacks to more bytes than `most` pixels may have."""
+    for count, what, limit in ((pixels, "pixels", most), (unpacked, "bytes", BYTES * most)):
+        if count > limit:
+            raise TooLarge(f"has {count} {what} and no more than {limit} are read: crop it, or set {VARIABLE} higher")
 
 
 def check_array(shape: Iterable[int], itemsize: int, most: int) -> None:
     """Raise TooLarge if an array (rows, cols, ...) has too many pixels or bytes."""
     sides = [int(side) for side in shape]
-    check_pixels(prod(sides[:2]), most)
-    check_bytes(prod(sides) * itemsize, most)
+    check_size(prod(sides[:2]), prod(sides) * itemsize, most)
 
 
 def check_file(path: PathLike, what: str, most: int) -> None:
@@ -81,7 +73,7 @@ def check_file(path: PathLike, what: str, most: int) -> None:
     if not stat.S_ISREG(found.st_mode):
         raise ValueError(f"{name} is not a regular file: give the path of {what}")
     try:
-        check_bytes(found.st_size, most)
+        check_size(0, found.st_size, most)
     except TooLarge as error:
         raise ValueError(f"{name} {error}") from None
 

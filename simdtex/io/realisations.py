@@ -30,17 +30,7 @@ _NEEDED = {".zarr": ("xarray", "zarr"), ".nc": ("xarray", "h5netcdf", "h5py"), "
 
 
 def check_realisations_path(path: PathLike) -> str:
-    """Check before a long simulation that its realisations can be written.
-
-    Parameters
-    ----------
-    path : path
-        The file or folder to be written later, as for `write_realisations`; nothing is created now.
-
-    Returns
-    -------
-    str
-        The suffix, in lower case.
+    """Check before a long simulation that its realisations can be written; return the suffix in lower case.
 
     Raises
     ------

@@ -41,22 +41,10 @@ _SLICE = re.compile(r"slice-([0-9]{3,})\.png")
 
 
 def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int | None = None) -> None:
-    """Check before a long run that its result can be written.
+    """Raise ValueError before a long run unless its result can be written; nothing is created now.
 
-    Parameters
-    ----------
-    path : path
-        The file, or the folder of slices, to be written later; nothing is created now.
-    dtype : dtype, optional
-        The type of the values; None is not checked.
-    channels : int, optional
-        The number of channels; None is not checked.
-
-    Raises
-    ------
-    ValueError
-        The suffix names no format that holds such values, or the path cannot be written; a folder is only replaced
-        if it contains nothing but slices.
+    The file or folder of slices must be writable, and its suffix name a format that holds values of this type and
+    number of channels; None is not checked. A folder is only replaced if it contains nothing but slices.
     """
     target = Path(path)
     suffix = target.suffix.lower()
@@ -77,7 +65,7 @@ def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int
     check_holds(target, _FORMATS, dtype, channels, other)
 
 
-def write(path: PathLike, volume: ArrayLike, channel_axis: int | None = None) -> None:
+def write(path: PathLike, volume: ArrayLike) -> None:
     """Write a solid texture in the format of the suffix, atomically.
 
     Parameters
@@ -86,10 +74,8 @@ def write(path: PathLike, volume: ArrayLike, channel_axis: int | None = None) ->
         ``.npz`` (compressed, key ``"volume"``) or ``.npy``, of any type; ``.tif`` ``.tiff``, a page for each slice, of
         any type but bool; ``.nrrd``, integers and floats of 32 and 64 bits; or a name without suffix for a folder
         of slices ``slice-000.png``, 8 or 16 bits, up to 4 channels. An existing folder of slices is replaced.
-    volume : array_like, (depth, rows, cols) or with channels
+    volume : array_like, (depth, rows, cols) or (depth, rows, cols, channels)
         Real numbers, written unchanged.
-    channel_axis : int, optional
-        The axis of the channels; None takes the last one of four.
 
     Raises
     ------
@@ -112,12 +98,6 @@ def write(path: PathLike, volume: ArrayLike, channel_axis: int | None = None) ->
         raise ValueError(
             f"the volume has the shape {values.shape}: give (depth, rows, cols) or (depth, rows, cols, channels)"
         )
-    if channel_axis is not None:
-        if values.ndim != 4 or not -4 <= channel_axis < 4:
-            raise ValueError(
-                f"channel_axis is {channel_axis} and the volume has {values.ndim} axes: give None, or one of four axes"
-            )
-        values = np.moveaxis(values, channel_axis, -1)
     check_writable(path, values.dtype, values.shape[3] if values.ndim == 4 else 1)
     suffix = Path(path).suffix.lower()
     if suffix not in (".npz", ".npy") and values.ndim == 4 and values.shape[3] == 1:
