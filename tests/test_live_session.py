@@ -102,8 +102,7 @@ def assert_lines_repeat(page, number, folder, monkeypatch):
 @pytest.mark.parametrize("case", cases(JOBS))
 def test_the_lines_of_a_result_repeat_its_bytes(opened, case, tmp_path, monkeypatch):
     carries = JOBS[case].get("method") != "pyramid"
-    if carries:
-        opened.ask("maps", png(texture(channels=1, seed=2)), kind="map", name="Height map.png")
+    opened.ask("maps", png(texture(channels=1, seed=2)), kind="map", name="Height map.png")
     result = opened.result(**JOBS[case])
     maps = ["map height-map"] * carries
     assert [layer for layer in result["layers"] if layer.startswith("map")] == maps
@@ -363,17 +362,18 @@ def test_the_first_picture_is_new_to_the_page_until_it_has_a_result():
     page.session.close()
 
 
-def test_maps_have_the_pictures_size_and_names_of_their_own(opened):
+def test_maps_have_the_pictures_size_and_are_carried_along(opened):
     assert opened.error(png(texture(9, 9)), kind="map", name="n.png") == (
         "n.png is 9x9 and the picture 48x40; give a map of the picture's size"
     )
-    for _ in range(2):
-        opened.ask("maps", png(texture(channels=1)), kind="map", name="n.png")
-    assert opened.ask("maps", kind="unmap", name="n")[0]["names"] == ["n-2"]
+    for seed in (1, 2):  # the second replaces the first
+        opened.ask("maps", png(texture(channels=1, seed=seed)), kind="map", name="n.png")
+    opened.ask("maps", png(texture()), kind="map", name="other.png")
+    assert opened.ask("maps", kind="unmap", name="other")[0]["names"] == ["n"]
     opened.result()
-    carried = apply_source_map(opened.latest.source, texture(channels=1))
-    np.testing.assert_array_equal(opened.latest.maps["n-2"], carried)
-    _, (pixels,) = opened.ask("frame", layer="map n-2", **WINDOW, wanted={"layer": "map n-2"})
+    carried = apply_source_map(opened.latest.source, texture(channels=1, seed=2))
+    np.testing.assert_array_equal(opened.latest.maps["n"], carried)
+    _, (pixels,) = opened.ask("frame", layer="map n", **WINDOW, wanted={"layer": "map n"})
     np.testing.assert_array_equal(np.frombuffer(pixels, np.uint8).reshape(28, 36, 4)[..., 0], carried)
 
 

@@ -65,13 +65,7 @@ class Frame(NamedTuple):
 
 
 def parse_window(message: Mapping[str, Any]) -> Window:
-    """Return the window that a message describes.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A number is missing, of another type, or out of range.
-    """
+    """Return the window that a message describes; raise ValueError or TypeError if it describes none."""
     window = Window(**{name: message[name] for name in Window._fields if name in message})
     if not isinstance(window.layer, str):
         raise TypeError("the layer must be a name")
@@ -86,15 +80,9 @@ def parse_window(message: Mapping[str, Any]) -> Window:
 
 
 def picture(pixels: Array, sample: Array, shape: tuple[int, int] | None = None) -> Layer:
-    """Return a picture as a layer; black and white are the sample's least and largest value, unless it has 8 bits.
+    """Return a picture, (rows, cols[, channels]), as a layer; `shape` is its size on the page, if of a coarse level.
 
-    Parameters
-    ----------
-    pixels : (rows, cols) or (rows, cols, channels) array
-    sample : array
-        The sample that the picture was made from.
-    shape : (rows, cols), optional
-        The size on the page, if the picture is of a coarse level.
+    Black and white are the least and the largest value of the sample that it was made from, unless it has 8 bits.
     """
     limits = None if sample.dtype == np.uint8 else (float(sample.min()), float(sample.max()))
     return Layer(shape or (pixels.shape[0], pixels.shape[1]), pixels, partial(to_display, limits=limits))
@@ -109,14 +97,8 @@ def layers(
 ) -> dict[str, Callable[[], Layer]]:
     """Return functions that make the layers of a run or a result, by name.
 
-    Parameters
-    ----------
-    sample : array
-        The sample.
-    shape : (rows, cols)
-        The size of the output, whatever the level.
-    image, source, temperature : callable
-        Return the arrays of the present level; None if the method has none.
+    ``shape`` are the rows and columns of the output, whatever the level. The functions ``image``, ``source`` and
+    ``temperature`` return the arrays of the present level; None if the method has none.
     """
     found = {"picture": lambda: picture(image(), sample, shape)}
     if source:

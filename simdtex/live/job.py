@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -24,6 +24,8 @@ from simdtex.run import Output
 from simdtex.synthesis import METHODS, synthesize
 
 Array = NDArray[Any]
+Maps = dict[str, Array]
+Message = dict[str, Any]
 
 FUNCTIONS: dict[str, Callable[..., Any]] = {"synth": synthesize, "extend": extend, "fill": fill}
 """The functions behind the page's jobs, by command: more of a texture, a seamless picture, and a filled hole."""
@@ -39,6 +41,9 @@ MAX_POINTS = 2**16
 
 MAX_LABEL = 8
 """The largest label of a stroke; 0 erases."""
+
+WHOLE = (slice(None), slice(None))
+"""All rows and columns."""
 
 RESERVED = ("", "texture", "hole", "guide-sample", "guide-texture")
 """Names that a picture's files cannot have, since other files of a package have them."""
@@ -56,27 +61,18 @@ class Picture(NamedTuple):
     channel_axis: int | None
 
 
-class Part(NamedTuple):
-    """A region of a picture, pixels."""
-
-    left: int
-    top: int
-    width: int
-    height: int
-
-
 class Job:
     """A run that the page asks for, checked.
 
     Parameters
     ----------
-    message : mapping
+    message : dict
         ``job`` (``synth``, ``extend`` or ``fill``) and ``seed``; ``width``, ``height`` and ``method`` of ``synth``;
         ``options``; ``part``, the region ``[left, top, width, height]`` of the picture that is the sample; ``guide``,
         with strokes on the ``sample`` and the ``output``; ``hole``, strokes; ``of``, the number of the result to fill.
     picture : Picture
-    maps : mapping
-        Further maps of the picture, by name.
+    maps : dict
+        Further maps of the picture, by name; ``pyramid`` cannot carry them.
     result : callable
         Returns the result of a number; its ``image`` and ``maps`` are used.
 
@@ -103,13 +99,7 @@ class Job:
         The message is wrong; the sentence says how.
     """
 
-    def __init__(
-        self,
-        message: Mapping[str, Any],
-        picture: Picture,
-        maps: Mapping[str, Array],
-        result: Callable[[int], Any],
-    ) -> None:
+    def __init__(self, message: Message, picture: Picture, maps: Maps, result: Callable[[Any], Any]) -> None:
         self.message = message
         one_of("job", message.get("job"), FUNCTIONS)
         self.kind: str = message["job"]
@@ -117,15 +107,14 @@ class Job:
         one_of("method", self.method, METHODS)
         seed: Any = message.get("seed")
         whole("seed", seed, 0, 2**32 - 1)
-        self.files: dict[str, Array] = {}
+        maps = {} if self.method == "pyramid" else maps
         self._keywords: dict[str, Any] = {}
-        self._arguments = ["picture.pixels"]
-        self._flags: list[str] = []
-        part = _part(message.get("part"), picture.pixels.shape) if self.kind != "fill" else None
+        self._arguments, self._flags = ["picture.pixels"], list[str]()
+        part = _part(message.get("part") if self.kind != "fill" else None, picture.pixels.shape)
         number = message.get("of") if self.kind == "fill" else None
         if number is None:
-            name = file_stem(picture.name, "sample") + ("-part" if part else "")
-            self._read(name, _cut(picture.pixels, part), {one: _cut(values, part) for one, values in maps.items()})
+            name = file_stem(picture.name, "sample") + ("" if part == WHOLE else "-part")
+            self._read(name, picture.pixels[part], {one: values[part] for one, values in maps.items()})
         else:
             before = result(number)
             self._read(f"result-{number}", before.image, before.maps)
@@ -170,16 +159,14 @@ class Job:
             lines += [f"image.write({write!r}, apply_source_map(output.source, image.read({read!r}).pixels))"]
         return "\n".join(lines) + "\n"
 
-    def _read(self, name: str, sample: Array, maps: Mapping[str, Array]) -> None:
+    def _read(self, name: str, sample: Array, maps: Maps) -> None:
         """Take the sample and its maps, whose files begin with `name`."""
-        self.sample, self.maps = sample, dict(maps)
-        self.output, self.carried = f"texture{_suffix(sample)}", {}
-        self.files[f"{name}{_suffix(sample)}"] = sample
-        self._also: list[tuple[str, str]] = []
-        for one, pixels in maps.items():
-            self.carried[one] = f"texture-{one}{_suffix(pixels)}"
-            self.files[f"{name}-{one}{_suffix(pixels)}"] = pixels
-            self._also.append((f"{name}-{one}{_suffix(pixels)}", self.carried[one]))
+        self.sample, self.maps = sample, maps
+        self.output = f"texture{_suffix(sample)}"
+        self.carried = {one: f"texture-{one}{_suffix(pixels)}" for one, pixels in maps.items()}
+        files = {f"{name}-{one}{_suffix(pixels)}": pixels for one, pixels in maps.items()}
+        self._also = list(zip(files, self.carried.values(), strict=True))
+        self.files = {f"{name}{_suffix(sample)}": sample, **files}
 
     def _add(self, name: str, value: Any, *flags: str, text: str = "") -> None:
         """Add an argument to the call, to the command line, and to the lines of Python, where it is `text`."""
@@ -187,7 +174,7 @@ class Job:
         self._arguments.append(f"{name}={text or repr(value)}")
         self._flags += flags
 
-    def _synthesize(self, message: Mapping[str, Any], picture: Picture, part: Part | None) -> None:
+    def _synthesize(self, message: Message, picture: Picture, part: tuple[slice, slice]) -> None:
         for name in ("width", "height"):
             whole(name, message.get(name), 1, MAX_SIDE)
         rows, cols = self.shape = (message["height"], message["width"])
@@ -196,7 +183,7 @@ class Job:
         guide = message.get("guide") or {}
         if not isinstance(guide, dict):
             raise TypeError("a guide is painted on the sample and on the output; paint both")
-        own = _cut(paint(guide.get("sample", []), picture.pixels.shape[:2]), part)
+        own = paint(guide.get("sample", []), picture.pixels.shape)[part]
         wanted = paint(guide.get("output", []), self.shape)
         if not wanted.any():
             return
@@ -226,7 +213,7 @@ def paint(strokes: Any, shape: tuple[int, ...]) -> NDArray[np.uint8]:
     strokes : list of dict
         Each has a ``label``, 0 to erase, a ``width`` in pixels, and ``points``, a list of [x, y] in pixels. A later
         stroke covers an earlier one.
-    shape : (rows, cols)
+    shape : (rows, cols, ...)
 
     Raises
     ------
@@ -274,26 +261,20 @@ def _options(given: Any, table: str) -> dict[str, Any]:
     return {name: value for name, value in given.items() if value is not None and value != defaults[name]}
 
 
-def _part(given: Any, shape: tuple[int, ...]) -> Part | None:
-    """Return a region, None if it is the whole picture."""
+def _part(given: Any, shape: tuple[int, ...]) -> tuple[slice, slice]:
+    """Return the rows and columns of a region, `WHOLE` if it is the whole picture."""
     if given is None:
-        return None
+        return WHOLE
     if not isinstance(given, list) or len(given) != 4:
         raise TypeError("a part of the picture is four numbers: left, top, width and height")
     rows, cols = shape[:2]
-    for name, value, most in zip(Part._fields, given, (cols, rows, cols, rows), strict=True):
+    for name, value, most in zip(("left", "top", "width", "height"), given, (cols, rows, cols, rows), strict=True):
         least = min(MIN_REGION, most) if name in ("width", "height") else 0
         whole(f"the {name} of the part", value, least, most)
-    part = Part(*given)
-    if part.left + part.width > cols or part.top + part.height > rows:
+    left, top, width, height = given
+    if left + width > cols or top + height > rows:
         raise ValueError(f"the part reaches beyond the picture of {cols}x{rows}; choose one within it")
-    return None if part == (0, 0, cols, rows) else part
-
-
-def _cut(pixels: Array, part: Part | None) -> Array:
-    if part is None:
-        return pixels
-    return np.ascontiguousarray(pixels[part.top : part.top + part.height, part.left : part.left + part.width])
+    return WHOLE if given == [0, 0, cols, rows] else (slice(top, top + height), slice(left, left + width))
 
 
 def file_stem(name: str, otherwise: str) -> str:

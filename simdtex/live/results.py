@@ -3,12 +3,10 @@
 
 from __future__ import annotations
 
-import io
-import zipfile
-from collections.abc import Callable
 from functools import cached_property, partial
 from math import isfinite
 from pathlib import Path
+from shutil import make_archive
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -19,7 +17,7 @@ from simdtex.experiments.quality import measure
 from simdtex.io.image import write
 from simdtex.live import frames
 from simdtex.live.job import Job
-from simdtex.model.source_map import apply_source_map
+from simdtex.model.source_map import apply_source_map, save_source_map
 from simdtex.options import one_of, whole
 from simdtex.run import Output
 
@@ -32,7 +30,7 @@ MAX_BYTES = 2**29
 THUMBNAIL = 96
 """The longest side of a thumbnail, pixels."""
 
-ARCHIVE = "texture.zip"
+ARRANGEMENT, ARCHIVE = "arrangement.npz", "texture.zip"
 
 MEASURED = 384
 """Figures of quality are those of the middle of a result, of so many rows and columns at most."""
@@ -73,17 +71,13 @@ class Result:
         self.number, self.job, self.image, self.seconds = number, job, image, seconds
         self.source, self.temperature = output.source, output.temperature
         self.device = output.statistics["device"]
-        complete = None  # the source map, if every pixel has a source
-        if self.source is not None and (self.source[..., 0] >= 0).all():
-            complete = self.source
-        self.maps = (
-            {} if complete is None else {name: apply_source_map(complete, one) for name, one in job.maps.items()}
-        )
+        complete = self.source is not None and bool((self.source[..., 0] >= 0).all())  # every pixel has a source
+        source: Any = self.source if complete else None
+        self.maps = {name: apply_source_map(source, one) for name, one in job.maps.items() if complete}
         self.figures: list[dict[str, Any]] = []
         measurable = job.kind == "synth" and min(*image.shape[:2], *job.sample.shape[:2]) >= 48
-        left_out = ("effective_use",) if complete is None else ()
-        self.unmeasured = [name for name in FIGURES if measurable and name not in left_out]
-        arrays = [None if one is None else partial(np.asarray, one) for one in (complete, self.temperature)]
+        self.unmeasured = [name for name in FIGURES if measurable and (complete or name != "effective_use")]
+        arrays = [None if one is None else partial(np.asarray, one) for one in (source, self.temperature)]
         self.layers = frames.layers(job.sample, job.shape, lambda: image, *arrays)
         for name, one in self.maps.items():
             self.layers[f"map {name}"] = partial(frames.picture, one, one)
@@ -104,38 +98,37 @@ class Result:
         return {
             **{"result": self.number, "width": self.job.shape[1], "height": self.job.shape[0]},
             **{"seconds": self.seconds, "device": self.device, "settings": self.job.message},
-            **{"layers": ["sample", *self.layers], "files": [*self._files, ARCHIVE]},
+            **{"layers": ["sample", *self.layers], "files": self.files},
             **{"command": self.job.command, "python": self.job.python, "figures": self.figures},
             "thumbnail": [self.thumbnail.width, self.thumbnail.height],
         }
 
     @property
-    def _files(self) -> dict[str, Callable[[], bytes]]:
-        """Functions that make its files, by name."""
-        arrays = {self.job.output: self.image} | {self.job.carried[name]: one for name, one in self.maps.items()}
-        found: dict[str, Callable[[], bytes]] = {name: partial(encode, name, one) for name, one in arrays.items()}
-        return found if self.source is None else found | {"arrangement.npz": partial(encode_source, self.source)}
+    def _pictures(self) -> dict[str, NDArray[Any]]:
+        """The picture and the maps, by file name."""
+        return {self.job.output: self.image} | {self.job.carried[name]: one for name, one in self.maps.items()}
+
+    @property
+    def files(self) -> list[str]:
+        """The names of its files; the last is an archive of the others, the files that the job reads, and its lines."""
+        return [*self._pictures, *[ARRANGEMENT] * (self.source is not None), ARCHIVE]
 
     def file(self, name: str) -> bytes:
-        """Return the bytes of a file; ``texture.zip`` has all others, the files that the job reads, and its lines.
-
-        Raises
-        ------
-        ValueError
-            There is no such file.
-        """
-        files = self._files
-        one_of("file", name, [*files, ARCHIVE])
-        if name != ARCHIVE:
-            return files[name]()
-        found = {each: encode(each, pixels) for each, pixels in self.job.files.items()}
-        found |= {each: make() for each, make in files.items()}
-        found |= {"again.txt": self.job.command.encode(), "again.py": self.job.python.encode()}
-        buffer = io.BytesIO()
-        with zipfile.ZipFile(buffer, "w") as archive:
-            for each, data in found.items():
-                archive.writestr(each, data)
-        return buffer.getvalue()
+        """Return the bytes of a file; raises ValueError if there is none of that name."""
+        one_of("file", name, self.files)
+        with TemporaryDirectory() as temporary:
+            folder = Path(temporary) / "files"
+            folder.mkdir()
+            wanted = self._pictures | self.job.files
+            for each in wanted if name == ARCHIVE else wanted.keys() & {name}:
+                write(folder / each, wanted[each])
+            if self.source is not None and name in (ARRANGEMENT, ARCHIVE):
+                save_source_map(folder / ARRANGEMENT, self.source)
+            if name != ARCHIVE:
+                return (folder / name).read_bytes()
+            (folder / "again.txt").write_text(self.job.command, encoding="utf-8")
+            (folder / "again.py").write_text(self.job.python, encoding="utf-8")
+            return Path(make_archive(str(folder), "zip", folder)).read_bytes()
 
     def measure(self) -> None:
         """Compute the next figures of quality."""
@@ -172,21 +165,6 @@ class Results(dict[int, Result]):
         if number not in self:
             raise ValueError(f"result {number} is no longer kept; make it again with its command line")
         return self[number]
-
-
-def encode(name: str, pixels: NDArray[Any]) -> bytes:
-    """Return the bytes of a picture's file, as `simdtex.io.image.write` writes it."""
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / name
-        write(path, pixels)
-        return path.read_bytes()
-
-
-def encode_source(source: NDArray[np.int32]) -> bytes:
-    """Return the bytes of a source map's file, as `simdtex.model.source_map.save_source_map` writes it."""
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, source=source)
-    return buffer.getvalue()
 
 
 def _middle(pixels: NDArray[Any]) -> NDArray[Any]:

@@ -24,8 +24,8 @@ from websockets.http11 import Request, Response
 from websockets.sync.server import ServerConnection
 from websockets.sync.server import serve as websocket_server
 
-from simdtex.live.job import Picture
-from simdtex.live.session import MAX_BYTES, Message, Send, Session
+from simdtex.live.job import Message, Picture
+from simdtex.live.session import MAX_BYTES, Send, Session
 from simdtex.machine import Machine, open_machine
 from simdtex.synthesis import synthesize
 
@@ -58,14 +58,14 @@ MAX_PAGES = 8
 """Pages that are open at a time, at most."""
 
 KEPT = 600.0
-"""Seconds that a session is kept after its page has lost the connection."""
+"""Seconds that a session is kept for a page that has lost the connection, at least, unless others need its place."""
 
 ENDING = 2.0
 """Seconds that the end of the server waits for a session's run, or for a request that does not come."""
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
-BAD_MESSAGE, POLICY, TOO_MANY = 1003, 1008, 1013
+BAD_MESSAGE, TOO_MANY = 1003, 1013
 """Codes with which a WebSocket is closed (RFC 6455, section 7.4.1)."""
 
 
@@ -81,16 +81,14 @@ class Pages:
     def join(self, key: str | None, send: Send) -> Session | None:
         """Return the session of a page, the one it had before or a new one; None if there are too many."""
         with self._lock:
-            overdue = [one for one, since in self._lost.items() if time.monotonic() - since > KEPT]
-            if key not in self._lost and len(self._sessions) - len(overdue) >= MAX_PAGES:
-                overdue += [one for one in self._lost if one not in overdue][:1]
-            for one in overdue:
-                del self._lost[one]
-                self._sessions.pop(one).close()
             if key in self._lost:
                 del self._lost[key]
                 self._sessions[key].send = send
                 return self._sessions[key]
+            for one, since in list(self._lost.items()):
+                if time.monotonic() - since > KEPT or len(self._sessions) >= MAX_PAGES:
+                    del self._lost[one]
+                    self._sessions.pop(one).close()
             if len(self._sessions) >= MAX_PAGES:
                 return None
             session = Session(send, self._machine, self._picture)
@@ -147,15 +145,7 @@ def serve(
 
 @contextmanager
 def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
-    """Serve pages in threads until the block ends; the value of the context is the port.
-
-    Parameters
-    ----------
-    pages : Pages
-    token : str
-        The first part of every path.
-    address, port
-        As of `serve`.
+    """Serve pages in threads until the block ends; the value of the context is the port. Every path has the token.
 
     Raises
     ------
@@ -167,9 +157,7 @@ def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
         listening = socket.create_server((address, port), family=family)
     except (OSError, OverflowError) as error:
         why = getattr(error, "strerror", None) or error
-        raise ValueError(
-            f"{address} port {port} cannot be listened to ({why}); give another --port or --host"
-        ) from None
+        raise ValueError(f"cannot listen to {address} port {port} ({why}); give another --port or --host") from None
 
     def answer(connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request; None has the WebSocket opened."""
@@ -177,7 +165,7 @@ def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
         given, _, name = request.path.partition("?")[0].lstrip("/").partition("/")
         if not is_own_name(host, address):
             return _response(connection, 400, "This server has another name.")
-        if not secrets.compare_digest(given.encode(), token.encode()):
+        if not secrets.compare_digest(given.encode(errors="surrogateescape"), token.encode()):
             return _response(connection, 403, REFUSED)
         if name == "socket":
             own = request.headers.get("Origin") == f"http://{host}"

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from simdtex.io.image import read_bytes
 from simdtex.live import frames
-from simdtex.live.job import Job, Picture, file_stem
+from simdtex.live.job import Job, Message, Picture, file_stem
 from simdtex.live.levels import Levels
 from simdtex.live.results import Result, Results
 from simdtex.live.words import METHODS, TABLES, controls
@@ -32,7 +32,6 @@ from simdtex.options import one_of, resolve
 
 __all__ = ["MAX_BYTES", "MAX_PIXELS", "Message", "Send", "Session"]
 
-Message = dict[str, Any]
 Send = Callable[[Message, Sequence[bytes]], None]
 
 MAX_BYTES = 2**27
@@ -73,7 +72,7 @@ class Cancelled(Exception):
 
 
 class Session:
-    """The pictures, runs and results of one page.
+    """The picture, the run and the results of one page.
 
     Parameters
     ----------
@@ -98,7 +97,7 @@ class Session:
         self._window = frames.Window()
         self._wanted: Message | None = None  # the job that is asked for, until it is finished
         self._begun: Message | None = None  # what the page was told of the present run
-        self._paused = self._closed = False
+        self._paused = self._measuring = self._closed = False
         self._stale = False  # whether the page waits for another frame
         self._unseen = 0  # frames that the page has not shown yet
         self._next_frame = 0.0  # when the run may be shown again
@@ -121,10 +120,12 @@ class Session:
 
     def _work(self) -> None:
         while not self._closed:
+            result = self._unmeasured
             try:
-                self._handle(*self._messages.get(timeout=IDLE if self._unmeasured else None))
+                self._handle(*self._messages.get(timeout=IDLE if result else None))
             except queue.Empty:
-                self._measure()
+                self._measuring = True
+                threading.Thread(target=self._measure, args=(result,), daemon=True).start()
             self._handle_all()
             while self._wanted and not self._closed:
                 self._run(self._wanted)
@@ -149,15 +150,14 @@ class Session:
         """Tell the page in a sentence what goes wrong in this block."""
         try:
             yield
+            return
         except (ValueError, TypeError) as error:
-            self._send_error(str(error))
+            sentence = str(error)
         except MemoryError:
-            self._send_error("there is not enough memory for this; give a smaller size")
+            sentence = "there is not enough memory for this; give a smaller size"
         except Exception:
             log.exception("a request of the live page failed")
-            self._send_error("this is an error in simdtex itself; the terminal says more")
-
-    def _send_error(self, sentence: str) -> None:
+            sentence = "this is an error in simdtex itself; the terminal says more"
         self.send({"kind": "error", "text": sentence}, [])
 
     # -- messages -------------------------------------------------------------------------------------------------
@@ -203,10 +203,7 @@ class Session:
             raise ValueError(f"{given.name} is {size} and the picture {wanted}; give a map of the picture's size")
         if len(self._maps) >= MAX_MAPS:
             raise ValueError(f"there are {MAX_MAPS} maps already; remove one first")
-        name, number = file_stem(given.name, "map"), 1
-        while (unique := name if number == 1 else f"{name}-{number}") in self._maps:
-            number += 1
-        self._maps[unique] = given.pixels
+        self._maps[file_stem(given.name, "map")] = given.pixels
         self.send({"kind": "maps", "names": list(self._maps)}, [])
 
     def _on_unmap(self, message: Message, buffers: Sequence[Any]) -> None:
@@ -274,12 +271,12 @@ class Session:
         else:
             name = name if name in layers else "picture"
             layer = layers[name]()
-        frame = frames.render(layer, self._window, smooth=smooth)
+        frame = frames.render(layer, self._window, smooth=smooth)._asdict()
+        pixels = frame.pop("pixels")
         told = {"layer": name, "rows": layer.shape[0], "cols": layer.shape[1], "step": self._window.step, "of": of}
-        told |= {"left": frame.left, "top": frame.top, "width": frame.width, "height": frame.height}
         self._stale = False
         self._unseen += 1
-        self.send({"kind": "frame", **told}, [frame.pixels])
+        self.send({"kind": "frame", **told, **frame}, [pixels])
 
     def _show_selected(self) -> None:
         """Send a frame of the selected result, or of the sample."""
@@ -356,14 +353,20 @@ class Session:
 
     @property
     def _unmeasured(self) -> Result | None:
-        """The selected result, if it has figures of quality to compute."""
+        """The selected result, if it has figures of quality left to compute, and none is being computed."""
         result = self.results.get(self._selected or 0)
-        return result if result and result.unmeasured else None
+        return result if result and result.unmeasured and not self._measuring else None
 
-    def _measure(self) -> None:
-        if result := self._unmeasured:
-            with self._reported():
-                result.measure()
+    def _measure(self, result: Result) -> None:
+        """Compute the next figures of a result, in a thread of its own: they may take seconds."""
+        try:
+            result.measure()
+        finally:
+            self.receive({"kind": "measured", "result": result.number})
+
+    def _on_measured(self, message: Message, buffers: Sequence[Any]) -> None:
+        self._measuring = False
+        if result := self.results.get(message.get("result", 0)):
             self.send({"kind": "quality", "result": result.number, "figures": result.figures}, [])
 
 
