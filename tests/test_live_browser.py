@@ -194,7 +194,7 @@ def test_a_part_options_a_seed_and_an_earlier_result(page, wall):
 
 
 @pytest.mark.slow
-def test_it_stops_and_goes_on_to_the_same_bytes(page, wall):
+def test_a_run_pauses_and_resumes_to_the_same_bytes(page, wall):
     page.script("page.auto.checked = false")
     drop(page.driver, wall)
     page.result(1)
@@ -217,13 +217,13 @@ def test_it_stops_and_goes_on_to_the_same_bytes(page, wall):
 
 
 @pytest.mark.slow
-def test_an_earlier_result_is_looked_at_while_a_run_goes_on(page, wall):
+def test_an_earlier_result_is_shown_during_a_run(page, wall):
     page.script("page.auto.checked = false")
     drop(page.driver, wall)
     page.result(1)
     assert not page.one(".strip .current").is_displayed()
-    page.put("Result width", 2000)
-    page.put("Result height", 1500)
+    page.put("Result width", 1000)
+    page.put("Result height", 750)
     page.button("Make the texture").click()
     until(lambda: page.script("return page.running"))
     until(lambda: page.one(".strip .current button").get_attribute("aria-current") == "true")
@@ -235,19 +235,19 @@ def test_an_earlier_result_is_looked_at_while_a_run_goes_on(page, wall):
     before = page.script("return page.progress.value")
     until(lambda: page.script("return page.progress.value") > before)
     page.button("Present run").click()
-    until(lambda: page.script("return page.view.frame.rows") == 1500)
+    until(lambda: page.script("return page.view.frame.rows") == 750)
     assert not page.one(".result [aria-label=Download]").is_displayed()
     page.all(".strip button")[0].click()
     until(lambda: page.script("return page.view.frame.of") == 1)
-    page.result(2)
+    page.result(2, timeout=180)
     assert page.script("return page.shown") == 1, "it is not taken away from whoever looks at it"
     assert not page.one(".strip .current").is_displayed()
     page.all(".strip button")[1].click()
-    until(lambda: page.script("return page.view.frame.rows") == 1500)
+    until(lambda: page.script("return page.view.frame.rows") == 750)
 
 
 @pytest.mark.slow
-def test_a_run_is_given_up(page, wall):
+def test_a_run_is_cancelled(page, wall):
     drop(page.driver, wall)
     page.result(1)
     page.put("Result height", 4000)
@@ -276,7 +276,7 @@ def test_a_painted_hole_is_filled_and_nothing_else_changes(page, wall, tmp_path)
 
 
 @pytest.mark.slow
-def test_labels_say_where_what_is_to_be(page, wall):
+def test_painted_labels_are_a_guide(page, wall):
     drop(page.driver, wall)
     page.result(1)
     page.open(".paint")

@@ -1,5 +1,8 @@
 """The controls of the live page are the declared options."""
 
+import json
+from math import inf
+
 import click
 import pytest
 
@@ -13,7 +16,7 @@ def test_controls_are_what_options_may_be_and_the_command_line_has_them(name):
     options, command = TABLES[name]
     flags = {flag for one in cli.load(command).params if isinstance(one, click.Option) for flag in one.opts}
     own = table(options)
-    found = controls(name)
+    found = json.loads(json.dumps(controls(name), allow_nan=False))  # as the page gets them
     assert {one["name"] for one in found} <= {other for other, one in own.items() if command in one.shown}
     for control in found:
         one = own[control["name"]]
@@ -24,7 +27,7 @@ def test_controls_are_what_options_may_be_and_the_command_line_has_them(name):
             assert [word for word, _ in control["valid"]] == list(one.kind.valid)
         elif control["kind"] != "switch":
             least, most, step = control["span"]
-            assert (control["least"], control["most"]) == (one.kind.least, one.kind.most)
+            assert control["least"] == (one.kind.least if one.kind.least > -inf else None)
             assert one.kind.least <= least < most <= one.kind.most and step > 0
             if control["default"] is None:
                 assert control["empty"], "it says what an empty field means"

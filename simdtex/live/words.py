@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any
 
 from simdtex.methods import mrf, multires, pyramid
@@ -34,8 +35,8 @@ def controls(name: str) -> list[dict[str, Any]]:
         One for each option that the command shows and that is a word, a switch, or a number with a slider: ``name``,
         ``group``, ``label``, ``hint``, ``kind`` (``"words"``, ``"whole"``, ``"number"`` or ``"switch"``) and
         ``default``, None if the method decides. Of words ``valid``, pairs of a value and its label. Of numbers
-        ``least`` and ``most``; ``span``, the least, the largest and the step of the slider; ``empty``, the text of an
-        empty field, and ``blank``, its value.
+        ``least``, None if there is none; ``span``, the least, the largest and the step of the slider; ``empty``, the
+        text of an empty field, and ``blank``, its value.
     """
     options, job = TABLES[name]
     made = [_control(name, one, one.default_of(job)) for name, one in table(options).items() if job in one.shown]
@@ -54,7 +55,7 @@ def _control(name: str, one: Option, default: Any) -> dict[str, Any]:
         return control | {"kind": "switch"}
     if isinstance(kind, (Whole, Number)) and one.slider:
         word = getattr(kind, "word", "")
-        control |= {"least": kind.least, "most": kind.most, "span": one.slider}
+        control |= {"least": kind.least if isfinite(kind.least) else None, "span": one.slider}
         control |= {"empty": word or ("automatic" if default is None else ""), "blank": word or None}
         return control | {"kind": "whole" if isinstance(kind, Whole) else "number"}
     return control
