@@ -57,9 +57,6 @@ def check_inputs(
     return Inputs(pictures, given, None if guide is None else check_guide(guide, shape, pictures))
 
 
-# ---------------------------------------------------------------- samples
-
-
 def check_samples(sample: Any, channel_axis: int | None, mask: Any = None) -> Pictures:
     """Check a sample, or a list or tuple of samples, and ``mask``, which says likewise what may be used."""
     several = is_several(sample, channel_axis)
@@ -69,9 +66,8 @@ def check_samples(sample: Any, channel_axis: int | None, mask: Any = None) -> Pi
     pixels, unknown = zip(*(check_picture(one, channel_axis) for one in arrays), strict=True)
     for number, picture in enumerate(pixels[1:], 1):
         if picture.dtype != pixels[0].dtype or picture.shape[2] != pixels[0].shape[2]:
-            raise ValueError(
-                f"sample {number} has {_kind(picture)} and sample 0 {_kind(pixels[0])}; give samples of one type"
-            )
+            kinds = [f"{one.shape[2]} channels of {one.dtype}" for one in (picture, pixels[0])]
+            raise ValueError(f"sample {number} has {kinds[0]} and sample 0 {kinds[1]}; give samples of one type")
     if mask is None:
         return Pictures(pixels, unknown)
     masks = list(mask) if several and np.iterable(mask) else [mask]
@@ -84,14 +80,7 @@ def check_samples(sample: Any, channel_axis: int | None, mask: Any = None) -> Pi
 
 
 def check_picture(image: Any, channel_axis: int | None) -> tuple[NDArray[Any], Mask]:
-    """Check a picture that may be unknown in part.
-
-    Returns
-    -------
-    pixels : (rows, cols, channels) array
-    unknown : (rows, cols) bool array
-        Where a channel is NaN or masked.
-    """
+    """Check a picture; return its pixels (rows, cols, channels), and where a channel is NaN or masked (rows, cols)."""
     array = as_array("the sample", image)
     pixels = check_sample(array, channel_axis, unknown=True)
     hidden = np.ma.getmaskarray(array)
@@ -113,9 +102,6 @@ def check_mask(mask: Any, shape: tuple[int, int]) -> Mask:
         raise TypeError(f"mask holds {found.dtype} values; give True and False")
     _check_size("mask", found.shape, "the picture", shape)
     return found
-
-
-# ---------------------------------------------------------------- known values
 
 
 def as_known(known: Any) -> HardData | NDArray[Any]:
@@ -175,19 +161,15 @@ def _check_source(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.in
             f"known_source is no array of integers ({there.shape[0]}, {there.shape[1]}, {columns}); give a source map"
         )
     used = (place[..., 0] >= 0) & there.all(-1)
-    row, col, *rest = np.moveaxis(place[used], -1, 0)
-    number = rest[0] if rest else np.zeros(row.shape, np.int32)
+    own = place[used]
+    number = own[:, 2] if columns == 3 else np.zeros(len(own), np.intp)
     inside = (number >= 0) & (number < len(pictures.pixels))
-    sizes = np.array([picture.shape[:2] for picture in pictures.pixels])
-    rows, cols = sizes[np.where(inside, number, 0).astype(np.intp)].T
-    if not (inside & (row < rows) & (col >= 0) & (col < cols)).all():  # before a cast, which would wrap
+    sizes = np.array([picture.shape[:2] for picture in pictures.pixels])[np.where(inside, number, 0).astype(np.intp)]
+    if not (inside & ((own[:, :2] >= 0) & (own[:, :2] < sizes)).all(-1)).all():  # before a cast, which would wrap
         raise ValueError("known_source points outside the sample; give -1 where a pixel is not from there")
     found = np.full(place.shape, -1, np.int32)
-    found[used] = place[used]
+    found[used] = own
     return found
-
-
-# ---------------------------------------------------------------- guides
 
 
 def check_guide(guide: Any, shape: tuple[int, int], pictures: Pictures) -> GuidePair:
@@ -233,10 +215,6 @@ def _unmasked(name: str, values: Any) -> NDArray[Any]:
     array = as_array(name, values)
     unmasked(name, array)
     return np.asarray(array)
-
-
-def _kind(picture: NDArray[Any]) -> str:
-    return f"{picture.shape[2]} channels of {picture.dtype}"
 
 
 def _check_size(name: str, shape: tuple[int, ...], other: str, wanted: tuple[int, ...]) -> None:
