@@ -17,7 +17,7 @@ help:
 	@echo "make docs    the documentation, into docs/_build/html, and whether its links and pages are sound"
 	@echo "make links   whether the links of the documentation to other sites still lead there; needs the network"
 	@echo "make mutants mutation tests of the Markov random field"
-	@echo "make fuzz    command lines and files that nobody would give, for MINUTES=10"
+	@echo "make fuzz    random command lines and damaged files, for MINUTES=10"
 	@echo "make cpu     the CPU runtime of the package index, beside what is here already"
 	@echo "make dist    the wheel and the source distribution, into dist, checked and tried"
 	@echo "make clean   remove what these commands made, except $(VENV)"

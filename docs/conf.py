@@ -115,7 +115,6 @@ with open(HERE / "fuzzing.json", encoding="utf-8") as file:
     fuzzed = json.load(file)
 counts = {
     "tries": f"{fuzzed['tries']:,}",
-    "of these with failing writes": f"{fuzzed['parts'].get('writes', 0):,}",
     "seconds": f"{fuzzed['seconds']:,.0f}",
     "seed": fuzzed["seed"],
     "ended with exit code 0": f"{fuzzed['codes'].get('0', 0):,}",

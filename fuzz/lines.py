@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Command lines and files, drawn from a seed: what `simdtex` may be given, and what nobody should give it."""
+"""Command lines and files drawn from a seed: valid ones, unusual ones and nonsense."""
 
 import random
 import re
@@ -11,6 +11,8 @@ import click
 
 from fuzz import corpus
 from simdtex.cli import load
+from simdtex.methods import mrf, multires, pyramid
+from simdtex.options import table
 
 COMMANDS = {
     "synth": 48,
@@ -29,24 +31,13 @@ COMMANDS = {
     "": 0.2,
     "nothing": 0.1,
 }
-"""How often each is tried; reports and their plots take long, so commands that always write one are rare."""
+"""Weight of each command; reports and their plots take long, so commands that always write one are rare."""
 
 WHOLE = (0, -1, 2**31 - 1, 2**31, 2**32, 2**63, 2**64, 10**30, -(2**31), -(2**63) - 1, "", "nan", "1.5", "x", "0x10")
 REAL = (0, -1, -0.0, "nan", "inf", "-inf", 1e308, -1e308, 1e-320, 5e-324, 2**31, 2**63, "1e999", "", "x", "1,5", 1e-30)
 TEXT = ("", " ", "x", "-", "--", "nan", "\u00d7", "\U0001f4a9", "a" * 5000, "\n", "%s", "{0}", "../x", "\udc80", "0")
 SIZES = (
-    "0x0",
-    "",
-    "x",
-    "5",
-    "1x1",
-    "2x9",
-    "100000x100000",
-    "46341x46341",
-    "1e3x4",
-    "-4x4",
-    "4x",
-    "999999999999x1",
+    *("0x0", "", "x", "5", "1x1", "2x9", "100000x100000", "46341x46341", "1e3x4", "-4x4", "4x", "999999999999x1"),
     "3x3x3",
 )
 
@@ -66,21 +57,10 @@ MODEST = {
 }
 """Values that make sense on pictures of ten pixels a side; other numbers are small ones."""
 
+METHODS = {"mrf": mrf.Options, "multires": multires.Options, "pyramid": pyramid.Options}
+
 CHOICES = {
-    "relaxation": ("icm", "gibbs"),
-    "pixel": ("source", "density"),
-    "phases": ("all", "decimated"),
-    "coarsest": ("gibbs", "same"),
-    "search": ("auto", "exact", "coherent"),
-    "boundary": ("torus", "open"),
-    "features": ("luminance", "channels"),
-    "parity": ("match", "free"),
-    "seams": ("blend", "cut"),
-    "pyramid": ("steerable", "laplacian"),
-    "match": ("rank", "lookup"),
-    "color": ("decorrelate", "channels"),
-    "mapping": ("cut-and-stack", "hierarchical"),
-    "array": ("4x4", "maspar-mp1-1k", "2x3"),
+    "array": ("4x4", "maspar-mp1-1k", "2x3:hierarchical"),
     "schedule": ("coloring", "luby", "checkerboard", "synchronous", "random-subset:0.5", "raster", "block:2x2"),
     "names": ("coloring", "luby,raster", "block:2x2", "random-scan"),
     "solids": ("turns", "average"),
@@ -92,12 +72,10 @@ CHOICES = {
     "start": ("up", "random"),
     "categorical_channels": ("0", "0,1", "2"),
 }
-"""Words that mean something to an option; those of ``--edges`` are the method's."""
-
-EDGES = {"multires": ("mend", "keep"), "pyramid": ("reflect", "wrap"), "mrf": ("auto", "reflect", "whole")}
+"""Valid words of options that are not a `simdtex.options.Choice` of a method."""
 
 LONG = ("free_sweeps", "iterations", "sweeps", "burn_in", "number", "seeds")
-"""Counts of what is done one after another: whoever asks for a milliard is served, so no try does."""
+"""Counts of steps done one after another: a very large number is valid and would take for ever, so no try gives one."""
 
 OTHERS = ("workers", "cluster")
 """Options that start processes or ask the network."""
@@ -114,11 +92,10 @@ OUTPUTS = {
 
 @dataclass
 class Try:
-    """What a command is given.
+    """A command line and its files.
 
     ``args`` of ``simdtex``; ``files`` name -> bytes, in the folder it runs in; ``kind`` what is unusual about it;
-    ``old`` names of files that are there and may be replaced; ``interrupt`` seconds after which it gets a Ctrl-C;
-    ``fault`` the number of the call to the system that fails, and how.
+    ``old`` names of files that are there and may be replaced; ``interrupt`` seconds after which it gets a Ctrl-C.
     """
 
     args: list[str]
@@ -126,7 +103,6 @@ class Try:
     kind: str = "plain"
     old: list[str] = field(default_factory=list)
     interrupt: float | None = None
-    fault: tuple[str, int, str] | None = None
 
     def as_json(self):
         return asdict(self) | {"files": {name: b64encode(data).decode() for name, data in self.files.items()}}
@@ -134,7 +110,7 @@ class Try:
     @classmethod
     def from_json(cls, found):
         files = {name: b64decode(data) for name, data in found["files"].items()}
-        return cls(**found | {"files": files, "fault": found["fault"] and tuple(found["fault"])})
+        return cls(**found | {"files": files})
 
 
 @cache
@@ -155,7 +131,7 @@ def _command(name):
 
 
 def made(seed, number):
-    """The try of a number under a seed; the same on every call."""
+    """Return the try of a number under a seed; the same on every call."""
     return _Maker(random.Random(f"{seed}-{number}")).make()
 
 
@@ -177,11 +153,11 @@ class _Maker:
             self.kinds.add("interrupted")
         old = self.old_outputs(args) if rng.random() < 0.1 else []
         if interrupt and old and "--seed" not in args and any(one.name == "seed" for one in _command(name).params):
-            args += ["--seed", "1"]  # so that what is new there can be compared with what is right
+            args += ["--seed", "1"]  # so that new outputs can be compared with right ones
         return Try(args, self.files, ", ".join(sorted(self.kinds)) or "plain", old, interrupt)
 
     def old_outputs(self, args):
-        """Files that stand where outputs are to go."""
+        """Make files with the names of outputs, and return these."""
         names = [word for word in args if word in ("out.png", "out.npy", "out.npz", "out.tif")]
         for name in names:
             self.files[name] = b"old"
@@ -194,7 +170,7 @@ class _Maker:
         rng, words = self.rng, []
         deep = rng.random() < DEEP.get(name, 0.5)
         method = rng.choices(("mrf", "multires", "pyramid"), (3, 4, 3))[0] if name == "synth" else None
-        fitting = rng.random() < 0.9  # options of the method alone
+        fitting = rng.random() < 0.9  # only options of the method
         size = self.size(name, rng.random() < (0.97 if deep else 0.85))
         options = []
         for parameter in command.params:
@@ -213,7 +189,7 @@ class _Maker:
             else []
         )
         if method and rng.random() < 0.03:
-            method = "mrf"  # as it is where none is named
+            method = "mrf"  # as without the option
         else:
             words += ["--method", method] if method else []
         words += ["-q"] if rng.random() < 0.8 else []
@@ -222,16 +198,8 @@ class _Maker:
         if name == "extend" and "--size" not in words:
             words += [rng.choice(("--left", "--right", "--top", "--bottom", "--band")), rng.choice("123")]
         if name == "ising":
-            words += [
-                "--sweeps",
-                "2",
-                "--burn-in",
-                "1",
-                "--seeds",
-                "2",
-                "--schedules",
-                rng.choice(("coloring", "raster", "block")),
-            ]
+            words += ["--sweeps", "2", "--burn-in", "1", "--seeds", "2"]
+            words += ["--schedules", rng.choice(("coloring", "raster", "block"))]
         if name == "schedules":
             words += ["--seeds", "1", "--schedules", "coloring", "--order", "1"]
         if name == "bench":  # which measures for minutes
@@ -297,9 +265,9 @@ class _Maker:
             )
         if ("x" in metavar.lower() and "HEIGHT" in metavar) or "COLS" in metavar:
             return rng.choice(("4x4", "2x8", *SIZES))
-        if name == "edges":
-            return rng.choice(EDGES[self.method])
-        return rng.choice(CHOICES.get(name) or re.findall(r"[a-z][a-z-]+", option.help or "") or TEXT)
+        declared = table(METHODS[self.method]).get(name)
+        valid = getattr(declared and declared.kind, "valid", None) or CHOICES.get(name)
+        return rng.choice(valid or re.findall(r"[a-z][a-z-]+", option.help or "") or TEXT)
 
     def size(self, name, modest):
         rng = self.rng
@@ -322,13 +290,7 @@ class _Maker:
             return rng.choice(("pages", "a/b", "out.png") if rng.random() < 0.3 else ("pages",))
         if name in ("source_map", "picture", "json", "plot"):
             return rng.choice(("map.npz", "map.npy", "map.png", "out.png", "view.png"))
-        roles = {
-            "sample_mask": "mask",
-            "known": "table",
-            "thresholds": "thresholds",
-            "start": "picture",
-        }
-        role = roles.get(name, "picture")
+        role = {"sample_mask": "mask", "known": "table", "thresholds": "thresholds"}.get(name, "picture")
         if name == "start" and command == "solid":
             role = "volume"
         if name == "known" and rng.random() < 0.4:
@@ -348,7 +310,7 @@ class _Maker:
         return rng.choice((*names, "no/such/out.png", ".", "", "out.png/", "a" * 300 + ".png", "OUT.PNG"))
 
     def file(self, role):
-        """The name of a file of a role, usually a good one."""
+        """Make a file of a role, usually a valid one, and return its name."""
         rng = self.rng
         files = seeds()[role]
         if role == "picture" and rng.random() < 0.6:
@@ -373,7 +335,7 @@ class _Maker:
 
 
 def _of_method(option, method):
-    """Whether an option of ``synth`` is of a method, as its help says."""
+    """Return whether an option of ``synth`` is one of a method, as its help says."""
     head = (option.help or "").partition(":")[0] if ":" in (option.help or "") else ""
     named = [
         one for one in ("mrf", "multires", "pyramid") if one in head.split(", ") or f"{one}:" in (option.help or "")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What came of many tries: counts, and each fault once with what makes it again."""
+"""Counts of tries and faults; each different fault is kept once, as a file that replays it."""
 
 import json
 import shlex
@@ -16,15 +16,13 @@ class Record:
     def __init__(self, seed, folder):
         self.seed, self.folder, self.began = seed, Path(folder), time.monotonic()
         self.tries, self.slowest, self.largest = 0, 0.0, 0
-        self.kinds, self.commands, self.codes, self.parts = Counter(), Counter(), Counter(), Counter()
+        self.kinds, self.commands, self.codes = Counter(), Counter(), Counter()
         self.faults, self.first = Counter(), {}
 
-    def add(self, one, kind, args, result, part="lines"):
-        """Count a try; ``one()`` makes it, where it has to be kept."""
+    def add(self, one, kind, args, result):
+        """Count a try; ``one()`` makes it if it has to be kept."""
         self.tries += 1
-        self.parts[part] += 1
-        for word in kind.split(", "):
-            self.kinds[word] += 1
+        self.kinds.update(kind.split(", "))
         self.commands[args[0] if args and args[0] in COMMANDS else "no command"] += 1
         self.codes[str(result["code"])] += 1
         self.slowest = max(self.slowest, result["seconds"])
@@ -35,7 +33,7 @@ class Record:
                 self.first[what, text] = self.keep(one(), len(self.first), what, text, result["said"])
 
     def keep(self, one, number, what, text, said):
-        """Write a try that makes a fault, and return the file's name."""
+        """Write a try with a fault, and return the file's name."""
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self.folder / f"{number:04}.json"
         told = {"fault": [what, text], "command": shlex.join(["simdtex", *one.args]), "said": said[-2000:]}
@@ -43,7 +41,7 @@ class Record:
         return path
 
     def results(self):
-        """All of it, as JSON knows it."""
+        """Return all counts and faults for JSON."""
         seconds = time.monotonic() - self.began
         return {
             "seed": self.seed,
@@ -53,7 +51,6 @@ class Record:
             "slowest": round(self.slowest, 2),
             "largest": self.largest,
             "codes": dict(sorted(self.codes.items())),
-            "parts": dict(self.parts),
             "commands": dict(self.commands.most_common()),
             "kinds": dict(self.kinds.most_common()),
             "faulty": sum(self.faults.values()),
@@ -64,7 +61,7 @@ class Record:
         }
 
     def text(self):
-        """The same for people."""
+        """Return the same as text."""
         found = self.results()
         lines = [
             f"{found['tries']} tries in {found['seconds']:.0f} s, {found['rate']:.0f} a second, seed {self.seed}",

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A process that runs command lines, one after another, in folders of their own, and says what was wrong with each.
+"""Runs command lines in this process, each in an empty folder, and checks the result of each.
 
-It reads a line of JSON for each try and answers with one. What it runs has a home, a folder for temporary files and a
-limit to its address space; every file that Python opens, moves or removes is noted.
+The process has a home, a folder for temporary files and a limit to its address space; every file that Python opens,
+moves or removes is noted.
 """
 
 import contextlib
-import json
 import os
 import re
 import resource
@@ -27,17 +26,27 @@ SECONDS = 10.0
 DEMO = 60.0
 """Seconds that `simdtex demo` may take, whose samples are those of the package."""
 
-LIFE = 3000
-"""Tries of a process: what libraries keep would count for the memory of later ones."""
+LOADING = (
+    "synth L.png -o out.png --size 8x8 --order 1",
+    "synth RGB.png -o out.tif --size 8x8 --method multires",
+    "synth L.png -o out.npy --size 8x8 --method pyramid --iterations 1",
+    "fill L.png --mask hole.png -o out.webp --order 1",
+    "extend L.png -o out.jpg --left 1 --order 1",
+    "solid L.png -o out.nrrd --size 4 --iterations 1",
+    "mix L.png L.png -o out.gif --size 6x6 --iterations 1",
+    "ising --size 4x4 --sweeps 2 --burn-in 1 --seeds 2 --schedules coloring",
+    "simulate L.png -o out.npz --size 6x6 --order 1 --number 1",
+)
+"""Commands that a worker runs first, so that modules need not be loaded during a try."""
 
 LOOKING = ("uname", "fc-list", sys.executable)
-"""Programs that libraries ask what machine this is, and ourselves what devices work."""
+"""Programs that may be started: libraries identify the machine with them, and simdtex probes devices."""
 
 PROGRAMS = ("subprocess.Popen", "os.system", "os.exec", "os.posix_spawn", "os.fork", "os.startfile")
 SYSTEM = ("/dev/", "/proc/")
 CACHES = ("/matplotlib", "/mpl", "/fontconfig", "/pocl", "/pyopencl", "/pytools", "__pycache__", "/.cache")
 HIDDEN = r"/\.[A-Za-z0-9_]|(?:^|[\s'])\.[a-z0-9_]{8,}|\.tmp\b|<[a-z_.]+ object at 0x"
-"""What no user has named: a temporary file, an object."""
+"""Names that no message may contain: of temporary files and objects."""
 
 NETWORK = ("socket.connect", "socket.getaddrinfo", "urllib.Request")
 CHANGES = (
@@ -55,14 +64,13 @@ CHANGES = (
 
 @dataclass
 class Result:
-    """What came of a try: its exit ``code``, what it said, ``seconds``, ``bytes`` beyond those before, ``faults``."""
+    """The result of a try: exit ``code``, standard error, ``seconds``, ``bytes`` of memory it added, ``faults``."""
 
     code: int | None
     said: str
     seconds: float
     bytes: int
     faults: list[tuple[str, str]] = field(default_factory=list)
-    fired: bool = False
 
 
 class Watch:
@@ -93,7 +101,7 @@ class Watch:
 
 
 class Sandbox:
-    """The folder of a worker: ``try`` for a try, and beside it a home, temporary files, and what is not to be read."""
+    """The folder of a worker: ``try`` for a try, a home, temporary files, and files that must not be read."""
 
     def __init__(self, root):
         self.root = Path(root)
@@ -138,26 +146,34 @@ def _stamp(path):
 class Worker:
     """Runs tries in a folder."""
 
-    def __init__(self, root):
+    def __init__(self, root, device):
+        from fuzz.lines import Try, seeds
+
+        environment = {"HOME": "home", "TMPDIR": "tmp", "XDG_CACHE_HOME": "home/.cache", "MPLCONFIGDIR": "home/mpl"}
+        os.environ.update({name: str(Path(root, value)) for name, value in environment.items()})
+        os.environ.update(SIMDTEX_DEVICE=device, COLUMNS="100", OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
         self.sandbox = Sandbox(root)
         self.streams = [os.memfd_create(name) for name in ("out", "err")]
         for stream, number in zip(self.streams, (1, 2), strict=True):
             os.dup2(stream, number)
         self.watch = Watch()
+        import h5netcdf  # noqa: F401
+        import matplotlib.font_manager  # noqa: F401 - asks the system for its fonts, once
+        import zarr  # noqa: F401
+
         from simdtex.cli import main
 
         self.main = main
-
-    def limit(self):
-        """Bound the address space to what there is and half as much again as a try may take."""
+        files = {name: data for role in seeds().values() for name, data in role.items()}
+        for line in LOADING if device == "reference" else LOADING[:3]:
+            words = line.split()
+            self.run(Try(words, {name: files[name] for name in words if name in files}))
         pages = int(Path("/proc/self/statm").read_text().split()[0])
-        most = pages * resource.getpagesize() + MEMORY * 3 // 2
+        most = pages * resource.getpagesize() + MEMORY * 3 // 2  # half as much again as a try may take
         resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
 
     def run(self, one):
-        """Run a try, and look at what it left."""
-        from fuzz.faults import failing
-
+        """Run a try, and check its result."""
         self.sandbox.fresh(one.files)
         os.chdir(self.sandbox.folder)
         for stream in self.streams:
@@ -167,9 +183,9 @@ class Worker:
             file.write("5")  # forget the peak
         before, began = _kibibytes("VmRSS"), time.perf_counter()
         self.watch.seen, self.watch.on = [], True
-        code, wrong, fired = 0, [], False
+        code, wrong = 0, []
         try:
-            with failing(one.fault, self.sandbox.folder) as calls, _interrupted(one.interrupt):
+            with _interrupted(one.interrupt):
                 self.main(args=list(one.args), prog_name="simdtex", standalone_mode=True)
         except SystemExit as error:
             code = error.code if isinstance(error.code, int) else 0 if error.code is None else 1
@@ -180,15 +196,14 @@ class Worker:
             self.watch.on = False
             os.chdir(self.sandbox.root)
         seconds = time.perf_counter() - began
-        fired = bool(one.fault) and calls.fired
         sys.stdout.flush()
         sys.stderr.flush()
         said = os.pread(self.streams[1], 2**16, 0).decode(errors="replace")
         size = 1024 * (_kibibytes("VmHWM") - before)
-        result = Result(code, said, seconds, size, wrong, fired)
+        result = Result(code, said, seconds, size, wrong)
         result.faults += self.said_wrong(one, result)
         result.faults += self.left_wrong(one, result)
-        if (one.fault or one.interrupt) and any(what == "old output changed" for what, _ in result.faults):
+        if one.interrupt and any(what == "old output changed" for what, _ in result.faults):
             result.faults = self.without_whole(one, result.faults)
         if seconds > seconds_for(one):
             result.faults.append(("time", one.args[0]))
@@ -197,16 +212,16 @@ class Worker:
         return result
 
     def without_whole(self, one, faults):
-        """The faults but for outputs that are what they are where nothing fails.
+        """Return the faults except of outputs that are as they should be without an interrupt.
 
-        The first of several may be new, and all of them where a Ctrl-C comes after the last.
+        The first of several outputs may be new, and all of them if a Ctrl-C comes after the last.
         """
         left = {
             name: (self.sandbox.folder / name).read_bytes()
             for name in one.old
             if (self.sandbox.folder / name).is_file()
         }
-        self.run(replace(one, fault=None, interrupt=None))
+        self.run(replace(one, interrupt=None))
         for name, data in left.items():
             path = self.sandbox.folder / name
             if data != one.files[name] and not (path.is_file() and path.read_bytes() == data):
@@ -214,7 +229,7 @@ class Worker:
         return [fault for fault in faults if fault[0] != "old output changed"]
 
     def said_wrong(self, one, result):
-        """What is wrong with the exit code and the sentence."""
+        """Yield the faults of the exit code and the message."""
         code, said = result.code, result.said
         if any(kind == "traceback" for kind, _ in result.faults):
             return
@@ -256,7 +271,7 @@ class Worker:
             yield "hidden name", _plain(sentence)
 
     def left_wrong(self, one, result):
-        """What is wrong with the files that are there now, and those that were opened."""
+        """Yield the faults of the files that are there now, and of those that were opened."""
         folder = self.sandbox.folder
         there = {}
         for top, folders, files in os.walk(folder):
@@ -274,7 +289,6 @@ class Worker:
                     continue
                 what = "old output changed" if name in one.old else "input changed"
                 yield what, f"{one.args[0]} {Path(name).suffix}"
-        stopped = one.interrupt or one.fault
         for name in there:
             if name in one.files:
                 continue
@@ -284,7 +298,7 @@ class Worker:
             elif not any(first == Path(word).parts[0] for word in named if word and Path(word).parts):
                 if first != "schedules-report" and one.args[0] != "demo":
                     yield "file nobody named", f"{one.args[0]} {_plain(name)}"
-            elif failed and not stopped and name == first and there[name].is_file():
+            elif failed and not one.interrupt and name == first and there[name].is_file():
                 yield "written on failure", f"{one.args[0]} {_plain(name)}"
         now = self.sandbox.listing(("home", "tmp", "beside"))
         for path in now.keys() ^ self.sandbox.around.keys():
@@ -303,12 +317,12 @@ class Worker:
 
 
 def _of_libraries(path):
-    """Whether a path is of caches that libraries keep in a home: of fonts, of compiled kernels."""
+    """Return whether a path is of a cache of a library: of fonts, of compiled kernels."""
     return any(word in path for word in CACHES)
 
 
 def _plain(text):
-    """A sentence without the numbers and names of one try, so that the same faults count as one."""
+    """Return a message without the numbers and names of one try, so that equal faults count as one."""
     text = re.sub(r"/dev/shm/fuzz[^ ]*/try/", "", text)
     text = re.sub(r"(^|/|[\s'])\.[a-z0-9_]{8,}", r"\1.*", text)
     text = re.sub(r"\d+", "N", text)
@@ -317,7 +331,7 @@ def _plain(text):
 
 
 def _where(error):
-    """What an error is, and where in the package it came about."""
+    """Return the kind of an error, and where in the package it was raised."""
     frames = traceback.extract_tb(error.__traceback__)
     ours = [frame for frame in frames if "/simdtex/" in frame.filename] or list(frames[-1:])
     last = ours[-1]
@@ -332,7 +346,7 @@ def _kibibytes(name):
 
 @contextlib.contextmanager
 def _interrupted(seconds):
-    """A Ctrl-C after some seconds, unless all is over before."""
+    """Send a Ctrl-C after some seconds, unless the try has ended."""
     if not seconds:
         yield
         return
@@ -349,78 +363,10 @@ def _interrupted(seconds):
 
 
 def _leave(_, frame):
-    """Before a command begins: as `simdtex.__main__` does, but for this process, which goes on."""
+    """Handle a Ctrl-C outside a command as `simdtex.__main__` does, but without ending the process."""
     from simdtex.cli.common import postponed
 
     if postponed(frame):
         return
     os.write(2, b"simdtex: stopped\n")
     raise SystemExit(130)
-
-
-def serve(root):
-    """Answer tries from standard input until it ends; an answer is a line on what was standard output."""
-    answers = os.fdopen(os.dup(1), "w", buffering=1)
-    questions = os.fdopen(os.dup(0), "rb", buffering=0)  # so that nothing asked is lost with a process
-    environment = {"HOME": "home", "TMPDIR": "tmp", "XDG_CACHE_HOME": "home/.cache", "MPLCONFIGDIR": "home/mpl"}
-    os.environ.update({name: str(Path(root, value)) for name, value in environment.items()})
-    os.environ.update(SIMDTEX_DEVICE=os.environ.get("FUZZ_DEVICE", "reference"), COLUMNS="100")
-    os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
-    reference = os.environ["SIMDTEX_DEVICE"] == "reference"
-    worker = Worker(root)
-    _load(worker, reference)
-    while True:  # a child serves until it ends: what it has loaded need not be loaded again
-        child = os.fork() if reference else 0
-        if not child:
-            _answer(worker, questions, answers)
-            return
-        _, status = os.waitpid(child, 0)
-        if not status:
-            return
-        answers.write(f"ended {os.waitstatus_to_exitcode(status)}\n")
-
-
-LOADING = (
-    "synth L.png -o out.png --size 8x8 --order 1",
-    "synth RGB.png -o out.tif --size 8x8 --method multires",
-    "synth L.png -o out.npy --size 8x8 --method pyramid --iterations 1",
-    "fill L.png --mask hole.png -o out.webp --order 1",
-    "extend L.png -o out.jpg --left 1 --order 1",
-    "solid L.png -o out.nrrd --size 4 --iterations 1",
-    "mix L.png L.png -o out.gif --size 6x6 --iterations 1",
-    "ising --size 4x4 --sweeps 2 --burn-in 1 --seeds 2 --schedules coloring",
-    "simulate L.png -o out.npz --size 6x6 --order 1 --number 1",
-)
-"""Commands that load what others need."""
-
-
-def _load(worker, reference):
-    """Run something of everything, but for what starts threads: a child would not have them."""
-    import matplotlib.font_manager  # noqa: F401 - which asks the system for its fonts, once
-
-    from fuzz.lines import Try, seeds
-
-    files = {name: data for role in seeds().values() for name, data in role.items()}
-    for line in LOADING if reference else LOADING[:3]:
-        words = line.split()
-        worker.run(Try(words, {name: files[name] for name in words if name in files}))
-    if reference:
-        import h5netcdf  # noqa: F401
-        import zarr  # noqa: F401
-
-
-def _answer(worker, questions, answers):
-    """Answer until there are no more questions, or life ends."""
-    from fuzz.lines import Try, made
-
-    worker.limit()
-    answers.write(f"ready {os.getpid()}\n")
-    for _ in range(LIFE):
-        line = questions.readline()
-        if not line:
-            os._exit(0)
-        asked = json.loads(line)
-        asked.pop("job", None)
-        one = made(asked["seed"], asked["number"]) if "seed" in asked else Try.from_json(asked)
-        answers.write(json.dumps([one.kind, one.args[:1], vars(worker.run(one))]) + "\n")
-    os._exit(1)
