@@ -16,7 +16,7 @@ copyright = author
 release = simdtex.__version__
 
 sys.path.insert(0, str(HERE / "extensions"))
-extensions = ["sphinx.ext.autodoc", "numpydoc", "sphinx_gallery.gen_gallery", "formulas", "names"]
+extensions = ["sphinx.ext.autodoc", "numpydoc", "sphinx_gallery.gen_gallery", "formulas", "names", "options"]
 exclude_patterns = ["_build", "generated", "extensions"]
 default_role = "py:obj"
 nitpicky = True

@@ -70,14 +70,13 @@ CHOICES = {
     "preset": ("default", "paper"),
     "alpha": ("0", "0.3", "auto"),
     "start": ("up", "random"),
-    "categorical_channels": ("0", "0,1", "2"),
 }
 """Valid words of options that are not a `simdtex.options.Choice` of a method."""
 
 LONG = ("free_sweeps", "iterations", "sweeps", "burn_in", "number", "seeds")
 """Counts of steps done one after another: a very large number is valid and would take for ever, so no try gives one."""
 
-OTHERS = ("workers", "cluster")
+OTHERS = ("workers",)
 """Options that start processes or ask the network."""
 
 DEEP = {"synth": 0.6, "sheet": 0.8, "schedules": 0.7, "demo": 0.2, "bench": 0.0}
@@ -199,13 +198,13 @@ class _Maker:
             words += [rng.choice(("--left", "--right", "--top", "--bottom", "--band")), rng.choice("123")]
         if name == "ising":
             words += ["--sweeps", "2", "--burn-in", "1", "--seeds", "2"]
-            words += ["--schedules", rng.choice(("coloring", "raster", "block"))]
+            words += ["--schedule", rng.choice(("coloring", "raster", "block"))]
         if name == "schedules":
-            words += ["--seeds", "1", "--schedules", "coloring", "--order", "1"]
+            words += ["--seeds", "1", "--schedule", "coloring", "--order", "1"]
         if name == "bench":  # which measures for minutes
             words += ["--json", "no/such/file.json"]
         if name == "sheet":
-            words += ["--alphas", "0.1", "--betas", "0"]
+            words += ["--alpha", "0.1", "--beta", "0"]
         if name in ("simulate", "synth", "fill", "extend") and method in (None, "mrf"):
             words += ["--order", rng.choice("1124")]
         words += ["--number", rng.choice("1112")] if name == "simulate" else []
@@ -217,7 +216,7 @@ class _Maker:
             usual = [option for option in usual if _of_method(option, method)]
         self.method = {"solid": "pyramid", "mix": "pyramid", "sheet": "multires"}.get(name, method or "mrf")
         if fitting:
-            useless = ("profile", *(("source_map", "also", "accounting") if self.method == "pyramid" else ()))
+            useless = ("profile", *(("source_map", "also") if self.method == "pyramid" else ()))
             usual = [option for option in usual if option.name not in useless]
         for option in rng.sample(usual, min(len(usual), rng.choice((0, 0, 1, 1, 2, 3, 5)))):
             words += self.option(option, samples, name, deep and rng.random() < 0.9)
@@ -336,6 +335,9 @@ class _Maker:
 
 def _of_method(option, method):
     """Return whether an option of ``synth`` is one of a method, as its help says."""
+    group = getattr(option, "group", "")
+    if group.startswith("Method "):
+        return group.startswith(f"Method {method}:")
     head = (option.help or "").partition(":")[0] if ":" in (option.help or "") else ""
     named = [
         one for one in ("mrf", "multires", "pyramid") if one in head.split(", ") or f"{one}:" in (option.help or "")

@@ -119,11 +119,24 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Other:
-    """Any other value: `examine` raises if it is not valid, `says` is its type, a `flag` is True or False on a page."""
+    """Any other value.
+
+    Parameters
+    ----------
+    examine : callable
+        Raises if a value is not valid.
+    says : str
+        The type, as in a docstring.
+    flag : bool
+        Whether the command line and the live page offer only True and False.
+    valid : tuple of str
+        Values that the shell completes.
+    """
 
     examine: Callable[[Any], object]
     says: str
     flag: bool = False
+    valid: tuple[str, ...] = ()
 
     def check(self, name: str, value: Any) -> None:
         """Raise unless the value is valid."""
@@ -202,8 +215,8 @@ PRESETS = ("default", "paper")
 PRESET = Option(
     "default",
     Choice(PRESETS),
-    "Begin with the defaults of the method, or with the rules of its paper",
-    group="Appearance",
+    "Begin with the defaults of the method (default), or with the rules of its paper (paper)",
+    group="Job",
 )
 """The option ``preset``, which every method has beside its table."""
 

@@ -210,7 +210,7 @@ def test_the_cases_give_every_option():
 
 # -- every option matters -------------------------------------------------------------------------------------
 
-NO_BYTE = {"check_schedule": False, "array": None, "mapping": "cut-and-stack"}
+NO_BYTE = {"array": None}
 """Options that change no byte, with their defaults: where a run is accounted for, and what is checked."""
 
 ELSEWHERE = {"categorical", "weights", "shares", "proportions", "data_weight", "guide_weight", "labels", "unsure"}
@@ -288,12 +288,12 @@ class Liar(schedules.Synchronous):
         return True
 
 
-def test_check_schedule_finds_neighbours_that_relax_together():
+def test_a_checked_schedule_finds_neighbours_that_relax_together():
     given = {**EXACT, "schedule": Liar()}
     run((9, 8), None, np.uint8, (6, 5), given)
     with pytest.raises(RuntimeError, match="equation \\(14\\)"):
-        run((9, 8), None, np.uint8, (6, 5), given | {"check_schedule": True})
-    assert_same_bits(outcome(**EXACT)[0], outcome(**EXACT, check_schedule=True)[0])
+        run((9, 8), None, np.uint8, (6, 5), given | {"schedule": schedules.Checked(Liar())})
+    assert_same_bits(outcome(**EXACT)[0], outcome(**EXACT | {"schedule": schedules.Checked(schedules.Coloring())})[0])
 
 
 def account(others, **options):
@@ -307,7 +307,7 @@ def account(others, **options):
 @pytest.mark.parametrize("others", [EXACT, FEW], ids=["exact", "few"])
 def test_an_array_and_its_mapping_change_the_account_alone(others):
     packed = account(others)
-    tiled, layered = (account(others, array="4x4", mapping=how) for how in ("hierarchical", "cut-and-stack"))
+    tiled, layered = (account(others, array=f"4x4{how}") for how in (":hierarchical", ""))
     assert {each["sites"] for each in (packed, tiled, layered)} == {packed["sites"]}
     assert packed["routed"] > 0 == packed["moved"]
     for each, how in ((tiled, "hierarchical"), (layered, "cut-and-stack")):

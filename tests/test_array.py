@@ -179,7 +179,7 @@ def test_an_array_changes_no_byte_and_is_counted_alike_on_every_machine(machine,
     packed, _ = run(REFERENCE, search=search)
     seen = []
     for device in (REFERENCE, machine):
-        image, output = run(device, search=search, array="4x8", mapping="hierarchical")
+        image, output = run(device, search=search, array="4x8:hierarchical")
         assert_same_bits(image, packed)
         seen.append(output.statistics["accounting"])
         assert seen[-1].pop("launches") > 0
@@ -220,9 +220,7 @@ def test_device_seconds_are_measured_on_request(any_device):
     [
         ({"array": "128"}, ValueError, "give rows x columns such as 128x128"),
         ({"array": 128}, ValueError, "give rows x columns such as 128x128"),
-        ({"array": "4x4", "mapping": "blocks"}, ValueError, "choose one of: cut-and-stack, hierarchical"),
-        ({"mapping": "blocks"}, ValueError, "choose one of: cut-and-stack, hierarchical"),
-        ({"check_schedule": "yes"}, TypeError, "check_schedule must be True or False"),
+        ({"array": "4x4:blocks"}, ValueError, "choose one of: cut-and-stack, hierarchical"),
     ],
     ids=str,
 )

@@ -79,11 +79,11 @@ def test_the_same_seed_gives_the_same_file(folder):
 
 
 def test_an_array_makes_the_same_file_and_an_account(folder):
-    packed = synth(folder, "--size", "9x8", "--seed", 3, "--schedule", "luby", "--check-schedule")
+    packed = synth(folder, "--size", "9x8", "--seed", 3, "--schedule", "luby")
     assert packed.exit_code == 0 and "PEs" not in packed.output
     made = (folder / "out.png").read_bytes()
-    for options in (["--array", "4x4"], ["--array", "4x4", "--mapping", "hierarchical"]):
-        result = synth(folder, "--size", "9x8", "--seed", 3, "--schedule", "luby", "--accounting", *options)
+    for array in ("4x4", "4x4:hierarchical"):
+        result = synth(folder, "--size", "9x8", "--seed", 3, "--schedule", "luby", "--array", array)
         assert result.exit_code == 0, result.output
         assert "4x4 PEs" in result.output and "utilisation" in result.output and "X-Net" in result.output
         assert (folder / "out.png").read_bytes() == made
@@ -99,7 +99,7 @@ def test_default_size_is_twice_the_sample(folder):
 
 
 BAD = {
-    "order 0": (["--order", 0], "order 0"),
+    "order 0": (["--order", 0], "order is 0"),
     "too large an order": (["--order", 400], "largest order that fits is"),
     "size 0": (["--size", "0x20"], "size"),
     "negative size": (["--size", "20x-3"], "size"),
@@ -113,7 +113,7 @@ BAD = {
     "share of a random subset": (["--schedule", "random-subset:2"], "random-subset:0.5"),
     "tile": (["--schedule", "block:16"], "block:16x16"),
     "array": (["--array", "128"], "rows x columns such as 128x128"),
-    "mapping": (["--mapping", "snake"], "choose one of: cut-and-stack, hierarchical"),
+    "mapping": (["--array", "4x4:snake"], "choose one of: cut-and-stack, hierarchical"),
     "xi": (["--xi", 0.5], "xi"),
     "bandwidth": (["--bandwidth", 0], "bandwidth"),
     "coherence": (["--coherence", -1], "coherence"),

@@ -128,10 +128,8 @@ def test_each_sample_has_its_mask(folder):
 
 def test_a_sample_may_be_unknown_in_parts(folder):
     unknown = pixels(folder, "unknown.tif")
-    out = made(
-        folder, "unknown.tif", "-o", "out.tif", "--stages", folder / "stages", "--unsure", 0.5, "--size", "24x20"
-    )
-    assert np.array_equal(out, simdtex.synthesize(unknown, (20, 24), unsure=0.5, **OPTIONS))
+    out = made(folder, "unknown.tif", "-o", "out.tif", "--stages", folder / "stages", "--size", "24x20")
+    assert np.array_equal(out, simdtex.synthesize(unknown, (20, 24), **OPTIONS))
     assert (out == 7.5).all()
     refused = synth(folder, "unknown.tif", "-o", "again.tif", "--method", "multires")
     assert refused.exit_code == 2 and "known everywhere" in refused.output
@@ -141,12 +139,12 @@ def test_a_sample_may_be_unknown_in_parts(folder):
 
 
 def test_a_table_is_kept(folder):
-    args = ["sample.png", "-o", "out.tif", "--size", "20x14", "--known", "wells.csv", "--data-weight", 4]
+    args = ["sample.png", "-o", "out.tif", "--size", "20x14", "--known", "wells.csv"]
     out = made(folder, *args, "--source-map", "s.npz")
     assert out[4, 3] == 200 and out[7, 10] == 17
     known = simdtex.place_hard_data([[3, 4, 200], [10.4, 7, 17]], (14, 20), "uint8")
     sample = pixels(folder, "sample.png")
-    assert np.array_equal(out, simdtex.synthesize(sample, (14, 20), known=known, data_weight=4.0, **OPTIONS))
+    assert np.array_equal(out, simdtex.synthesize(sample, (14, 20), known=known, **OPTIONS))
     assert (load_source_map(folder / "s.npz")[4, 3] == -1).all()
 
 
@@ -166,14 +164,6 @@ def test_categories_are_never_mixed(folder):
     facies = pixels(folder, "facies.tif")
     assert set(np.unique(out)) <= {0, 3}
     assert np.array_equal(out, simdtex.synthesize(facies, (16, 16), categorical=True, **OPTIONS))
-    assert np.array_equal(made(folder, *args, "--categorical-channels", 0), out)
-
-
-def test_channels_have_weights(folder):
-    out = made(folder, "colour.png", "-o", "out.tif", "--size", 16, "--weights", "1,0.5,2")
-    colour = pixels(folder, "colour.png")
-    wanted = simdtex.synthesize(colour, (16, 16), channel_axis=-1, weights=(1, 0.5, 2), **OPTIONS)
-    assert np.array_equal(out, wanted)
 
 
 # ---------------------------------------------------------------- guides
@@ -229,7 +219,7 @@ BAD = {
     "samples of two kinds": (["sample.png", "colour.png", *OUT], "the samples have 2 and 3 axes"),
     "samples of another method": ([*TWO, "--method", "pyramid"], "takes one sample"),
     "known values of another method": ([*ONE, "--method", "multires", "--known", "known.png"], "no known values"),
-    "an option of another method": ([*ONE, "--method", "multires", "--unsure", 1], "unknown option 'unsure'"),
+    "an option of another method": ([*ONE, "--method", "multires", "--order", 1], "unknown option 'order'"),
     "shares of one": ([*ONE, "--shares", "1,2"], "2 shares and 1 samples"),
     "shares of nothing": ([*TWO, "--shares", "0,0"], "above 0"),
     "a mask too few": ([*TWO, "--sample-mask", "left.png"], "once for each sample"),
@@ -264,9 +254,6 @@ BAD = {
     "guides of two kinds": ([*ONE, "--guide", "grey.png=wanted.png"], "1 channels and that of the output 3"),
     "a strange colour": ([*ONE, "--guide", "labels.png=strange.png"], "the colour (0, 255, 0)"),
     "a strange label": ([*ONE, "--guide", "grey.png=grey-strange.png"], "asks for the label 127"),
-    "weights of too many": ([*ONE, "--weights", "1,2"], "2 weights and 1 variables"),
-    "proportions in words": ([*CATEGORIES, "--proportions", "half"], "numbers parted by commas"),
-    "proportions of too many": ([*CATEGORIES, "--proportions", "1,2,3"], "3 proportions and 2 categories"),
     "categories of a photo": ([*ONE, "--categorical"], "categories; give 16 or fewer"),
     "the mask overwritten": (["sample.png", "--sample-mask", "left.png", "-o", "left.png"], "overwritten"),
     "the data overwritten": (["sample.png", "--known", "known.png", "-o", "known.png"], "overwritten"),

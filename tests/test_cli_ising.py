@@ -23,7 +23,7 @@ def run(*args):
 
 def small(*args, device="reference", schedules="coloring,synchronous"):
     few = ("--size", "6x4", "--seeds", 4, "--sweeps", 12, "--burn-in", 4)
-    return run("--schedules", schedules, *few, "--device", device, *args)
+    return run("--schedule", schedules, *few, "--device", device, *args)
 
 
 def test_a_table_for_each_temperature():
@@ -39,7 +39,7 @@ def test_a_table_for_each_temperature():
 
 def test_the_synchronous_schedule_fails_and_coloring_does_not(any_device, tmp_path):
     options = ("--size", 8, "--seeds", 16, "--sweeps", 150, "--burn-in", 60, "-q", "-o", tmp_path / "report")
-    done = run("--schedules", "coloring,synchronous", "--temperature", 2.6, *options, "--device", any_device.index)
+    done = run("--schedule", "coloring,synchronous", "--temperature", 2.6, *options, "--device", any_device.index)
     assert (done.exit_code, done.output) == (0, "")
     results = json.loads((tmp_path / "report" / "results.json").read_text())
     right, wrong = results["findings"]
@@ -103,8 +103,8 @@ def test_a_device_finds_what_the_reference_finds(any_device, tmp_path):
     [
         (["--temperature", "0"], "temperature is 0.0; give a number above 0"),
         (["--temperature", "nan"], "temperature is nan; give a number above 0"),
-        (["--schedules", "chess"], "unknown schedule 'chess'; choose one of: coloring"),
-        (["--schedules", ""], "unknown schedule ''; choose one of: coloring"),
+        (["--schedule", "chess"], "unknown schedule 'chess'; choose one of: coloring"),
+        (["--schedule", ""], "unknown schedule ''; choose one of: coloring"),
         (["--size", "1"], "a side of the lattice is 1; give 2 or more"),
         (["--size", "big"], "size 'big' is not WIDTHxHEIGHT"),
         (["--size", "99999999"], "give a smaller size or fewer seeds"),

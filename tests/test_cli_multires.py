@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 import simdtex
 from simdtex.cli import main
-from simdtex.cli.common import numbers
+from simdtex.cli.options import numbers
 from simdtex.experiments.thresholds import series
 from simdtex.io import image
 from simdtex.model.source_map import load_source_map
@@ -45,27 +45,13 @@ def files(folder):
 
 
 def test_everything_at_once(folder):
-    args = [
-        "--size",
-        "30x26",
-        "--alpha",
-        "0.6",
-        "--beta",
-        "0.5",
-        "--orientations",
-        3,
-        "--sigma",
-        0.8,
-        "--filter-size",
-        5,
-    ]
-    args += ["--parity", "free", "--levels", 4, "--boundary", "open", "--edges", "keep", "--seams", "cut"]
+    args = ["--size", "30x26", "--alpha", "0.6", "--beta", "0.5", "--orientations", 3]
+    args += ["--levels", 4, "--boundary", "open", "--preset", "paper"]
     args += ["--stages", folder / "st"]
     result = synth(folder, *args, "--source-map", folder / "s.npz", "--also", f"{folder}/colour.png={folder}/c.png")
     assert result.exit_code == 0, result.output
     made = image.read(folder / "out.png").pixels
-    options = {"alpha": 0.6, "beta": 0.5, "orientations": 3, "sigma": 0.8, "filter_size": 5}
-    options |= {"parity": "free", "levels": 4, "boundary": "open", "edges": "keep", "seams": "cut"}
+    options = {"alpha": 0.6, "beta": 0.5, "orientations": 3, "levels": 4, "boundary": "open", "preset": "paper"}
     options |= {"rng": 5, "device": "reference"}
     expected = simdtex.synthesize(texture((16, 12)), (26, 30), method="multires", **options)
     np.testing.assert_array_equal(made, expected)
@@ -79,45 +65,19 @@ def test_everything_at_once(folder):
 def test_alpha_0_tiles_and_auto_says_what_it_took(folder):
     assert synth(folder, "--alpha", 0, "--size", "24x32", "--edges", "keep").exit_code == 0
     np.testing.assert_array_equal(image.read(folder / "out.png").pixels, np.tile(texture((16, 12)), (2, 2)))
-    result = synth(folder, "--alpha", "auto", "--target", 1.5)
-    expected = simdtex.suggest_alpha(texture((16, 12)), target=1.5, device="reference")
-    assert f"alpha {expected};" in result.output
-    alpha = simdtex.suggest_alpha(texture((16, 12)), strain=0.2, device="reference")
-    assert alpha != expected and f"alpha {alpha};" in synth(folder, "--alpha", "auto", "--strain", 0.2).output
+    alpha = simdtex.suggest_alpha(texture((16, 12)), device="reference")
+    assert f"alpha {alpha};" in synth(folder, "--alpha", "auto").output
     assert "alpha inf;" in synth(folder, "--alpha", "inf").output
     assert synth(folder, "-q").output == ""
 
 
-@pytest.mark.parametrize("text", ["0.1\n0.2\n0.3\n0.4\n", "0.1, 0.1\n0.2,0.2\n\n0.3 0.3\n0.4 inf\n"])
-def test_a_table_of_thresholds(folder, text):
-    (folder / "table.csv").write_text(text)
-    result = synth(folder, "--orientations", 0, "--thresholds", folder / "table.csv")
-    columns = 1 if "," not in text else 2
-    assert (result.exit_code == 0) == (columns == 1), result.output
-    if columns == 2:
-        assert "2 columns; give 1" in result.output
-        return
-    table = [0.1, 0.2, 0.3, 0.4]
-    options = {"orientations": 0, "thresholds": table, "rng": 5, "device": "reference"}
-    expected = simdtex.synthesize(texture((16, 12)), (32, 24), method="multires", **options)
-    np.testing.assert_array_equal(image.read(folder / "out.png").pixels, expected)
-
-
 BAD = {
-    "alpha": (["--alpha", "much"], "--alpha much is not a number; give one of at least 0, or auto"),
+    "alpha": (["--alpha", "much"], "--alpha much is not a number; give one, or auto"),
     "negative alpha": (["--alpha", -1], "alpha is -1.0; give a number of at least 0"),
     "beta": (["--beta", -1], "beta is -1.0"),
-    "target": (["--alpha", "auto", "--target", 0], "target is 0.0; give a number of at least 1"),
-    "filter size": (["--filter-size", 4], "give an odd number"),
-    "features": (["--features", "hue"], "choose one of: luminance, channels"),
-    "parity": (["--parity", "any"], "choose one of: match, free"),
     "edges": (["--edges", "reflect"], "choose one of: mend, keep"),
-    "seams": (["--seams", "glue"], "choose one of: blend, cut"),
     "levels": (["--levels", 9], "levels=9 is too many for this sample; give at most 5"),
-    "an option of mrf": (["--order", 8], "choose from: alpha, beta"),
-    "accounting": (["--accounting"], "--accounting is of the method mrf"),
-    "no table": (["--thresholds", "none.csv"], "none.csv"),
-    "no numbers": (["--thresholds", "sample.png"], "is not a table of numbers"),
+    "an option of mrf": (["--order", 8], "choose from: preset, alpha, beta"),
 }
 
 
@@ -140,7 +100,7 @@ def test_an_option_of_multires_is_none_of_mrf(folder):
 
 
 def test_a_sheet_of_both_figures(folder):
-    result = sheet(folder, "--alphas", "0,0.3,...,0.9", "--betas", "0,1", "--size", "20x18")
+    result = sheet(folder, "--alpha", "0,0.3,...,0.9", "--beta", "0,1", "--size", "20x18")
     assert result.exit_code == 0, result.output
     lines = result.output.splitlines()
     assert [line.partition(":")[0] for line in lines[:-1]] == [
@@ -154,20 +114,20 @@ def test_a_sheet_of_both_figures(folder):
 
 
 def test_a_sheet_of_colour_says_the_seed(folder):
-    args = ["--alphas", "0.2", "--betas", "0", "--device", "reference", "--levels", 3]
+    args = ["--alpha", "0.2", "--beta", "0", "--device", "reference", "--levels", 3]
     result = run("sheet", folder / "colour.png", "-o", folder / "sheet.png", *args)
     assert result.exit_code == 0 and re.search(r"seed \d+$", result.output.strip())
-    assert sheet(folder, "--alphas", "0.2", "--betas", "0", "-q").output == ""
+    assert sheet(folder, "--alpha", "0.2", "--beta", "0", "-q").output == ""
 
 
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        (["--alphas", "0.1,x"], "--alphas 0.1,x must be numbers parted by commas"),
-        (["--alphas", ""], "must be numbers"),
-        (["--alphas", "-0.1"], "alpha is -0.1"),
-        (["--betas", "-1"], "beta is -1.0"),
-        (["--alphas", "0.1", "--parity", "any"], "choose one of: match, free"),
+        (["--alpha", "0.1,x"], "--alpha 0.1,x must be numbers parted by commas"),
+        (["--alpha", ""], "must be numbers"),
+        (["--alpha", "-0.1"], "alpha is -0.1"),
+        (["--beta", "-1"], "beta is -1.0"),
+        (["--alpha", "0.1", "--boundary", "round"], "choose one of: torus, open"),
         (["--size", "0x1"], "size"),
         (["-o", "sheet.xyz"], "end its name in"),
         (["-o", "sample.png"], "is an input and would be overwritten"),
@@ -192,15 +152,15 @@ def test_bad_sheets_get_one_sentence_and_write_nothing(folder, args, words, monk
     ],
 )
 def test_numbers(text, expected):
-    assert numbers("--alphas", text) == expected
+    assert numbers("--alpha", text) == expected
 
 
 @pytest.mark.parametrize(
     "text", ["...", "0.1,...", "...,0.3", "0.1,...,0.2,0.3", "0,...,1", "2,1,...,0", "0,1e-9,...,1", "1,...,inf"]
 )
 def test_numbers_that_are_none(text):
-    with pytest.raises(ValueError, match=r"--alphas .* must be numbers parted by commas"):
-        numbers("--alphas", text)
+    with pytest.raises(ValueError, match=r"--alpha .* must be numbers parted by commas"):
+        numbers("--alpha", text)
 
 
 # ---------------------------------------------------------------- series

@@ -24,15 +24,12 @@ TEXTS = {
         "preset",
         "relaxation",
         "pixel",
-        "phases",
-        "coarsest",
         "search",
         "edges",
         "boundary",
     ),
-    *("categorical_channels", "weights", "shares", "proportions", "alpha", "features", "parity", "seams", "pyramid"),
-    *("match", "color", "schedule", "array", "mapping", "solids", "slices", "average", "blend", "pixels", "names"),
-    *("alphas", "betas", "palette", "pattern", "low", "high", "cluster"),
+    *("weights", "shares", "proportions", "alpha", "pyramid", "seamless", "workers"),
+    *("color", "schedule", "array", "average", "names", "alphas", "betas", "palette", "pattern", "low", "high"),
 }
 PICTURES = ("synth", "fill", "extend", "mix", "sheet")
 ISING_START = ("ising", "start")  # up or random
@@ -188,24 +185,12 @@ def test_the_sample_in_the_folder_of_stages(folder):
     (folder / "st").mkdir()
     os.rename("sample.png", "st/level0.png")
     refused(folder, "synth", ["st/level0.png", "-o", "out.png", "--stages", "st"], "is an input and lies in st")
-    refused(folder, "synth", ["map.png", "-o", "o.png", "--stages", "st", "--start", "st/level0.png"], "lies in st")
 
 
 def test_the_sample_among_the_slices_of_a_solid(folder):
     (folder / "block").mkdir()
     os.rename("sample.png", "block/slice-000.png")
     refused(folder, "solid", ["block/slice-000.png", "-o", "block"], "is an input and lies in block")
-    refused(folder, "solid", ["map.png", "-o", "block", "--start", "block"], "is an input and would be overwritten")
-    for inner in ("block/slice-000.png", "block/new.npz", "block/../block/new.nrrd"):
-        option = ["--view", inner, "-o", "out.npz"] if inner.endswith(".png") else ["-o", inner]
-        said = "which is an input; give another folder"
-        refused(folder, "solid", ["map.png", "--start", "block", *option], said)
-
-
-def test_the_thresholds_that_are_written_over(folder):
-    (folder / "th.npy").write_text("0.1\n")
-    args = ["sample.png", "--method", "multires", "--thresholds", "th.npy", "-o", "th.npy"]
-    refused(folder, "synth", args, "th.npy is an input and would be overwritten")
 
 
 OUTPUTS = [
@@ -281,8 +266,3 @@ def test_an_empty_size_is_no_default(folder, name):
         args += ["-o", "report"]
     refused(folder, name, args, "size '' is not ")
     assert not Path("report").exists()
-
-
-def test_empty_channels_are_no_default(folder):
-    args = ["sample.png", "-o", "out.png", "--categorical-channels", "", "--device", "reference"]
-    refused(folder, "synth", args, "--categorical-channels  must be channels parted by commas")

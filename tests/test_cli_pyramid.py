@@ -17,7 +17,7 @@ from simdtex.report.solid import view
 
 GREY, COLOUR = texture((32, 28)), texture((32, 28), 3, seed=1)
 OTHER, START = texture((30, 34), 3, seed=2), texture((24, 40), seed=3)
-FILES = ["block.npy", "colour.png", "grey.png", "other.png", "start.png", "wide.png"]
+FILES = ["colour.png", "grey.png", "other.png", "start.png", "wide.png"]
 SAME = {"rng": 5, "device": "reference"}
 SEEDED = ["--seed", 5, "--device", "reference"]
 QUICK = ["--levels", 1, "--iterations", 2]
@@ -26,17 +26,12 @@ EACH = {"levels": 1, "iterations": 2}
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder with samples, pictures and a block to begin with, and nothing else; the present one."""
+    """A folder with samples and nothing else; the present one."""
     pictures = {"grey": GREY, "colour": COLOUR, "other": OTHER, "start": START, "wide": texture((32, 28), 3, np.uint16)}
     for name, picture in pictures.items():
         image.write(tmp_path / f"{name}.png", picture)
-    np.save(tmp_path / "block.npy", block())
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-def block(shape=(6, 10, 8)):
-    return texture((shape[0] * shape[1], shape[2]), seed=4).reshape(shape)
 
 
 def run(*args):
@@ -79,8 +74,8 @@ OPTIONS = {
         {"orientations": 2, "levels": 2, "edges": "wrap", "iterations": 1},
     ),
     "tables": (
-        ["--pyramid", "laplacian", "--match", "lookup", "--bins", 64, *QUICK],
-        {"pyramid": "laplacian", "match": "lookup", "bins": 64, **EACH},
+        ["--pyramid", "laplacian", "--preset", "paper", *QUICK],
+        {"pyramid": "laplacian", "match": "lookup", **EACH},
     ),
     "no iterations": (["--iterations", 0], {"iterations": 0}),
 }
@@ -108,13 +103,6 @@ def test_the_last_distance_is_that_of_the_subbands():
     assert flat == "levels 3, iterations 1"
 
 
-def test_synth_in_colour_begins_with_a_picture_and_takes_its_size(folder):
-    assert synth("--start", "start.png", "--color", "channels", "-q", *QUICK, sample="colour.png").output == ""
-    options = {"start": START, "color": "channels", "channel_axis": -1, **EACH}
-    expected = simdtex.synthesize(COLOUR, (24, 40), method="pyramid", **options, **SAME)
-    np.testing.assert_array_equal(picture(), expected)
-
-
 def test_a_constant_sample_has_no_distances(folder):
     image.write("flat.png", np.full((16, 16), 7, np.uint8))
     result = synth(*QUICK, sample="flat.png")
@@ -138,30 +126,20 @@ BAD_PYRAMID = {
     "pyramid": (["--pyramid", "wavelet"], "choose one of: steerable, laplacian"),
     "orientations": (["--orientations", 5], "orientations is 5"),
     "iterations": (["--iterations", -1], "iterations is -1; give 0 or more"),
-    "match": (["--match", "mean"], "choose one of: rank, lookup"),
-    "few bins": (["--bins", 1], "bins is 1; give 2 or more"),
-    "many bins": (["--bins", 5000], "give 4096 or fewer"),
     "edges": (["--edges", "whole"], "choose one of: reflect, wrap"),
-    "color": (["--color", "hue"], "choose one of: decorrelate, channels"),
     "levels": (["--levels", 9], "levels=9 is too many"),
     "seed": (["--seed", -1], "seed"),
     "device": (["--device", "no such device"], "no such device"),
-    "no start": (["--start", "none.png"], "none.png does not exist"),
-    "start of another size": (["--size", "40", "--start", "grey.png"], "start has shape (32, 28); give one of 40 x 40"),
-    "start in colour": (["--start", "colour.png"], "start has shape (32, 28, 3); give one of 32 x 28 pixels, grey"),
     "size 0": (["--size", "0"], "size '0' is not WIDTHxHEIGHT"),
     "suffix": (["-o", "out.xyz"], "end its name in"),
     "overwritten sample": (["-o", "grey.png"], "grey.png is an input and would be overwritten"),
-    "overwritten start": (["--start", "start.png", "-o", "start.png"], "is an input and would be overwritten"),
     "stages in the output's place": (["--stages", "out.png"], "out.png would be written twice"),
 }
 BAD_SYNTH = BAD_PYRAMID | {
     "boundary": (["--boundary", "open"], "unknown option 'boundary' of the method 'pyramid'"),
     "option of mrf": (["--order", 8], "unknown option 'order' of the method 'pyramid'"),
-    "accounting": (["--accounting"], "--accounting is of the method mrf"),
     "source map": (["--source-map", "map.npz"], "takes no pixel from the sample; leave --source-map and --also out"),
     "another map": (["--also", "colour.png=c.png"], "leave --source-map and --also out"),
-    "start of mrf": (["--method", "mrf", "--start", "start.png"], "unknown option 'start' of the method 'mrf'"),
     "too large": (["--size", "60000x60000"], "give a smaller size"),
 }
 
@@ -177,10 +155,10 @@ def test_bad_synth_gets_one_sentence_and_writes_nothing(folder, case):
 
 
 def test_solid_is_what_python_makes(folder):
-    args = ["--solids", "average", "--slices", "each", "--orientations", 2, "--edges", "wrap", *QUICK]
+    args = ["--preset", "paper", "--orientations", 2, "--edges", "wrap", *QUICK]
     result = solid("--size", "6x10x8", "-o", "out.nrrd", "-o", "out.tif", "-o", "slices", "--view", "v.png", *args)
     assert result.exit_code == 0, result.output
-    options = {"solids": "average", "slices": "each", "orientations": 2, "edges": "wrap", **EACH}
+    options = {"solids": "average", "slices": "each", "match": "lookup", "orientations": 2, "edges": "wrap", **EACH}
     expected, run = simdtex.synthesize_solid(GREY, (6, 10, 8), full_output=True, **options, **SAME)
     for name in ("out.npz", "out.nrrd", "out.tif", "slices"):
         np.testing.assert_array_equal(loaded(name), expected)
@@ -191,13 +169,11 @@ def test_solid_is_what_python_makes(folder):
     assert second == last_iteration(run.statistics)
 
 
-def test_a_solid_in_colour_begins_with_a_block_and_takes_its_size(folder):
-    args = ["--pyramid", "laplacian", "--match", "lookup", "--bins", 32, "--color", "channels"]
-    assert solid("--start", "block.npy", "-q", *args, *QUICK, sample="colour.png").output == ""
-    options = {"pyramid": "laplacian", "match": "lookup", "bins": 32, "color": "channels"}
-    options |= {"start": block(), "channel_axis": -1, **EACH}
-    expected = simdtex.synthesize_solid(COLOUR, (6, 10, 8), **options, **SAME)
-    np.testing.assert_array_equal(loaded("out.npz"), expected)
+def test_a_solid_in_colour(folder):
+    args = ["--size", "6x10x8", "--pyramid", "laplacian", "--color", "channels"]
+    assert solid("-q", *args, *QUICK, sample="colour.png").output == ""
+    options = {"pyramid": "laplacian", "color": "channels", "channel_axis": -1, **EACH}
+    np.testing.assert_array_equal(loaded("out.npz"), simdtex.synthesize_solid(COLOUR, (6, 10, 8), **options, **SAME))
 
 
 def test_stages_of_a_solid_are_its_middle_slice(folder):
@@ -239,24 +215,18 @@ def test_too_little_memory_is_one_sentence(folder, monkeypatch):
 
 
 SOLID_SIZES = ["0", "4x5", "4x5x0", "4x5x6x7", "-3", "large", "1.5", "4,5,6"]
-PICTURES_ONLY = {"size 0", "suffix", "overwritten sample", "start in colour", "stages in the output's place"}
+PICTURES_ONLY = {"size 0", "suffix", "overwritten sample", "stages in the output's place"}
 BAD_SOLID = {name: case for name, case in BAD_PYRAMID.items() if name not in PICTURES_ONLY} | {
     **{f"size {text}": (["--size", text], f"size '{text}' is not DEPTHxHEIGHTxWIDTH") for text in SOLID_SIZES},
     "beyond 2**31": (
         ["--size", "700"],
         "a block of 700 x 700 x 700 is beyond 2**31 values, 8 for each voxel; give a smaller size",
     ),
-    "solids": (["--solids", "sum"], "choose one of: turns, average"),
-    "slices": (["--slices", "some"], "choose one of: each, together"),
     "suffix": (["-o", "out.xyz"], "end its name in one of .npy, .npz"),
     "written twice": (["-o", "out.npz"], "out.npz would be written twice"),
     "view and output": (["-o", "a.npy", "--view", "grey.png"], "grey.png is an input"),
     "view suffix": (["--view", "v.npz"], "end its name in one of .png"),
     "no folder": (["--view", "nowhere/v.png"], "the folder nowhere does not exist"),
-    "no start": (["--start", "none.npz"], "none.npz cannot be read as a volume"),
-    "start is no block": (["--start", "grey.png"], "grey.png cannot be read as a volume"),
-    "start of another size": (["--size", "8", "--start", "block.npy"], "give one of 8 x 8 x 8 pixels"),
-    "overwritten start": (["--start", "block.npy", "-o", "block.npy"], "is an input and would be overwritten"),
     "stages in the output's place": (["-o", "st"], "st would be written twice"),
 }
 
@@ -264,7 +234,7 @@ BAD_SOLID = {name: case for name, case in BAD_PYRAMID.items() if name not in PIC
 @pytest.mark.parametrize("case", BAD_SOLID)
 def test_bad_solids_get_one_sentence_and_write_nothing(folder, case):
     args, words = BAD_SOLID[case]
-    size = [] if {"--size", "--start"} & set(args) else ["--size", "8"]
+    size = [] if "--size" in args else ["--size", "8"]
     assert_one_sentence(solid(*size, "--stages", "st", *args), words, folder)
 
 
@@ -281,15 +251,15 @@ MIXTURES = {
     "average of all": ([], {}),
     "palette by path, pattern by number": (["--palette", "other.png", "--pattern", 1], {"palette": 1, "pattern": 0}),
     "pattern by path": (["--pattern", "./other.png"], {"pattern": 1}),
-    "weights": (["--average", "1,0.5", "--blend", "quantiles"], {"average": [1, 0.5], "blend": "quantiles"}),
-    "low and high": (["--low", 2, "--high", "colour.png", "--split", 1], {"low": 1, "high": 0, "split": 1}),
-    "pixels": (
-        ["--palette", 2, "--pixels", "pattern", "--color", "channels", "--edges", "wrap"],
-        {"palette": 1, "pixels": "pattern", "color": "channels", "edges": "wrap"},
+    "weights": (["--average", "1,0.5"], {"average": [1, 0.5]}),
+    "low and high": (["--low", 2, "--high", "colour.png"], {"low": 1, "high": 0}),
+    "colours": (
+        ["--palette", 2, "--color", "channels", "--edges", "wrap"],
+        {"palette": 1, "color": "channels", "edges": "wrap"},
     ),
     "tables": (
-        ["--pyramid", "laplacian", "--match", "lookup", "--bins", 32, "--pattern", 2],
-        {"pyramid": "laplacian", "match": "lookup", "bins": 32, "pattern": 1},
+        ["--pyramid", "laplacian", "--preset", "paper", "--pattern", 2],
+        {"pyramid": "laplacian", "match": "lookup", "pattern": 1},
     ),
 }
 
@@ -307,10 +277,10 @@ def test_mix_is_what_python_makes(folder, case):
     assert second == last_iteration(run.statistics)
 
 
-def test_mix_of_grey_and_colour_begins_with_a_picture_and_takes_its_size(folder):
+def test_mix_of_grey_and_colour(folder):
     samples = ("grey.png", "other.png", "colour.png")
-    assert mix("--start", "start.png", "--average", "1,2,0", "-q", *QUICK, samples=samples).output == ""
-    options = {"start": START, "average": [1, 2, 0], "channel_axis": -1, **EACH}
+    assert mix("--size", "40x24", "--average", "1,2,0", "-q", *QUICK, samples=samples).output == ""
+    options = {"average": [1, 2, 0], "channel_axis": -1, **EACH}
     expected = simdtex.mix([GREY, OTHER, COLOUR], (24, 40), **options, **SAME)
     np.testing.assert_array_equal(picture(), expected)
 
@@ -336,7 +306,7 @@ def test_stages_of_a_mixture(folder):
 
 
 P = "give the path of one as it stands in the command, or its number, 1 to 2"
-BAD_MIX = {k: v for k, v in BAD_PYRAMID.items() if k not in ("start in colour", "overwritten sample")} | {
+BAD_MIX = {k: v for k, v in BAD_PYRAMID.items() if k != "overwritten sample"} | {
     "unknown palette": (["--palette", "grey.png"], f"--palette grey.png is none of the samples; {P}"),
     "pattern 0": (["--pattern", 0], f"--pattern 0 is none of the samples; {P}"),
     "pattern 3": (["--pattern", 3], P),
@@ -351,11 +321,6 @@ BAD_MIX = {k: v for k, v in BAD_PYRAMID.items() if k not in ("start in colour", 
     "negative weight": (["--average", "1,-1"], "give a number of at least 0"),
     "no weight": (["--average", "0,0"], "give one above 0"),
     "no finite weight": (["--average", "inf,1"], "give a number of at least 0"),
-    "split alone": (["--split", 1], "give these two, or leave split out"),
-    "many high levels": (["--low", 1, "--high", 2, "--split", 99], "split is 99"),
-    "negative split": (["--low", 1, "--high", 2, "--split", -1], "split is -1"),
-    "blend": (["--blend", "mean"], "choose one of: histograms, quantiles"),
-    "pixels": (["--pixels", "all"], "choose one of: palette, pattern"),
     "overwritten sample": (["-o", "other.png"], "other.png is an input and would be overwritten"),
 }
 

@@ -27,7 +27,7 @@ def run(*args):
 
 
 def small(folder, *args):
-    job = ["--order", 2, "--size", "12x10", "--device", "reference", "--schedules", "coloring,synchronous"]
+    job = ["--order", 2, "--size", "12x10", "--device", "reference", "--schedule", "coloring,synchronous"]
     return run(folder / "sample.png", "-o", folder / "report", *job, "--seeds", 2, *args)
 
 
@@ -44,7 +44,7 @@ def test_a_report(folder):
     beside = {path.read_bytes() for path in (folder / "report").glob("*.png")}
     assert set(embedded(reader)) == beside and len(embedded(reader)) == len(beside) == 5
     assert "breaks (14)" in reader.text
-    job = "--output REPORT --schedules coloring,synchronous --seeds 2 --size 12x10 --order 2 --device reference"
+    job = "--output REPORT --schedule coloring,synchronous --seeds 2 --size 12x10 --order 2 --device reference"
     assert f"$ simdtex schedules SAMPLE {job}" in reader.text.replace(str(folder / "report"), "REPORT").replace(
         str(folder / "sample.png"), "SAMPLE"
     )
@@ -68,8 +68,8 @@ def test_the_same_command_gives_the_same_pictures(folder):
 
 
 def test_options_reach_the_runs(folder):
-    given = ["--free-sweeps", 3, "--relaxation", "gibbs", "--boundary", "open", "--array", "8x8", "--seed", 7]
-    result = small(folder, *given, "--mapping", "hierarchical", "--coherence", 0, "--levels", 1)
+    given = ["--free-sweeps", 3, "--relaxation", "gibbs", "--boundary", "open", "--coherence", 0, "--levels", 1]
+    result = small(folder, *given, "--array", "8x8:hierarchical", "--seed", 7)
     assert result.exit_code == 0, result.output
     found = json.loads((folder / "report" / "results.json").read_text(encoding="utf-8"))
     options = found["options"]
@@ -81,7 +81,7 @@ def test_options_reach_the_runs(folder):
 
 
 def test_without_a_sample_it_is_brick(any_device, tmp_path):
-    args = ["--order", 2, "--size", "9x9", "--seeds", 1, "--schedules", "coloring", "--device", any_device.index, "-q"]
+    args = ["--order", 2, "--size", "9x9", "--seeds", 1, "--schedule", "coloring", "--device", any_device.index, "-q"]
     result = run("-o", tmp_path / "report", *args)
     assert result.exit_code == 0, result.output
     found = json.loads((tmp_path / "report" / "results.json").read_text(encoding="utf-8"))
@@ -90,9 +90,9 @@ def test_without_a_sample_it_is_brick(any_device, tmp_path):
 
 
 BAD = {
-    "unknown schedule": (["--schedules", "coloring,lubi"], "choose one of: coloring"),
-    "no schedule": (["--schedules", ""], "choose one of: coloring"),
-    "a schedule twice": (["--schedules", "luby,luby"], "given twice"),
+    "unknown schedule": (["--schedule", "coloring,lubi"], "choose one of: coloring"),
+    "no schedule": (["--schedule", ""], "choose one of: coloring"),
+    "a schedule twice": (["--schedule", "luby,luby"], "given twice"),
     "order too large": (["--order", 400], "largest order that fits"),
     "no seeds": (["--seeds", 0], "give 1 or more"),
     "a negative seed": (["--seed", -3], "seed"),
@@ -102,7 +102,7 @@ BAD = {
     "relaxation": (["--relaxation", "icn"], "choose one of: icm, gibbs"),
     "preset": (["--preset", "papre"], "choose one of: default, paper"),
     "array": (["--array", "big"], "array"),
-    "mapping": (["--mapping", "flat"], "choose one of: cut-and-stack"),
+    "mapping": (["--array", "8x8:flat"], "choose one of: cut-and-stack"),
     "device": (["--device", "no such device"], "no such device"),
 }
 

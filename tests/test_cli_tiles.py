@@ -69,11 +69,10 @@ def test_a_dry_run_prints_the_plan_and_makes_nothing(folder):
     [
         (["-o", "o.png", "--tiles", 16], "o.png is no .zarr store, which tiles are written to; end its name in .zarr"),
         (["-o", "o.png", "--workers", 2], "--workers goes with --tiles"),
-        (["-o", "o.png", "--cluster", "tcp://a"], "--cluster goes with --tiles"),
         (["-o", "o.png", "--dry-run"], "--dry-run goes with --tiles"),
         (["-o", "o.zarr", "--tiles", 0], "tiles is 0; give 1 or more"),
         (["-o", "o.zarr", "--tiles", 16, "--workers", 0], "workers is 0; give 1 or more"),
-        (["-o", "o.zarr", "--tiles", 16, "--workers", 1, "--cluster", "x"], "not both"),
+        (["-o", "o.zarr", "--tiles", 16, "--workers", "x"], "--workers x is neither a number nor an address"),
         (["-o", "o.zarr", "--tiles", 16, "--method", "pyramid"], "the method pyramid needs the whole output at once"),
         (
             ["-o", "o.zarr", "--tiles", 16, "--stages", "s"],
@@ -85,8 +84,8 @@ def test_a_dry_run_prints_the_plan_and_makes_nothing(folder):
         (["-o", "no/o.zarr", "--tiles", 16], "does not exist; make it first"),
         (["-o", "there.zarr", "--tiles", 16], "is there already; remove it, give another name, or go on with"),
         (
-            ["-o", "o.zarr", "--tiles", 16, "--cluster", "nonsense"],
-            "no scheduler answers at nonsense; start one",
+            ["-o", "o.zarr", "--tiles", 16, "--workers", "nonsense://a"],
+            "no scheduler answers at nonsense://a; start one",
         ),
     ],
     ids=str,

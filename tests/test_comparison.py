@@ -230,7 +230,6 @@ def test_progress_runs_from_0_to_1():
         ({"sample": np.zeros((8, 20))}, "too small"),
         ({"order": 400}, "largest order that fits"),
         ({"array": "round"}, "array"),
-        ({"mapping": "flat"}, "choose one of"),
         ({"xi": 1.0}, "xi"),
     ],
 )

@@ -50,7 +50,7 @@ LARGE = {
     },
     "array": ("brick-64", (56, 56), {"array": "16x32", "order": 8}),
     "array-exact": ("brick-64", (40, 40), {"array": "16x32", "order": 5, "search": "exact"}),
-    "array-luby": ("brick-64", (40, 40), {"array": "16x16", "order": 5, "schedule": "luby", "mapping": "hierarchical"}),
+    "array-luby": ("brick-64", (40, 40), {"array": "16x16:hierarchical", "order": 5, "schedule": "luby"}),
     "multires-brick": ("brick", (256, 200), {"method": "multires"}),
     "multires-coffee": ("coffee", (130, 96), {"method": "multires", "alpha": "auto"}),
     "multires-brick-paper": ("brick", (256, 200), {"method": "multires"} | PAPER),

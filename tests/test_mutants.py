@@ -52,7 +52,6 @@ REFUSED = [
     ("similar", -1, "similar is -1; give 0 or more"),
     ("chance", -1, "chance is -1; give 0 or more"),
     ("exhaustive", -1, "exhaustive is -1; give 0 or more"),
-    ("check_schedule", 1, "check_schedule must be True or False, not 1"),
     ("anything", 1, "unknown option 'anything' of the method 'mrf'; choose from: preset, order, "),
 ]
 

@@ -14,7 +14,7 @@ from simdtex.ops.coloring import coloring
 from simdtex.ops.commit import commit
 from simdtex.ops.relax import Choice, Everything, Listed, Relaxation, relax, relax_apart
 from simdtex.ops.similar import most_similar
-from simdtex.schedules import Coloring
+from simdtex.schedules import Checked, Coloring
 
 PLAIN = {"suggesting": 12, "similar": 0, "chance": 4}
 
@@ -306,7 +306,7 @@ def run(device=None, **options):
 def test_a_schedule_that_is_watched_changes_no_bit(cl_device):
     """Which takes the sweeps step by step, and not in place."""
     machine = opencl(cl_device)
-    ahead, apart_ = run(machine, order=8), run(machine, order=8, check_schedule=True)
+    ahead, apart_ = run(machine, order=8), run(machine, order=8, schedule=Checked(Coloring()))
     assert_same_bits(ahead[0], apart_[0])
     assert ahead[1] == apart_[1]
 

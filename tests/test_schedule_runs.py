@@ -162,7 +162,7 @@ def test_any_size_ends_with_nothing_hot(name, shape):
 
 @every
 def test_the_check_changes_no_bit(name):
-    assert_same_bits(run(name, "gibbs", check_schedule=True), expected(name, "gibbs"))
+    assert_same_bits(run(schedules.Checked(schedules.get(name)), "gibbs"), expected(name, "gibbs"))
 
 
 @pytest.mark.parametrize(
@@ -171,7 +171,7 @@ def test_the_check_changes_no_bit(name):
 def test_a_schedule_that_lies_is_stopped(machine, sites, words):
     for m in (REFERENCE, machine):
         with pytest.raises(RuntimeError, match=f"the schedule told .*{words}"):
-            run(Told(sites), check_schedule=True, levels=1, device=m)
+            run(schedules.Checked(Told(sites)), levels=1, device=m)
 
 
 # -- of one's own ---------------------------------------------------------------------------------------------
@@ -183,7 +183,7 @@ def test_the_schedule_of_the_page_works(machine):
     exec(textwrap.dedent(code), names)
     wavefront = names["Wavefront"]()
     for relaxation in ("icm", "gibbs"):
-        ours = run(wavefront, relaxation, (9, 11), machine, check_schedule=True, boundary="open")
+        ours = run(schedules.Checked(wavefront), relaxation, (9, 11), machine, boundary="open")
         assert_same_bits(ours, run("raster", relaxation, (9, 11), boundary="open"))
     grid = Grid(6, 8, 1, False)
     state = wavefront.init(setting(grid))
@@ -249,7 +249,9 @@ def test_the_statistics_count_what_the_schedule_did(name):
 
 
 def test_an_object_is_told_by_its_name():
-    assert watched("random-subset:0.2", check_schedule=True)[2]["options"]["schedule"] == "random-subset:0.2"
+    assert (
+        watched(schedules.Checked(schedules.get("random-subset:0.2")))[2]["options"]["schedule"] == "random-subset:0.2"
+    )
     assert watched("luby")[2]["options"]["schedule"] == "luby"
 
 

@@ -147,7 +147,7 @@ def test_synthesis_with_what_is_installed(wheel, sdist, tmp_path, any_device):
     assert (tmp_path / "wheel.png").read_bytes() == (tmp_path / "sdist.png").read_bytes()
     run(
         scripts / "simdtex",
-        *("schedules", "sample.png", "--schedules", "coloring,synchronous", "--seeds", 1, "--size", 20, "--order", 2),
+        *("schedules", "sample.png", "--schedule", "coloring,synchronous", "--seeds", 1, "--size", 20, "--order", 2),
         *("-o", "report", "--device", any_device.index),
         cwd=elsewhere,
     )

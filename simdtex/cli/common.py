@@ -164,61 +164,6 @@ def opened(device: str | None, profile: bool) -> Any:
     return machine
 
 
-def given(options: dict[str, Any]) -> dict[str, Any]:
-    """The options that were given; lists of numbers, alpha and a table of thresholds as numbers."""
-    chosen = {name: value for name, value in options.items() if value is not None}
-    if chosen.get("alpha", "auto") != "auto":
-        try:
-            chosen["alpha"] = float(chosen["alpha"])
-        except ValueError:
-            raise ValueError(f"--alpha {chosen['alpha']} is not a number; give one of at least 0, or auto") from None
-    if "thresholds" in chosen:
-        chosen["thresholds"] = _table(chosen["thresholds"])
-    for name in ("weights", "shares", "proportions"):
-        if name in chosen:
-            chosen[name] = tuple(numbers(f"--{name}", chosen[name]))
-    channels = chosen.pop("categorical_channels", None)
-    if channels is not None:
-        words = [word.strip() for word in channels.split(",")]
-        if "categorical" in chosen:
-            raise ValueError("--categorical is of all channels and --categorical-channels of some; give one of them")
-        if not all(word.isdecimal() for word in words):
-            raise ValueError(f"--categorical-channels {channels} must be channels parted by commas, as 0,2")
-        chosen["categorical"] = tuple(int(word) for word in words)
-    return chosen
-
-
-def numbers(name: str, text: str) -> list[float]:
-    """Numbers parted by commas. ``a,b,...,z`` goes on from b by the same steps, ``a,...,z`` by steps of a."""
-    words = [word.strip() for word in text.split(",")]
-    try:
-        if "..." not in words:
-            return [float(word) for word in words]
-        gap = words.index("...")
-        begin, (last,) = [float(word) for word in words[:gap]], [float(word) for word in words[gap + 1 :]]
-        step = begin[-1] - begin[-2] if len(begin) > 1 else begin[0]
-        if not step > 0 or not 0 <= (last - begin[-1]) / step <= 1000:
-            raise ValueError
-    except (ValueError, IndexError):
-        raise ValueError(f"{name} {text} must be numbers parted by commas, as 0.1,0.2 or 0.05,0.10,...,0.30") from None
-    steps = int((last - begin[-1]) / step + 1e-9)
-    return [*begin, *(round(begin[-1] + i * step, 9) for i in range(1, steps + 1))]
-
-
-def _table(path: Path) -> list[list[float]]:
-    """Numbers parted by commas or blanks, a line for each level."""
-    from simdtex.io.limits import check_file
-
-    check_file(path, "the thresholds", 2**20)
-    if path.stat().st_size > 2**20:
-        raise ValueError(f"{path} is too long for a table of thresholds; give a line of numbers for each level")
-    try:
-        lines = path.read_text(encoding="utf-8").replace(",", " ").splitlines()
-        return [[float(word) for word in line.split()] for line in lines if line.strip()]
-    except (UnicodeDecodeError, ValueError):
-        raise ValueError(f"{path} is not a table of numbers; give a line of them for each level") from None
-
-
 def candidates_per_level(levels: list[dict[str, Any]]) -> str:
     """The mean candidates of each level that was sampled, the coarsest first."""
     return " ".join(f"{level['candidates']:.3g}" for level in levels[1:])

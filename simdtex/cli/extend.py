@@ -9,11 +9,11 @@ from typing import Any
 
 import click
 
-from simdtex.cli.common import afterwards, command_line, given, plainly, settle, watching
-from simdtex.cli.helping import command
+from simdtex.cli.common import afterwards, command_line, plainly, settle, watching
+from simdtex.cli.helping import OUTPUTS, command
 from simdtex.cli.inputs import channels, check_source_map, read_also, read_material, write_arranged
 from simdtex.cli.keeping import kept
-from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, extend_options, stages_option
+from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, given, job_options, option, stages_option
 from simdtex.cli.places import FOLDER, READ, WRITE, WRITE_PAIR
 
 SIDES = ("top", "bottom", "left", "right")
@@ -35,42 +35,46 @@ SIDES = ("top", "bottom", "left", "right")
     metavar="WIDTHxHEIGHT",
     help="Make an output of this size, in pixels, instead: add at the right and at the bottom.",
 )
-@click.option("--centre", is_flag=True, help="Add on all sides alike, with --size.")
-@click.option(
+@option(
     "--seamless",
-    is_flag=True,
-    help="Make the output tile: in a direction in which nothing is added, make a band along the edges anew.",
+    is_flag=False,
+    flag_value="both",
+    metavar="[x|y|both]",
+    words=("both", "x", "y"),
+    help="Make the output tile: left and right (x), top and bottom (y), or both. In a direction in which nothing is "
+    "added, a band along the edges is made anew.  [both, if no direction is given]",
 )
-@click.option("--seamless-x", is_flag=True, help="Make it tile to the left and right alone.")
-@click.option("--seamless-y", is_flag=True, help="Make it tile to the top and bottom alone.")
 @click.option(
     "--band",
     type=int,
     help="Make this many pixels anew along each edge, with --seamless.  [an eighth of the shorter side, 8 to 64]",
 )
-@click.option(
+@option(
     "--also",
+    group=OUTPUTS,
     multiple=True,
     type=WRITE_PAIR,
     metavar="MAP=OUT",
     help="Extend another map of the material (normal, height) in the same arrangement; may be repeated.",
 )
-@click.option(
+@option(
     "--source-map",
+    group=OUTPUTS,
     type=WRITE,
     metavar="FILE",
     help="Write from where in the picture each pixel is: .npz, .npy or .png.",
 )
 @stages_option("every level and sweep")
-@click.option(
+@option(
     "--report",
+    group=OUTPUTS,
     type=FOLDER,
     metavar="DIR",
     help="Write a page of the run: pictures, and how evenly it uses the picture.",
 )
 @SEED
 @DEVICE
-@extend_options
+@job_options("extend")
 @CHECKPOINT
 @QUIET
 @plainly
@@ -79,10 +83,7 @@ def extend(
     picture: Path,
     output: Path,
     size: str | None,
-    centre: bool,
-    seamless: bool,
-    seamless_x: bool,
-    seamless_y: bool,
+    seamless: str | None,
     band: int | None,
     also: tuple[str, ...],
     source_map: Path | None,
@@ -104,12 +105,10 @@ def extend(
     pixels = whole.pixels[0]
     sides = {name: options.pop(name) for name in SIDES}
     if size is not None:
-        sides = _sides(size, centre, sides, whole.sizes[0])
-    elif centre:
-        raise ValueError("--centre says where the picture lies in --size; give that too")
-    tiling: bool | str = (
-        seamless or (seamless_x and seamless_y) or ("x" if seamless_x else "y" if seamless_y else False)
-    )
+        sides = _sides(size, sides, whole.sizes[0])
+    if seamless not in (None, "x", "y", "both"):
+        raise ValueError(f"--seamless {seamless} is no direction; give x, y or both")
+    tiling: bool | str = seamless if seamless in ("x", "y") else bool(seamless)
     if not (tiling or any(sides.values())):
         raise ValueError("there is nothing to add; give --left, --right, --top, --bottom or --size, or --seamless")
     if band is not None and not tiling:
@@ -153,7 +152,7 @@ def extend(
         )
 
 
-def _sides(text: str, centre: bool, sides: dict[str, int], shape: tuple[int, int]) -> dict[str, int]:
+def _sides(text: str, sides: dict[str, int], shape: tuple[int, int]) -> dict[str, int]:
     """What is to be added on each side for an output of this size."""
     from simdtex.io.image import parse_size
 
@@ -164,5 +163,4 @@ def _sides(text: str, centre: bool, sides: dict[str, int], shape: tuple[int, int
         raise ValueError(
             f"--size {text} is smaller than the picture of {shape[1]}x{shape[0]}; give no less, or crop it first"
         )
-    top, left = (more[0] // 2, more[1] // 2) if centre else (0, 0)
-    return {"top": top, "bottom": more[0] - top, "left": left, "right": more[1] - left}
+    return {"top": 0, "bottom": more[0], "left": 0, "right": more[1]}

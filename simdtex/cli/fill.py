@@ -11,8 +11,8 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.common import given, plainly, settle, watching
-from simdtex.cli.helping import command
+from simdtex.cli.common import plainly, settle, watching
+from simdtex.cli.helping import OUTPUTS, command
 from simdtex.cli.inputs import (
     channels,
     check_source_map,
@@ -21,7 +21,7 @@ from simdtex.cli.inputs import (
     write_arranged,
 )
 from simdtex.cli.keeping import kept
-from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, fill_options
+from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, given, job_options, option
 from simdtex.cli.places import READ, WRITE, WRITE_PAIR
 
 
@@ -55,22 +55,24 @@ from simdtex.cli.places import READ, WRITE, WRITE_PAIR
     type=int,
     help="Fill a hole from what is this near, in pixels.  [128, or twice its longer side]",
 )
-@click.option(
+@option(
     "--also",
+    group=OUTPUTS,
     multiple=True,
     type=WRITE_PAIR,
     metavar="MAP=OUT",
     help="Fill another map of the material (normal, height) in the same arrangement; may be repeated.",
 )
-@click.option(
+@option(
     "--source-map",
+    group=OUTPUTS,
     type=WRITE,
     metavar="FILE",
     help="Write from where in the picture each pixel is: .npz, .npy or .png.",
 )
 @SEED
 @DEVICE
-@fill_options
+@job_options("fill")
 @CHECKPOINT
 @QUIET
 @plainly

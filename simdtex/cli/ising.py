@@ -25,9 +25,9 @@ PICTURE_SWEEPS = 50
 
 @command(
     ("ising -o page", "All schedules, and a report."),
-    ("ising --schedules coloring,synchronous --temperature 2.3", "Two schedules at one temperature."),
+    ("ising --schedule coloring,synchronous --temperature 2.3", "Two schedules at one temperature."),
 )
-@click.option("--schedules", "names", default=SCHEDULES, metavar="A,B,...", help="Try these.  [all kinds there are]")
+@click.option("--schedule", "names", default=SCHEDULES, metavar="A,B,...", help="Try these.  [all kinds there are]")
 @click.option(
     "--temperature",
     "temperatures",

@@ -10,9 +10,7 @@ from typing import Any
 import click
 
 from simdtex.cli.common import (
-    given,
     last_iteration,
-    numbers,
     opened,
     output_shape,
     plainly,
@@ -22,7 +20,7 @@ from simdtex.cli.common import (
 from simdtex.cli.helping import command
 from simdtex.cli.inputs import channels
 from simdtex.cli.keeping import kept
-from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, pyramid_options, stages_option
+from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, given, job_options, numbers, stages_option
 from simdtex.cli.places import READ, WRITE
 
 CHOSEN = ("palette", "pattern", "low", "high")
@@ -38,25 +36,14 @@ CHOSEN = ("palette", "pattern", "low", "high")
 @click.option(
     "--size",
     metavar="WIDTHxHEIGHT",
-    help="Make an output of this size, in pixels.  [that of --start, else twice the first sample]",
+    help="Make an output of this size, in pixels.  [twice the first sample]",
 )
 @click.option("--palette", metavar="SAMPLE", help="Take the colours of this sample.  [those of the pattern]")
 @click.option("--pattern", metavar="SAMPLE", help="Take the pattern of this sample.  [the average of all]")
 @click.option("--average", metavar="W,W,...", help="Take the average of the patterns, a weight for each sample.")
 @click.option("--low", metavar="SAMPLE", help="Take the low frequencies of this sample, with --high.")
 @click.option("--high", metavar="SAMPLE", help="Take the high frequencies of this sample, with --low.")
-@click.option(
-    "--split",
-    type=int,
-    help="Count this many levels among the high frequencies, with --low and --high.  [half of them]",
-)
-@click.option("--blend", metavar="histograms|quantiles", help="Average histograms, or quantiles.  [histograms]")
-@click.option(
-    "--pixels",
-    metavar="palette|pattern",
-    help="Match pixels of the palette, or of the pattern, under --palette.  [palette]",
-)
-@pyramid_options("PICTURE: picture")
+@job_options("mix")
 @SEED
 @DEVICE
 @stages_option("every iteration")
@@ -70,7 +57,6 @@ def mix(
     output: Path,
     size: str | None,
     average: str | None,
-    start: Path | None,
     seed: int | None,
     device: str | None,
     stages: Path | None,
@@ -90,8 +76,7 @@ def mix(
     weights = None if average is None else numbers("--average", average)
     pictures = [image.read(path) for path in samples]
     arrays = [picture.pixels for picture in pictures]
-    begin = image.read(start).pixels if start else None
-    shape = output_shape(size, arrays[0], begin)
+    shape = output_shape(size, arrays[0])
     colour = any(picture.channel_axis is not None for picture in pictures)
     image.check_writable(output, arrays[0].dtype, max(channels(array) for array in arrays))
 
@@ -107,7 +92,7 @@ def mix(
             callback=callback,
             checkpoint=click.get_current_context().obj,
             full_output=True,
-            **given(options | chosen | {"average": weights, "start": begin}),
+            **given(options | chosen | {"average": weights}),
         )
     image.write(output, made)
     settle()

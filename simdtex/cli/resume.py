@@ -15,7 +15,7 @@ from simdtex.cli.common import plainly
 from simdtex.cli.helping import command
 from simdtex.cli.options import DEVICE, QUIET
 from simdtex.cli.places import ENTER
-from simdtex.cli.tiles import cluster_option, resume_tiles, workers_option
+from simdtex.cli.tiles import resume_tiles, workers_option
 
 COMMANDS = ("extend", "fill", "mix", "simulate", "solid", "synth")
 """Those that keep checkpoints."""
@@ -27,23 +27,19 @@ COMMANDS = ("extend", "fill", "mix", "simulate", "solid", "synth")
 )
 @click.argument("folder", metavar="FILE", type=ENTER)
 @workers_option
-@cluster_option
 @DEVICE
 @QUIET
 @plainly
-def resume(folder: Path, workers: int | None, cluster: str | None, device: str | None, quiet: bool) -> None:
+def resume(folder: Path, workers: str | None, device: str | None, quiet: bool) -> None:
     """Go on with the run whose state is in FILE, and write what its command writes.
 
     FILE is that of --checkpoint, or the .zarr store of --tiles.
     """
-    if workers is not None and cluster is not None:
-        raise ValueError("a scheduler has its own workers; give --workers or --cluster, not both")
     if is_store(folder):
-        resume_tiles(folder, workers, cluster, device, quiet)
+        resume_tiles(folder, workers, device, quiet)
         return
-    for name, value in (("workers", workers), ("cluster", cluster)):
-        if value is not None:
-            raise ValueError(f"--{name} goes with the .zarr store of --tiles; leave it out")
+    if workers is not None:
+        raise ValueError("--workers goes with the .zarr store of --tiles; leave it out")
     more = [*(["--device", device] if device else []), *(["--quiet"] if quiet else [])]
     kind(folder)(folder, more)
 

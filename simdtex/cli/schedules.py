@@ -9,17 +9,16 @@ from typing import Any
 
 import click
 
-from simdtex.cli.common import afterwards, command_line, given, plainly, progress_bar
+from simdtex.cli.common import afterwards, command_line, plainly, progress_bar
 from simdtex.cli.helping import command
-from simdtex.cli.options import DEVICE, mrf_options
+from simdtex.cli.options import DEVICE, given, job_options
 from simdtex.cli.places import FOLDER, READ
-from simdtex.methods.mrf import Options
 from simdtex.schedules import TOGETHER
 
 
 @command(
     ("schedules", "Compare them on a picture of brick, in the folder schedules-report."),
-    ("schedules gravel.png -o page --schedules coloring,synchronous --seeds 5", "Two of them, with five seeds."),
+    ("schedules gravel.png -o page --schedule coloring,synchronous --seeds 5", "Two of them, with five seeds."),
 )
 @click.argument("sample", required=False, type=READ)
 @click.option(
@@ -31,7 +30,7 @@ from simdtex.schedules import TOGETHER
     help="Write the report into this folder.",
 )
 @click.option(
-    "--schedules",
+    "--schedule",
     "names",
     default=",".join(TOGETHER),
     metavar="A,B,...",
@@ -47,16 +46,7 @@ from simdtex.schedules import TOGETHER
 @click.option(
     "--size", default="96x96", show_default=True, metavar="WIDTHxHEIGHT", help="Make outputs of this size, in pixels."
 )
-@mrf_options
-@click.option(
-    "--array", default="maspar-mp1-16k", show_default=True, help="Count on this processor array, or one of ROWSxCOLS."
-)
-@click.option(
-    "--mapping",
-    default=Options.mapping,
-    show_default=True,
-    help="Lay pixels onto the array in this way, or hierarchical.",
-)
+@job_options("schedules")
 @DEVICE
 @click.option("-q", "--quiet", is_flag=True, help="Show no progress and no table.")
 @plainly

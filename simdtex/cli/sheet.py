@@ -9,29 +9,35 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.common import candidates_per_level, given, numbers, output_shape, plainly, progress_bar
+from simdtex.cli.common import candidates_per_level, output_shape, plainly, progress_bar
 from simdtex.cli.helping import command
-from simdtex.cli.options import DEVICE, multires_options
+from simdtex.cli.options import DEVICE, given, job_options, numbers
 from simdtex.cli.places import READ, WRITE
 
 
 @command(
-    ("sheet gravel.png -o sheet.png --alphas 0.1,0.2,0.4", "Three thresholds."),
+    ("sheet gravel.png -o sheet.png --alpha 0.1,0.2,0.4", "Three thresholds."),
 )
 @click.argument("sample", type=READ)
 @click.option("-o", "--output", required=True, type=WRITE, help="Write this sheet.")
 @click.option(
-    "--alphas",
+    "--alpha",
+    "alphas",
     default="0.05,0.10,...,0.30",
     show_default=True,
     metavar="A,B,...",
     help="Make a picture for each of these thresholds; auto is not among them.",
 )
 @click.option(
-    "--betas", default="0,1", show_default=True, metavar="A,B,...", help="Make a row of pictures for each of these."
+    "--beta",
+    "betas",
+    default="0,1",
+    show_default=True,
+    metavar="A,B,...",
+    help="Make a row of pictures for each of these.",
 )
 @click.option("--size", metavar="WIDTHxHEIGHT", help="Make pictures of this size, in pixels.  [twice the sample]")
-@multires_options
+@job_options("sheet")
 @click.option("--seed", type=int, help="Make every picture from this seed.  [a fresh one, printed]")
 @DEVICE
 @click.option("-q", "--quiet", is_flag=True, help="Show no progress bar and no numbers.")
@@ -60,14 +66,14 @@ def sheet(
     picture = image.read(sample)
     height, width = picture.pixels.shape[:2]
     shape = output_shape(size, picture.pixels)
-    across = numbers("--alphas", alphas)
+    across = numbers("--alpha", alphas)
     seed = as_seed(seed)
     with progress_bar(quiet) as show:
         made = series(
             picture.pixels,
             shape,
             across,
-            numbers("--betas", betas),
+            numbers("--beta", betas),
             channel_axis=picture.channel_axis,
             rng=seed,
             device=device,

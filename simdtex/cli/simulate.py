@@ -12,12 +12,12 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.common import afterwards, command_line, given, output_shape, plainly, settle, watching
+from simdtex.cli.common import afterwards, command_line, output_shape, plainly, settle, watching
 from simdtex.cli.guides import read_guides
-from simdtex.cli.helping import command
+from simdtex.cli.helping import DATA, DEVICE_GROUP, OUTPUTS, command
 from simdtex.cli.inputs import read_known, read_masks, read_material
 from simdtex.cli.keeping import kept
-from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, simulate_options
+from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, given, job_options, option
 from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
 
 
@@ -43,38 +43,45 @@ from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
     metavar="WIDTHxHEIGHT",
     help="Make realisations of this size, in pixels.  [that of --known, else of TRAINING_IMAGE]",
 )
-@click.option(
+@option(
     "--known",
+    group=DATA,
     type=READ,
     metavar="FILE",
     help="Honour these hard data in every realisation: a table x,y,value (.csv), or a picture that is NaN or "
     "transparent where nothing is known.",
 )
-@click.option(
+@option(
     "--sample-mask",
+    group=DATA,
     multiple=True,
     type=READ,
     metavar="FILE",
     help="Use the training image only where this picture is white; once for each of several.",
 )
-@click.option(
+@option(
     "--guide",
+    group=DATA,
     type=READ_PAIR,
     metavar="A[,B...]=OUT",
     help="Follow secondary data: of each training image, and of the realisations.",
 )
-@click.option(
-    "--jobs", type=int, help="Make this many realisations at a time.  [one for each core, at most 4; on a GPU 1]"
+@option(
+    "--jobs",
+    group=DEVICE_GROUP,
+    type=int,
+    help="Make this many realisations at a time.  [one for each core, at most 4; on a GPU 1]",
 )
-@click.option(
+@option(
     "--report",
+    group=OUTPUTS,
     type=FOLDER,
     metavar="DIR",
     help="Write a page: realisations, shares, entropy, variograms, connectivity, variety.",
 )
 @SEED
 @DEVICE
-@simulate_options
+@job_options("simulate")
 @CHECKPOINT
 @QUIET
 @plainly

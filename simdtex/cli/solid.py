@@ -11,14 +11,12 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.common import afterwards, given, last_iteration, opened, plainly, settle, watching
-from simdtex.cli.helping import command
+from simdtex.cli.common import afterwards, last_iteration, opened, plainly, settle, watching
+from simdtex.cli.helping import OUTPUTS, command
 from simdtex.cli.keeping import kept
-from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, option, pyramid_options, stages_option
+from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, given, job_options, option, stages_option
 from simdtex.cli.places import EITHER, READ, WRITE
-from simdtex.methods.pyramid import solid as method
 
-DEFAULTS = method.Options()
 SIDE = 128
 """Voxels a side, where no size is given."""
 
@@ -43,19 +41,17 @@ SIDE = 128
 @click.option(
     "--size",
     metavar="DEPTHxHEIGHTxWIDTH",
-    help="Make a block of this many slices, rows and columns, the depth first, or a cube of one number.  "
-    f"[that of --start, else {SIDE}]",
+    help=f"Make a block of this many slices, rows and columns, the depth first, or a cube of one number.  [{SIDE}]",
 )
-@click.option(
+@option(
     "--view",
     "picture",
+    group=OUTPUTS,
     type=WRITE,
     metavar="PNG",
     help="Write a picture of it: a cube, a sphere and three slices.",
 )
-@option("--solids", help=f"Match the three families of slices in turns, or take their average.  [{DEFAULTS.solids}]")
-@option("--slices", help=f"Match the slices of a family together, or each alone.  [{DEFAULTS.slices}]")
-@pyramid_options("BLOCK: block")
+@job_options("solid")
 @SEED
 @DEVICE
 @stages_option("the middle slice of every iteration")
@@ -69,7 +65,6 @@ def solid(
     outputs: tuple[Path, ...],
     size: str | None,
     picture: Path | None,
-    start: Path | None,
     seed: int | None,
     device: str | None,
     stages: Path | None,
@@ -88,9 +83,6 @@ def solid(
     shape = (SIDE, SIDE, SIDE) if size is None else block_shape(size)
     read = image.read(sample)
     pixels = read.pixels
-    begin = volume.read(start) if start else None
-    if begin is not None and size is None:
-        shape = begin.shape[0], begin.shape[1], begin.shape[2]
     channels = 1 if read.channel_axis is None else pixels.shape[-1]
     for output in outputs:
         volume.check_writable(output, pixels.dtype, channels)
@@ -108,7 +100,7 @@ def solid(
             callback=callback,
             checkpoint=click.get_current_context().obj,
             full_output=True,
-            **given(options | {"start": begin}),
+            **given(options),
         )
     seconds = time.perf_counter() - began
     for output in outputs:

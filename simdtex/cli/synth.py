@@ -13,7 +13,6 @@ from simdtex.cli.common import (
     afterwards,
     candidates_per_level,
     command_line,
-    given,
     last_iteration,
     opened,
     output_shape,
@@ -22,7 +21,7 @@ from simdtex.cli.common import (
     watching,
 )
 from simdtex.cli.guides import read_guides
-from simdtex.cli.helping import command
+from simdtex.cli.helping import DATA, OUTPUTS, command
 from simdtex.cli.inputs import (
     channels,
     check_source_map,
@@ -33,7 +32,18 @@ from simdtex.cli.inputs import (
     write_arranged,
 )
 from simdtex.cli.keeping import kept
-from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, method_options, option, stages_option
+from simdtex.cli.options import (
+    CHECKPOINT,
+    DEVICE,
+    METHODS,
+    PROFILE,
+    QUIET,
+    SEED,
+    given,
+    job_options,
+    option,
+    stages_option,
+)
 from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR, WRITE, WRITE_PAIR
 from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 
@@ -51,71 +61,63 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 @click.option(
     "--size",
     metavar="WIDTHxHEIGHT",
-    help="Make an output of this size, in pixels.  [that of the picture of --known, of the output's guide, or of "
-    "--start, else twice the first sample]",
+    help="Make an output of this size, in pixels.  [that of the picture of --known, of the output's guide, "
+    "else twice the first sample]",
 )
 @option(
     "--method",
     default="mrf",
     show_default=True,
+    words=METHODS["synth"],
     help="Use Paget and Longstaff's method (mrf), De Bonet's (multires), or Heeger and Bergen's (pyramid).",
 )
-@click.option(
+@option(
     "--sample-mask",
+    group=DATA,
     multiple=True,
     type=READ,
     metavar="FILE",
     help="mrf: take pixels only where this picture of the sample's size is white; once for each sample.",
 )
-@click.option(
+@option(
     "--known",
+    group=DATA,
     type=READ,
     metavar="FILE",
     help="mrf: keep what is known of the output: a table of x, y and values (.csv, .tsv, .txt, .dat), or a picture "
     "that is transparent or NaN where it is not known.",
 )
-@click.option(
+@option(
     "--guide",
+    group=DATA,
     type=READ_PAIR,
     metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
     help="mrf: take each place of the output from where the first of these two pictures, of labels or numbers, has "
     "what the second has there. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples.",
 )
-@method_options
-@option(
-    "--schedule",
-    help="mrf: relax sites together by coloring, coloring-fixed, luby, checkerboard, synchronous, "
-    "random-subset[:P], raster, random-scan or block[:ROWSxCOLS].  [{mrf.schedule}]",
-)
-@click.option(
-    "--check-schedule",
-    is_flag=True,
-    default=None,
-    help="mrf: check at every step that sites are independent, equation (14).",
-)
-@click.option(
-    "--array",
-    metavar="ROWSxCOLS",
-    help="mrf: count the work on a processor array of this size, or on maspar-mp1-1k to -16k.",
-)
-@option("--mapping", help="mrf: lay pixels onto the array in this way.  [{mrf.mapping}]")
-@click.option("--accounting", is_flag=True, help="mrf: print what the run costs on the array, or on a full MP-1.")
+@job_options("synth")
 @SEED
 @DEVICE
 @stages_option("every level, sweep or iteration")
-@click.option(
-    "--source-map", type=WRITE, metavar="FILE", help="Write from where in the sample each pixel is: .npz, .npy or .png."
+@option(
+    "--source-map",
+    group=OUTPUTS,
+    type=WRITE,
+    metavar="FILE",
+    help="Write from where in the sample each pixel is: .npz, .npy or .png.",
 )
-@click.option(
+@option(
     "--also",
+    group=OUTPUTS,
     multiple=True,
     type=WRITE_PAIR,
     metavar="MAP=OUT",
     help="Carry the arrangement over to another map of the material (normal, height); may be repeated. Give "
     "MAP0,MAP1=OUT for several samples.",
 )
-@click.option(
+@option(
     "--report",
+    group=OUTPUTS,
     type=FOLDER,
     metavar="DIR",
     help="Write a page of the run: pictures, and how evenly it uses the sample.",
@@ -134,17 +136,14 @@ def synth(
     sample_mask: tuple[Path, ...],
     known: Path | None,
     guide: str | None,
-    start: Path | None,
     seed: int | None,
     device: str | None,
     stages: Path | None,
     source_map: Path | None,
     also: tuple[str, ...],
     report: Path | None,
-    accounting: bool,
     tiles: int | None,
-    workers: int | None,
-    cluster: str | None,
+    workers: str | None,
     dry_run: bool,
     profile: bool,
     quiet: bool,
@@ -158,8 +157,6 @@ def synth(
     from simdtex.synthesis import synthesize
 
     check_tiles(click.get_current_context())
-    if accounting and method != "mrf":
-        raise ValueError(f"--accounting is of the method mrf, not {method}; leave it out")
     if method == "pyramid" and (source_map or also):
         raise ValueError("the method pyramid takes no pixel from the sample; leave --source-map and --also out")
     material = read_material(samples)
@@ -167,8 +164,7 @@ def synth(
     masks = read_masks(sample_mask, material)
     values = read_known(known, pixels) if known else None
     guides = read_guides(guide, material, options["labels"]) if guide else None
-    begin = image.read(start).pixels if start else None
-    shape = output_shape(size, pixels, values, guides and guides.output, begin)
+    shape = output_shape(size, pixels, values, guides and guides.output)
     if guides:
         options["labels"] = guides.labels
     inputs = {
@@ -205,7 +201,7 @@ def synth(
             checkpoint=click.get_current_context().obj,
             full_output=True,
             **inputs,
-            **given(options | {"start": begin}),
+            **given(options),
         )
     write_arranged(output, made, others, source_map, run.source)
     if report:
@@ -231,7 +227,7 @@ def synth(
         from simdtex.report.terminal import print_profile
 
         print_profile(run.statistics)
-    if accounting:
+    if options["array"] and not quiet:
         from simdtex.report.terminal import print_accounting
 
         print_accounting(run.statistics["accounting"])

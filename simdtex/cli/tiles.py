@@ -12,19 +12,21 @@ from typing import Any
 import click
 
 from simdtex.cli.common import Ended, give_up, number_of, progress_bar
+from simdtex.cli.helping import RUNS
+from simdtex.cli.options import option
 
-ALONE = ("stages", "source_map", "also", "report", "start", "accounting", "profile", "array", "check_schedule")
+ALONE = ("stages", "source_map", "also", "report", "profile", "array")
 """Options that are of a picture which one process holds."""
 
 
 def tiles_options(command: Callable[..., None]) -> Callable[..., None]:
-    """``--tiles`` and what goes with it."""
+    """Add ``--tiles`` and what goes with it."""
     for one in (
-        click.option("--dry-run", is_flag=True, help="Print the plan of --tiles, and do nothing."),
-        cluster_option,
+        option("--dry-run", group=RUNS, is_flag=True, help="Print the plan of --tiles, and do nothing."),
         workers_option,
-        click.option(
+        option(
             "--tiles",
+            group=RUNS,
             type=int,
             metavar="SIDE",
             help="mrf: make the output in tiles of this many pixels to the side, into a .zarr store: for sizes beyond "
@@ -35,19 +37,30 @@ def tiles_options(command: Callable[..., None]) -> Callable[..., None]:
     return command
 
 
-workers_option = click.option(
-    "--workers", type=int, metavar="N", help="Start N processes on this machine to do the tiles."
+workers_option = option(
+    "--workers",
+    group=RUNS,
+    metavar="N|ADDRESS",
+    help="Start N processes on this machine to make the tiles, or use the workers of the Dask scheduler at "
+    "tcp://HOST:8786.",
 )
-cluster_option = click.option(
-    "--cluster", metavar="ADDRESS", help="Have the tiles done by the workers of a Dask scheduler: tcp://HOST:8786."
-)
+
+
+def workers_of(text: str | None) -> int | str | None:
+    """Return the number of processes or the address that ``--workers`` names."""
+    if text is None or "://" in text:
+        return text
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"--workers {text} is neither a number nor an address as tcp://HOST:8786") from None
 
 
 def check_tiles(context: click.Context) -> None:
     """Raise where options are given that do not go with one another."""
     given = context.params
     if given["tiles"] is None:
-        for name in ("workers", "cluster", "dry_run"):
+        for name in ("workers", "dry_run"):
             if given[name]:
                 raise ValueError(f"--{name.replace('_', '-')} goes with --tiles; give the side of a tile, as 2048")
         return
@@ -58,8 +71,6 @@ def check_tiles(context: click.Context) -> None:
             raise ValueError(f"--{name.replace('_', '-')} is of an output at once; leave it out, or --tiles")
     if given["output"].suffix.lower() != ".zarr":
         raise ValueError(f"{given['output']} is no .zarr store, which tiles are written to; end its name in .zarr")
-    if given["workers"] is not None and given["cluster"] is not None:
-        raise ValueError("a scheduler has its own workers; give --workers or --cluster, not both")
     if given.get("checkpoint"):
         raise ValueError("the store of --tiles is a checkpoint itself; leave --checkpoint out")
 
@@ -71,20 +82,20 @@ def synthesize_in_tiles(context: click.Context, sample: Any, shape: tuple[int, i
     given, began = context.params, time.perf_counter()
     output: Path = given["output"]
     plan_of = {name: value for name, value in options.items() if name not in ("rng", "device")}
-    plan = distributed.plan(
-        sample, shape, tiles=given["tiles"], workers=1 if given["workers"] is None else given["workers"], **plan_of
-    )
+    workers = workers_of(given["workers"])
+    count = workers if isinstance(workers, int) else 1
+    plan = distributed.plan(sample, shape, tiles=given["tiles"], workers=count, **plan_of)
     if given["dry_run"] or not given["quiet"]:
         for line in plan.lines():
             click.echo(line, err=not given["dry_run"])
     if given["dry_run"]:
         return
-    with _crew(given["workers"], given["cluster"]) as crew, _shown(output, given["quiet"]) as callback:
+    with _crew(workers) as crew, _shown(output, given["quiet"]) as callback:
         distributed.synthesize(sample, shape, output, tiles=given["tiles"], callback=callback, **crew, **options)
     _done(output, given["quiet"], began)
 
 
-def resume_tiles(store: Path, workers: int | None, cluster: str | None, device: str | None, quiet: bool) -> None:
+def resume_tiles(store: Path, workers: str | None, device: str | None, quiet: bool) -> None:
     """Go on with an output in tiles."""
     from simdtex import distributed
 
@@ -92,17 +103,17 @@ def resume_tiles(store: Path, workers: int | None, cluster: str | None, device: 
     if distributed.finished(store):
         click.echo(f"{store} is finished; there is nothing to go on with")
         return
-    with _crew(workers, cluster) as crew, _shown(store, quiet) as callback:
+    with _crew(workers_of(workers)) as crew, _shown(store, quiet) as callback:
         distributed.resume(store, device=device, callback=callback, **crew)
     _done(store, quiet, began)
 
 
 @contextmanager
-def _crew(workers: int | None, cluster: str | None) -> Iterator[dict[str, Any]]:
+def _crew(workers: int | str | None) -> Iterator[dict[str, Any]]:
     """Who does the tiles, as keywords."""
     from simdtex.distributed.cluster import connected
 
-    with connected(workers, cluster) as client:
+    with connected(workers) as client:
         if client is not None and not client.scheduler_info(n_workers=-1)["workers"]:
             click.echo("the scheduler has no workers yet; start some with: dask worker ADDRESS", err=True)
         yield {} if client is None else {"client": client}

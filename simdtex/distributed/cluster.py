@@ -69,23 +69,22 @@ def across(client: Client, store: Store, device: str | None) -> Execute:
 
 
 @contextmanager
-def connected(workers: int | None, cluster: str | None) -> Iterator[Client | None]:
-    """A client of the cluster that is asked for: of one's own on this machine, of a scheduler's, or none."""
-    if workers is None and cluster is None:
+def connected(workers: int | str | None) -> Iterator[Client | None]:
+    """Yield a client of a cluster of so many processes on this machine, of the scheduler at an address, or None."""
+    if workers is None:
         yield None
         return
     Client, LocalCluster = _libraries()
-    if cluster is not None:
+    if isinstance(workers, str):
         try:
-            client = Client(cluster, timeout=10)
+            client = Client(workers, timeout=10)
         except (OSError, ValueError) as error:
-            raise ValueError(f"no scheduler answers at {cluster}; start one with: dask scheduler") from error
+            raise ValueError(f"no scheduler answers at {workers}; start one with: dask scheduler") from error
         with client:
             yield client
         return
     from simdtex.distributed.cores import Cores
 
-    assert workers is not None
     whole("workers", workers, 1, 4 * (os.cpu_count() or 1))
     each = max(1, (os.cpu_count() or 1) // workers)
     limits = {name: str(each) for name in ("POCL_MAX_PTHREAD_COUNT", "POCL_CPU_MAX_CU_COUNT")}

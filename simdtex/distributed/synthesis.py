@@ -153,7 +153,7 @@ def resume(
     where = _address(store)
     opened = _opened(where)
     _workers(client, workers)
-    with nullcontext() if "://" in where else exclusive(where), connected(workers, None) as own:
+    with nullcontext() if "://" in where else exclusive(where), connected(workers) as own:
         crew = client or own
         if crew is not None and not (device is None or isinstance(device, (str, int))):
             raise TypeError("each worker opens its own device; give its name, not an open machine")

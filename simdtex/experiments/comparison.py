@@ -269,8 +269,6 @@ def compare(
     channel_axis: int | None = None,
     device: str | Machine | None = None,
     callback: Callable[[Now], Any] | None = None,
-    array: str | None = None,
-    mapping: str = "cut-and-stack",
     **options: Any,
 ) -> Comparison:
     """Run the same job under several schedules, and measure each.
@@ -291,11 +289,9 @@ def compare(
         As in `simdtex.synthesize`; all runs are on one machine.
     callback : callable, optional
         Called with a `Now` several times a second; an exception ends the comparison.
-    array, mapping : str, optional
-        The processor array that the runs are counted on, see `simdtex.methods.mrf.Options`.
     **options
-        Of the method ``mrf``, see `simdtex.methods.mrf.Options`; ``preset`` too. ``search`` is ``"exact"`` unless
-        given: a schedule is judged by the model, not by a list of candidates.
+        Of the method ``mrf``, see `simdtex.methods.mrf.Options`, which says what defaults differ in ``schedules``:
+        ``search`` is ``"exact"``, since a schedule is judged by the model, not by a list of candidates.
 
     Returns
     -------
@@ -339,7 +335,7 @@ def compare(
     _check_distinct("seed", keys)
     if "schedule" in options:
         raise TypeError("schedule is no option here; give schedules, a sequence of them")
-    settled = resolve(Options, "schedules", options | {"array": array, "mapping": mapping})
+    settled = resolve(Options, "schedules", options)
     pixels = check_sample(sample, channel_axis)
     size = _check_sides(pixels.shape[:2], shape)
     job = _Job(np.asarray(sample), pixels, channel_axis, open_machine(device, profile=True), vars(settled))
@@ -351,7 +347,7 @@ def compare(
             job.warm_up(schedule, size, tell)
         found[schedule.name].append(job.run(schedule, seed, size, tell))
     entries = [Entry(name, done[0][1], tuple(run for run, _ in done)) for name, done in found.items()]
-    settings = {name: value for name, value in job.settings.items() if name not in ("schedule", "check_schedule")}
+    settings = {name: value for name, value in job.settings.items() if name != "schedule"}
     return Comparison(job.sample, size, channel_axis, tuple(keys), job.machine.name, settings, tuple(entries))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import schedules
-from simdtex.maspar.array import MAPPINGS, parse_array
+from simdtex.maspar.array import ARRAYS, parse_array
 from simdtex.model.lattice import MOST_ORDER
 from simdtex.model.pictures import Pictures
 from simdtex.options import (
@@ -55,7 +55,6 @@ def check_categorical(value: Any) -> None:
 
 
 ALL = ("synth", "fill", "extend", "simulate", "schedules")
-TEXTURES = ("synth", "extend", "simulate", "schedules")
 DATA = ("synth", "fill", "extend", "simulate")
 
 appearance = partial(option, group="Appearance", shown=ALL)
@@ -78,7 +77,7 @@ class Options:
         18,
         Whole(1, MOST_ORDER),
         "Compare neighbours within sqrt(order) pixels: 8 has 24 of them, 18 has 60; more keep larger shapes",
-        more="The time grows with their number.",
+        more="The time grows with the number of neighbours.",
         symbol="o of equation (3)",
         slider=(2, 40, 1),
     )
@@ -126,9 +125,9 @@ class Options:
         Number(0, WIDEST),
         "Blend seams over this many pixels; 0 keeps every pixel as one of the sample's",
         more="Each output pixel is the mean of what its neighbours' sources say of it, with Gaussian weights of this "
-        "standard deviation, 0.01 to 16 or 0.",
-        none="1.5; 0 if a sample has 16 different pixels or fewer, since categories have no mean, and with "
-        '``pixel="density"``',
+        "standard deviation, 0.01 to 16 or 0. A sample of 16 different pixels or fewer is taken for categories, which "
+        "have no mean.",
+        none="1.5; 0 for samples of 16 different pixels or fewer, and for pixels of the density",
         unit="pixels",
         paper=0.0,
         slider=(0, 4, 0.25),
@@ -139,14 +138,16 @@ class Options:
         "Keep this many candidates of the sample at the coarsest of the default levels, at least; the fewer, the more "
         "of its layout comes out again",
         paper=64,
-        shown=TEXTURES,
+        shown=(),
         slider=(16, 1024, 16),
     )
     levels: int | None = scales(
         None,
         Whole(1),
         "Go through this many levels, from coarse to fine",
-        none="as many as leave the sample `overview` candidates, and the output's lattice a whole neighbourhood",
+        more="By default the sample has `overview` candidates or more at the coarsest level, and the output's lattice "
+        "holds a whole neighbourhood; in ``fill`` the hole decides.",
+        none="as many as sample and output allow",
         symbol="M of Algorithm 1",
         slider=(1, 8, 1),
     )
@@ -160,8 +161,8 @@ class Options:
     edges: str = scales(
         "auto",
         Choice(("auto", "reflect", "whole")),
-        "Take candidates with their whole neighbourhood in the sample (whole), or all, with neighbourhoods completed "
-        "by reflection at its edges (reflect), or reflect at all levels but the finest (auto)",
+        "Take candidates whose whole neighbourhood is in the sample (whole), or all, completed by reflection "
+        "(reflect), or reflect at all levels but the finest (auto)",
         more="``auto`` reflects at the finest level too if fewer than three quarters of the positions have a whole "
         "neighbourhood.",
         symbol="equation (4)",
@@ -173,6 +174,7 @@ class Options:
         "Take candidates at coarse levels from all positions of the sample, or from the decimated sample",
         symbol="equation (10)",
         paper="decimated",
+        shown=(),
     )
     search: str = searching(
         "auto",
@@ -189,12 +191,14 @@ class Options:
         Whole(1),
         "Let this many nearest neighbours suggest a candidate each, in a coherent search",
         slider=(1, 24, 1),
+        shown=(),
     )
     similar: int = searching(
         0,
         Whole(0, SIMILAR),
         "Weigh this many more candidates that are like each of these, in a coherent search",
         slider=(0, 8, 1),
+        shown=(),
     )
     chance: int = searching(
         4,
@@ -202,12 +206,14 @@ class Options:
         "Weigh this many more candidates at random, in a coherent search",
         jobs={"fill": 16, "extend": 16},
         slider=(0, 32, 1),
+        shown=(),
     )
     exhaustive: int = searching(
         64,
         Whole(0),
         "Weigh all candidates at levels with this many or fewer, in a coherent search",
         slider=(0, 1024, 16),
+        shown=(),
     )
     relaxation: str = sampling(
         "icm",
@@ -240,6 +246,7 @@ class Options:
         "Sweep over all sites, also those of the coarser level, this many times after the equilibrium of a level",
         paper=0,
         slider=(0, 8, 1),
+        shown=("fill", "extend", "simulate", "schedules"),
     )
     pixel: str = sampling(
         "source",
@@ -254,32 +261,22 @@ class Options:
         "Let the coarsest level draw (gibbs), or relax as the others (same)",
         more="Its mode says nothing while all is unknown.",
         paper="same",
+        shown=(),
     )
     schedule: str | schedules.Schedule = parallel(
         "coloring",
-        Other(schedules.get, "str or simdtex.schedules.Schedule"),
+        Other(schedules.get, "str or simdtex.schedules.Schedule", valid=tuple(schedules.SCHEDULES)),
         "Relax sites together by this schedule: coloring, coloring-fixed, luby, checkerboard, synchronous, "
         "random-subset[:P], raster, random-scan or block[:ROWSxCOLS]",
         symbol="equation (14)",
     )
-    check_schedule: bool = parallel(
-        False,
-        Switch(),
-        "Check at every step that a schedule which claims independent sites keeps equation (14)",
-    )
     array: str | None = parallel(
         None,
-        Other(parse_array, "str"),
-        "Account for the run on this processor array: ROWSxCOLS, or maspar-mp1-1k to maspar-mp1-16k",
+        Other(parse_array, "str", valid=tuple(ARRAYS)),
+        "Account for the run on this processor array: ROWSxCOLS or maspar-mp1-1k to -16k, and maybe :hierarchical",
         more="No byte of the result depends on it.",
         none="packed active sites on a full MP-1",
         jobs={"schedules": "maspar-mp1-16k"},
-        shown=("synth", "schedules"),
-    )
-    mapping: str = parallel(
-        "cut-and-stack",
-        Choice(MAPPINGS),
-        "Lay a picture larger than the array onto it in this way",
         shown=("synth", "schedules"),
     )
     categorical: bool | tuple[int, ...] = data(
@@ -293,6 +290,7 @@ class Options:
         Numbers(),
         "Bring all channels to one spread, times these weights, one for each channel (variable)",
         none="all but categories are on one scale, as colours are",
+        shown=("fill", "extend", "simulate"),
     )
     shares: tuple[float, ...] | None = data(
         None,
@@ -306,13 +304,14 @@ class Options:
         Numbers(),
         "Make this much of the output of each category, in ascending order, kept by a price",
         none="as follows from the sample and the known pixels",
-        shown=("synth", "simulate"),
+        shown=("simulate",),
     )
     data_weight: float = data(
         16.0,
         Number(0),
         "Count a known pixel that is from no sample for this many neighbours",
         jobs={"fill": 4.0, "extend": 4.0},
+        shown=("fill", "extend", "simulate"),
     )
     guide_weight: float = data(
         1.0,
@@ -332,7 +331,7 @@ class Options:
         Number(0, 1),
         "Let this share of a candidate's neighbours be unknown, if the sample is not known everywhere",
         more="They are taken to be as the nearest known pixel.",
-        shown=("synth", "fill", "simulate"),
+        shown=(),
     )
 
     def __post_init__(self) -> None:

@@ -94,9 +94,7 @@ def plan(
     values = round(heavy * (channels * len(offsets) + len(beside)))
     levels, sample = sampled(pictures, levels, offsets, values, options, beside)
     known = planes(given, sample) if given and given.whole.any() else None
-    schedule = schedules.get(options.schedule)
-    schedule = schedules.Checked(schedule) if options.check_schedule else schedule
-    return Plan(sample, shape, offsets, options, schedule, levels, given, known)
+    return Plan(sample, shape, offsets, options, schedules.get(options.schedule), levels, given, known)
 
 
 def sampled(

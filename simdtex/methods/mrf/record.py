@@ -136,7 +136,7 @@ class Record:
         options = run.options
         self.stages: list[Stage] = []
         self.meter = Meter(expected_work(run))
-        array = parse_array(options.array or "maspar-mp1-16k", options.mapping)
+        array = parse_array(options.array or "maspar-mp1-16k")
         self.account = Account(array, packed=options.array is None)
         self.launches = run.machine.launches
         self._run, self._callback = run, callback

@@ -67,7 +67,7 @@ class Options:
         Number(0),
         "Let pieces that meet differ by at most this from what either would continue with, with alpha auto",
         more="0 is nothing, 1 as much as unrelated pieces. See `simdtex.methods.multires.strain`.",
-        shown=("synth",),
+        shown=(),
         slider=(0, 0.5, 0.01),
     )
     target: float | None = appearance(
@@ -75,7 +75,7 @@ class Options:
         Number(1, 2**31),
         "Let alpha auto find this many candidates for a pixel of the coarser levels, on average",
         none="`strain` decides",
-        shown=("synth",),
+        shown=(),
     )
     thresholds: ArrayLike | None = appearance(
         None,
@@ -84,13 +84,14 @@ class Options:
         "first, and a column for all features or one for each",
         none="those of alpha and beta",
         symbol="T of equation (13)",
-        shown=("synth",),
+        shown=(),
     )
     seams: str = appearance(
         "blend",
         Choice(("blend", "cut")),
         "Let the bands of pieces that meet fade into each other over a pixel of each level (blend), or end there (cut)",
         paper="cut",
+        shown=(),
     )
     parity: str = appearance(
         "match",
@@ -98,12 +99,14 @@ class Options:
         "Take a candidate from even or odd rows and columns, as the pixel's are (match), or from any (free)",
         symbol="equation (8)",
         paper="free",
+        shown=(),
     )
     features: str = appearance(
         "luminance",
         Choice(("luminance", "channels")),
         "Make features of the luminance, or of every channel",
         more="Bands are copied with all their channels.",
+        shown=(),
     )
     levels: int | None = scales(
         None,
@@ -139,6 +142,7 @@ class Options:
         "Make the Gaussian of the filters this wide",
         unit="pixels",
         slider=(0.3, 3, 0.1),
+        shown=(),
     )
     filter_size: int = scales(
         3,
@@ -146,6 +150,7 @@ class Options:
         "Give filters this many rows and columns, an odd number",
         more="A level smaller than that has no responses.",
         slider=(3, 15, 2),
+        shown=(),
     )
 
     def __post_init__(self) -> None:

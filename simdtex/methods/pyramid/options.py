@@ -40,24 +40,27 @@ class Options:
         Choice(("rank", "lookup")),
         "Match histograms exactly, by rank, or by the paper's lookup tables",
         paper="lookup",
+        shown=(),
     )
-    bins: int = appearance(256, Whole(2, 4096), "Give the lookup tables this many bins", slider=(2, 1024, 2))
+    bins: int = appearance(256, Whole(2, 4096), "Give the lookup tables this many bins", shown=())
     color: str = appearance(
         "decorrelate",
         Choice(("decorrelate", "channels")),
         "Match the decorrelated channels, or the channels as they are",
+        shown=("mix", "solid"),
     )
     start: ArrayLike | None = appearance(
         None,
         Other(partial(real_array, "start"), "array"),
         "Begin with this, of the output's shape, with the sample's channels",
         none="noise",
+        shown=(),
     )
     levels: int | None = scales(
         None,
         Whole(0),
         "Go through this many levels of the pyramids",
-        none="as many as leave a low-pass residue of 8 pixels a side, of the sample and of the output",
+        none="as many as leave 8 pixels a side",
         slider=(0, 8, 1),
     )
     edges: str = scales(

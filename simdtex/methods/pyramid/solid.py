@@ -52,7 +52,6 @@ class Options(pyramid.Options):
         "and average the solids",
         more='This matters with ``pyramid="steerable"``: the Laplacian pyramid of the block comes first.',
         paper="average",
-        shown=("solid",),
         group="Appearance",
     )
     slices: str = option(
@@ -60,7 +59,6 @@ class Options(pyramid.Options):
         Choice(("each", "together")),
         "Match the histograms of a family's slices together, or each alone",
         paper="each",
-        shown=("solid",),
         group="Appearance",
     )
 
