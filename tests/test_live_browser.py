@@ -194,7 +194,7 @@ def test_a_part_options_a_seed_and_an_earlier_result(page, wall):
 
 
 @pytest.mark.slow
-def test_a_run_pauses_and_resumes_to_the_same_bytes(page, wall):
+def test_a_run_pauses_resumes_and_is_cancelled(page, wall):
     page.script("page.auto.checked = false")
     drop(page.driver, wall)
     page.result(1)
@@ -214,6 +214,12 @@ def test_a_run_pauses_and_resumes_to_the_same_bytes(page, wall):
     page.button("Resume").click()
     page.result(2)
     page.assert_command_repeats(wall.parent)
+    page.put("Result height", 4000)
+    page.button("Make the texture").click()
+    until(lambda: page.script("return page.running"))
+    page.button("Cancel").click()
+    until(lambda: page.status == "Cancelled.")
+    assert page.results == 2
 
 
 @pytest.mark.slow
@@ -244,17 +250,6 @@ def test_an_earlier_result_is_shown_during_a_run(page, wall):
     assert not page.one(".strip .current").is_displayed()
     page.all(".strip button")[1].click()
     until(lambda: page.script("return page.view.frame.rows") == 750)
-
-
-@pytest.mark.slow
-def test_a_run_is_cancelled(page, wall):
-    drop(page.driver, wall)
-    page.result(1)
-    page.put("Result height", 4000)
-    until(lambda: page.script("return page.running"))
-    page.button("Cancel").click()
-    until(lambda: page.status == "Cancelled.")
-    assert page.results == 1
 
 
 def test_a_painted_hole_is_filled_and_nothing_else_changes(page, wall, tmp_path):
@@ -349,30 +344,6 @@ def test_everything_is_done_by_the_keyboard_alone(page):
 
 
 @pytest.mark.slow
-def test_a_picture_of_the_command_line_is_made_at_once(chromium, wall):
-    with live(str(wall)) as (_, address):
-        page = Page(chromium, address)
-        page.result(1)
-        assert "wall.png" in page.one(".named").text
-        chromium.close()
-        chromium.switch_to.window(chromium.window_handles[0])
-
-
-@pytest.mark.slow
-def test_two_pages_at_once(page, wall, served, tmp_path):
-    other_wall = tmp_path / "other.png"
-    other_wall.write_bytes(png(texture(64, 72, seed=9)))
-    other = Page(page.driver, served)
-    for one, path in ((page, wall), (other, other_wall)):
-        page.driver.switch_to.window(one.handle)
-        drop(page.driver, path)
-    for one, path in ((page, wall), (other, other_wall)):
-        page.driver.switch_to.window(one.handle)
-        one.result(1)
-        assert path.name in one.command
-
-
-@pytest.mark.slow
 def test_a_page_that_is_loaded_again_has_its_results(page, wall):
     drop(page.driver, wall)
     page.result(1)
@@ -401,24 +372,6 @@ def test_a_killed_server_is_told_and_a_new_one_found(chromium, wall):
 
 
 @pytest.mark.slow
-def test_a_wrong_token_is_told(chromium, served):
-    chromium.get(served.replace(TOKEN, "another-token-than-that"))
-    assert "lacks the right token" in chromium.find_element(By.TAG_NAME, "body").text
-
-
-@pytest.mark.slow
-def test_another_site_reaches_nothing(chromium, served):
-    """A page of another origin opens no connection, although it knows the address."""
-    chromium.get("data:text/html,<title>elsewhere</title>")
-    opened = chromium.execute_async_script(
-        "const done = arguments[1]; const s = new WebSocket(arguments[0]);"
-        "s.onopen = () => done('open'); s.onerror = () => done('refused')",
-        served.replace("http", "ws") + "socket",
-    )
-    assert opened == "refused"
-
-
-@pytest.mark.slow
 def test_what_is_wrong_is_said(page, tmp_path):
     (tmp_path / "text.png").write_text("this is no picture")
     drop(page.driver, tmp_path / "text.png")
@@ -439,26 +392,17 @@ def test_nothing_keeps_people_out(page, wall, dark):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("width", [320, 390, 820, 1400])
-def test_it_fits_a_phone(page, wall, width):
-    shown(page.driver, width=width)
+@pytest.mark.parametrize(("window", "cell"), [(320, None), (390, None), (820, None), (1400, 300), (1400, 850)])
+def test_it_fits_a_phone_and_a_cell_of_a_notebook(page, wall, window, cell):
+    shown(page.driver, width=window)
+    if cell:
+        page.script("document.getElementById('simdtex-live').style.width = arguments[0] + 'px'", cell)
     drop(page.driver, wall)
     page.result(1)
     page.script("document.querySelectorAll('details').forEach((one) => (one.open = true))")
-    assert page.script("return document.documentElement.scrollWidth") <= width
-    assert page.script("return document.querySelector('canvas.view').clientWidth") > 0.4 * min(width, 800)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("width", [300, 620, 850])
-def test_it_fits_a_cell_of_a_notebook(page, wall, width):
-    """Which is narrower than the window."""
-    page.script("document.getElementById('simdtex-live').style.width = arguments[0] + 'px'", width)
-    drop(page.driver, wall)
-    page.result(1)
-    page.script("document.querySelectorAll('details').forEach((one) => (one.open = true))")
-    assert page.script("return document.querySelector('.simdtex').scrollWidth") <= width
-    assert page.script("return document.querySelector('canvas.view').clientWidth") > 0.5 * width
+    scrolled = "document.querySelector('.simdtex')" if cell else "document.documentElement"
+    assert page.script(f"return {scrolled}.scrollWidth") <= (cell or window)
+    assert page.script("return document.querySelector('canvas.view').clientWidth") > 0.4 * min(cell or window, 800)
 
 
 @pytest.mark.slow

@@ -94,51 +94,43 @@ def test_the_page_is_served_to_whoever_knows_the_token(port):
         assert not elsewhere, "nothing is loaded from elsewhere"
 
 
-@pytest.mark.parametrize(
-    "path", ["/", "/live.js", "/wrong/", "/wrong/live.js", f"/{SECRET[:-1]}/", f"/{SECRET}x/", "/%C3%A4/"]
-)
+@pytest.mark.parametrize("path", ["/", "/live.js", "/wrong/live.js", f"/{SECRET[:-1]}/", f"/{SECRET}x/", "/%C3%A4/"])
 def test_a_wrong_token_is_refused(port, path):
     answer, text = get(port, path)
     assert (answer.status, text) == (403, serving.REFUSED)
 
 
-@pytest.mark.parametrize("path", [f"/{SECRET}/x", f"/{SECRET}/session.py", f"/{SECRET}/..%2fsession.py"])
-def test_there_is_nothing_else(port, path):
-    assert get(port, path)[0].status in (403, 404)
+@pytest.mark.parametrize("name", ["x", "session.py", "..%2fsession.py"])
+def test_there_is_nothing_else(port, name):
+    assert get(port, f"/{SECRET}/{name}")[0].status == 404
 
 
-@pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "192.168.1.5", ""])
-def test_another_host_is_refused(port, host):
-    assert get(port, f"/{SECRET}/", Host=host)[0].status == 400
+OWN = ["127.0.0.1", "127.0.0.1:80", "localhost", "LOCALHOST:80", "[::1]", "[::1]:80"]
+OTHER = ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "192.168.1.5", "[fe80::1]:80", ""]
+CASES = [*((host, "127.0.0.1", host in OWN) for host in OWN + OTHER), ("Wall.local:80", "wall.local", True)]
+CASES += [(host, "0.0.0.0", host in [*OWN, "192.168.1.5", "[fe80::1]:80"]) for host in OWN + OTHER]
+
+
+@pytest.mark.parametrize(("host", "address", "own"), CASES)
+def test_a_server_has_its_own_names_alone(host, address, own):
+    assert is_own_name(host, address) is own
+
+
+REFUSED = {
+    "a host": ({"host": "evil.example"}, 400),
+    "no host": ({"host": "x"}, 400),
+    "a token": ({"token": "wrong"}, 403),
+    **{f"origin {origin}": ({"origin": origin}, 403) for origin in (None, "null", "https://127.0.0.1", "http://x")},
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_a_socket_needs_the_host_the_token_and_the_origin(port, case):
+    wrong, status = REFUSED[case]
     with pytest.raises(InvalidStatus) as refused:
-        Client(port, host=host or "x")
-    assert refused.value.response.status_code == 400
-
-
-@pytest.mark.parametrize("host", ["localhost", "LOCALHOST", "[::1]"])
-def test_this_machines_other_names_are_taken(port, host):
-    assert get(port, f"/{SECRET}/", Host=f"{host}:{port}")[0].status == 200
-
-
-def test_an_address_that_others_reach_has_no_names_but_its_own():
-    with running("0.0.0.0") as (port, _):
-        assert get(port, f"/{SECRET}/", Host="192.168.1.5:80")[0].status == 200
-        assert get(port, f"/{SECRET}/", Host="[fe80::1]:80")[0].status == 200
-        assert get(port, f"/{SECRET}/", Host="evil.example")[0].status == 400
-    assert is_own_name("[::1]:80", "127.0.0.1") and is_own_name("Wall.local:80", "wall.local")
-
-
-@pytest.mark.parametrize("origin", [None, "http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"])
-def test_another_origin_is_refused(port, origin):
-    with pytest.raises(InvalidStatus) as refused:
-        Client(port, origin=origin)
-    assert refused.value.response.status_code == 403
-
-
-def test_a_socket_needs_the_token(port):
-    with pytest.raises(InvalidStatus) as refused:
-        Client(port, token="wrong")
-    assert refused.value.response.status_code == 403
+        Client(port, **wrong)
+    assert refused.value.response.status_code == status
+    assert get(port, f"/{SECRET}/", Host="evil.example")[0].status == 400
 
 
 def test_a_page_gives_a_picture_and_takes_a_result_away(port):
@@ -226,33 +218,23 @@ def test_a_message_that_is_too_large_ends_the_connection(monkeypatch):
 # -- the command ------------------------------------------------------------------------------------------------------
 
 
-def started(*words, **environment):
-    """``simdtex live`` in a process of its own, and its address."""
+@pytest.mark.parametrize(("number", "token"), [(signal.SIGINT, ""), (signal.SIGTERM, SECRET)])
+def test_the_command_prints_an_address_serves_it_and_ends(number, token, tmp_path):
+    (tmp_path / "wall.png").write_bytes(png(texture()))
     process = subprocess.Popen(
-        [sys.executable, "-m", "simdtex", "live", "--no-browser", "--device", "reference", *words],
+        [sys.executable, "-m", "simdtex", "live", "--no-browser", "--device", "reference", str(tmp_path / "wall.png")],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env=os.environ | environment,
+        env=os.environ | {TOKEN: token},
     )
-    return process, process.stdout.readline()
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_the_command_prints_an_address_serves_it_and_ends(number):
-    process, line = started()
-    found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/([\w-]{32})/  \(on reference \(NumPy\); Ctrl-C ends it\)\n", line)
+    line = process.stdout.readline()
+    found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/([\w-]+)/  \(on reference \(NumPy\); Ctrl-C ends it\)\n", line)
     assert found, line
-    port, token = int(found[1]), found[2]
-    for _ in range(100):
-        try:
-            answer, _ = get(port, f"/{token}/")
-            break
-        except ConnectionError:
-            time.sleep(0.05)
-    assert answer.status == 200
-    page = Client(port, token)
-    page.say(png(texture()), kind="open", name="a.png")
+    assert found[2] == token or len(found[2]) == 32 and not token
+    assert get(int(found[1]), f"/{found[2]}/")[0].status == 200
+    page = Client(int(found[1]), found[2])
+    assert page.wait("picture")[0]["name"] == "wall.png"
     page.say(**asked(width=400, height=400))
     page.wait("begun")
     process.send_signal(number)
@@ -262,35 +244,10 @@ def test_the_command_prints_an_address_serves_it_and_ends(number):
         page.wait("result")
 
 
-def test_the_token_can_be_given_and_must_be_long():
-    process, line = started(**{TOKEN: SECRET})
-    try:
-        assert f"/{SECRET}/" in line
-    finally:
-        process.kill()
-        process.communicate()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(TOKEN, "short")
-        with pytest.raises(ValueError, match="must be 16 or more letters"):
-            serve(None, "reference", "127.0.0.1", 0, lambda *_: None)
-
-
-def test_a_picture_of_the_command_line_is_there_at_once(tmp_path):
-    (tmp_path / "wall.png").write_bytes(png(texture()))
-    process, line = started(str(tmp_path / "wall.png"))
-    try:
-        _, token, _ = line.split()[0].rsplit("/", 2)
-        port = int(line.split(":")[2].split("/")[0])
-        for _ in range(100):
-            try:
-                page = Client(port, token)
-                break
-            except ConnectionError:
-                time.sleep(0.05)
-        assert page.wait("picture")[0]["name"] == "wall.png"
-    finally:
-        process.kill()
-        process.communicate()
+def test_a_token_is_long(monkeypatch):
+    monkeypatch.setenv(TOKEN, "short")
+    with pytest.raises(ValueError, match="must be 16 or more letters"):
+        serve(None, "reference", "127.0.0.1", 0, lambda *_: None)
 
 
 def test_what_cannot_be_listened_to_is_said(tmp_path):

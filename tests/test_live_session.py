@@ -65,15 +65,7 @@ JOBS = {
 }
 
 
-SLOW = (
-    *("guide-everywhere", "guide-of-a-part", "extend-a-part", "multires-auto", "a result"),
-    *("search", "both", "similar", "suggesting", "edges", "levels"),
-)
-
-
-def cases(names):
-    """The cases of these names; some are like others, and wait for `make slow`."""
-    return [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in names]
+SLOW = ("guide-everywhere", "guide-of-a-part", "extend-a-part", "multires-auto")
 
 
 def assert_lines_repeat(page, number, folder, monkeypatch):
@@ -99,7 +91,7 @@ def assert_lines_repeat(page, number, folder, monkeypatch):
             (folder / name).unlink()
 
 
-@pytest.mark.parametrize("case", cases(JOBS))
+@pytest.mark.parametrize("case", [pytest.param(one, marks=[pytest.mark.slow] * (one in SLOW)) for one in JOBS])
 def test_the_lines_of_a_result_repeat_its_bytes(opened, case, tmp_path, monkeypatch):
     carries = JOBS[case].get("method") != "pyramid"
     opened.ask("maps", png(texture(channels=1, seed=2)), kind="map", name="Height map.png")
@@ -109,10 +101,10 @@ def test_the_lines_of_a_result_repeat_its_bytes(opened, case, tmp_path, monkeypa
     assert_lines_repeat(opened, 1, tmp_path, monkeypatch)
 
 
-@pytest.mark.parametrize("of", cases(["the picture", "a result"]))
-def test_the_lines_of_a_filled_hole_repeat_its_bytes(opened, of, tmp_path, monkeypatch):
+@pytest.mark.parametrize("of_result", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_the_lines_of_a_filled_hole_repeat_its_bytes(opened, of_result, tmp_path, monkeypatch):
     opened.ask("maps", png(texture(channels=1, seed=2)), kind="map", name="h.png")
-    before = None if of == "the picture" else opened.result()["result"]
+    before = opened.result()["result"] if of_result else None
     result = opened.result(job="fill", of=before, hole=[stroke((30, 20), (40, 24)), stroke((35, 22), label=0, width=2)])
     assert set(result["files"]) == {"texture.png", "texture-h.png", "arrangement.npz", "texture.zip"}
     assert_lines_repeat(opened, result["result"], tmp_path, monkeypatch)
@@ -125,49 +117,43 @@ def test_no_file_of_a_package_takes_the_name_of_another(page, name):
     assert {"sample.png", "hole.png", "texture.png"} <= set(page.package(hole["result"]))
 
 
-def test_categories_stay_categories(page):
-    labels = (texture(channels=1) // 80).astype(np.uint8)
-    page.ask("picture", png(labels), kind="open", name="facies.png")
-    result = page.result(options={"categorical": True})
-    assert set(np.unique(page.latest.image)) <= set(np.unique(labels))
-    assert "--categorical" in shlex.split(result["command"])
-
-
-def test_16_bits_stay_16_bits():
-    page = Fake(Picture("deep.tif", texture(channels=1, dtype=np.uint16), None))
-    page.result()
+@pytest.mark.parametrize("kind", ["categories", "16 bits"])
+def test_categories_and_16_bits_stay(kind):
+    deep = kind == "16 bits"
+    pixels = texture(channels=1, dtype=np.uint16) if deep else (texture(channels=1) // 80).astype(np.uint8)
+    page = Fake(Picture("sample.tif", pixels, None))
+    result = page.result(options={} if deep else {"categorical": True})
     _, (data,) = page.ask("file", kind="download", result=1, name="texture.png")
-    assert page.latest.image.dtype == np.uint16
-    np.testing.assert_array_equal(read_bytes("texture.png", data).pixels, page.latest.image)
+    found = read_bytes("texture.png", data).pixels
+    assert found.dtype == pixels.dtype and set(np.unique(found)) <= set(np.unique(pixels))
+    assert ("--categorical" in shlex.split(result["command"])) is not deep
     page.session.close()
 
 
-CHANGES = {
-    "finish": ({"finish": 0.5}, 0),
-    "nothing": ({}, 0),
-    "chance": ({"chance": 8}, "coarsest"),
-    "similar": ({"similar": 2}, "coarsest"),
-    "suggesting": ({"suggesting": 4}, "coarsest"),
-    "exhaustive": ({"exhaustive": 4096}, "coarsest"),
-    "search": ({"search": "exact"}, "coarsest"),
-    "both": ({"search": "exact", "finish": 0}, "coarsest"),
-    "coherence": ({"coherence": 1.0}, None),
-    "overview": ({"overview": 64}, None),
-    "edges": ({"edges": "whole"}, None),
-    "levels": ({"levels": 2}, None),
-}
+COARSEST = 1  # of two levels
+CHANGES = [
+    ({"finish": 0.5}, 0),
+    ({}, 0),
+    ({"chance": 8}, COARSEST),
+    ({"exhaustive": 4096}, COARSEST),
+    *(
+        pytest.param({name: value}, COARSEST, marks=pytest.mark.slow)
+        for name, value in (("similar", 2), ("suggesting", 4))
+    ),
+    pytest.param({"search": "exact", "finish": 0}, COARSEST, marks=pytest.mark.slow),
+    ({"coherence": 1.0}, None),
+    pytest.param({"overview": 64}, None, marks=pytest.mark.slow),
+    pytest.param({"edges": "whole"}, None, marks=pytest.mark.slow),
+    pytest.param({"levels": 1}, None, marks=pytest.mark.slow),
+]
 
 
-@pytest.mark.parametrize("change", cases(CHANGES))
-def test_a_change_restarts_from_the_level_it_affects_and_gives_the_same_bytes(opened, change):
-    options, level = CHANGES[change]
+@pytest.mark.parametrize(("options", "level"), CHANGES, ids=str)
+def test_a_change_restarts_from_the_level_it_affects_and_gives_the_same_bytes(opened, options, level):
     opened.result()
     after = len(opened.got)
     opened.result(options=options)
-    begun, _ = opened.wait("begun", after=after)
-    coarsest = max(opened.session._levels._states)
-    assert coarsest > 0
-    assert begun["from"] == (coarsest if level == "coarsest" else level)
+    assert opened.wait("begun", after=after)[0]["from"] == level
     np.testing.assert_array_equal(opened.latest.image, whole(**options))
 
 
@@ -377,97 +363,71 @@ def test_maps_have_the_pictures_size_and_are_carried_along(opened):
     np.testing.assert_array_equal(np.frombuffer(pixels, np.uint8).reshape(28, 36, 4)[..., 0], carried)
 
 
-WRONG = {
-    "a kind": ({"kind": "rm -rf"}, "the page and simdtex are of different versions; load the page again"),
-    "no kind": ({}, "the page and simdtex are of different versions; load the page again"),
-    "an example": (
-        {"kind": "example", "name": "../x"},
-        "unknown example '../x'; choose one of: brick, grass, gravel",
-    ),
-    "no file": ({"kind": "open", "name": "a.png"}, "no file came with that; give the picture again"),
-    "a result": ({"kind": "select", "result": 5}, "result 5 is no longer kept; make it again with its command line"),
-    "a result's kind": ({"kind": "select", "result": "x"}, "the result must be an integer, not 'x'"),
-    "a size": (asked(width=0), "width is 0; give 1 or more"),
-    "a large size": (asked(height=10**6), "height is 1000000; give 16384 or fewer"),
-    "a size in words": (asked(width="big"), "width must be an integer, not 'big'"),
-    "a seed": (asked(seed=-1), "seed is -1; give 0 or more"),
-    "a job": (asked(job="rm"), "unknown job 'rm'; choose one of: synth, extend, fill"),
-    "a method": (asked(method="os"), "unknown method 'os'; choose one of: mrf, multires, pyramid"),
-    "an option": (asked(options={"array": "4x4"}), "there is no control for 'array'; choose one of: "),
-    "an option's value": (asked(options={"balance": -1}), "balance is -1; give a number of at least 0"),
-    "an option's kind": (asked(options={"balance": [1]}), "balance must be a number, not "),
-    "options": (asked(options={}) | {"options": 3}, "options must be names and values, not 3"),
-    "a part": (asked(part=[40, 0, 20, 20]), "the part reaches beyond the picture of 48x40; choose one within it"),
-    "a small part": (asked(part=[0, 0, 2, 20]), "the width of the part is 2; give 8 or more"),
-    "no part": (asked(part=[1, 2]), "a part of the picture is four numbers: left, top, width and height"),
-    "a guide": (asked(guide=[1]), "a guide is painted on the sample and on the output; paint both"),
-    "half a guide": (
-        asked(guide={"output": [stroke((1, 1))]}),
-        "label 1 is on the output and not on the sample; paint it on the sample too",
-    ),
-    "no hole": (
-        asked(job="fill"),
-        "there is no hole to fill; paint over what is to be replaced",
-    ),
-    "all hole": (
-        asked(job="fill", hole=[stroke((20, 20), width=200)]),
-        "the hole covers the whole picture; leave some of it",
-    ),
-    "strokes": (asked(job="fill", hole="x"), "strokes must be a list; paint again"),
-    "a stroke": (asked(job="fill", hole=[{}]), "a stroke has no points; paint again"),
-    "points": (
-        asked(job="fill", hole=[{"label": 1, "width": 4, "points": [["a", 1]]}]),
-        "a point of a stroke must be two numbers; paint again",
-    ),
-    "far points": (
-        asked(job="fill", hole=[stroke((1e30, 0))]),
-        "a point of a stroke must be two numbers; paint again",
-    ),
-    "a label": (asked(job="fill", hole=[stroke((1, 1), label=99)]), "the label of a stroke is 99; give 8 or fewer"),
-    "many points": (
-        asked(job="fill", hole=[stroke(*[(1, 1)] * 70000)]),
-        "there are more than 65536 points; paint with a wider brush",
-    ),
-    "a look": ({"kind": "view", "width": 0}, "width is 0; give 1 or more"),
-    "a large look": (
-        {"kind": "view", "width": 4096, "height": 4096},
-        "a window has at most 4194304 pixels; make it smaller",
-    ),
-    "a layer": ({"kind": "view", "layer": 3}, "the layer must be a name"),
-    "a file of no result": ({"kind": "download", "result": 1, "name": "/etc"}, "result 1 is no longer kept; make it"),
-}
+def hole(*strokes):
+    return asked(job="fill", hole=list(strokes))
 
 
-@pytest.mark.parametrize("case", WRONG)
-def test_what_is_wrong_is_said_in_a_sentence_and_the_session_goes_on(opened, case):
-    message, sentence = WRONG[case]
-    assert opened.error(**message).startswith(sentence)
+VERSION = "the page and simdtex are of different versions; load the page again"
+POINT = "a point of a stroke must be two numbers; paint again"
+WRONG = [
+    (VERSION, {"kind": "rm -rf"}),
+    (VERSION, {}),
+    ("unknown example '../x'; choose one of: brick, grass, gravel", {"kind": "example", "name": "../x"}),
+    ("no file came with that; give the picture again", {"kind": "open", "name": "a.png"}),
+    ("result 5 is no longer kept; make it again with its command line", {"kind": "select", "result": 5}),
+    ("result 5 is no longer kept;", {"kind": "download", "result": 5, "name": "/etc"}),
+    ("the result must be an integer, not 'x'", {"kind": "select", "result": "x"}),
+    ("width is 0; give 1 or more", asked(width=0)),
+    ("height is 1000000; give 16384 or fewer", asked(height=10**6)),
+    ("width must be an integer, not 'big'", asked(width="big")),
+    ("seed is -1; give 0 or more", asked(seed=-1)),
+    ("unknown job 'rm'; choose one of: synth, extend, fill", asked(job="rm")),
+    ("unknown method 'os'; choose one of: mrf, multires, pyramid", asked(method="os")),
+    ("there is no control for 'array'; choose one of: ", asked(options={"array": "4x4"})),
+    ("balance is -1; give a number of at least 0", asked(options={"balance": -1})),
+    ("balance must be a number, not ", asked(options={"balance": [1]})),
+    ("options must be names and values, not 3", asked() | {"options": 3}),
+    ("the part reaches beyond the picture of 48x40; choose one within it", asked(part=[40, 0, 20, 20])),
+    ("the width of the part is 2; give 8 or more", asked(part=[0, 0, 2, 20])),
+    ("a part of the picture is four numbers: left, top, width and height", asked(part=[1, 2])),
+    ("a guide is painted on the sample and on the output; paint both", asked(guide=[1])),
+    ("label 1 is on the output and not on the sample;", asked(guide={"output": [stroke((1, 1))]})),
+    ("there is no hole to fill; paint over what is to be replaced", hole()),
+    ("the hole covers the whole picture; leave some of it", hole(stroke((20, 20), width=200))),
+    ("strokes must be a list; paint again", asked(job="fill", hole="x")),
+    ("a stroke has no points; paint again", hole({})),
+    (POINT, hole({"label": 1, "width": 4, "points": [["a", 1]]})),
+    (POINT, hole({"label": 1, "width": 4, "points": [[1, 1], [1]]})),
+    (POINT, hole(stroke((1e30, 0)))),
+    ("the label of a stroke is 99; give 8 or fewer", hole(stroke((1, 1), label=99))),
+    ("there are more than 65536 points; paint with a wider brush", hole(stroke(*[(1, 1)] * 70000))),
+    ("width is 0; give 1 or more", {"kind": "view", "width": 0}),
+    ("a window has at most 4194304 pixels; make it smaller", {"kind": "view", "width": 4096, "height": 4096}),
+    ("the layer must be a name", {"kind": "view", "layer": 3}),
+]
+
+
+def test_what_is_wrong_is_said_in_a_sentence_and_the_session_goes_on(opened):
+    for sentence, message in WRONG:
+        assert opened.error(**message).startswith(sentence), sentence
     assert opened.result(method="pyramid", options={"iterations": 0})["result"] == 1
 
 
-FILES = {
-    "empty": (b"", "a.png is empty (0 bytes): give a file with an image in it"),
-    "text": (b"hello", "a.png is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF or .npy file"),
-    "cut": (png(texture())[:100], "a.png cannot be decoded, it is truncated, damaged or of an unknown kind"),
-}
+FILES = [
+    (b"", "a.png is empty (0 bytes): give a file with an image in it"),
+    (b"hello", "a.png is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF or .npy file"),
+    (png(texture())[:100], "a.png cannot be decoded, it is truncated, damaged or of an unknown kind"),
+    (png(texture(50, 48)), "a.png has 2400 pixels and no more than 2000"),
+    (bytes(10001), "the file has 10001 bytes and at most 10000 are taken; give a smaller one"),
+]
 
 
-@pytest.mark.parametrize("case", FILES)
-def test_a_file_that_is_no_picture_is_refused(opened, case):
-    data, sentence = FILES[case]
-    assert opened.error(data, kind="open", name="/home/somebody/a.png").startswith(sentence)
+def test_a_file_that_is_no_picture_is_refused(opened, monkeypatch):
+    monkeypatch.setattr(sessions, "MAX_PIXELS", 2000)
+    monkeypatch.setattr(sessions, "MAX_BYTES", 10000)
+    for data, sentence in FILES:
+        assert opened.error(data, kind="open", name="/home/somebody/a.png").startswith(sentence), sentence
     assert opened.result(method="pyramid", options={"iterations": 0})["result"] == 1
-
-
-def test_a_picture_of_too_many_pixels_or_bytes_is_refused(page, monkeypatch):
-    monkeypatch.setattr(sessions, "MAX_PIXELS", 100)
-    assert page.error(png(texture()), kind="open", name="a.png").startswith(
-        "a.png has 1920 pixels and no more than 100"
-    )
-    monkeypatch.setattr(sessions, "MAX_BYTES", 100)
-    assert page.error(bytes(101), kind="open", name="a.png") == (
-        "the file has 101 bytes and at most 100 are taken; give a smaller one"
-    )
 
 
 def test_an_unforeseen_error_is_told_without_its_words(opened, monkeypatch, caplog):
@@ -504,11 +464,7 @@ FIELDS = ("name", "result", "what", "layer", "left", "top", "width", "height", "
 FIELDS += ("options", "part", "guide", "hole", "of")
 
 
-KINDS = [
-    *("hello", "open", "example", "map", "unmap", "pause", "resume", "cancel", "view", "shown"),
-    "select",
-    "download",
-]
+KINDS = ["hello", "open", "example", "map", "unmap", "pause", "resume", "cancel", "view", "shown", "select", "download"]
 
 
 @given(
