@@ -127,17 +127,8 @@ def processes(device, runs, methods):
             cpu, wall = [], []
             for name, sample in colour.items():
                 write(Path(folder) / f"{name}.png", sample)
-                command = [
-                    sys.executable,
-                    "-m",
-                    "simdtex",
-                    "synth",
-                    f"{name}.png",
-                    "-o",
-                    "more.png",
-                    "--size",
-                    "256x256",
-                ]
+                words = f"-m simdtex synth {name}.png -o more.png --size 256x256"
+                command = [sys.executable, *words.split()]
                 command += [*METHODS[method], "--seed", "1", "--quiet", *(["--device", device] if device else [])]
                 seconds = []
                 for _ in range(1 + runs):

@@ -2,29 +2,24 @@
 """Every figure of the page on multiresolution sampling.
 
     python benchmarks/multires_figures.py [--out docs/multires] [--device TEXT]
-    python benchmarks/multires_figures.py --table [--folder FOLDER] [--device TEXT]
 
-The first writes PNG files, the same bytes every time, and prints their names. The second prints how much edges and
-lines show, for the samples of the studies or for the PNG files of a folder.
+Writes PNG files, the same bytes every time, and prints their names.
 """
 
 import argparse
 from functools import partial
-from io import BytesIO
 from itertools import pairwise, product
 from math import inf
 from pathlib import Path
-from statistics import median
 
 import numpy as np
-import PIL.Image
 import samples
 from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.patches import Patch, Polygon, Rectangle
+from pyramid_figures import png
 
 import simdtex
 from simdtex.experiments.quality import seam
-from simdtex.io.image import read
 from simdtex.methods.multires import tiled
 from simdtex.methods.multires.analysis import pyramid
 from simdtex.methods.multires.mend import mend
@@ -38,16 +33,6 @@ ALPHAS = {0: (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, inf), 1: (0.1, 
 OWN, SIMILAR, FAILS, CANDIDATE = "#0072B2", "#8CC9A8", "#E07B4F", "#E69F00"
 SIBLING, OTHER, UNSEEN, THIRD = "#A9D3EE", "#F8E3B5", "#ECECEA", "#CFE8DA"
 PERIODS = (8, 16, 32)  # of the grids whose lines show
-PAPER = {"edges": "keep", "seams": "cut"}
-SHOWN = {
-    "alpha 0.3, keep, cut": {"alpha": 0.3} | PAPER,
-    "auto, target 1.1, keep, cut": {"alpha": "auto", "target": 1.1} | PAPER,
-    "alpha 0.3, mend, cut": {"alpha": 0.3, "seams": "cut"},
-    "alpha 0.3, keep, blend": {"alpha": 0.3, "edges": "keep"},
-    "alpha 0.3": {"alpha": 0.3},
-    "auto": {"alpha": "auto"},
-    "auto, target 1.1": {"alpha": "auto", "target": 1.1},
-}
 CELL = 160  # side of an output that is shown level by level, pixels; 1.25 tiles
 
 
@@ -55,17 +40,12 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "docs" / "multires")
     parser.add_argument("--device")
-    parser.add_argument("--table", action="store_true")
-    parser.add_argument("--folder", type=Path, metavar="FOLDER", help="PNG files to measure in place of the studies'")
     options = parser.parse_args()
     machine = simdtex.open_machine(options.device)
     print(f"device: {machine.name}")
     options.out.mkdir(parents=True, exist_ok=True)
     collection = samples.grey() | samples.colour()
     gravel, tissue = collection["gravel"], collection["tissue"]
-    if options.table or options.folder:
-        folder = options.folder and sorted(options.folder.glob("*.png"))
-        return table(machine, {path.stem: read(path).pixels for path in folder} if folder else collection)
     made = {
         "pyramid": partial(pyramids, machine, gravel),
         "filters": partial(responses, machine, gravel),
@@ -84,14 +64,6 @@ def main():
         path = options.out / f"{name}.png"
         path.write_bytes(figure())
         print(f"{path}  {path.stat().st_size / 1000:.0f} kB", flush=True)
-
-
-def png(sheet):
-    """A sheet as a PNG, in shades of grey where it has no colours."""
-    grey = (sheet == sheet[..., :1]).all()
-    buffer = BytesIO()
-    PIL.Image.fromarray(sheet[..., 0] if grey else sheet).save(buffer, format="PNG", optimize=True)
-    return buffer.getvalue()
 
 
 # ---------------------------------------------------------------- the first phase
@@ -379,17 +351,6 @@ def lines(picture):
         at = np.arange(1, len(across) + 1) % period == 0
         ratios.append(across[at].mean() / across[~at].mean())
     return float(np.mean(ratios))
-
-
-def table(machine, collection):
-    """How much edges and lines show in textures of each sample, by option."""
-    for how, options in SHOWN.items():
-        made = {name: run(machine, one, 2 * len(one), **options) for name, one in collection.items()}
-        seams, shown = ({name: measure(image) for name, (image, _) in made.items()} for measure in (seam, lines))
-        print(f"{how}: seam {median(seams.values()):.2f}, lines {median(shown.values()):.2f}")
-        for name, (_, output) in made.items():
-            alpha = output.statistics["options"]["alpha"]
-            print(f"    {name:<9} alpha {alpha:<4g} seam {seams[name]:.2f}, lines {shown[name]:.2f}", flush=True)
 
 
 def parities(machine, gravel):

@@ -126,7 +126,7 @@ def sheet(path, cells, columns):
         path,
         columns=columns,
         captions=[caption for *_, caption in cells],
-        one_to_one=True,
+        scale=1,
     )
 
 

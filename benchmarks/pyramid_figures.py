@@ -25,7 +25,7 @@ from simdtex.experiments.quality import seam
 from simdtex.methods.pyramid.pyramids import decompose
 from simdtex.ops.steerable_filters import ORIENTATIONS, filters
 from simdtex.report.plots import FAINT, INK, figure_png, new_figure, tidy
-from simdtex.report.sheet import LEAST_SIDE, contact_sheet, enlarged
+from simdtex.report.sheet import contact_sheet, enlarged
 
 COLOURS = ("#D55E00", "#0072B2", "#56B4E9", "#009E73", "#8A6D00", "#E69F00", "#CC79A7", "#000000")
 
@@ -123,12 +123,6 @@ def png(sheet):
     buffer = BytesIO()
     picture.save(buffer, format="PNG", optimize=True)
     return buffer.getvalue()
-
-
-def framed(picture):
-    """A picture with white beside it, so that a sheet does not enlarge it."""
-    space = [(0, max(0, LEAST_SIDE - n)) for n in picture.shape[:2]]
-    return np.pad(picture, [*space, (0, 0)][: picture.ndim], constant_values=255)
 
 
 # ---------------------------------------------------------------- the pyramid
@@ -246,7 +240,7 @@ def iterations(making):
                 image, statistics = making.run(sample, 144, pyramid=kind, iterations=making.small(count))
                 print(f"  {name}, {kind}, {count:3} iterations: mean distance {moved(statistics):.4f}")
                 pictures.append((f"{kind}, {count}", image))
-    return png(contact_sheet(pictures, columns=4))
+    return png(contact_sheet(pictures, columns=4, scale=1))
 
 
 # ---------------------------------------------------------------- galleries
@@ -258,8 +252,8 @@ def gallery(chosen, making):
         image, statistics = making.run(sample, 192)
         print(f"  {name}: mean distance {moved(statistics):.3f}, seam {seam(image):.2f}")
         kind, _, what = name.rpartition(": ")
-        pictures += [(what, framed(making.crop(sample))), (kind, image)]
-    return png(contact_sheet(pictures, columns=4))
+        pictures += [(what, making.crop(sample)), (kind, image)]
+    return png(contact_sheet(pictures, columns=4, scale=1))
 
 
 def colour(making):
@@ -272,7 +266,7 @@ def colour(making):
     }
     pictures = []
     for name, sample in chosen.items():
-        pictures.append((name, framed(making.crop(sample))))
+        pictures.append((name, making.crop(sample)))
         known = cKDTree(np.unique(making.crop(sample).reshape(-1, 3), axis=0))
         for option in ("decorrelate", "channels"):
             image, _ = making.run(sample, 144, color=option)
@@ -284,7 +278,7 @@ def colour(making):
             alone = making.run(grey, 144)[0].astype(int)
             by = np.abs(pictures[-2][1] - alone[..., None]).max()
             print(f"  gravel as RGB, decorrelated, differs from the grey output by at most {by}")
-    return png(contact_sheet(pictures, columns=3))
+    return png(contact_sheet(pictures, columns=3, scale=1))
 
 
 def edges(making):
@@ -292,7 +286,7 @@ def edges(making):
     chosen = {"brick": data.brick()[:128, :128], "retina": reduced(data.retina(), 2)[330:426, 130:226]}
     pictures = []
     for name, sample in chosen.items():
-        pictures.append((name, framed(making.crop(sample))))
+        pictures.append((name, making.crop(sample)))
         found = {}
         for option, boundary in (("reflect", "open"), ("wrap", "torus")):
             image, _ = making.run(sample, 144, edges=option)
@@ -304,7 +298,7 @@ def edges(making):
         print(
             f"  {name}: wrapped, the standard deviation of high is {more[0]:.3f} times, of level 0 {more[1]:.3f} times"
         )
-    return png(contact_sheet(pictures, columns=3))
+    return png(contact_sheet(pictures, columns=3, scale=1))
 
 
 def seams(making):
@@ -322,10 +316,10 @@ def seams(making):
                 own = making.crop(sample)[: making.small(96), : making.small(96)]
                 for label, picture in (("sample", own), ("output", images[0])):
                     tiled = np.tile(picture, (2, 2, 1)[: sample.ndim])
-                    pictures.append((f"{label}, tiled: {seam(picture):.2f}", framed(tiled)))
+                    pictures.append((f"{label}, tiled: {seam(picture):.2f}", tiled))
         figures = "; ".join(f"{n} {np.mean(s):.3f} ({min(s):.3f} to {max(s):.3f})" for n, s in found.items())
         print(f"  {name}: gradient across the seam over that inside, 5 seeds: {figures}")
-    return png(contact_sheet(pictures, columns=4))
+    return png(contact_sheet(pictures, columns=4, scale=1))
 
 
 def match(making):
@@ -356,11 +350,11 @@ def mixtures(making):
     a, b = samples.colour()["wood"], data.immunohistochemistry()[250:346, 160:256]
     c, d = data.gravel()[:128, :128], reduced(data.grass(), 4)
     names = "A B"
-    pictures = [("A: wood", framed(making.crop(a))), ("B: stroma", framed(making.crop(b)))]
+    pictures = [("A: wood", making.crop(a)), ("B: stroma", making.crop(b))]
     for palette, pattern in ((0, 1), (1, 0)):
         made = making.mix([a, b], 128, palette=palette, pattern=pattern)
         pictures.append((f"palette {names[2 * palette]}, pattern {names[2 * pattern]}", made))
-    pictures += [("C: gravel", framed(making.crop(c))), ("D: grass, reduced", framed(making.crop(d)))]
+    pictures += [("C: gravel", making.crop(c)), ("D: grass, reduced", making.crop(d))]
     for low, high in ((0, 1), (1, 0)):
         made = making.mix([c, d], 128, low=low, high=high, split=2 if making.part == 1 else 1)
         pictures.append((f"low {'CD'[low]}, high {'CD'[high]}, split 2", made))
@@ -375,7 +369,7 @@ def mixtures(making):
     start = resize(data.camera()[70:270, 120:320], (side, side), anti_aliasing=True)
     made = simdtex.mix([making.crop(a)], (side, side), start=start, iterations=making.small(5), **making.given(a))[0]
     pictures.append(("A, begun with a picture", made))
-    return png(contact_sheet(pictures, columns=4))
+    return png(contact_sheet(pictures, columns=4, scale=1))
 
 
 MADE = {

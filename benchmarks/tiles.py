@@ -6,11 +6,16 @@
 Each way runs in processes of its own: ``whole`` is simdtex.synthesize, ``here`` one process that does tile after tile,
 ``workers`` a cluster on this machine whose workers share its cores out. All have the same cores together. The
 efficiency is the time of ``here`` over that of ``workers``. A last line says whether all made the same bytes.
+
+    python benchmarks/tiles.py --size 32768 --sizes > docs/tiles/sizes.csv
+
+prints redundant work and memory by the side of tiles instead.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import hashlib
 import json
 import subprocess
@@ -83,6 +88,20 @@ def measured(given: argparse.Namespace, way: str) -> dict:
         return found | {"peak": max(peaks.values())}
 
 
+def sizes(size: int) -> None:
+    """Print redundant work and memory by the side of tiles."""
+    writer = csv.writer(sys.stdout, lineterminator="\n")
+    writer.writerow(["side of a tile", "tiles", "redundant work, torus, %", "redundant work, open, %", "memory, MiB"])
+    colour = data.astronaut()[:128, :128]
+    for side in (256, 512, 1024, 2048, 4096, 8192):
+        plans = [
+            distributed.plan(colour, (size, size), tiles=side, boundary=boundary, channel_axis=-1)
+            for boundary in ("torus", "open")
+        ]
+        redundant = [f"{100 * plan.levels[0].redundant:.0f}" for plan in plans]
+        writer.writerow([side, plans[0].levels[0].count, *redundant, f"{plans[0].memory / 2**20:.0f}"])
+
+
 def main() -> None:
     """Print a line for each way."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -93,10 +112,14 @@ def main() -> None:
     parser.add_argument("--device")
     parser.add_argument("--only", choices=WAYS, action="append", help="only this way; may be repeated")
     parser.add_argument("--folder", help="where the stores are")
+    parser.add_argument("--sizes", action="store_true", help="print a table of sides of tiles instead")
     parser.add_argument("--way", choices=WAYS, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.way:
         run(given, given.folder)
+        return
+    if given.sizes:
+        sizes(given.size)
         return
     pixels = sample(given.sample)
     axis = -1 if pixels.ndim == 3 else None
