@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,45 +143,14 @@ def _saved(run: Run, state: Any, observer: Observer) -> Tree:
     return {"state": run.save(state), "observer": observer.save()}
 
 
-class Job(Protocol):
-    """A validated call of a public function, see `PlannedJob`; `simdtex.fill` drives several plans."""
+class Call(NamedTuple):
+    """The arguments that all public functions share, see `simdtex.synthesize`."""
 
-    @property
-    def name(self) -> str: ...  # noqa: D102
-
-    @property
-    def channel_axis(self) -> int | None: ...  # noqa: D102
-
-    def inputs(self) -> dict[str, Any]: ...  # noqa: D102
-
-    def run(  # noqa: D102
-        self, machine: Machine, seed: int, callback: Callback | None, keep: Keep
-    ) -> tuple[NDArray[Any], Output]: ...
-
-
-@dataclass(frozen=True)
-class PlannedJob:
-    """A validated call of a public function that drives one plan.
-
-    Attributes
-    ----------
-    name : str
-        The function.
-    plan : Plan
-    inputs : callable
-        Returns all that determines the result but the seed, by the names that users give it.
-    channel_axis : int or None
-        The axis of channels in what the function returns.
-    """
-
-    name: str
-    plan: Plan
-    inputs: Callable[[], dict[str, Any]]
-    channel_axis: int | None
-
-    def run(self, machine: Machine, seed: int, callback: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
-        """Drive the plan."""
-        return drive(self.plan, machine, seed, callback, keep)
+    rng: int | np.random.Generator | None
+    device: str | Machine | None
+    callback: Callback | None
+    full_output: bool
+    checkpoint: str | os.PathLike[str] | Checkpoint | Keep | None
 
 
 Result = NDArray[Any] | tuple[NDArray[Any], Output]
@@ -189,29 +158,40 @@ Result = NDArray[Any] | tuple[NDArray[Any], Output]
 
 
 def execute(
-    job: Job,
-    rng: Any,
-    device: str | Machine | None,
-    callback: Callback | None,
-    full_output: bool,
-    checkpoint: str | os.PathLike[str] | Checkpoint | Keep | None = None,
+    name: str,
+    run: Callable[[Machine, int, Callback | None, Keep], tuple[NDArray[Any], Output]],
+    inputs: Callable[[], dict[str, Any]],
+    channel_axis: int | None,
+    call: Call,
 ) -> Result:
-    """Run a job on a device: what every public function does once its input is validated.
+    """Run a validated call on a device: what every public function does once its input is validated.
 
-    The arguments are those of `simdtex.synthesize`; a `Keep` as ``checkpoint`` keeps states in memory.
+    Parameters
+    ----------
+    name : str
+        The public function.
+    run : callable
+        `drive` with its plan, or a function that drives several plans in turn.
+    inputs : callable
+        Returns all that determines the result but the seed, by the names that users give it.
+    channel_axis : int or None
+        The axis of channels in what the function returns.
+    call : Call
+        A `Keep` in place of its checkpoint keeps states in memory.
     """
-    machine, axis = open_machine(device), job.channel_axis
+    machine, checkpoint = open_machine(call.device), call.checkpoint
     machine.profile()  # forget what was before
+    callback = seeing(call.callback, channel_axis)
     if isinstance(checkpoint, Keep):
-        image, output = job.run(machine, as_seed(rng), seeing(callback, axis), checkpoint)
+        image, output = run(machine, as_seed(call.rng), callback, checkpoint)
     else:
-        with opened(checkpoint, job.name, rng, job.inputs, machine.name) as (seed, found, offer):
-            image, output = job.run(machine, seed, seeing(callback, axis), Keep(found, offer))
+        with opened(checkpoint, name, call.rng, inputs, machine.name) as (seed, found, offer):
+            image, output = run(machine, seed, callback, Keep(found, offer))
     output.statistics.update(machine.profile() or {})
-    picture = restored(image, axis)
-    if not full_output:
+    picture = restored(image, channel_axis)
+    if not call.full_output:
         return picture
-    stages = [replace(stage, image=restored(stage.image, axis)) for stage in output.stages]
+    stages = [replace(stage, image=restored(stage.image, channel_axis)) for stage in output.stages]
     return picture, replace(output, stages=stages, made=image)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 from math import isqrt
 from typing import Any, Literal, overload
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpoint
-from simdtex.driver import Plan, PlannedJob, check_shape, execute, with_channels_last
+from simdtex.driver import Call, Plan, check_shape, drive, execute, with_channels_last
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine, open_machine
@@ -149,13 +150,12 @@ def synthesize(
         plan: Plan = package.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
     else:
         plan = package.Plan(inputs.pictures.pixels[0], size, chosen)
-    job = PlannedJob(
-        "synthesize",
-        plan,
-        lambda: {"method": method, "shape": size, "options": chosen, **inputs.identity()},
-        channel_axis,
-    )
-    return execute(job, rng, device, callback, full_output, checkpoint)
+    call = Call(rng, device, callback, full_output, checkpoint)
+
+    def identity() -> dict[str, Any]:
+        return {"method": method, "shape": size, "options": chosen, **inputs.identity()}
+
+    return execute("synthesize", partial(drive, plan), identity, channel_axis, call)
 
 
 def synthesize_solid(
@@ -224,14 +224,9 @@ def synthesize_solid(
     pixels = check_sample(sample, channel_axis)
     size = _check_block(shape)
     chosen = resolve(solid.Options, "solid", options)
-    plan = solid.Plan(pixels, size, chosen)
-    job = PlannedJob(
-        "synthesize_solid",
-        plan,
-        lambda: {"shape": size, "options": chosen, "sample": pixels},
-        None if channel_axis is None else -1,
-    )
-    return execute(job, rng, device, callback, full_output, checkpoint)
+    run, axis = partial(drive, solid.Plan(pixels, size, chosen)), None if channel_axis is None else -1
+    call = Call(rng, device, callback, full_output, checkpoint)
+    return execute("synthesize_solid", run, lambda: {"shape": size, "options": chosen, "sample": pixels}, axis, call)
 
 
 def suggest_alpha(

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, replace
+from functools import partial
 from math import ceil, log2, prod
 from typing import Any, NamedTuple
 
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from simdtex.checkpoint import Checkpoint
-from simdtex.driver import NOTHING, Keep, PlannedJob, drive, execute
+from simdtex.driver import Call, Keep, drive, execute
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_mask, check_picture, check_samples
 from simdtex.machine import Machine, memory
@@ -156,8 +157,8 @@ def fill(
         whole("reach", reach, 1)
     given = None if sample is None else _check_sample(sample, channel_axis, pixels)
     chosen = resolve(Options, "fill", options)
-    job = Filling(pixels, hole, given, reach, chosen, channel_axis)
-    return execute(job, rng, device, callback, full_output, checkpoint)
+    job = Filling(pixels, hole, given, reach, chosen)
+    return execute("fill", job.run, job.inputs, channel_axis, Call(rng, device, callback, full_output, checkpoint))
 
 
 def extend(
@@ -249,8 +250,10 @@ def extend(
     given = Given(canvas, np.repeat(~hole[..., None], canvas.shape[2], -1), place, suggests=bool(seamless))
 
     plan = mrf.plan(Pictures((pixels,)), canvas.shape[:2], chosen, given)
-    job = PlannedJob("extend", plan, lambda: {"options": chosen, "image": pixels, **sides}, channel_axis)
-    return execute(job, rng, device, callback, full_output, checkpoint)
+    call = Call(rng, device, callback, full_output, checkpoint)
+    return execute(
+        "extend", partial(drive, plan), lambda: {"options": chosen, "image": pixels, **sides}, channel_axis, call
+    )
 
 
 class Made(NamedTuple):
@@ -300,7 +303,6 @@ class Filling:
     reach : int or None
         How far around a hole its sample reaches, pixels.
     options : simdtex.methods.mrf.Options
-    channel_axis : int or None
     """
 
     pixels: NDArray[Any]
@@ -308,9 +310,6 @@ class Filling:
     sample: Pictures | None
     reach: int | None
     options: Options
-    channel_axis: int | None
-
-    name = "fill"
 
     def inputs(self) -> dict[str, Any]:
         """Return all that determines the result but the seed, by the names that users give it."""
@@ -318,9 +317,7 @@ class Filling:
         sample = self.sample and (self.sample.pixels, self.sample.known)
         return {"options": self.options, "image": known, "mask": self.hole, "sample": sample, "reach": self.reach}
 
-    def run(
-        self, machine: Machine, seed: int, callback: Callback | None, keep: Keep = NOTHING
-    ) -> tuple[NDArray[Any], Output]:
+    def run(self, machine: Machine, seed: int, callback: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
         """Fill one window after the other; the state is what came of the finished windows, and the present run's."""
         shape, options = self.hole.shape, self.options
         several = self.sample is not None and len(self.sample.pixels) > 1

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from numbers import Integral
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.driver import PlannedJob, check_shape, execute, with_channels_last
+from simdtex.driver import Call, check_shape, drive, execute, with_channels_last
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, memory
 from simdtex.methods.pyramid import algorithm as pyramid
@@ -113,7 +114,8 @@ def mix(
     chosen = resolve(Options, "mix", with_channels_last(options, channel_axis))
     sides = None if low is None or high is None else (low, high, split)
     plan = Mixture(pictures, size, chosen, weights, sides, palette, blend, pixels)
-    return execute(PlannedJob("mix", plan, plan.inputs, channel_axis), rng, device, callback, full_output, checkpoint)
+    call = Call(rng, device, callback, full_output, checkpoint)
+    return execute("mix", partial(drive, plan), lambda: dict(vars(plan)), channel_axis, call)
 
 
 @dataclass(frozen=True)
@@ -143,10 +145,6 @@ class Mixture:
     palette: int | None
     blend: str
     pixels: str
-
-    def inputs(self) -> dict[str, Any]:
-        """Return all that determines the result but the seed."""
-        return dict(vars(self))
 
     def on(self, machine: Machine, seed: int) -> pyramid.Run:
         """Analyse the samples on a machine."""
