@@ -87,7 +87,6 @@ MULTIRES = {
     "alpha=1": {"alpha": 1.0},
     "alpha=inf": {"alpha": np.inf},
     "alpha=auto": {"alpha": "auto"},
-    "alpha=auto, target=1.2": {"alpha": "auto", "target": 1.2},
     "alpha=auto, beta=1": {"alpha": "auto", "beta": 1.0},
     "alpha=1, beta=1": {"alpha": 1.0, "beta": 1.0},
     "alpha=4, beta=2": {"alpha": 4.0, "beta": 2.0},
@@ -118,12 +117,10 @@ PYRAMID = {
     "levels=3": {"levels": 3},
     "levels=5": {"levels": 5},
     "match=lookup": {"match": "lookup"},
-    "match=lookup, bins=32": {"match": "lookup", "bins": 32},
     "edges=wrap": {"edges": "wrap"},
     "color=channels": {"color": "channels"},
 }
 UNSEEN = {  # not on the sheets, where they look like others
-    "alpha=auto, target=1.2",
     "alpha=auto, beta=1",
     "orientations=2",
     "orientations=8",
@@ -136,7 +133,6 @@ UNSEEN = {  # not on the sheets, where they look like others
     "iterations=10",
     "levels=3",
     "levels=5",
-    "match=lookup, bins=32",
     "edges=wrap",
 }
 FIGURES = ("plausibility", "coverage", "copying", "histogram_distance", "seam")

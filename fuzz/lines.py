@@ -49,7 +49,6 @@ MODEST = {
     **dict.fromkeys(("seeds", "sweeps"), (2, 3)),
     **dict.fromkeys(("burn_in", "number", "jobs", "first"), (0, 1, 2)),
     "filter_size": (3, 5),
-    "bins": (2, 16, 256),
     "seed": (0, 1, 2**63),
     "xi": (-1, -0.5, -5),
     "tiles": (8, 12, 16),

@@ -155,9 +155,8 @@ inline void find_parents(Parents *own, __global const int4 *synthesis, __global 
 // The size of C_i, (9), for the pixels first .. end-1 of a level, and a uniform draw from C_i, (12), by its number in
 // the order of the scan. Siblings have the same parents, so a work-item makes one scan for up to four of them, and goes
 // on to the siblings `items` further. No list of candidates is kept: every so many places of the scan are noted, half as
-// many as soon as the notes are full, and a draw goes on from the last one before it. Without
-// `draw` candidates are only counted.
-__kernel void candidates(const ulong seed, const int level, const int top, const int match, const int draw,
+// many as soon as the notes are full, and a draw goes on from the last one before it.
+__kernel void candidates(const ulong seed, const int level, const int top, const int match,
                          __global const int4 *restrict analysis, __global const int *restrict features,
                          __global const uint *restrict threshold, __global const int4 *restrict synthesis,
                          const int first, const int end, const int items, __global int *source,
@@ -207,8 +206,6 @@ __kernel void candidates(const ulong seed, const int level, const int top, const
             if (s < first || s >= end)
                 continue;
             counts[here.z + s] = (int2)(count, compared);
-            if (!draw)
-                continue;
             int wanted = 0, note = notes - 1, ignored;
             if (count > 1) {
                 const uint4 bits = draw4(seed, level, 0, s, PURPOSE_DRAW, 0);

@@ -232,21 +232,16 @@ def synthesize_solid(
 def suggest_alpha(
     sample: ArrayLike,
     *,
-    target: float | None = None,
     channel_axis: int | None = None,
     device: str | Machine | None = None,
     **options: Any,
 ) -> float:
-    """The threshold of the method ``multires`` that leaves as much choice as seams allow.
+    """Return the threshold of the method ``multires`` that leaves as much choice as seams allow.
 
     Parameters
     ----------
     sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
         As in `synthesize`.
-    target : float, optional
-        Candidates that a pixel of the coarser half of the levels is to have on average, 1 or more. At 1 there is
-        nothing to choose, and the sample is tiled; the more, the less of its order is kept. Without a target the option
-        ``strain`` decides: how much pieces of the sample that meet may differ from what either would go on with.
     channel_axis : int, optional
         As in `synthesize`.
     device : str, optional
@@ -257,10 +252,9 @@ def suggest_alpha(
     Returns
     -------
     float
-        alpha, which ``alpha="auto"`` takes: without a target, the largest multiple of 1/100 up to 0.4 at which a
-        texture as large as the sample has no more than this strain, 0 where there is none; with one, the least at which
-        the candidates of the sample's own pixels, averaged over each of these levels and then over the levels, reach
-        it, 4 where none below does.
+        alpha, which ``alpha="auto"`` takes: the largest multiple of 1/100 up to 0.4 at which a texture as large as the
+        sample has a strain of 0.05 or less, 0 if there is none. The strain is how much pieces of the sample that meet
+        differ from what either would go on with: 0 is nothing, 1 as much as unrelated pieces.
 
     Raises
     ------
@@ -269,15 +263,15 @@ def suggest_alpha(
 
     Notes
     -----
-    Cost: six textures of the sample's size; for a target, nine scans of at most 4096 pixels of each of these levels.
+    Cost: six textures of the sample's size.
 
     Examples
     --------
     >>> from skimage import data
     >>> import simdtex
     >>> gravel = data.gravel()[:64, :64]
-    >>> simdtex.suggest_alpha(gravel, target=1.2) < simdtex.suggest_alpha(gravel, target=2)
-    True
+    >>> simdtex.suggest_alpha(gravel)
+    0.3
     """
     from simdtex.methods import multires
     from simdtex.methods.multires.analysis import analyse
@@ -286,7 +280,7 @@ def suggest_alpha(
     for name in ("alpha", "thresholds"):
         if name in options:
             raise TypeError(f"suggest_alpha finds alpha; leave {name} out")
-    chosen = resolve(multires.Options, "synth", ({} if target is None else {"target": target}) | options)
+    chosen = resolve(multires.Options, "synth", options)
     machine = open_machine(device)
     return multires.suggest_alpha(machine, analyse(machine, pixels, **chosen.analysis), chosen)
 

@@ -38,7 +38,7 @@ DEFAULTS = {
     **{"free_sweeps": 2, "pixel": "source", "phases": "decimated", "edges": "auto", "coarsest": "gibbs"},
     **{"schedule": "coloring", "boundary": "torus", "search": "auto", "suggesting": 12, "similar": 0, "chance": 4},
     **{"exhaustive": 64, "categorical": False, "weights": None, "shares": None, "proportions": None},
-    **{"data_weight": 16.0, "guide_weight": 1.0, "labels": None, "unsure": 0.25},
+    **{"data_weight": 16.0, "guide_weight": 1.0, "labels": None},
 }
 PAPER = {
     **{"relaxation": "gibbs", "bandwidth": 1.0, "coherence": 0.0, "free_sweeps": 0, "pixel": "density"},
@@ -310,7 +310,7 @@ def sure(Y, place, spacing, o):
     for a, b in offsets:
         k, m = i + a * spacing, j + b * spacing
         unknown += 0 <= k < Y.gaps[n].shape[0] and 0 <= m < Y.gaps[n].shape[1] and bool(Y.gaps[n][k, m])
-    return unknown <= o.unsure * len(offsets)
+    return unknown <= 0.25 * len(offsets)
 
 
 def similar(level):

@@ -160,8 +160,8 @@ KINDS = {
         {"masked": 0.2, "dtype": np.uint16},
     ),
     "gaps": ({}, {"gaps": 0.1, "dtype": np.float32}),
-    "gaps-unsure": ({"unsure": 0.1, "levels": 1, "edges": "reflect"}, {"gaps": 0.1, "dtype": np.float64}),
-    "gaps-colour": (GIBBS | {"unsure": 0.6}, {"gaps": 0.3, "dtype": np.float32, "channels": 2}),
+    "gaps-reflect": ({"levels": 1, "edges": "reflect"}, {"gaps": 0.1, "dtype": np.float64}),
+    "gaps-colour": (GIBBS, {"gaps": 0.1, "dtype": np.float32, "channels": 2}),
     "categories": ({"categorical": True}, {"kinds": 4}),
     "two-categories": ({"categorical": True, "order": 4}, {"kinds": 2, "dtype": np.uint16}),
     "one-category": ({"categorical": True}, {"kinds": 1}),
@@ -182,7 +182,7 @@ KINDS = {
         {"kinds": 3, "known": 0.3, "partly": True, "channels": 2, "labels": 2},
     ),
     "everything": (
-        {"shares": (1.0, 2.0), "unsure": 0.4, "schedule": "luby"},
+        {"shares": (1.0, 2.0), "schedule": "luby"},
         TWO
         | {"known": 0.15, "placed": 0.4, "labels": 0, "silent": 0.2, "masked": 0.2, "gaps": 0.05}
         | {"dtype": np.float32, "channels": 2, "partly": True},
@@ -251,10 +251,6 @@ CHANGES = {
     "data_weight": [(EXACT, {"known": 0.2}, 16.0, 0.0), (FEW, {"known": 0.2}, 16.0, 1.0)],
     "guide_weight": [(EXACT, {"labels": 3}, 1.0, 0.0), (FEW, {"labels": 0}, 1.0, 0.1)],
     "labels": [(EXACT | {"labels": True}, {"labels": 3}, True, False), (FEW, {"labels": 4}, True, False)],
-    "unsure": [
-        (EXACT, {"gaps": 0.04, "dtype": np.float32}, 0.25, 0.0),
-        (FEW, {"gaps": 0.1, "dtype": np.float32}, 0.125, 1.0),
-    ],
 }
 
 

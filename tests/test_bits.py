@@ -106,8 +106,8 @@ RUNS = {
         (11, 15),
         MULTIRES | {"orientations": 1, "thresholds": [[0, 0, 0], [2, 1, np.inf], [0.5, 4, 1], [0.2, 0.7, 0.3]]},
     ),
-    "multires-auto": ((14, 13), None, np.uint8, (17, 12), MULTIRES | {"alpha": "auto", "target": 1.5}),
-    "multires-mended": ((17, 20), 3, np.uint8, (21, 23), MULTIRES | {"alpha": "auto", "strain": 0.2}),
+    "multires-auto": ((14, 13), None, np.uint8, (17, 12), MULTIRES | {"alpha": "auto"}),
+    "multires-mended": ((17, 20), 3, np.uint8, (21, 23), MULTIRES | {"alpha": 0.4}),
     "multires-keep-cut": ((17, 20), 3, np.uint8, (21, 23), MULTIRES | {"edges": "keep", "seams": "cut"}),
     "multires-larger-than-the-sample": ((7, 6), None, np.uint8, (33, 29), MULTIRES | {"alpha": 1.5}),
     "multires-smaller-than-the-sample": ((23, 26), None, np.uint8, (5, 4), MULTIRES | {"orientations": 0}),
@@ -124,7 +124,7 @@ RUNS = {
         None,
         np.bool_,
         (18, 16),
-        PYRAMID | {"pyramid": "laplacian", "match": "lookup", "bins": 16, "levels": 3},
+        PYRAMID | {"pyramid": "laplacian", "match": "lookup", "levels": 3},
     ),
     "pyramid-a-row": ((9, 8), None, np.uint8, (1, 17), PYRAMID | {"orientations": 2}),
     "pyramid-no-levels": ((9, 8), None, np.uint8, (8, 9), PYRAMID | {"levels": 0, "orientations": 2}),
@@ -369,7 +369,7 @@ runs = [
     (grey, None, {"method": "multires", "alpha": 0.6}),
     (colour, -1, {"method": "multires", "boundary": "open", "parity": "free", "features": "channels", "alpha": 0.5}),
     (grey, None, {"method": "pyramid", "iterations": 1, "levels": 1, "orientations": 2}),
-    (grey, None, {"method": "pyramid", "iterations": 1, "pyramid": "laplacian", "match": "lookup", "bins": 8}),
+    (grey, None, {"method": "pyramid", "iterations": 1, "pyramid": "laplacian", "match": "lookup"}),
 ]
 machines = [OpenCL(info, work_group=3, vector=4, split=3), OpenCL(info, work_group=4, vector=1, split=64)]
 machines = [OpenCL(info), *machines, OpenCL(info, skip=False)]

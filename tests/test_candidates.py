@@ -298,20 +298,6 @@ def test_nothing_but_the_range_is_written(machine):
 
 
 @phases
-def test_candidates_are_counted_without_a_draw(machine, match):
-    p = problem(3, tile=(9, 11), shape=(20, 25), levels=4)
-    for m in (REFERENCE, machine):
-        structure, sampled = p.on(m)
-        before = host(m, sampled[:1])[0]
-        candidates(m, structure, sampled, 2, 1, p.pixels(2) - 1, match, 1, draw=False)
-        source, counts = host(m, sampled[:2])
-        assert_same_bits(source, before)
-        own = slice(p.own(2).start + 1, p.own(2).stop - 1)
-        assert_same_bits(counts[own], one_level(p, before, 2, match)[1][1:-1])
-        assert (np.delete(counts, np.r_[own], 0) == [1, 0]).all()
-
-
-@phases
 @pytest.mark.parametrize("closed", [1, 2, 3])
 def test_levels_that_are_not_compared_are_counted_all_the_same(machine, closed, match):
     """Every difference passes below a level; more candidates than places of the scan that are noted."""

@@ -54,7 +54,7 @@ LARGE = {
     "multires-brick": ("brick", (256, 200), {"method": "multires"}),
     "multires-coffee": ("coffee", (130, 96), {"method": "multires", "alpha": "auto"}),
     "multires-brick-paper": ("brick", (256, 200), {"method": "multires"} | PAPER),
-    "multires-coffee-paper": ("coffee", (130, 96), {"method": "multires", "alpha": "auto", "target": 1.1} | PAPER),
+    "multires-coffee-paper": ("coffee", (130, 96), {"method": "multires", "alpha": 0.93} | PAPER),
     "pyramid-grass": ("grass", (128, 160), {"method": "pyramid"}),
     "pyramid-coffee": ("coffee", (96, 96), {"method": "pyramid", "match": "lookup", "pyramid": "laplacian"}),
 }

@@ -283,7 +283,7 @@ def test_no_gap_of_a_sample_comes_out(search, edges):
     sample = texture((16, 15), dtype=np.float32)
     sample[4:8, 3:9] = np.nan
     sample[13, 2] = np.nan
-    image, output = run(sample, (13, 12), search=search, order=2, edges=edges, unsure=0.5, finish=1.5)
+    image, output = run(sample, (13, 12), search=search, order=2, edges=edges, finish=1.5)
     assert np.isfinite(image).all()
     assert np.isfinite(sample[tuple(np.moveaxis(output.source, -1, 0))]).all()
 

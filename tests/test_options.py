@@ -82,7 +82,7 @@ NUMBERS = ("order", "bandwidth", "coherence", "balance", "structure", "novelty",
 COUNTS = ("levels", "overview", "free_sweeps", "suggesting", "similar", "chance", "exhaustive")
 TOO_MUCH = {
     **{f"mrf {name}": ("mrf", {name: 2**31}) for name in (*NUMBERS[:-1], *COUNTS)},
-    **{f"mrf {name} 1e308": ("mrf", {name: 1e308}) for name in (*NUMBERS[1:7], "guide_weight", "unsure")},
+    **{f"mrf {name} 1e308": ("mrf", {name: 1e308}) for name in (*NUMBERS[1:7], "guide_weight")},
     "xi": ("mrf", {"xi": -3e6}),
     "a finish of next to nothing": ("mrf", {"finish": 1e-320}),
     "beta": ("multires", {"beta": 1e308}),
@@ -104,10 +104,9 @@ LARGEST = {
     "mrf": {
         **{name: GREATEST for name in ("bandwidth", "coherence", "balance", "structure", "novelty", "data_weight")},
         **{"finish": 16, "similar": 64, "chance": 4096, "suggesting": MOST, "overview": MOST, "exhaustive": MOST},
-        **{"xi": -GREATEST, "guide_weight": GREATEST, "unsure": 1, "weights": (GREATEST,), "shares": (GREATEST,)},
+        **{"xi": -GREATEST, "guide_weight": GREATEST, "weights": (GREATEST,), "shares": (GREATEST,)},
     },
     "multires": {"alpha": 1e308, "beta": GREATEST, "orientations": 64, "sigma": 100, "filter_size": 101},
-    "pyramid": {"bins": 4096},
 }
 SMALLEST = {
     "mrf": {"bandwidth": 1e-320, "coherence": 5e-324, "balance": 1e-320, "finish": 0.01, "xi": -0.1},

@@ -126,14 +126,15 @@ def test_candidates_are_those_of_each_picture_alone(edges, spacing, phases):
     assert found == (every if all_of_them else whole)
 
 
-def test_a_candidate_knows_enough_of_its_neighbours():
+def test_a_candidate_knows_enough_of_its_neighbours(monkeypatch):
     known = np.ones((9, 9), bool)
     known[4, 4] = known[4, 5] = False
     pixels = (np.zeros((9, 9, 1), np.uint8),)
     offsets = neighbourhood_offsets(1)
     found = {}
     for unsure in (0.0, 0.25, 0.5):
-        sample = Sample(Pictures(pixels, unknown=(~known,)), 4, 1, unsure=unsure)
+        monkeypatch.setattr("simdtex.model.sample.UNSURE", unsure)
+        sample = Sample(Pictures(pixels, unknown=(~known,)), 4, 1)
         found[unsure] = {tuple(p) for p in sample.place(sample.positions(offsets, 1, "all", "reflect")).tolist()}
     everywhere = {(i, j) for i, j in np.ndindex(9, 9) if known[i, j]}
     beside = {(3, 4), (5, 4), (4, 3), (3, 5), (5, 5), (4, 6)}  # each sees one of the two

@@ -84,12 +84,11 @@ def test_another_size_has_the_samples_quantiles(shape, dtype):
     assert_same_bits(np.sort(made, axis=None), plain.quantiles(sample, prod(shape)))
 
 
-@pytest.mark.parametrize("bins", [256, 64])
-def test_by_lookup_it_has_the_samples_pixels_to_about_a_bin(bins):
+def test_by_lookup_it_has_the_samples_pixels_to_about_a_bin():
     sample = data.gravel()[:128, :128].astype(float)
-    made = synthesize(sample, (128, 128), match="lookup", bins=bins, levels=3)
-    off = abs(np.sort(made, axis=None) - np.sort(sample, axis=None)) / (np.ptp(sample) / bins)
-    inner = off[off.size // bins : -off.size // bins]  # beyond, a table has one entry
+    made = synthesize(sample, (128, 128), match="lookup", levels=3)
+    off = abs(np.sort(made, axis=None) - np.sort(sample, axis=None)) / (np.ptp(sample) / 256)
+    inner = off[off.size // 256 : -off.size // 256]  # beyond, a table has one entry
     assert off.mean() < 0.5
     assert np.quantile(inner, 0.99) <= LOOKUP
 
@@ -272,9 +271,6 @@ def test_an_output_smaller_than_the_sample_and_no_levels_at_all():
         ({"iterations": -1}, ValueError, "iterations is -1; give 0 or more"),
         ({"iterations": 2.0}, TypeError, "iterations must be an integer"),
         ({"match": "sort"}, ValueError, "unknown match 'sort'; choose one of: rank, lookup"),
-        ({"bins": 1}, ValueError, "bins is 1; give 2 or more"),
-        ({"bins": 4097}, ValueError, "bins is 4097; give 4096 or fewer"),
-        ({"bins": 9.5}, TypeError, "bins must be an integer"),
         ({"edges": "zero"}, ValueError, "unknown edges 'zero'; choose one of: reflect, wrap"),
         ({"color": "rgb"}, ValueError, "unknown color 'rgb'; choose one of: decorrelate, channels"),
         ({"boundary": "open"}, TypeError, "unknown option 'boundary' of the method 'pyramid'"),
@@ -329,7 +325,7 @@ def test_statistics_say_what_was_done():
     said = output.statistics
     assert (said["device"], said["seed"], said["device_seconds"]) == (REFERENCE.name, 9, None)
     assert said["options"] == {
-        **{"pyramid": "steerable", "levels": 1, "orientations": 4, "iterations": 5, "match": "rank", "bins": 256},
+        **{"pyramid": "steerable", "levels": 1, "orientations": 4, "iterations": 5, "match": "rank"},
         **{"edges": "reflect", "color": "decorrelate"},
     }
     assert said["seconds"] >= sum(report["seconds"] for report in said["iterations"]) > 0

@@ -375,7 +375,7 @@ BAD = [
     ({"sample": SAMPLE.astype(complex)}, TypeError, "real"),
     ({"sample": SAMPLE.astype(str)}, TypeError, "convert it"),
     ({"sample": None}, TypeError, "convert it"),
-    ({"sample": [[1, 2], [3]]}, ValueError, "ragged: give rows of equal length"),
+    ({"sample": [[1, 2], [3]]}, ValueError, "ragged; give rows of equal length"),
     ({"sample": SAMPLE[0]}, ValueError, r"give \(rows, cols\)"),
     ({"sample": texture((9, 9), 3)}, ValueError, "or channel_axis=-1 if its last axis holds the channels"),
     ({"channel_axis": -1}, ValueError, "give three axes"),

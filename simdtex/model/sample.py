@@ -24,6 +24,9 @@ STEPS = 1023
 FINE = 8
 """Steps to a working level, where that is no pixel of its own."""
 
+UNSURE = 0.25
+"""Share of a candidate's neighbours that may be unknown; they are taken to be as the nearest known pixel."""
+
 ENOUGH_WHOLE = 0.75
 """Share of positions that must have a whole neighbourhood for ``edges="auto"`` not to reflect."""
 
@@ -77,8 +80,6 @@ class Sample:
         Pixels from site to site at the coarsest level; every picture begins at a multiple.
     beside : sequence of Beside
         Guides: their channels come last.
-    unsure : float
-        Share of a candidate's neighbours that may be unknown.
     apart : int
         Pixels between two pictures at least, where more than their margins: what looks so far from a pixel of one sees
         no other.
@@ -111,7 +112,6 @@ class Sample:
         weight: float = 0.0,
         step: int = 1,
         beside: Sequence[Beside] = (),
-        unsure: float = 0.25,
         apart: int = 0,
     ) -> None:
         self.pictures = pixels if isinstance(pixels, Pictures) else Pictures((pixels,))
@@ -120,10 +120,9 @@ class Sample:
             "margin": margin,
             "weight": weight,
             "step": step,
-            "unsure": unsure,
             "apart": apart,
         }
-        self.scale, self.unsure = Scale(self.pictures, values), unsure
+        self.scale = Scale(self.pictures, values)
         self.top, self.unit, self.direct = self.scale.top, self.scale.unit, self.scale.direct
         levels = [self.scale.levels(picture) for picture in self.pictures.pixels]
         self.shown, spread = len(levels[0]), variance(*levels)
@@ -145,7 +144,7 @@ class Sample:
         """A grey sample that is given in working levels 0 .. count - 1 already."""
         sample = cls.__new__(cls)
         sample.pixels, sample.shown, sample.pictures = levels[..., None], 1, Pictures((levels[..., None],))
-        sample.top, sample.unit, sample.direct, sample.unsure = count - 1, 1.0, True, 0.0
+        sample.top, sample.unit, sample.direct = count - 1, 1.0, True
         sample.guides = np.zeros((0, 1, 1), np.uint16)
         sample._lay([levels[None].astype(np.uint16)], 0)
         return sample
@@ -246,7 +245,7 @@ class Sample:
         """Which of `everywhere` are candidates, (n,); None where all are.
 
         Those that are no pixel of a picture, unknown or not to be used are none, nor are those of whose neighbours a
-        larger share than `unsure` is unknown; where neighbourhoods must be whole, each counts within its own picture.
+        larger share than `UNSURE` is unknown; where neighbourhoods must be whole, each counts within its own picture.
         """
         if self.pictures.clean:
             return None
@@ -285,7 +284,7 @@ class Sample:
             count = np.zeros((int(near.sum()), col.size), np.int16)
             for a, b in offsets * spacing:
                 count += padded[np.ix_(row[near] + margin + a, col + margin + b)]
-            found[near] &= count <= self.unsure * len(offsets)
+            found[near] &= count <= UNSURE * len(offsets)
         return found
 
     def fair(self, offsets: NDArray[np.int32], spacing: int, phases: str, edges: str) -> NDArray[np.int64] | None:

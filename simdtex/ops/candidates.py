@@ -54,15 +54,13 @@ def _reference(
     end: int,
     match: bool,
     seed: int,
-    draw: bool = True,
 ) -> Sampled:
     begin = int(sampled.lattice[level, 2])
     step = max(1, TOGETHER // (4 * int(structure.lattice[level + 1, :2].prod())))
     for s in range(first, end, step):
         sites = np.arange(s, min(end, s + step))
         choice, counts = _drawn(structure, sampled, level, sites, match, seed)
-        if draw:
-            sampled.source[begin + sites] = choice
+        sampled.source[begin + sites] = choice
         sampled.counts[begin + sites] = counts
     return sampled
 
@@ -128,14 +126,13 @@ def _launch(
     end: int,
     match: bool,
     seed: int,
-    draw: bool = True,
 ) -> Sampled:
     levels, features = structure.threshold.shape
     items = -(-(end - first) // 4)  # one for four siblings; where these are fewer, an item takes several
     machine.launch(
         machine.kernel("candidates", "candidates", FEATURES=features),
         (items,),
-        *(np.uint64(seed), np.int32(level), np.int32(levels - 1), np.int32(match), np.int32(draw)),
+        *(np.uint64(seed), np.int32(level), np.int32(levels - 1), np.int32(match)),
         *(structure.lattice, structure.features, structure.threshold, sampled.lattice),
         *(np.int32(first), np.int32(end), np.int32(items), sampled.source, sampled.counts),
     )
@@ -143,9 +140,9 @@ def _launch(
 
 
 candidates = Operation("candidates", _reference, _launch)
-"""``candidates(machine, structure, sampled, level, first, end, match, seed, draw=True)``: pixels first .. end-1.
+"""``candidates(machine, structure, sampled, level, first, end, match, seed)``: pixels first .. end-1.
 
-``sampled`` is changed in place; without ``draw`` only its counts. With ``match`` a candidate stands where the pixel
+``sampled`` is changed in place. With ``match`` a candidate stands where the pixel
 does among its siblings, in an even or odd row and column, and below a node that stands for as many pixels of the sample
 as the pixel's parent does, which those at its edge may not; else any child of a node that passes is one. Cost: at most
 nodes x M comparisons for four pixels, and about a sixteenth of that more for each that is drawn from many candidates;

@@ -326,14 +326,6 @@ class Options:
         none="names if they are integers of at most 16 different values",
         shown=("synth", "simulate"),
     )
-    unsure: float = data(
-        0.25,
-        Number(0, 1),
-        "Let this share of a candidate's neighbours be unknown, if the sample is not known everywhere",
-        more="They are taken to be as the nearest known pixel.",
-        shown=(),
-    )
-
     def __post_init__(self) -> None:
         """Check every value, and what goes together."""
         check(self)

@@ -110,7 +110,7 @@ def sampled(
     for fewer in range(levels, 0, -1):
         step = 2 ** (fewer - 1)
         margin = int(offsets.max()) * step
-        sample = Sample(pictures, values, margin, options.structure, step, beside, options.unsure, far)
+        sample = Sample(pictures, values, margin, options.structure, step, beside, far)
         try:
             for number in range(fewer):
                 sample.allowed(offsets, 2**number, options.phases, options.edges)

@@ -2,13 +2,11 @@
 """De Bonet's multiresolution sampling (1997)."""
 
 from simdtex.methods.multires.algorithm import Plan, Run, tiled
-from simdtex.methods.multires.alpha import STRETCH, STRETCHES, strain, suggest_alpha
+from simdtex.methods.multires.alpha import strain, suggest_alpha
 from simdtex.methods.multires.levels import differences, thresholds
 from simdtex.methods.multires.options import Options
 
 __all__ = [
-    "STRETCH",
-    "STRETCHES",
     "Options",
     "Plan",
     "Run",

@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The threshold that suits a sample: as free as seams allow, or as leaves a number of candidates."""
+"""The threshold that leaves as much choice as seams allow."""
 
 from __future__ import annotations
-
-from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,65 +14,59 @@ from simdtex.methods.multires.levels import (
     pixels,
     places,
     read_sources,
-    sampled_from,
     structure_of,
     thresholds,
 )
 from simdtex.methods.multires.options import Options
-from simdtex.ops.candidates import Sampled, candidates
+from simdtex.ops.candidates import candidates
 from simdtex.ops.laplacian import beside, within
 from simdtex.run import paced
 
-STEPS, MOST = 100, 4
-"""`suggest_alpha` tries the multiples of 1/100 up to 4 for a target."""
+STEPS = 100
+"""`suggest_alpha` tries the multiples of 1/100."""
 
 FREEST = 0.4
-"""The largest alpha of the paper's figures, and the largest that is suggested for a strain."""
+"""The largest alpha of the paper's figures, and the largest that is suggested."""
+
+STRAIN = 0.05
+"""The largest strain of a suggested alpha: 0 is nothing, 1 as much as unrelated pieces have."""
 
 COARSENED = 6
 """Bits that strains leave out of a band, so that the sums of squares fit 64."""
 
-STRETCHES, STRETCH = 16, 256
-"""Of pixels, in each level, that `suggest_alpha` counts the candidates of."""
-
 
 def alpha_of(machine: Machine, analysis: Analysis, options: Options) -> float | None:
-    """The alpha of a run, None where a table stands in its place."""
+    """Return the alpha of a run; None if the options give a table of thresholds."""
     if options.thresholds is not None:
         return None
     return suggest_alpha(machine, analysis, options) if isinstance(options.alpha, str) else float(options.alpha)
 
 
 def suggest_alpha(machine: Machine, analysis: Analysis, options: Options) -> float:
-    """The freest alpha at which seams do not show, or that at which pixels have `Options.target` candidates.
+    """Return the largest alpha at which seams do not show.
 
     Parameters
     ----------
     machine : Machine
     analysis : Analysis
     options : Options
-        Of which ``strain``, ``target``, ``beta`` and ``parity`` matter, beside those of the analysis.
+        ``beta`` and ``parity``, and those of the analysis.
 
     Returns
     -------
     float
-        Without a target, the largest multiple of 1/100 up to 0.4 at which a texture as large as the sample has no more
-        than this `strain`; 0 where there is none.
-
-        With a target, the least multiple of 1/100 at which the candidates of the sample's own pixels, averaged over
-        each level of the coarser half and then over these levels, reach it; 4 where none below does.
+        The largest multiple of 1/100 up to 0.4 at which a texture as large as the sample has a `strain` of 0.05 or
+        less; 0 if there is none.
 
     Notes
     -----
-    Cost: six textures of the sample's size without their pictures; for a target, eight or nine scans, without draws, of
-    at most 4096 pixels of each of these levels. Both bisect: candidates never fall as alpha grows, and a strain hardly.
+    Cost: six textures of the sample's size without their pictures. The search bisects, since a strain hardly ever falls
+    as alpha grows.
     """
-    if options.target is not None:
-        return _alpha_of_target(machine, analysis, options, options.target)
     low, high = 0, 1 + round(FREEST * STEPS)
     while high - low > 1:
         middle = (low + high) // 2
-        passes = strain(machine, analysis, options, middle / STEPS) <= options.strain
+        passes = strain(machine, analysis, options, middle / STEPS) <= STRAIN
         low, high = (middle, high) if passes else (low, middle)
     return low / STEPS
 
@@ -136,31 +128,3 @@ def _strain(band: NDArray[np.int64], source: NDArray[np.int32], torus: bool) -> 
         apart = band[own[..., 0], own[..., 1]] - band[other[..., 0], other[..., 1]]
         differences += int((apart * apart).sum())
     return differences / (4 * squares)  # of two directions
-
-
-def _alpha_of_target(machine: Machine, analysis: Analysis, options: Options, target: float) -> float:
-    """The alpha of a target, counted on the sample itself."""
-    itself = sampled_from(
-        machine, analysis.shapes, [np.arange(pixels([shape]), dtype=np.int32) for shape in analysis.shapes]
-    )
-    low, high = 0, MOST * STEPS
-    while high - low > 1:  # candidates only grow with alpha
-        middle = (low + high) // 2
-        reached = _mean_candidates(machine, analysis, itself, options, middle / STEPS) >= target
-        low, high = (low, middle) if reached else (middle, high)
-    return high / STEPS
-
-
-def _mean_candidates(machine: Machine, analysis: Analysis, itself: Sampled, options: Options, alpha: float) -> float:
-    structure = structure_of(machine, analysis, thresholds(analysis.levels, options, alpha))
-    means = []
-    for level in range((analysis.levels - 1) // 2, analysis.levels - 1):
-        begin, n = pixels(analysis.shapes[:level]), pixels(analysis.shapes[level : level + 1])
-        few = n <= STRETCHES * STRETCH
-        counts = []
-        for first in [0] if few else [i * n // STRETCHES for i in range(STRETCHES)]:
-            end = n if few else first + STRETCH
-            candidates(machine, structure, itself, level, first, end, options.parity == "match", 0, draw=False)
-            counts.append(machine.get(machine.part(itself.counts, begin + first, begin + end))[:, 0])
-        means.append(float(np.concatenate(counts).mean()))
-    return float(np.mean(means)) if means else inf

@@ -49,7 +49,7 @@ class Options:
         Number(0, inf, word="auto"),
         "Exchange places that differ by no more than this: 0 tiles the sample, more is freer, auto finds a value",
         more="0 tiles the sample but for parts that are equal to the bit, infinity samples every band on its own. "
-        '``"auto"`` takes what `simdtex.suggest_alpha` finds for ``strain`` or ``target``.',
+        '``"auto"`` takes what `simdtex.suggest_alpha` finds.',
         symbol="alpha of T = alpha / k^beta, equation (13)",
         shown=("synth",),
         slider=(0, 1, 0.01),
@@ -61,21 +61,6 @@ class Options:
         symbol="beta of equation (13)",
         shown=("synth",),
         slider=(0, 3, 0.1),
-    )
-    strain: float = appearance(
-        0.05,
-        Number(0),
-        "Let pieces that meet differ by at most this from what either would continue with, with alpha auto",
-        more="0 is nothing, 1 as much as unrelated pieces. See `simdtex.methods.multires.strain`.",
-        shown=(),
-        slider=(0, 0.5, 0.01),
-    )
-    target: float | None = appearance(
-        None,
-        Number(1, 2**31),
-        "Let alpha auto find this many candidates for a pixel of the coarser levels, on average",
-        none="`strain` decides",
-        shown=(),
     )
     thresholds: ArrayLike | None = appearance(
         None,

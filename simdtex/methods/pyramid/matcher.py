@@ -30,7 +30,7 @@ class Wanted:
 
     Attributes
     ----------
-    table : (bands, m) or (bands, bins + 1) int32 array of the machine
+    table : (bands, m) or (bands, 257) int32 array of the machine
         Sorted values, or the inverse of their cumulative distribution.
     deviations : (bands,) float64 array
         Standard deviations, 1 where there is none.
@@ -66,7 +66,7 @@ class Matcher:
         deviations = values.std(1, dtype=np.float64)
         deviations[deviations == 0] = 1.0
         if self._options.match == "lookup":
-            values = np.stack([inverse_cdf(band, self._options.bins) for band in values])
+            values = np.stack([inverse_cdf(band) for band in values])
         return Wanted(self._machine.put(values), deviations)
 
     def match(self, name: str, values: Array, wanted: Wanted, together: bool = False) -> Array:

@@ -42,7 +42,6 @@ class Options:
         paper="lookup",
         shown=(),
     )
-    bins: int = appearance(256, Whole(2, 4096), "Give the lookup tables this many bins", shown=())
     color: str = appearance(
         "decorrelate",
         Choice(("decorrelate", "channels")),
