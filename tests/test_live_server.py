@@ -231,7 +231,7 @@ def test_the_command_prints_an_address_serves_it_and_ends(number, token, tmp_pat
     line = process.stdout.readline()
     found = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/([\w-]+)/  \(on reference \(NumPy\); Ctrl-C ends it\)\n", line)
     assert found, line
-    assert found[2] == token or len(found[2]) == 32 and not token
+    assert found[2] == token or (len(found[2]) == 32 and not token)
     assert get(int(found[1]), f"/{found[2]}/")[0].status == 200
     page = Client(int(found[1]), found[2])
     assert page.wait("picture")[0]["name"] == "wall.png"

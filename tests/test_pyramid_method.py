@@ -277,7 +277,7 @@ def test_an_output_smaller_than_the_sample_and_no_levels_at_all():
         (
             {"slices": "each"},
             TypeError,
-            "unknown option 'slices' of the method 'pyramid'; choose from: pyramid, levels",
+            "unknown option 'slices' of the method 'pyramid'; choose from: preset, pyramid, iterations",
         ),
         ({"alpha": 1}, TypeError, "unknown option 'alpha'"),
     ],

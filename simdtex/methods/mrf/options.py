@@ -326,6 +326,7 @@ class Options:
         none="names if they are integers of at most 16 different values",
         shown=("synth", "simulate"),
     )
+
     def __post_init__(self) -> None:
         """Check every value, and what goes together."""
         check(self)
