@@ -15,7 +15,7 @@ def main() -> None:
         import signal
 
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else whoever started us ignores it
-            signal.signal(signal.SIGINT, leave)  # until a command begins: simdtex.cli.common.plainly
+            signal.signal(signal.SIGINT, leave)  # until a command begins: simdtex.cli.ending
         from simdtex.cli import main as command
 
         command()

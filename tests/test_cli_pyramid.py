@@ -10,7 +10,7 @@ from volumes import loaded
 
 import simdtex
 from simdtex.cli import main
-from simdtex.cli.common import last_iteration
+from simdtex.cli.inputs import last_iteration
 from simdtex.cli.solid import block_shape
 from simdtex.io import image
 from simdtex.report.solid import view

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 import simdtex
-from simdtex.cli.common import plainly
+from simdtex.cli.ending import report_errors
 from simdtex.experiments import onsager
 from simdtex.experiments.comparison import compare
 from simdtex.experiments.ising import ising
@@ -176,7 +176,7 @@ def test_no_work_is_done_for_filters_that_fit_no_level():
 
 def test_memory_errors_are_said_in_one_sentence():
     @click.command()
-    @plainly
+    @report_errors
     def command():
         raise MemoryError
 

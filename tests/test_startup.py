@@ -158,22 +158,22 @@ def test_a_ctrl_c_that_was_to_be_ignored_is(tmp_path):
 @pytest.mark.parametrize("module", ["simdtex.machine.runtimes", "weakref", "_weakrefset"])
 def test_ctrl_c_waits_where_an_exception_would_do_harm(module):
     """In the search for runtimes, which would leave its temporary folder, and in callbacks of what is collected."""
-    from simdtex.cli import common
+    from simdtex.cli import ending
 
     assert find_spec(module)
     over, names = [], {"__name__": module, "signal": signal, "time": time}
     exec("def search(over):\n signal.raise_signal(signal.SIGINT)\n time.sleep(0.05)\n over.append(True)", names)
-    with pytest.raises(KeyboardInterrupt), common._interruptible():
+    with pytest.raises(KeyboardInterrupt), ending.catch_signals(click.Context(click.Command("any"))):
         names["search"](over)
         time.sleep(1)
     assert over
 
 
 def test_what_ctrl_c_leaves_undone_is_not_warned_of():
-    from simdtex.cli.common import plainly
+    from simdtex.cli.ending import report_errors
 
     @click.command()
-    @plainly
+    @report_errors
     def stopped():
         raise KeyboardInterrupt
 

@@ -9,7 +9,7 @@ from importlib import import_module
 
 import click
 
-from simdtex.cli.helping import write_examples
+from simdtex.cli.command import write_examples
 
 GROUPS = {
     "More of a texture": {

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import click
 
-from simdtex.cli.common import afterwards, plainly
-from simdtex.cli.helping import command
+from simdtex.cli.command import command
+from simdtex.cli.ending import afterwards
 from simdtex.cli.places import FOLDER, WRITE
 
 
@@ -26,7 +26,6 @@ from simdtex.cli.places import FOLDER, WRITE
 @click.option("--json", "path", type=WRITE, metavar="FILE", help="Write all that was measured.")
 @click.option("--plot", "folder", type=FOLDER, metavar="DIR", help="Draw rooflines and growth.")
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing on what is being measured, and show no tables.")
-@plainly
 def bench(device: str | None, quick: bool, path: Path | None, folder: Path | None, quiet: bool) -> None:
     """Measure what devices can do at most, and what the methods take.
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import click
 
-from simdtex.cli.common import plainly, progress_bar
-from simdtex.cli.helping import command
+from simdtex.cli.command import command
+from simdtex.cli.job import progress_bar
 from simdtex.cli.options import DEVICE
 from simdtex.cli.places import FOLDER
 
@@ -23,7 +23,6 @@ from simdtex.cli.places import FOLDER
 )
 @click.option("--seed", type=int, default=1, show_default=True, help="Make the pictures from this seed.")
 @DEVICE
-@plainly
 def demo(output: Path, size: str, seed: int, device: str | None) -> None:
     """Synthesise brick, grass and gravel from scikit-image's own pictures."""
     from skimage import data

@@ -8,8 +8,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from simdtex.cli.common import plainly
-from simdtex.cli.helping import command
+from simdtex.cli.command import command
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -20,7 +19,6 @@ COLUMNS = ("", "index", "platform", "device", "kind", "OpenCL", "units", "memory
 
 
 @command()
-@plainly
 def devices() -> None:
     """List every OpenCL device, whether it works, and which one would be chosen."""
     from rich.console import Console

@@ -3,26 +3,26 @@
 
 from __future__ import annotations
 
-import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
-from simdtex.cli.common import afterwards, command_line, plainly, settle, watching
-from simdtex.cli.helping import OUTPUTS, command
+from simdtex.cli.command import OUTPUTS
 from simdtex.cli.inputs import channels, check_source_map, read_also, read_material, write_arranged
-from simdtex.cli.keeping import kept
-from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, given, job_options, option, stages_option
+from simdtex.cli.job import Task, command_line, job
+from simdtex.cli.options import given, option
 from simdtex.cli.places import FOLDER, READ, WRITE, WRITE_PAIR
 
 SIDES = ("top", "bottom", "left", "right")
 
 
-@command(
+@job(
     ("extend photo.png -o tile.png --seamless", "Make a photo tile."),
     ("extend photo.png -o wide.png --left 200 --right 200", "Continue it at both sides."),
     ("extend photo.png -o tile.png --seamless --also normal.png=tile-normal.png", "And its normal map with it."),
+    stages="every level and sweep",
 )
 @click.argument("picture", type=READ)
 @click.option("-o", "--output", required=True, type=WRITE, help="Write this picture.")
@@ -64,7 +64,6 @@ SIDES = ("top", "bottom", "left", "right")
     metavar="FILE",
     help="Write from where in the picture each pixel is: .npz, .npy or .png.",
 )
-@stages_option("every level and sweep")
 @option(
     "--report",
     group=OUTPUTS,
@@ -72,88 +71,56 @@ SIDES = ("top", "bottom", "left", "right")
     metavar="DIR",
     help="Write a page of the run: pictures, and how evenly it uses the picture.",
 )
-@SEED
-@DEVICE
-@job_options("extend")
-@CHECKPOINT
-@QUIET
-@plainly
-@kept
 def extend(
     picture: Path,
     output: Path,
     size: str | None,
     seamless: str | None,
-    band: int | None,
     also: tuple[str, ...],
     source_map: Path | None,
-    stages: Path | None,
     report: Path | None,
-    seed: int | None,
-    device: str | None,
-    quiet: bool,
     **options: Any,
-) -> None:
+) -> Task:
     """Continue PICTURE beyond its edges, or make it seamless.
 
     `simdtex extend photo.png -o tile.png --seamless` makes of a photo a texture that tiles.
     """
-    from simdtex import extend as make
+    from simdtex import extend
     from simdtex.io import image
 
     whole = read_material([picture])
-    pixels = whole.pixels[0]
+    pixels, (rows, cols) = whole.pixels[0], whole.sizes[0]
     sides = {name: options.pop(name) for name in SIDES}
     if size is not None:
-        sides = _sides(size, sides, whole.sizes[0])
+        sides = _sides(size, sides, (rows, cols))
     if seamless not in (None, "x", "y", "both"):
         raise ValueError(f"--seamless {seamless} is no direction; give x, y or both")
     tiling: bool | str = seamless if seamless in ("x", "y") else bool(seamless)
     if not (tiling or any(sides.values())):
         raise ValueError("there is nothing to add; give --left, --right, --top, --bottom or --size, or --seamless")
-    if band is not None and not tiling:
+    if options["band"] is not None and not tiling:
         raise ValueError("--band is what --seamless makes anew; leave it out, or give --seamless")
     others = read_also(also, whole)
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, whole)
+    writers = write_arranged(output, others, source_map)
     if report:
         from simdtex.report.page import check_folder
-
-        check_folder(report)
-
-    began = time.perf_counter()
-    with watching(quiet, stages, whole.limits) as callback:
-        extended: Any = make(
-            pixels,
-            **sides,
-            seamless=tiling,
-            band=band,
-            channel_axis=whole.channel_axis,
-            rng=seed,
-            device=device,
-            callback=callback,
-            checkpoint=click.get_current_context().obj,
-            full_output=True,
-            **given(options),
-        )
-    made, run = extended
-    write_arranged(output, made, others, source_map, run.source)
-    if report:
         from simdtex.report.synthesis import write_synthesis
 
-        with afterwards():
-            write_synthesis(report, pixels, made, run, command_line(click.get_current_context()))
-    settle()
-    if not quiet:
-        (rows, cols), (height, width) = whole.sizes[0], made.shape[:2]
-        click.echo(
-            f"{output}: {width}x{height} from {cols}x{rows} in {time.perf_counter() - began:.1f} s "
-            f"on {run.statistics['device']}, seed {run.statistics['seed']}"
-        )
+        check_folder(report)
+        writers.append(lambda made, run: write_synthesis(report, pixels, made, run, command_line()))
+    return Task(
+        partial(extend, pixels, seamless=tiling, channel_axis=whole.channel_axis, **sides, **given(options)),
+        lambda made: f"{made.shape[1]}x{made.shape[0]} from {cols}x{rows}",
+        str(output),
+        writers,
+        whole.limits,
+    )
 
 
 def _sides(text: str, sides: dict[str, int], shape: tuple[int, int]) -> dict[str, int]:
-    """What is to be added on each side for an output of this size."""
+    """Return what is to be added on each side for an output of this size."""
     from simdtex.io.image import parse_size
 
     if any(sides.values()):

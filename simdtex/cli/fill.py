@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,21 +11,14 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.common import plainly, settle, watching
-from simdtex.cli.helping import OUTPUTS, command
-from simdtex.cli.inputs import (
-    channels,
-    check_source_map,
-    read_also,
-    read_material,
-    write_arranged,
-)
-from simdtex.cli.keeping import kept
-from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, given, job_options, option
+from simdtex.cli.command import OUTPUTS
+from simdtex.cli.inputs import channels, check_source_map, read_also, read_material, write_arranged
+from simdtex.cli.job import Task, job
+from simdtex.cli.options import given, option
 from simdtex.cli.places import READ, WRITE, WRITE_PAIR
 
 
-@command(
+@job(
     ("fill photo.png -o whole.png --mask hole.png", "What is white in the mask is made anew."),
     ("fill cutout.png -o whole.png", "So is what is transparent in the picture."),
     (
@@ -70,13 +63,6 @@ from simdtex.cli.places import READ, WRITE, WRITE_PAIR
     metavar="FILE",
     help="Write from where in the picture each pixel is: .npz, .npy or .png.",
 )
-@SEED
-@DEVICE
-@job_options("fill")
-@CHECKPOINT
-@QUIET
-@plainly
-@kept
 def fill(
     picture: Path,
     output: Path,
@@ -85,16 +71,13 @@ def fill(
     reach: int | None,
     also: tuple[str, ...],
     source_map: Path | None,
-    seed: int | None,
-    device: str | None,
-    quiet: bool,
     **options: Any,
-) -> None:
+) -> Task:
     """Fill the holes of PICTURE with more of what is around them.
 
     Everything outside the holes stays as it is, to the bit.
     """
-    from simdtex import fill as make
+    from simdtex import fill
     from simdtex.io import image
 
     whole = read_material([picture])
@@ -105,34 +88,18 @@ def fill(
     others = read_also(also, whole)
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, texture or whole, everywhere=not texture)
-
-    began = time.perf_counter()
-    with watching(quiet, None, (0.0, 1.0)) as callback:
-        filled: Any = make(
-            pixels,
-            hole,
-            sample=texture.array if texture else None,
-            reach=reach,
-            channel_axis=None if pixels.ndim == 2 else -1,
-            rng=seed,
-            device=device,
-            callback=callback,
-            checkpoint=click.get_current_context().obj,
-            full_output=True,
-            **given(options),
-        )
-    made, run = filled
-    write_arranged(output, made, others, source_map, run.source)
-    settle()
-    if not quiet:
-        click.echo(
-            f"{output}: {np.count_nonzero(hole)} of {hole.size} pixels filled in {time.perf_counter() - began:.1f} s "
-            f"on {run.statistics['device']}, seed {run.statistics['seed']}"
-        )
+    sample = texture and texture.array
+    axis = None if pixels.ndim == 2 else -1
+    return Task(
+        partial(fill, pixels, hole, sample=sample, reach=reach, channel_axis=axis, **given(options)),
+        lambda made: f"{np.count_nonzero(hole)} of {hole.size} pixels filled",
+        str(output),
+        write_arranged(output, others, source_map),
+    )
 
 
 def _hole(pixels: NDArray[Any], mask: Path | None) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """The picture, and where it is to be made: where the mask is white or, without one, it is transparent; or NaN."""
+    """Return the picture, and its hole: where the mask is white or, without one, it is transparent; or it is NaN."""
     from simdtex.io.image import read_mask, split_alpha
 
     if mask:

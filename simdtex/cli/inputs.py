@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from simdtex.cli.common import afterwards
 
 if TYPE_CHECKING:
     from simdtex.io.hard_data import HardData
@@ -139,22 +138,50 @@ def _other_map(text: str, samples: Material) -> Also:
     return Also(maps, Path(out))
 
 
-def write_arranged(
-    output: Path, made: NDArray[Any], others: Sequence[Also], source_map: Path | None, source: Any
-) -> None:
-    """Write a picture, the other maps in its arrangement and, where it is asked for, the source map."""
+def write_arranged(output: Path, others: Sequence[Also], source_map: Path | None) -> list[Callable[[Any, Any], object]]:
+    """Return functions that write a picture, the other maps in its arrangement, and the source map if it has a file."""
     from simdtex.io import image
     from simdtex.model.source_map import save_source_map
 
-    carried = [(one.carried(source), one.out) for one in others]
-    with afterwards():
-        image.write(output, made)
-    for array, path in carried:
-        with afterwards():
-            image.write(path, array)
+    writers: list[Callable[[Any, Any], object]] = [lambda made, run: image.write(output, made)]
+    for one in others:
+        writers.append(partial(_write_map, one))
     if source_map:
-        with afterwards():
-            save_source_map(source_map, source)
+        writers.append(lambda made, run: save_source_map(source_map, run.source))
+    return writers
+
+
+def _write_map(other: Also, made: NDArray[Any], run: Any) -> None:
+    from simdtex.io import image
+
+    image.write(other.out, other.carried(run.source))
+
+
+def output_shape(size: str | None, pixels: Any, *like: Any) -> tuple[int, int]:
+    """Return rows and columns of ``--size``; by default those of the first picture of `like`, or twice the sample's."""
+    from simdtex.io.image import parse_size
+
+    if size is not None:
+        return parse_size(size)
+    for picture in like:
+        if hasattr(picture, "shape"):  # a table has none
+            return (picture.shape[0], picture.shape[1])
+    return (2 * pixels.shape[0], 2 * pixels.shape[1])
+
+
+def candidates_per_level(levels: list[dict[str, Any]]) -> str:
+    """Return the mean candidates of each level that was sampled, the coarsest first."""
+    return " ".join(f"{level['candidates']:.3g}" for level in levels[1:])
+
+
+def last_iteration(statistics: dict[str, Any]) -> str:
+    """Return levels, iterations, and how far the last iteration had to move the subbands on average."""
+    reports = statistics["iterations"]
+    text = f"levels {statistics['options']['levels']}, iterations {len(reports)}"
+    moved = [by for name, by in reports[-1]["distances"].items() if name != "pixels"] if reports else []
+    if not moved:  # no iteration, or a constant sample
+        return text
+    return f"{text}, mean distance of the subbands in the last: {sum(moved) / len(moved):.3f} standard deviations"
 
 
 def check_source_map(path: Path | None, samples: Material, *, everywhere: bool = True) -> None:

@@ -9,8 +9,8 @@ from typing import Any
 
 import click
 
-from simdtex.cli.common import command_line, plainly, progress_bar
-from simdtex.cli.helping import command
+from simdtex.cli.command import command
+from simdtex.cli.job import command_line, progress_bar
 from simdtex.cli.options import DEVICE
 from simdtex.cli.places import FOLDER
 
@@ -50,19 +50,15 @@ PICTURE_SWEEPS = 50
 @DEVICE
 @click.option("-o", "--output", type=FOLDER, metavar="DIR", help="Write a report there.")
 @click.option("-q", "--quiet", is_flag=True, help="Show no progress and no table.")
-@plainly
 def ising(
     names: str,
     temperatures: tuple[float, ...],
     size: str,
-    seeds: int,
-    sweeps: int,
-    burn_in: int,
-    start: str,
     seed: int,
     device: str | None,
     output: Path | None,
     quiet: bool,
+    **options: Any,
 ) -> None:
     """Relax Ising spins by each schedule and compare with the exact energy and magnetisation."""
     from simdtex import schedules as known
@@ -81,10 +77,9 @@ def ising(
     chosen = _distinct([known.get(name.strip()) for name in names.split(",")])
     temperatures = tuple(dict.fromkeys(temperatures))
     shape = image.parse_size(size)
-    whole("--seeds", seeds, 2)  # there is no error bar over one
-    whole("--sweeps", sweeps, 2)
+    whole("--seeds", options["seeds"], 2)  # there is no error bar over one
+    whole("--sweeps", options["sweeps"], 2)
     as_seed(seed)
-    options: dict[str, Any] = {"seeds": seeds, "sweeps": sweeps, "burn_in": burn_in, "start": start}
     check(shape, temperatures, **options)
     machine = open_machine(device)
 
@@ -111,7 +106,7 @@ def ising(
     if output:
         settings = {"device": machine.name, "rows": shape[0], "columns": shape[1], "seed": seed, **options}
         settings |= {"boundary": "torus", "temperatures": temperatures}
-        report.write_ising(output, found, runs, pictures, settings, command_line(click.get_current_context()))
+        report.write_ising(output, found, runs, pictures, settings, command_line())
     if not quiet:
         where = f"{output / 'index.html'}: " if output else ""
         click.echo(f"{where}{time.perf_counter() - began:.0f} s on {machine.name}")

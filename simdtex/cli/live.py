@@ -9,8 +9,7 @@ from pathlib import Path
 
 import click
 
-from simdtex.cli.common import Ended, plainly
-from simdtex.cli.helping import command
+from simdtex.cli.command import command
 from simdtex.cli.options import DEVICE
 from simdtex.cli.places import READ
 from simdtex.machine import Machine
@@ -33,7 +32,6 @@ EXTRA = "simdtex live needs packages of its own ({}); install them with: pip ins
 )
 @click.option("--browser/--no-browser", default=True, help="Open the page, or print its address alone.")
 @DEVICE
-@plainly
 def live(picture: Path | None, port: int, host: str, browser: bool, device: str | None) -> None:
     """Watch a texture take shape in the browser, and steer it.
 
@@ -58,6 +56,6 @@ def live(picture: Path | None, port: int, host: str, browser: bool, device: str 
         if browser:
             webbrowser.open(address)
 
-    with suppress(KeyboardInterrupt, Ended):
+    with suppress(KeyboardInterrupt):
         serve(given, device, host, port, ready)
     click.echo("ended")

@@ -11,7 +11,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from simdtex.cli.helping import DEVICE_GROUP, FIRST, JOB, OUTPUTS, RUNS
+from simdtex.cli.command import DEVICE_GROUP, FIRST, JOB, OUTPUTS, RUNS
 from simdtex.cli.places import FOLDER, WRITE
 from simdtex.options import PRESET, Choice, Number, Numbers, Other, Switch, Whole, is_flag, table
 from simdtex.options import Option as Declared
@@ -114,10 +114,10 @@ def _help(job: str, one: Declared) -> str:
     return f"{one.help}.  [{shown}]"
 
 
-def given(options: dict[str, Any]) -> dict[str, Any]:
-    """Return the options that were given, the texts of numbers as numbers."""
+def given(options: dict[str, Any], without: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return the options that were given, the texts of numbers as numbers; some left out."""
     kinds = {one.name: getattr(one, "kind", None) for one in click.get_current_context().command.params}
-    chosen = {name: value for name, value in options.items() if value is not None}
+    chosen = {name: value for name, value in options.items() if value is not None and name not in without}
     for name, value in chosen.items():
         kind, flag = kinds.get(name), f"--{name.replace('_', '-')}"
         if isinstance(kind, Numbers):

@@ -9,8 +9,9 @@ from typing import Any
 
 import click
 
-from simdtex.cli.common import afterwards, command_line, plainly, progress_bar
-from simdtex.cli.helping import command
+from simdtex.cli.command import command
+from simdtex.cli.ending import afterwards
+from simdtex.cli.job import command_line, progress_bar
 from simdtex.cli.options import DEVICE, given, job_options
 from simdtex.cli.places import FOLDER, READ
 from simdtex.schedules import TOGETHER
@@ -49,7 +50,6 @@ from simdtex.schedules import TOGETHER
 @job_options("schedules")
 @DEVICE
 @click.option("-q", "--quiet", is_flag=True, help="Show no progress and no table.")
-@plainly
 def schedules(
     sample: Path | None,
     output: Path,
@@ -57,7 +57,6 @@ def schedules(
     seeds: int,
     seed: int,
     size: str,
-    device: str | None,
     quiet: bool,
     **options: Any,
 ) -> None:
@@ -91,12 +90,11 @@ def schedules(
             chosen,
             seeds=range(seed, seed + seeds),
             channel_axis=channel_axis,
-            device=device,
             callback=tell,
             **given(options),
         )
     with afterwards():
-        write_comparison(output, found, command_line(click.get_current_context()))
+        write_comparison(output, found, command_line())
     if quiet:
         return
     for table in tables(found):

@@ -9,8 +9,9 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.common import candidates_per_level, output_shape, plainly, progress_bar
-from simdtex.cli.helping import command
+from simdtex.cli.command import command
+from simdtex.cli.inputs import candidates_per_level, output_shape
+from simdtex.cli.job import progress_bar
 from simdtex.cli.options import DEVICE, given, job_options, numbers
 from simdtex.cli.places import READ, WRITE
 
@@ -41,7 +42,6 @@ from simdtex.cli.places import READ, WRITE
 @click.option("--seed", type=int, help="Make every picture from this seed.  [a fresh one, printed]")
 @DEVICE
 @click.option("-q", "--quiet", is_flag=True, help="Show no progress bar and no numbers.")
-@plainly
 def sheet(
     sample: Path,
     output: Path,
@@ -49,7 +49,6 @@ def sheet(
     betas: str,
     size: str | None,
     seed: int | None,
-    device: str | None,
     quiet: bool,
     **options: Any,
 ) -> None:
@@ -76,7 +75,6 @@ def sheet(
             numbers("--beta", betas),
             channel_axis=picture.channel_axis,
             rng=seed,
-            device=device,
             callback=lambda fraction, _: show(fraction, "sampling", ""),
             **given(options),
         )

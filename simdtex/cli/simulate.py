@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import time
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -12,16 +11,15 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.common import afterwards, command_line, output_shape, plainly, settle, watching
+from simdtex.cli.command import DATA, DEVICE_GROUP, OUTPUTS
 from simdtex.cli.guides import read_guides
-from simdtex.cli.helping import DATA, DEVICE_GROUP, OUTPUTS, command
-from simdtex.cli.inputs import read_known, read_masks, read_material
-from simdtex.cli.keeping import kept
-from simdtex.cli.options import CHECKPOINT, DEVICE, QUIET, SEED, given, job_options, option
+from simdtex.cli.inputs import output_shape, read_known, read_masks, read_material
+from simdtex.cli.job import Task, command_line, job
+from simdtex.cli.options import given, option
 from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
 
 
-@command(
+@job(
     (
         "simulate facies.png -o many.nc --number 50 --categorical --known wells.csv",
         "50 that honour the data of wells.",
@@ -79,91 +77,66 @@ from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
     metavar="DIR",
     help="Write a page: realisations, shares, entropy, variograms, connectivity, variety.",
 )
-@SEED
-@DEVICE
-@job_options("simulate")
-@CHECKPOINT
-@QUIET
-@plainly
-@kept
 def simulate(
     training_image: tuple[Path, ...],
     output: Path,
     number: int,
-    first: int,
     size: str | None,
-    known: Path | None,
-    sample_mask: tuple[Path, ...],
-    guide: str | None,
-    jobs: int | None,
     report: Path | None,
-    seed: int | None,
-    device: str | None,
-    quiet: bool,
     **options: Any,
-) -> None:
+) -> Task:
     """Simulate what TRAINING_IMAGE shows: realisations that look like it and honour data.
 
     A realisation depends on the seed and on its own number alone.
     """
-    from simdtex import simulate as make
+    from simdtex import simulate
     from simdtex.io.realisations import check_realisations_path, write_realisations
+    from simdtex.run import Output
 
     material = read_material(training_image)
-    masks = read_masks(sample_mask, material)
-    values = read_known(known, material.pixels[0]) if known else None
+    pixels = material.pixels[0]
+    masks = read_masks(options.pop("sample_mask"), material)
+    file, guide = options.pop("known"), options.pop("guide")
+    known = read_known(file, pixels) if file else None
     guides = read_guides(guide, material, options["labels"]) if guide is not None else None
-    shape = output_shape(size, material.pixels[0], values, material.pixels[0])
+    shape = output_shape(size, pixels, known, pixels)
     check_realisations_path(output)
+    writers: list[Any] = [lambda made, run: write_realisations(output, made)]
     if report:
-        _check_report(report, material.pixels, shape, getattr(values, "values", values))
+        _check_report(report, material.pixels, shape, getattr(known, "values", known))
+        writers.append(lambda made, run: _report(report, pixels, made, None if known is None else _rows(known, shape)))
     if guides:
         options["labels"] = guides.labels
+    inputs = {
+        "shape": shape,
+        "known": known,
+        "guide": guides and guides.pair,
+        "mask": masks and (masks if material.several else masks[0]),
+        "channel_axis": material.channel_axis,
+        **given(options),
+    }
 
-    began = time.perf_counter()
-    with watching(quiet, None, material.limits) as callback:
-        made = make(
-            material.array,
-            number,
-            shape=shape,
-            known=values,
-            guide=guides and guides.pair,
-            mask=None if masks is None else (masks if material.several else masks[0]),
-            first=first,
-            jobs=jobs,
-            channel_axis=material.channel_axis,
-            rng=seed,
-            device=device,
-            callback=callback,
-            checkpoint=click.get_current_context().obj,
-            **given(options),
-        )
-    with afterwards():
-        write_realisations(output, made)
-    if report:
-        from simdtex.report.ensemble import write_ensemble
+    def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
+        made = simulate(material.array, number, **inputs, **call)
+        return made, Output(None, statistics=made.attrs)
 
-        categorical = bool(json.loads(made.attrs["options"])["categorical"])
-        with afterwards():
-            write_ensemble(
-                report,
-                material.pixels[0],
-                made.values,
-                data=None if values is None else _rows(values, shape),
-                categories=None if categorical else [],
-                command=command_line(click.get_current_context()),
-            )
-    settle()
-    if not quiet:
-        seconds = time.perf_counter() - began
-        click.echo(
-            f"{output}: {number} realisation{'s' * (number != 1)} of {shape[1]}x{shape[0]} in {seconds:.1f} s "
-            f"on {made.attrs['device']}, seed {made.attrs['seed']}"
-        )
+    return Task(
+        make,
+        lambda made: f"{number} realisation{'s' * (number != 1)} of {shape[1]}x{shape[0]}",
+        str(output),
+        writers,
+    )
+
+
+def _report(folder: Path, pixels: Any, made: Any, data: Any) -> None:
+    from simdtex.report.ensemble import write_ensemble
+
+    categories: list[Any] | None = None if json.loads(made.attrs["options"])["categorical"] else []
+    write_ensemble(folder, pixels, made.values, data=data, categories=categories, command=command_line())
 
 
 def _check_report(folder: Path, pictures: list[Any], shape: tuple[int, int], known: Any) -> None:
-    """Raise where a report cannot be made, before anything is simulated."""
+    """Raise if a report cannot be made, before anything is simulated."""
     from simdtex.experiments.ensemble.summary import LARGEST, LEAST
     from simdtex.report.page import check_folder
 
@@ -182,7 +155,7 @@ def _check_report(folder: Path, pictures: list[Any], shape: tuple[int, int], kno
 
 
 def _rows(known: Any, shape: tuple[int, int]) -> Any:
-    """Hard data as x, y, value."""
+    """Return hard data as rows of x, y and value."""
     from simdtex.io.hard_data import HardData, place_hard_data
 
     known = place_hard_data(known, shape) if isinstance(known, HardData) else np.ma.masked_invalid(known)

@@ -4,29 +4,31 @@
 from __future__ import annotations
 
 import re
-import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
 
-from simdtex.cli.common import afterwards, last_iteration, opened, plainly, settle, watching
-from simdtex.cli.helping import OUTPUTS, command
-from simdtex.cli.keeping import kept
-from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, given, job_options, option, stages_option
+from simdtex.cli.command import OUTPUTS
+from simdtex.cli.inputs import channels, last_iteration, read_material
+from simdtex.cli.job import Task, job
+from simdtex.cli.options import given, option
 from simdtex.cli.places import EITHER, READ, WRITE
 
 SIDE = 128
-"""Voxels a side, where no size is given."""
+"""The default size, voxels a side."""
 
 
-@command(
+@job(
     (
         "solid marble.png -o block.npz --size 64 --view block.png",
         "A cube of 64^3 voxels, and a picture of it.",
     ),
     ("solid marble.png -o slices --size 16x64x64", "A folder of 16 slices."),
+    stages="the middle slice of every iteration",
+    profile=True,
 )
 @click.argument("sample", type=READ)
 @click.option(
@@ -51,27 +53,7 @@ SIDE = 128
     metavar="PNG",
     help="Write a picture of it: a cube, a sphere and three slices.",
 )
-@job_options("solid")
-@SEED
-@DEVICE
-@stages_option("the middle slice of every iteration")
-@PROFILE
-@CHECKPOINT
-@QUIET
-@plainly
-@kept
-def solid(
-    sample: Path,
-    outputs: tuple[Path, ...],
-    size: str | None,
-    picture: Path | None,
-    seed: int | None,
-    device: str | None,
-    stages: Path | None,
-    profile: bool,
-    quiet: bool,
-    **options: Any,
-) -> None:
+def solid(sample: Path, outputs: tuple[Path, ...], size: str | None, picture: Path | None, **options: Any) -> Task:
     """Make a solid of the texture SAMPLE: a block whose slices look like it.
 
     The method is Heeger and Bergen's (1995), for textures that look alike in all directions.
@@ -81,50 +63,27 @@ def solid(
     from simdtex.synthesis import synthesize_solid
 
     shape = (SIDE, SIDE, SIDE) if size is None else block_shape(size)
-    read = image.read(sample)
-    pixels = read.pixels
-    channels = 1 if read.channel_axis is None else pixels.shape[-1]
+    material = read_material([sample])
+    pixels, (rows, cols) = material.pixels[0], material.sizes[0]
+    writers: list[Any] = []
     for output in outputs:
-        volume.check_writable(output, pixels.dtype, channels)
+        volume.check_writable(output, pixels.dtype, channels(pixels))
+        writers.append(lambda block, run, output=output: volume.write(output, block))
     if picture:
         image.check_writable(picture, suffixes=(".png",))
-
-    began = time.perf_counter()
-    with watching(quiet, stages, (float(pixels.min()), float(pixels.max()))) as callback:
-        block, run = synthesize_solid(
-            pixels,
-            shape,
-            channel_axis=read.channel_axis,
-            rng=seed,
-            device=opened(device, profile),
-            callback=callback,
-            checkpoint=click.get_current_context().obj,
-            full_output=True,
-            **given(options),
-        )
-    seconds = time.perf_counter() - began
-    for output in outputs:
-        with afterwards():
-            volume.write(output, block)
-    if picture:
-        with afterwards():
-            view(np.asarray(block), picture)
-    settle()
-    if not quiet:
-        names = ", ".join(str(path) for path in (*outputs, *([picture] if picture else [])))
-        click.echo(
-            f"{names}: {'x'.join(str(side) for side in shape)} from {pixels.shape[1]}x{pixels.shape[0]} "
-            f"in {seconds:.1f} s on {run.statistics['device']}, seed {run.statistics['seed']}"
-        )
-        click.echo(last_iteration(run.statistics))
-    if profile:
-        from simdtex.report.terminal import print_profile
-
-        print_profile(run.statistics)
+        writers.append(lambda block, run: view(np.asarray(block), picture))
+    return Task(
+        partial(synthesize_solid, pixels, shape, channel_axis=material.channel_axis, **given(options)),
+        lambda block: f"{'x'.join(map(str, shape))} from {cols}x{rows}",
+        ", ".join(str(path) for path in (*outputs, picture) if path),
+        writers,
+        material.limits,
+        lambda statistics: click.echo(last_iteration(statistics)),
+    )
 
 
 def block_shape(text: str) -> tuple[int, int, int]:
-    """Depth, rows and columns of ``--size``."""
+    """Return the depth, rows and columns of ``--size``."""
     match = re.fullmatch(r"\s*([0-9]{1,8})(?:\s*[xX\u00d7]\s*([0-9]{1,8})\s*[xX\u00d7]\s*([0-9]{1,8}))?\s*", text)
     sides = [int(side or match[1]) for side in match.groups()] if match else [0]
     if 0 in sides:

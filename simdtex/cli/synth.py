@@ -3,58 +3,41 @@
 
 from __future__ import annotations
 
-import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
-from simdtex.cli.common import (
-    afterwards,
-    candidates_per_level,
-    command_line,
-    last_iteration,
-    opened,
-    output_shape,
-    plainly,
-    settle,
-    watching,
-)
+from simdtex.cli.command import DATA, OUTPUTS
 from simdtex.cli.guides import read_guides
-from simdtex.cli.helping import DATA, OUTPUTS, command
 from simdtex.cli.inputs import (
+    candidates_per_level,
     channels,
     check_source_map,
+    last_iteration,
+    output_shape,
     read_also,
     read_known,
     read_masks,
     read_material,
     write_arranged,
 )
-from simdtex.cli.keeping import kept
-from simdtex.cli.options import (
-    CHECKPOINT,
-    DEVICE,
-    METHODS,
-    PROFILE,
-    QUIET,
-    SEED,
-    given,
-    job_options,
-    option,
-    stages_option,
-)
+from simdtex.cli.job import Task, command_line, job
+from simdtex.cli.options import METHODS, given, option
 from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR, WRITE, WRITE_PAIR
 from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 
 
-@command(
+@job(
     ("synth gravel.png -o more.png", "Twice as much, and it tiles."),
     (
         "synth gravel.png -o more.png --size 1024x512 --seed 7 --also normal.png=more-normal.png",
         "A size, a seed for the same pixels anywhere, a map carried along.",
     ),
     ("synth gravel.png -o more.zarr --size 32768x32768 --tiles 2048", "More than the memory holds."),
+    stages="every level, sweep or iteration",
+    profile=True,
 )
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
 @click.option("-o", "--output", required=True, type=EITHER, help="Write this picture; with --tiles a .zarr store.")
@@ -95,10 +78,6 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
     help="mrf: take each place of the output from where the first of these two pictures, of labels or numbers, has "
     "what the second has there. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples.",
 )
-@job_options("synth")
-@SEED
-@DEVICE
-@stages_option("every level, sweep or iteration")
 @option(
     "--source-map",
     group=OUTPUTS,
@@ -123,32 +102,16 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
     help="Write a page of the run: pictures, and how evenly it uses the sample.",
 )
 @tiles_options
-@PROFILE
-@CHECKPOINT
-@QUIET
-@plainly
-@kept
 def synth(
     samples: tuple[Path, ...],
     output: Path,
     size: str | None,
     method: str,
-    sample_mask: tuple[Path, ...],
-    known: Path | None,
-    guide: str | None,
-    seed: int | None,
-    device: str | None,
-    stages: Path | None,
     source_map: Path | None,
     also: tuple[str, ...],
     report: Path | None,
-    tiles: int | None,
-    workers: str | None,
-    dry_run: bool,
-    profile: bool,
-    quiet: bool,
     **options: Any,
-) -> None:
+) -> Task | None:
     """Make more of the texture SAMPLE.
 
     The method mrf takes several samples of one type, and their pixels may be NaN where they are unknown.
@@ -156,78 +119,64 @@ def synth(
     from simdtex.io import image
     from simdtex.synthesis import synthesize
 
-    check_tiles(click.get_current_context())
+    context = click.get_current_context()
+    check_tiles(context)
     if method == "pyramid" and (source_map or also):
         raise ValueError("the method pyramid takes no pixel from the sample; leave --source-map and --also out")
     material = read_material(samples)
     pixels = material.pixels[0]
-    masks = read_masks(sample_mask, material)
-    values = read_known(known, pixels) if known else None
+    masks = read_masks(options.pop("sample_mask"), material)
+    file, guide = options.pop("known"), options.pop("guide")
+    known = read_known(file, pixels) if file else None
     guides = read_guides(guide, material, options["labels"]) if guide else None
-    shape = output_shape(size, pixels, values, guides and guides.output)
+    shape = output_shape(size, pixels, known, guides and guides.output)
     if guides:
         options["labels"] = guides.labels
     inputs = {
         "channel_axis": material.channel_axis,
         "mask": masks and (masks if material.several else masks[0]),
-        "known": values,
+        "known": known,
         "guide": guides and guides.pair,
-        "rng": seed,
+        **given(options, without=("tiles", "workers", "dry_run")),
     }
-    if tiles is not None:
-        more = inputs | {"device": device} | given(options)
-        synthesize_in_tiles(click.get_current_context(), material.array, shape, more)
-        return
+    if options["tiles"] is not None:
+        synthesize_in_tiles(context, material.array, shape, inputs)
+        return None
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, material, everywhere=known is None)
     others = read_also(also, material)
-    if others and known:
+    if others and file:
         raise ValueError("known pixels are from no sample, and nothing says what a map has there; leave --also out")
+    writers = write_arranged(output, others, source_map)
     if report:
         from simdtex.report.page import check_folder
-
-        if material.several or known or not material.known:
-            raise ValueError("--report shows one sample, all of it known, and what is taken from it; leave it out")
-        check_folder(report)
-
-    began = time.perf_counter()
-    with watching(quiet, stages, material.limits) as callback:
-        made, run = synthesize(
-            material.array,
-            shape,
-            method=method,
-            device=opened(device, profile),
-            callback=callback,
-            checkpoint=click.get_current_context().obj,
-            full_output=True,
-            **inputs,
-            **given(options),
-        )
-    write_arranged(output, made, others, source_map, run.source)
-    if report:
         from simdtex.report.synthesis import write_synthesis
 
-        with afterwards():
-            write_synthesis(report, pixels, made, run, command_line(click.get_current_context()))
-    settle()
-    if not quiet:
-        height, width = material.sizes[0]
-        by = f"{len(samples)} samples" if material.several else f"{width}x{height}"
-        click.echo(
-            f"{output}: {shape[1]}x{shape[0]} from {by} in {time.perf_counter() - began:.1f} s "
-            f"on {run.statistics['device']}, seed {run.statistics['seed']}"
-        )
+        if material.several or file or not material.known:
+            raise ValueError("--report shows one sample, all of it known, and what is taken from it; leave it out")
+        check_folder(report)
+        writers.append(lambda made, run: write_synthesis(report, pixels, made, run, command_line()))
+
+    def more(statistics: dict[str, Any]) -> None:
         if method == "multires":
-            levels, alpha = run.statistics["levels"], run.statistics["options"]["alpha"]
+            alpha = statistics["options"]["alpha"]
             thresholds = "thresholds as given" if alpha is None else f"alpha {alpha}"
-            click.echo(f"{thresholds}; candidates per level, coarse to fine: {candidates_per_level(levels)}")
-        if method == "pyramid":
-            click.echo(last_iteration(run.statistics))
-    if profile:
-        from simdtex.report.terminal import print_profile
+            counts = candidates_per_level(statistics["levels"])
+            click.echo(f"{thresholds}; candidates per level, coarse to fine: {counts}")
+        elif method == "pyramid":
+            click.echo(last_iteration(statistics))
+        if options["array"]:
+            from simdtex.report.terminal import print_accounting
 
-        print_profile(run.statistics)
-    if options["array"] and not quiet:
-        from simdtex.report.terminal import print_accounting
+            print_accounting(statistics["accounting"])
 
-        print_accounting(run.statistics["accounting"])
+    height, width = material.sizes[0]
+    by = f"{len(samples)} samples" if material.several else f"{width}x{height}"
+    return Task(
+        partial(synthesize, material.array, shape, method=method, **inputs),
+        lambda made: f"{shape[1]}x{shape[0]} from {by}",
+        str(output),
+        writers,
+        material.limits,
+        more,
+    )

@@ -11,15 +11,16 @@ from typing import Any
 
 import click
 
-from simdtex.cli.common import Ended, give_up, number_of, progress_bar
-from simdtex.cli.helping import RUNS
+from simdtex.cli.command import RUNS
+from simdtex.cli.ending import RESUME
+from simdtex.cli.job import progress_bar
 from simdtex.cli.options import option
 
 ALONE = ("stages", "source_map", "also", "report", "profile", "array")
 """Options that are of a picture which one process holds."""
 
 
-def tiles_options(command: Callable[..., None]) -> Callable[..., None]:
+def tiles_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add ``--tiles`` and what goes with it."""
     for one in (
         option("--dry-run", group=RUNS, is_flag=True, help="Print the plan of --tiles, and do nothing."),
@@ -57,7 +58,7 @@ def workers_of(text: str | None) -> int | str | None:
 
 
 def check_tiles(context: click.Context) -> None:
-    """Raise where options are given that do not go with one another."""
+    """Raise if options exclude one another."""
     given = context.params
     if given["tiles"] is None:
         for name in ("workers", "dry_run"):
@@ -76,22 +77,22 @@ def check_tiles(context: click.Context) -> None:
 
 
 def synthesize_in_tiles(context: click.Context, sample: Any, shape: tuple[int, int], options: dict[str, Any]) -> None:
-    """Make an output in tiles; ``options`` are keywords of `simdtex.distributed.synthesize`."""
+    """Make an output in tiles; ``options`` are keywords of `simdtex.distributed.plan`."""
     from simdtex import distributed
 
     given, began = context.params, time.perf_counter()
     output: Path = given["output"]
-    plan_of = {name: value for name, value in options.items() if name not in ("rng", "device")}
     workers = workers_of(given["workers"])
     count = workers if isinstance(workers, int) else 1
-    plan = distributed.plan(sample, shape, tiles=given["tiles"], workers=count, **plan_of)
+    plan = distributed.plan(sample, shape, tiles=given["tiles"], workers=count, **options)
     if given["dry_run"] or not given["quiet"]:
         for line in plan.lines():
             click.echo(line, err=not given["dry_run"])
     if given["dry_run"]:
         return
-    with _crew(workers) as crew, _shown(output, given["quiet"]) as callback:
-        distributed.synthesize(sample, shape, output, tiles=given["tiles"], callback=callback, **crew, **options)
+    options |= {"rng": given["seed"], "device": given["device"]}
+    with _workers(workers) as client, _progress(output, given["quiet"]) as callback:
+        distributed.synthesize(sample, shape, output, tiles=given["tiles"], callback=callback, **client, **options)
     _done(output, given["quiet"], began)
 
 
@@ -103,14 +104,14 @@ def resume_tiles(store: Path, workers: str | None, device: str | None, quiet: bo
     if distributed.finished(store):
         click.echo(f"{store} is finished; there is nothing to go on with")
         return
-    with _crew(workers_of(workers)) as crew, _shown(store, quiet) as callback:
-        distributed.resume(store, device=device, callback=callback, **crew)
+    with _workers(workers_of(workers)) as client, _progress(store, quiet) as callback:
+        distributed.resume(store, device=device, callback=callback, **client)
     _done(store, quiet, began)
 
 
 @contextmanager
-def _crew(workers: int | str | None) -> Iterator[dict[str, Any]]:
-    """Who does the tiles, as keywords."""
+def _workers(workers: int | str | None) -> Iterator[dict[str, Any]]:
+    """Yield the Dask client whose workers make the tiles, as a keyword; none if this process makes them."""
     from simdtex.distributed.cluster import connected
 
     with connected(workers) as client:
@@ -120,15 +121,11 @@ def _crew(workers: int | str | None) -> Iterator[dict[str, Any]]:
 
 
 @contextmanager
-def _shown(store: Path, quiet: bool) -> Iterator[Callable[[Any], None]]:
-    """A callback that moves a progress bar; a signal says how to go on."""
-    try:
-        with progress_bar(quiet) as show:
-            yield lambda progress: show(progress.fraction, progress.doing, "")
-    except (KeyboardInterrupt, Ended) as signalled:
-        if not store.exists():
-            raise
-        give_up(f"stopped; go on with: simdtex resume {store}", number_of(signalled))
+def _progress(store: Path, quiet: bool) -> Iterator[Callable[[Any], None]]:
+    """Yield a callback that moves a progress bar; if the command is stopped, it says how to go on with the store."""
+    click.get_current_context().meta[RESUME] = store
+    with progress_bar(quiet) as show:
+        yield lambda progress: show(progress.fraction, progress.doing)
 
 
 def _done(store: Path, quiet: bool, began: float) -> None:

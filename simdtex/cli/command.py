@@ -8,6 +8,8 @@ from typing import Any
 
 import click
 
+from simdtex.cli.ending import report_errors
+
 Examples = Sequence[tuple[str, str]]
 """Words after ``simdtex``, and what they do."""
 
@@ -35,7 +37,7 @@ class Command(click.Command):
         self.examples = examples
 
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """What it does, and the examples."""
+        """Write what the command does, and the examples."""
         super().format_help_text(ctx, formatter)
         write_examples(self.examples, formatter)
 
@@ -69,5 +71,9 @@ def write_examples(examples: Examples, formatter: click.HelpFormatter) -> None:
 
 
 def command(*examples: tuple[str, str]) -> Callable[[Callable[..., None]], click.Command]:
-    """A command of this kind, as `click.command` makes it."""
-    return click.command(cls=Command, examples=examples)
+    """Return a decorator that makes a command of a function, whose errors are reported in one sentence."""
+
+    def decorate(function: Callable[..., None]) -> click.Command:
+        return click.command(cls=Command, examples=examples)(report_errors(function))
+
+    return decorate

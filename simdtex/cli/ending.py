@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""How a command ends: an error is one sentence and exit code 2, a signal one sentence and 128 plus its number."""
+
+from __future__ import annotations
+
+import functools
+import os
+import signal
+import sys
+import threading
+import time
+import warnings
+from _thread import interrupt_main
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Any, NoReturn
+
+import click
+
+from simdtex.cli.places import check_places
+
+UNINTERRUPTED = ("simdtex.machine.runtimes", "weakref", "_weakrefset")
+"""Modules in which an exception does harm: the search for runtimes, and callbacks of collected objects."""
+
+RESUME, FAILURES = f"{__name__}.resume", f"{__name__}.failures"
+"""Keys of a context's `meta`: the path that ``simdtex resume`` takes, and errors that wait for the end."""
+
+
+class Ended(KeyboardInterrupt):
+    """The process was asked to end, by the signal of this number."""
+
+
+def report_errors(function: Callable[..., None]) -> Callable[..., None]:
+    """Check a command's paths, run it, and report errors and signals in one sentence."""
+
+    @functools.wraps(function)
+    def reported(*args: Any, **kwargs: Any) -> None:
+        context = click.get_current_context()
+        try:
+            with catch_signals(context):
+                check_places(context)
+                function(*args, **kwargs)
+        except (ValueError, TypeError, OSError) as error:
+            settle(error)
+        except MemoryError:
+            click.echo("simdtex: the memory does not suffice for this; give a smaller size", err=True)
+            sys.exit(2)
+        except KeyboardInterrupt as signalled:
+            give_up(context, signalled.args[0] if signalled.args else signal.SIGINT)
+        settle()
+
+    return reported
+
+
+def give_up(context: click.Context, number: int) -> NoReturn:
+    """Say that the command was stopped, and how to go on, and exit with the code of a signal."""
+    path: Path | None = context.meta.get(RESUME)
+    how = f"go on with: simdtex resume {path}" if path and path.exists() else "nothing but stages may have been written"
+    warnings.filterwarnings("ignore", "coroutine .* was never awaited")  # which Zarr had begun
+    click.echo(f"simdtex: stopped; {how}", err=True)
+    sys.exit(128 + number)
+
+
+@contextmanager
+def catch_signals(context: click.Context) -> Iterator[None]:
+    """Let SIGINT, SIGTERM and SIGHUP stop a run after its present step if it has a checkpoint, else raise `Ended`.
+
+    A second signal stops it at once. The checkpoint is the context's `obj`.
+    """
+    caught: list[int] = []
+    raised = 0.0
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        nonlocal raised
+        if context.obj and context.obj.running and not caught:
+            caught.append(number)
+            context.obj.stop()
+            os.write(2, b"\nsimdtex: stopping after the present step; once more stops at once\n")
+            return
+        if number == signal.SIGINT and postponed(frame):
+            return
+        last, raised = raised, time.monotonic()
+        if number == signal.SIGINT or raised - last > 1:  # some programs send SIGTERM twice at once
+            raise Ended(number)
+
+    before: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+            number: int | None = getattr(signal, name, None)
+            if number is not None and signal.getsignal(number) not in (signal.SIG_IGN, None):
+                before[number] = signal.signal(number, handle)
+    try:
+        yield
+    except KeyboardInterrupt as signalled:
+        raise (signalled if signalled.args or not caught else Ended(caught[0])) from None
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def postponed(frame: FrameType | None) -> bool:
+    """Return whether an exception would do harm in a frame, and if so have SIGINT come again a little later.
+
+    An import may swallow it, print its traceback or, in C++, abort; in a callback of a collected object it is ignored
+    but printed; the search for runtimes would leave its temporary folder.
+    """
+    while frame:
+        name, path = frame.f_globals.get("__name__"), frame.f_code.co_filename
+        if name in UNINTERRUPTED or path.startswith("<frozen importlib"):
+            again = threading.Timer(0.02, interrupt_main)
+            again.daemon = True
+            again.start()
+            return True
+        frame = frame.f_back
+    return False
+
+
+@contextmanager
+def afterwards() -> Iterator[None]:
+    """Keep an error until the end of the command, so that its other outputs are written; see `settle`."""
+    try:
+        yield
+    except (ValueError, OSError) as error:
+        click.get_current_context().meta.setdefault(FAILURES, []).append(error)
+
+
+def settle(*errors: Exception) -> None:
+    """Exit with code 2 and one sentence if there are errors, or `afterwards` has kept some."""
+    failures = [*errors, *click.get_current_context().meta.pop(FAILURES, [])]
+    if failures:
+        click.echo(f"simdtex: {'; '.join(_sentence(error) for error in failures)}", err=True)
+        sys.exit(2)
+
+
+def _sentence(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:  # without its number
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return str(error)
