@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a command is given in files, read and checked: samples, masks, known values, and other maps of a material."""
+"""The files that a command reads: samples, masks, known values, guides, and other maps of a material."""
 
 from __future__ import annotations
 
@@ -110,32 +110,37 @@ def read_masks(paths: Sequence[Path], samples: Material) -> list[NDArray[np.bool
     return [image.read_mask(path, shape) for path, shape in zip(paths, samples.sizes, strict=True)]
 
 
-def read_also(texts: Sequence[str], samples: Material) -> list[Also]:
-    """Read the maps of ``--also MAP=OUT``, and check that they can be carried over and written."""
-    return [_other_map(text, samples) for text in texts]
-
-
-def _other_map(text: str, samples: Material) -> Also:
-    from simdtex.io import image
-
+def read_pair(option: str, form: str, text: str, samples: Material) -> tuple[list[Path], Path]:
+    """Return the files that ``A=OUT`` names or, of several samples, ``A0,A1=OUT``: one for each sample, and OUT."""
     name, equals, out = text.partition("=")
     names = [part.strip() for part in name.split(",")] if samples.several else [name]
     if not (equals and out and all(names)):
-        raise ValueError(f"--also {text} must be MAP=OUT, the map's file and the file to write")
+        raise ValueError(f"{option} {text} must be {form}, two files")
     if len(names) != len(samples.pixels):
         raise ValueError(
-            f"--also {text} names {len(names)} of the maps that the {len(samples.pixels)} samples have; "
-            "give a map of each, parted by commas, as MAP0,MAP1=OUT"
+            f"{option} {text} names {len(names)} files and there are {len(samples.pixels)} samples; "
+            f"give one for each, parted by commas"
         )
-    maps = read_material([Path(one) for one in names])
-    for path, pixels, of, sample in zip(maps.paths, maps.pixels, samples.paths, samples.pixels, strict=True):
-        check_alike(path, pixels, maps.paths[0], maps.pixels[0])
-        if pixels.shape[:2] != sample.shape[:2]:
-            raise ValueError(
-                f"{path} is {size(pixels)} and {of} {size(sample)}; give --also a map of the sample's size"
-            )
-    image.check_writable(out, maps.pixels[0].dtype, channels(maps.pixels[0]))
-    return Also(maps, Path(out))
+    return [Path(one) for one in names], Path(out)
+
+
+def read_also(texts: Sequence[str], samples: Material) -> list[Also]:
+    """Read the maps of ``--also MAP=OUT``, and check that they can be carried over and written."""
+    from simdtex.io import image
+
+    found = []
+    for text in texts:
+        paths, out = read_pair("--also", "MAP=OUT", text, samples)
+        maps = read_material(paths)
+        for path, pixels, of, sample in zip(maps.paths, maps.pixels, samples.paths, samples.pixels, strict=True):
+            check_alike(path, pixels, maps.paths[0], maps.pixels[0])
+            if pixels.shape[:2] != sample.shape[:2]:
+                raise ValueError(
+                    f"{path} is {size(pixels)} and {of} {size(sample)}; give --also a map of the sample's size"
+                )
+        image.check_writable(out, maps.pixels[0].dtype, channels(maps.pixels[0]))
+        found.append(Also(maps, out))
+    return found
 
 
 def write_arranged(output: Path, others: Sequence[Also], source_map: Path | None) -> list[Callable[[Any, Any], object]]:

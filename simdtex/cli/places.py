@@ -27,7 +27,7 @@ class Place(click.Path):
         self.role = role
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The path; raises where there is none."""
+        """Return the path; fail if it is empty."""
         if not os.fspath(value):
             self.fail("the path is empty; give one, or leave the option out", param, ctx)
         return super().convert(value, param, ctx)
@@ -42,7 +42,7 @@ class Pair(click.types.StringParamType):
         self.role = role
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """The text itself, which its reader takes apart; raises where there is none."""
+        """Return the text itself, which its reader takes apart; fail if it is empty."""
         if not value:
             self.fail("it is empty; give two files with = between them, or leave the option out", param, ctx)
         return str(value)
@@ -61,7 +61,7 @@ class _Named(NamedTuple):
 
 
 def check_places(context: click.Context) -> None:
-    """Raise where a command would overwrite what it reads, or one of its outputs another."""
+    """Raise if a command would overwrite what it reads, or one of its outputs another."""
     named = list(_named(context))
     reads = [one for one in named if one.role in READING]
     writes = [one for one in named if one.role not in READING]
@@ -69,10 +69,10 @@ def check_places(context: click.Context) -> None:
         for one in reads:
             _check_input(out, one)
         for other in writes[:number]:
-            if _same(_real(out.path), _real(other.path)):
+            if _same(out.path, other.path):
                 raise ValueError(f"{out.path} would be written twice; give each output a file of its own")
             for inner, outer in ((out, other), (other, out)):
-                if outer.role != "write" and _within(_real(inner.path), outer.path):
+                if outer.role != "write" and _within(inner.path, outer.path):
                     raise ValueError(
                         f"{inner.path} would be written into {outer.path}, which another output has for itself; "
                         "give it another folder"
@@ -80,19 +80,19 @@ def check_places(context: click.Context) -> None:
 
 
 def _check_input(out: _Named, one: _Named) -> None:
-    """Raise where an output would overwrite or remove an input, or change a folder that is one."""
-    places = list(_places(one.path))
-    if any(_same(_real(out.path), place) for place in places):
+    """Raise if an output would overwrite or remove an input, or change a folder that is one."""
+    if _same(out.path, one.path):
         raise ValueError(f"{out.path} is an input and would be overwritten; give the output another name")
-    folder = out.role == "folder" or (out.role == "either" and os.path.isdir(out.path))
-    if folder and any(_within(place, out.path) for place in places):
+    folder = out.role == "folder" or (out.role == "either" and out.path.is_dir())
+    link = one.path.parent.resolve() / one.path.name  # a link in the folder would be removed
+    if folder and (_within(one.path, out.path) or link.is_relative_to(out.path.resolve())):
         raise ValueError(f"{one.path} is an input and lies in {out.path}, which is written anew; give another folder")
-    if one.role == "enter" and _within(_real(out.path), one.path):
+    if one.role == "enter" and _within(out.path, one.path):
         raise ValueError(f"{out.path} would be written into {one.path}, which is an input; give another folder")
 
 
 def _named(context: click.Context) -> Iterator[_Named]:
-    """Every path that a command was given, or has by default."""
+    """Yield every path that a command was given, or has by default."""
     for parameter in context.command.params:
         kind, value = parameter.type, context.params.get(parameter.name or "")
         for one in value if isinstance(value, tuple) else [value]:
@@ -103,58 +103,17 @@ def _named(context: click.Context) -> Iterator[_Named]:
             elif isinstance(kind, Pair):
                 left, _, right = str(one).partition("=")
                 # how many files the left names depends on the samples; a file that is not there harms nothing
-                for text in {left, *(part.strip() for part in left.split(","))}:
-                    if text:
-                        yield _Named(Path(text), "read")
+                for text in {left, *(part.strip() for part in left.split(","))} - {""}:
+                    yield _Named(Path(text), "read")
                 if right:
                     yield _Named(Path(right), kind.role)
 
 
-# ---------------------------------------------------------------- where paths lead
+def _same(a: Path, b: Path) -> bool:
+    """Return whether two paths are one file, by name or as links."""
+    return a.resolve() == b.resolve() or (a.exists() and b.exists() and a.samefile(b))
 
 
-def _real(path: Path) -> str:
-    return os.path.realpath(path)
-
-
-def _places(path: Path) -> Iterator[str]:
-    """Where a path itself is, where the link leads that it may be, and so on to what is read."""
-    here = os.fspath(path)
-    for _ in range(40):  # as many links as Linux follows
-        here = os.path.join(_real(Path(os.path.dirname(here) or os.curdir)), os.path.basename(here))
-        yield here
-        if not os.path.islink(here):
-            break
-        here = os.path.join(os.path.dirname(here), os.readlink(here))
-    yield _real(path)
-
-
-def _same(a: str, b: str) -> bool:
-    """Whether two paths are one file, by name or, as hard links, by what is there."""
-    if a == b:
-        return True
-    try:
-        return os.path.samefile(a, b)
-    except (OSError, ValueError):
-        return a.casefold() == b.casefold() and _folds_case(os.path.dirname(a))
-
-
-def _folds_case(folder: str) -> bool:
-    """Whether names that differ in case alone are one there."""
-    head, name = os.path.split(folder)
-    try:
-        return name.swapcase() != name and os.path.samefile(folder, os.path.join(head, name.swapcase()))
-    except (OSError, ValueError):
-        return False
-
-
-def _within(place: str, folder: Path) -> bool:
-    """Whether a place is somewhere inside a folder."""
-    outer = _real(folder)
-    here = os.path.dirname(place)
-    while True:
-        if _same(here, outer):
-            return True
-        if here == os.path.dirname(here):
-            return False
-        here = os.path.dirname(here)
+def _within(path: Path, folder: Path) -> bool:
+    """Return whether a path is somewhere inside a folder."""
+    return path.resolve() != folder.resolve() and path.resolve().is_relative_to(folder.resolve())
