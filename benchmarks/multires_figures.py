@@ -20,7 +20,7 @@ from pyramid_figures import png
 
 import simdtex
 from simdtex.experiments.quality import seam
-from simdtex.methods.multires import tiled
+from simdtex.methods.multires.algorithm import tiled
 from simdtex.methods.multires.analysis import pyramid
 from simdtex.methods.multires.mend import mend
 from simdtex.model.colours import heat, source_colours

@@ -18,6 +18,7 @@ from simdtex.driver import Call, Plan, check_shape, drive, execute, with_channel
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine, open_machine
+from simdtex.methods import mrf
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
 from simdtex.options import one_of, real, resolve, unmasked, whole
@@ -144,12 +145,13 @@ def synthesize(
             f"the method {method} takes one sample that is known everywhere, no mask, no known values and no guide; "
             'give method="mrf"'
         )
-    package = import_module(f"simdtex.methods.{method}")
-    chosen = resolve(package.Options, "synth", with_channels_last(options, channel_axis))
+    table = import_module(f"simdtex.methods.{method}").Options
+    chosen: Any = resolve(table, "synth", with_channels_last(options, channel_axis))
+    plan: Plan
     if method == "mrf":
-        plan: Plan = package.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
+        plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
     else:
-        plan = package.Plan(inputs.pictures.pixels[0], size, chosen)
+        plan = import_module(f"simdtex.methods.{method}.algorithm").Plan(inputs.pictures.pixels[0], size, chosen)
     call = Call(rng, device, callback, full_output, checkpoint)
 
     def identity() -> dict[str, Any]:
@@ -273,16 +275,15 @@ def suggest_alpha(
     >>> simdtex.suggest_alpha(gravel)
     0.3
     """
-    from simdtex.methods import multires
+    from simdtex.methods.multires import Options, alpha
     from simdtex.methods.multires.analysis import analyse
 
     pixels = check_sample(sample, channel_axis)
-    for name in ("alpha", "thresholds"):
-        if name in options:
-            raise TypeError(f"suggest_alpha finds alpha; leave {name} out")
-    chosen = resolve(multires.Options, "synth", options)
+    for name in {"alpha", "thresholds"} & set(options):
+        raise TypeError(f"suggest_alpha finds alpha; leave {name} out")
+    chosen = resolve(Options, "synth", options)
     machine = open_machine(device)
-    return multires.suggest_alpha(machine, analyse(machine, pixels, **chosen.analysis), chosen)
+    return alpha.suggest_alpha(machine, analyse(machine, pixels, **chosen.analysis), chosen)
 
 
 def lcpdf(
@@ -339,7 +340,6 @@ def lcpdf(
     -----
     Cost: S x sample pixels x neighbours x 2 fma, and 12 S x levels bytes for a piece of the sites.
     """
-    from simdtex.methods.mrf import check_fit
     from simdtex.methods.mrf.density import lcpdf_at
 
     whole("levels", levels, 2)
@@ -356,7 +356,7 @@ def lcpdf(
         most = 1 + isqrt(2**33 // len(offsets))
         raise ValueError(f"levels is {levels}; give at most {most} for order {order}")
     grey = Sample.of_levels(y, levels)
-    check_fit(y.shape, int(offsets.max()), order)
+    mrf.check_fit(y.shape, int(offsets.max()), order)
 
     machine = open_machine(device)
     grid, t = Grid(x.shape[0], x.shape[1], 1, boundary == "torus"), _check_temperature(temperature, x.shape)

@@ -174,7 +174,12 @@ def test_no_folder_that_is_made_anew_holds_an_input(folder, pair):
     (folder / "in" / "level0.png").symlink_to(folder / "sample.png")
     (folder / "way").symlink_to("in")
     rest = required(COMMANDS[name], out, given)
-    for one, other in [("in/given.png", "in"), ("in/level0.png", "in"), ("in/given.png", "way"), ("way/given.png", "in/.")]:
+    for one, other in [
+        ("in/given.png", "in"),
+        ("in/level0.png", "in"),
+        ("in/given.png", "way"),
+        ("way/given.png", "in/."),
+    ]:
         args = [*reading(given, one), *rest, *writing(out, other)]
         refused(folder, name, args, "is an input and lies in")
 

@@ -15,6 +15,7 @@ from tolerances import SIGNIFICANCE
 import simdtex
 from simdtex.methods import multires
 from simdtex.methods.multires.analysis import analyse
+from simdtex.methods.multires.levels import differences, thresholds
 from simdtex.ops.candidates import Sampled, Structure, candidates
 
 INF = math.inf
@@ -368,8 +369,8 @@ def test_candidates_grow_with_alpha_at_every_level(parity):
     nodes = lattice - [[0, 0, begins[1], 0]]
     before = np.zeros(begins[-1])
     for alpha in ALPHAS:
-        table = multires.thresholds(found.levels, multires.Options(alpha=alpha), alpha)
-        structure = Structure(found.features, multires.differences(found, table), nodes)
+        table = thresholds(found.levels, multires.Options(alpha=alpha), alpha)
+        structure = Structure(found.features, differences(found, table), nodes)
         counts = np.ones((begins[-1], 2), np.int32)
         for level, size in enumerate(found.shapes[:-1]):  # all of it is the sample itself
             source = np.concatenate([np.arange(math.prod(size), dtype=np.int32) for size in found.shapes])
@@ -382,7 +383,7 @@ def test_candidates_grow_with_alpha_at_every_level(parity):
 @pytest.mark.parametrize("beta", [0, 0.5, 1, 2.5])
 @pytest.mark.parametrize("levels", [2, 5, 9])
 def test_thresholds_are_alpha_over_the_number_of_the_level_from_the_top(levels, beta):
-    table = multires.thresholds(levels, multires.Options(alpha=0.3, beta=beta), 0.3)
+    table = thresholds(levels, multires.Options(alpha=0.3, beta=beta), 0.3)
     assert len(table) == levels
     expected = [0.3 / (levels - level) ** beta for level in range(1, levels)]
     assert np.array_equal(table[1:, 0].astype(np.float32), np.float32(expected))

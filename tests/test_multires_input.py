@@ -13,6 +13,8 @@ import simdtex
 from simdtex.driver import drive
 from simdtex.machine import memory
 from simdtex.methods import multires
+from simdtex.methods.multires.algorithm import Plan
+from simdtex.methods.multires.alpha import strain, suggest_alpha
 from simdtex.methods.multires.analysis import analyse
 
 INF = math.inf
@@ -344,13 +346,13 @@ def test_a_suggested_alpha_is_the_freest_whose_strain_is_small_enough(monkeypatc
         for most in (0, 0.02, 0.1, 0.3, 9):
             monkeypatch.setattr("simdtex.methods.multires.alpha.STRAIN", most)
             options = multires.Options(beta=beta)
-            alpha = multires.suggest_alpha(REFERENCE, analysis, options)
+            alpha = suggest_alpha(REFERENCE, analysis, options)
             found = simdtex.suggest_alpha(sample, beta=beta, channel_axis=-1, device=REFERENCE)
             assert found == alpha
-            strains[alpha] = multires.strain(REFERENCE, analysis, options, alpha)
+            strains[alpha] = strain(REFERENCE, analysis, options, alpha)
             assert strains[alpha] <= most
             if alpha < 0.4:
-                assert multires.strain(REFERENCE, analysis, options, alpha + 0.01) > most
+                assert strain(REFERENCE, analysis, options, alpha + 0.01) > most
         assert min(strains) < max(strains) == 0.4
         assert list(strains) == sorted(strains)
 
@@ -361,7 +363,7 @@ def test_where_nothing_meets_nothing_strains():
         assert simdtex.suggest_alpha(sample, device=REFERENCE) == 0.4
     assert simdtex.suggest_alpha(texture((9, 9)), levels=1, device=REFERENCE) == 0.4
     analysis = analyse(REFERENCE, texture((32, 32), 1))
-    assert multires.strain(REFERENCE, analysis, multires.Options(), 0) == 0
+    assert strain(REFERENCE, analysis, multires.Options(), 0) == 0
 
 
 @pytest.mark.parametrize("boundary", ["torus", "open"])
@@ -369,7 +371,7 @@ def test_a_strain_is_what_neighbours_differ_by_from_what_the_other_goes_on_with(
     sample, torus = texture((24, 20), 2), boundary == "torus"
     options = multires.Options(boundary=boundary, alpha=1.0, edges="keep")
     analysis = analyse(REFERENCE, sample, **options.analysis)
-    _, output = drive(multires.Plan(sample, (24, 20), options, analysis), REFERENCE, 0)
+    _, output = drive(Plan(sample, (24, 20), options, analysis), REFERENCE, 0)
     levels = []
     for level, source in ((stage.level, stage.source) for stage in output.stages if stage.level < 2):
         band = analysis.bands[level].astype(float)
@@ -384,13 +386,13 @@ def test_a_strain_is_what_neighbours_differ_by_from_what_the_other_goes_on_with(
                     total += ((band[:, row, col] - band[:, there[0], there[1]]) ** 2).sum()
         levels.append(total / (4 * (band**2).sum()))
     assert len(levels) == 2
-    assert multires.strain(REFERENCE, analysis, options, 1.0) == pytest.approx(np.mean(levels), rel=1e-3)
+    assert strain(REFERENCE, analysis, options, 1.0) == pytest.approx(np.mean(levels), rel=1e-3)
 
 
 def test_strangers_strain_by_1():
     noise = np.random.default_rng(1).integers(0, 256, (80, 80, 1)).astype(np.uint8)
     analysis = analyse(REFERENCE, noise, edges="keep", levels=3)
-    free = multires.strain(REFERENCE, analysis, multires.Options(parity="free"), INF)
+    free = strain(REFERENCE, analysis, multires.Options(parity="free"), INF)
     assert free == pytest.approx(1, abs=0.05)
 
 

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex.driver import check_shape, drive, restored
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, open_machine
-from simdtex.methods import multires
+from simdtex.methods.multires.algorithm import Plan
 from simdtex.methods.multires.analysis import analyse
+from simdtex.methods.multires.options import Options
 from simdtex.options import resolve
 from simdtex.random import as_seed
 
@@ -81,7 +82,7 @@ def series(
     alphas = list(alphas)
     made: list[Member] = []
     pairs = [{"alpha": alpha, "beta": beta} for beta in betas for alpha in alphas]
-    chosen = [resolve(multires.Options, "sheet", pair | options) for pair in pairs]
+    chosen = [resolve(Options, "sheet", pair | options) for pair in pairs]
     if not chosen:
         raise ValueError("there is no alpha or no beta; give one of each or more")
     machine = open_machine(device)
@@ -92,7 +93,7 @@ def series(
             if callback:
                 callback((number + progress.fraction) / len(chosen), made[-1] if made else None)
 
-        image, output = drive(multires.Plan(pixels, size, one, analysis), machine, seed, tell)
+        image, output = drive(Plan(pixels, size, one, analysis), machine, seed, tell)
         found = output.statistics
         image = restored(image, channel_axis)
         made.append(Member(found["options"]["alpha"], one.beta, image, found["levels"], found["seconds"]))

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Heeger and Bergen's pyramid matching (1995): pictures, solids and mixtures."""
 
-from simdtex.methods.pyramid.algorithm import MEMORY, Plan, Run
-from simdtex.methods.pyramid.matcher import TIES
 from simdtex.methods.pyramid.options import Options
 
-__all__ = ["MEMORY", "TIES", "Options", "Plan", "Run"]
+__all__ = ["Options"]

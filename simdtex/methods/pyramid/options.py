@@ -8,13 +8,26 @@ from functools import partial
 
 from numpy.typing import ArrayLike
 
-from simdtex.methods.pyramid.pyramids import KINDS, check_kind
-from simdtex.options import Choice, Other, Whole, check, documented, option, real_array
+from simdtex.ops.steerable_filters import ORIENTATIONS
+from simdtex.options import Choice, Other, Whole, check, documented, one_of, option, real_array, whole
+
+KINDS = ("steerable", "laplacian")
 
 ALL = ("synth", "mix", "solid")
 
 appearance = partial(option, group="Appearance", shown=ALL)
 scales = partial(option, group="Scales and edges", shown=ALL)
+
+
+def check_kind(kind: str, levels: int | None, orientations: int) -> None:
+    """Raise unless these describe a pyramid."""
+    one_of("pyramid", kind, KINDS)
+    if levels is not None:
+        whole("levels", levels, 0)
+    whole("orientations", orientations, 1)
+    if orientations not in ORIENTATIONS:
+        valid = ", ".join(str(n) for n in ORIENTATIONS)
+        raise ValueError(f"orientations is {orientations}; the steerable filters have one of: {valid}")
 
 
 @documented

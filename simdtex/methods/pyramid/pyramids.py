@@ -18,16 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, open_machine
 from simdtex.machine.interface import Array
+from simdtex.methods.pyramid.options import check_kind
 from simdtex.model.stretched import Stretched
 from simdtex.ops.fold import fold, folded, unfold
 from simdtex.ops.laplacian import laplacian_band, laplacian_collapse, laplacian_reduce
 from simdtex.ops.steerable import steerable_join, steerable_split
-from simdtex.ops.steerable_filters import ORIENTATIONS, filters
+from simdtex.ops.steerable_filters import filters
 from simdtex.options import one_of, whole
 
 __all__ = ["Pyramid", "Transform", "decompose"]
-
-KINDS = ("steerable", "laplacian")
 
 BINOMIAL = np.outer([1, 4, 6, 4, 1], [1, 4, 6, 4, 1]).astype(np.float32) / 256
 """Of the Laplacian pyramid."""
@@ -164,17 +163,6 @@ class Transform:
                 self._sources[shape] = self._machine.put(np.arange(prod(shape), dtype=np.int32).reshape(shape))
             picture = laplacian_collapse(self._machine, band, self._sources[shape], picture, self._torus)
         return picture
-
-
-def check_kind(kind: str, levels: int | None, orientations: int) -> None:
-    """Raise unless these describe a pyramid."""
-    one_of("pyramid", kind, KINDS)
-    if levels is not None:
-        whole("levels", levels, 0)
-    whole("orientations", orientations, 1)
-    if orientations not in ORIENTATIONS:
-        valid = ", ".join(str(n) for n in ORIENTATIONS)
-        raise ValueError(f"orientations is {orientations}; the steerable filters have one of: {valid}")
 
 
 def most_levels(*sides: int) -> int:
