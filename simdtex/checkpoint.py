@@ -37,47 +37,8 @@ FIRST = 1.0
 SHARE = 75
 """Seconds between two writes over the seconds that the last one took: writing takes at most 1/76 of the time."""
 
-SPEED = 2.0**27
-"""Bytes a second that the first write is assumed to manage."""
-
 NAMES = {"job": "call", "shape": "shape of the output"}
 """Names of inputs in messages, if they differ from the input's own."""
-
-
-class Pace:
-    """When to write a state.
-
-    Parameters
-    ----------
-    every : float, optional
-        Seconds between two writes. None: at least a second, and 75 times what the last write took; the first write, and
-        one of more than twice the bytes of the last, waits 75 times what it should take.
-    """
-
-    def __init__(self, every: float | None) -> None:
-        self._every = every
-        self._since = time.perf_counter()
-        self._next = self._since + (FIRST if every is None else every)
-        self._size = 0
-
-    @property
-    def due(self) -> bool:
-        """Whether it is time to write."""
-        return time.perf_counter() >= self._next
-
-    def early(self, began: float, size: int) -> bool:
-        """Return whether a write of so many bytes, collected since ``began``, should wait longer, and postpone it."""
-        now = time.perf_counter()
-        if self._every is not None or size <= 2 * self._size:
-            return False
-        self._next = self._since + SHARE * (now - began + size / SPEED)
-        return now < self._next
-
-    def wrote(self, began: float, size: int) -> None:
-        """Note a write of so many bytes that began then and ends now."""
-        now, self._size = time.perf_counter(), size
-        self._since = now
-        self._next = now + (max(FIRST, SHARE * (now - began)) if self._every is None else self._every)
 
 
 class Checkpoint:
@@ -127,7 +88,7 @@ class Checkpoint:
         self._every, self._command, self._note = every, command, note or _warn
         self._failed = self._used = self._saved = False
         self._about: dict[str, Any] = {}
-        self._pace = Pace(every)
+        self._next = time.perf_counter() + (FIRST if every is None else every)
 
     def stop(self) -> None:
         """Write the state after the present step, and raise KeyboardInterrupt there.
@@ -238,26 +199,23 @@ class Checkpoint:
             The run is to stop here.
         """
         stopping = self.stopping
-        wrote = (now or stopping or self._pace.due) and self._save(tree)
+        wrote = (now or stopping or time.perf_counter() >= self._next) and self._save(tree)
         if stopping or (wrote and self.stopping):
             raise KeyboardInterrupt
         return wrote
 
     def _save(self, tree: Callable[[], Any]) -> bool:
         began = time.perf_counter()
-        found = tree()
-        much = size(found)
-        if not self.stopping and self._pace.early(began, much):
-            return False
         try:
-            self._write(found)
+            self._write(tree())
         except ValueError as error:  # the run is worth more than its checkpoint
             if not self._failed:
                 self._note(f"{error}; the run goes on, and will try again")
             self._failed = True
             return False
         finally:
-            self._pace.wrote(began, much)
+            ended = time.perf_counter()
+            self._next = ended + (max(FIRST, SHARE * (ended - began)) if self._every is None else self._every)
         self._failed, self._saved = False, True
         return True
 
@@ -373,11 +331,6 @@ def pack(tree: Any) -> tuple[Any, list[NDArray[Any]]]:
         )
 
     return packed(tree), arrays
-
-
-def size(tree: Any) -> int:
-    """Bytes of the arrays of a tree."""
-    return sum(array.nbytes for array in pack(tree)[1])
 
 
 def unpack(told: Any, arrays: Sequence[NDArray[Any]]) -> Any:

@@ -430,32 +430,26 @@ def test_a_path_that_cannot_be_written_is_refused_before_the_work(file, monkeypa
 # -- how often, and what --------------------------------------------------------------------------------------
 
 
-def test_a_write_waits_75_times_what_the_last_one_took(monkeypatch):
-    now = [100.0]
+def test_a_write_waits_75_times_what_the_last_one_took(file, monkeypatch):
+    now, writes = [100.0], []
     monkeypatch.setattr(checkpoints.time, "perf_counter", lambda: now[0])
-    pace = checkpoints.Pace(None)
-    assert not pace.due
-    now[0] += 0.99
-    assert not pace.due
-    now[0] += 0.02
-    assert pace.due
-    assert pace.early(now[0], 2**27 // 10)  # a tenth of a second, so 7.5 from the beginning
-    assert not pace.due
-    now[0] += 6.4
-    assert not pace.due
-    now[0] += 0.2
-    assert pace.due and not pace.early(now[0], 2**27 // 10)
-    began, now[0] = now[0], now[0] + 0.2
-    pace.wrote(began, 2**20)
-    assert not pace.early(now[0], 2**21)  # what is measured counts
-    now[0] += 14.9
-    assert not pace.due
-    now[0] += 0.2
-    assert pace.due
-    assert pace.early(now[0], 2**40) and not pace.due  # but for far more bytes
-    pace.wrote(now[0], 2**40)
-    now[0] += 0.9  # a write that took nothing
-    assert not pace.due
+    checkpoint = Checkpoint(file)
+
+    def write(tree):
+        writes.append(tree)
+        now[0] += tree
+
+    monkeypatch.setattr(checkpoint, "_write", write)
+    for wait, seconds, wrote in [
+        (0.99, 0, False),
+        (0.02, 0.2, True),
+        (14.9, 0, False),
+        (0.2, 0, True),
+        (0.9, 0, False),
+    ]:
+        now[0] += wait
+        assert checkpoint.offer(None, lambda seconds=seconds: seconds) == wrote
+    assert writes == [0.2, 0]
     assert checkpoints.SHARE == 75 and checkpoints.FIRST == 1
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from copy import deepcopy
 from typing import Any
 
-from simdtex.checkpoint import size
+from simdtex.checkpoint import pack
 from simdtex.driver import Keep
 from simdtex.methods import mrf
 
@@ -50,5 +50,5 @@ class Levels:
         if self._key is None or not getattr(info, "ended", False):
             return
         state = tree()
-        if size(state) <= MAX_BYTES:
+        if sum(array.nbytes for array in pack(state)[1]) <= MAX_BYTES:
             self._states[info.level] = deepcopy(state)  # the run changes parts of it
