@@ -31,12 +31,12 @@ sample = data.grass()[:size, :size] // 16  # 16 grey levels
 picture = np.hstack([data.grass()[-size:, : size // 2], data.gravel()[:size, : size - size // 2]]) // 16
 
 row, col = size // 2, size // 4
-site = simdtex.lcpdf(picture, sample, [(row, col)], order=8, levels=16)[0]
+site = simdtex.lcpdf(picture, sample, [(row, col)], order=8, greys=16)[0]
 print(f"site ({row}, {col}) is {picture[row, col]}; its LCPDF over the 16 levels:")
 print(" ".join(f"{p:.3f}" for p in site))
 
 sites = np.argwhere(np.ones(picture.shape, bool))
-table = simdtex.lcpdf(picture, sample, sites, order=8, levels=16, boundary="open")
+table = simdtex.lcpdf(picture, sample, sites, order=8, greys=16, boundary="open")
 likely = table[np.arange(len(sites)), picture.ravel()].reshape(picture.shape)
 surprise = -np.log(np.maximum(likely, 1e-6))
 print(f"mean surprise: grass {surprise[:, : size // 2].mean():.2f}, gravel {surprise[:, size // 2 :].mean():.2f}")

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma OPENCL FP_CONTRACT OFF
-#include "common/favour.h"
+#include "common/coherence.h"
 #include "common/lattice.h"
 
 #ifndef BLOCK
 #define BLOCK 64
 #endif
 
-// The preference of common/favour.h, for distances that are kept.
+// The preference of common/coherence.h, for distances that are kept.
 //
 // source   (H, W)                 pixel index in the sample of each site's source
 // offsets  (N, 2), reach (N,)     of the neighbours, on the lattice and in the sample
@@ -18,7 +18,7 @@
 __kernel void coherence(__global const int *restrict sites, const int S, const int P,
                         __global const int *restrict source, __global const ushort *restrict temperature,
                         __global const int2 *restrict offsets, const int N, const Lattice g, __global const int *restrict reach,
-                        __global const int *restrict index_of, const int pixels, const float favour,
+                        __global const int *restrict index_of, const int pixels, const float discount,
                         __global float *restrict distance, __global float *restrict nearest)
 {
     const int s = get_global_id(0);
@@ -35,7 +35,7 @@ __kernel void coherence(__global const int *restrict sites, const int S, const i
         const float d = distance[p * P + s];
         if (signbit(d))
             continue;
-        const float favoured = d * favour;
+        const float favoured = d * discount;
         distance[p * P + s] = -favoured;
         nearest[p / BLOCK * P + s] = fmin(nearest[p / BLOCK * P + s], favoured);
     }

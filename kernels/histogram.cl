@@ -8,17 +8,17 @@
 // match is a distance of 0, equation (12), so a neighbour at temperature 1 matches anything.
 //
 // distance (blocks * BLOCK, P), nearest (blocks, P)   from lcpdf.cl
-// counts   (S, levels)                                out: F(x, neighbours)
+// counts   (S, greys)                                 out: F(x, neighbours)
 // One work-item per site.
 __kernel void histogram(__global const float *restrict distance, __global const float *restrict nearest,
                         const int blocks, const int S, const int P, __global const float *restrict sample,
-                        __global const int *restrict candidates, const int levels, __global uint *restrict counts)
+                        __global const int *restrict candidates, const int greys, __global uint *restrict counts)
 {
     const int s = get_global_id(0);
     if (s >= S)
         return;
-    __global uint *F = counts + (size_t)s * levels;
-    for (int x = 0; x < levels; ++x)
+    __global uint *F = counts + (size_t)s * greys;
+    for (int x = 0; x < greys; ++x)
         F[x] = 0;
     for (int b = 0; b < blocks; ++b) {
         if (nearest[b * P + s] > 0.0f)

@@ -1,20 +1,56 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // The local conditional probability density function, equations (6) to (8) and (12), and what relaxation takes
-// from it: a draw (Gibbs), its mode (ICM), or the whole table of probabilities.
+// from it: a draw (Gibbs), the nearest candidate (ICM), or the whole table of probabilities.
 //
 //   P(x) ~ sum_p w_p exp(-|x - y_p|^2 / 2h^2),   w_p = exp(-d_p / 2h^2),   d_p = sum_r ((x_r - y_r)(1 - t_r))^2
 //
 // Weights are integers, zero below 2^-40 of the largest: common/parzen.h.
 #pragma OPENCL FP_CONTRACT OFF
+#include "common/confidence.h"
+#include "common/distance.h"
 #include "common/lattice.h"
 #include "common/parzen.h"
 #include "common/philox.h"
 #include "common/vector.h"
-#include "common/weigh.h"
 
 #ifndef BLOCK
 #define BLOCK 64 // candidates to a block, each with its smallest distance
 #endif
+#ifndef STEP
+#define STEP 4 // candidates that are kept in registers together
+#endif
+
+// The distances of V sites to STEP candidates. This loop is the cost of the exact search.
+//
+// confidence (N, P), weighted (N, C, P)   from neighbourhood.cl, from the first site on; -D OWN: confidence (N, C, P)
+// sample     (C, plane)                   working grey levels as float
+// candidates (STEP,)                      pixel index in the sample
+// reach      (N,)                         pixel offset in the sample of each neighbour
+// d          (STEP,)                      out
+inline void weigh(__global const float *restrict confidence, __global const float *restrict weighted, const int N,
+                  const int P, __global const float *restrict sample, const int plane,
+                  __global const int *restrict candidates, __global const int *restrict reach, __private vec *d)
+{
+    __global const float *y[STEP];
+#pragma unroll
+    for (int q = 0; q < STEP; ++q) {
+        y[q] = sample + candidates[q];
+        d[q] = 0.0f;
+    }
+    for (int k = 0; k < N; ++k) {
+        const int o = reach[k];
+#pragma unroll
+        for (int c = 0; c < C; ++c) {
+            const vec u = LOAD(confidence + (k * CONFIDENCES + CONFIDENT(c)) * P);
+            const vec xu = LOAD(weighted + (k * C + c) * P);
+#pragma unroll
+            for (int q = 0; q < STEP; ++q) {
+                const vec e = GAP((vec)y[q][c * plane + o], u, xu);
+                d[q] = fma(e, e, d[q]);
+            }
+        }
+    }
+}
 
 // Equation (12): d_p for V sites and one block of candidates, neighbours in canonical order, channels inside.
 //
@@ -133,151 +169,25 @@ __kernel void lcpdf_least(__global const float *restrict distance, __global cons
         values[c * S + s] = (ushort)sample[c * plane + candidates[p]];
 }
 
-// f(x) for one grey level: the weights per grey level, smoothed by the kernel of equation (7), level 0 first.
-inline float density(__private const ushort *level_of, __private const float *mass, const int m, const int x,
-                     __global const float *kernel_, const int radius)
-{
-    float f = 0.0f;
-    for (int i = 0; i < m; ++i) {
-        const int step = abs(x - (int)level_of[i]);
-        f = step <= radius ? fma(mass[i], kernel_[step], f) : f;
-    }
-    return f;
-}
-
-#define LEVELS 256
-
-// ICM over grey levels (one channel, 256 levels): the mode of P(x), lowest level where several are. The source is
-// the candidate that answers for most of the density there.
-//
-// window (radius + 1,)  exp(-k^2 / 2h^2), k = 0..radius
-__kernel void lcpdf_mode(__global const float *restrict distance, __global const float *restrict nearest,
-                         const int blocks, const int S, const int P, const float scale,
-                         __global const float *restrict sample, const int plane,
-                         __global const int *restrict candidates, __global const float *restrict window,
-                         const int radius, __global int *restrict choice, __global ushort *restrict values)
-{
-    const int s = get_global_id(0);
-    if (s >= S)
-        return;
-    const float smallest = smallest_of(nearest, blocks, P, s);
-    ulong weights[LEVELS];
-    for (int x = 0; x < LEVELS; ++x)
-        weights[x] = 0;
-    FOR_CANDIDATES(p)
-    {
-        const ulong w = weight(DISTANCE(p), smallest, scale);
-        if (w)
-            weights[(int)sample[candidates[p]]] += w;
-    }
-    ushort level_of[LEVELS];
-    float mass[LEVELS];
-    int m = 0;
-    for (int x = 0; x < LEVELS; ++x)
-        if (weights[x]) {
-            level_of[m] = (ushort)x;
-            mass[m++] = (float)weights[x];
-        }
-    int mode = 0;
-    float highest = -1.0f;
-    for (int x = level_of[0]; x <= level_of[m - 1]; ++x) { // a mixture of Gaussians peaks between its extremes
-        const float f = density(level_of, mass, m, x, window, radius);
-        if (f > highest) {
-            highest = f;
-            mode = x;
-        }
-    }
-    float share = -1.0f;
-    FOR_CANDIDATES(p)
-    {
-        const ulong w = weight(DISTANCE(p), smallest, scale);
-        const int step = w ? abs(mode - (int)sample[candidates[p]]) : 0;
-        const float here = w && step <= radius ? (float)w * window[step] : -1.0f;
-        if (here > share) {
-            share = here;
-            choice[s] = candidates[p];
-        }
-    }
-    values[s] = (ushort)mode;
-}
-
-#ifndef HEAVIEST
-#define HEAVIEST 16
-#endif
-
-// ICM over pixel vectors: the mode of P(x) among the values of the HEAVIEST heaviest candidates, the density summed
-// over all candidates. Heavier first, then the lower index.
-__kernel void lcpdf_mode_vector(__global const float *restrict distance, __global const float *restrict nearest,
-                                const int blocks, const int S, const int P, const float scale,
-                                __global const float *restrict sample, const int plane,
-                                __global const int *restrict candidates, __global int *restrict choice,
-                                __global ushort *restrict values)
-{
-    const int s = get_global_id(0);
-    if (s >= S)
-        return;
-    const float smallest = smallest_of(nearest, blocks, P, s);
-    ulong heaviest[HEAVIEST];
-    int at[HEAVIEST];
-    int m = 0;
-    FOR_CANDIDATES(p)
-    {
-        const ulong w = weight(DISTANCE(p), smallest, scale);
-        if (!w || (m == HEAVIEST && w <= heaviest[m - 1]))
-            continue;
-        int i = m < HEAVIEST ? m++ : m - 1;
-        for (; i > 0 && heaviest[i - 1] < w; --i) {
-            heaviest[i] = heaviest[i - 1];
-            at[i] = at[i - 1];
-        }
-        heaviest[i] = w;
-        at[i] = candidates[p];
-    }
-    float f[HEAVIEST];
-    for (int i = 0; i < m; ++i)
-        f[i] = 0.0f;
-    FOR_CANDIDATES(p)
-    {
-        const ulong w = weight(DISTANCE(p), smallest, scale);
-        if (!w)
-            continue;
-        for (int i = 0; i < m; ++i) {
-            float gap = 0.0f; // |y_q - y_p|^2
-            for (int c = 0; c < C; ++c) {
-                const float e = sample[c * plane + at[i]] - sample[c * plane + candidates[p]];
-                gap = fma(e, e, gap);
-            }
-            const float a = gap * scale;
-            f[i] = a < NO_WEIGHT ? fma((float)w, exp32(-a), f[i]) : f[i];
-        }
-    }
-    int mode = 0;
-    for (int i = 1; i < m; ++i)
-        mode = f[i] > f[mode] ? i : mode;
-    choice[s] = at[mode];
-    for (int c = 0; c < C; ++c)
-        values[c * S + s] = (ushort)sample[c * plane + at[mode]];
-}
-
-// The whole density of one channel, (S, levels), up to a factor: the host divides each row by its sum, since OpenCL lets
+// The whole density of one channel, (S, greys), up to a factor: the host divides each row by its sum, since OpenCL lets
 // devices round a division as they like.
 //
 // window  (radius + 1,)   exp(-k^2 / 2h^2)
-// mass    (S, levels)     scratch: sum of the weights per grey level
-// table   (S, levels)     out: f(x)
+// mass    (S, greys)      scratch: sum of the weights per grey level
+// table   (S, greys)      out: f(x)
 __kernel void lcpdf_density(__global const float *restrict distance, __global const float *restrict nearest,
                           const int blocks, const int S, const int P, const float scale,
                           __global const float *restrict sample, __global const int *restrict candidates,
-                          __global const float *restrict window, const int radius, const int levels,
+                          __global const float *restrict window, const int radius, const int greys,
                           __global ulong *restrict mass, __global float *restrict table)
 {
     const int s = get_global_id(0);
     if (s >= S)
         return;
     const float smallest = smallest_of(nearest, blocks, P, s);
-    __global ulong *m = mass + (size_t)s * levels;
-    __global float *f = table + (size_t)s * levels;
-    for (int x = 0; x < levels; ++x)
+    __global ulong *m = mass + (size_t)s * greys;
+    __global float *f = table + (size_t)s * greys;
+    for (int x = 0; x < greys; ++x)
         m[x] = 0;
     FOR_CANDIDATES(p)
     {
@@ -285,9 +195,9 @@ __kernel void lcpdf_density(__global const float *restrict distance, __global co
         if (w)
             m[(int)sample[candidates[p]]] += w;
     }
-    for (int x = 0; x < levels; ++x) {
+    for (int x = 0; x < greys; ++x) {
         float here = 0.0f;
-        for (int v = max(0, x - radius); v <= min(levels - 1, x + radius); ++v)
+        for (int v = max(0, x - radius); v <= min(greys - 1, x + radius); ++v)
             here = m[v] ? fma((float)m[v], window[abs(x - v)], here) : here;
         f[x] = here;
     }

@@ -2,14 +2,14 @@
 // ICM over sample positions without keeping a distance: for each site the candidate of the least squared distance of
 // equation (12), divided where it continues a neighbour's source, and of several the first.
 //
-//   d_p = sum_r ((x_r - y_r)(1 - t_r))^2,   d'_p = favour d_p + price_p, favour = 1 unless p is coherent
+//   d_p = sum_r ((x_r - y_r)(1 - t_r))^2,   d'_p = discount d_p + price_p, discount = 1 unless p is coherent
 //
 // Whoever is proved to lie beyond the best so far is skipped. Three facts make that exact: partial sums never fall, no
 // price is below 0, and a sum in another order differs by less than SLACK. What survives is weighed again in the
 // canonical order.
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/distance.h"
-#include "common/favour.h"
+#include "common/coherence.h"
 #include "common/lattice.h"
 #include "common/vector.h"
 
@@ -19,12 +19,8 @@
 #ifndef STEP
 #define STEP 2 // vectors of candidates that are weighed together
 #endif
-#include "common/weigh.h"
 #ifndef CHECK
 #define CHECK 4 // neighbours between two looks at the bound
-#endif
-#ifndef BLOCK
-#define BLOCK 64
 #endif
 #define WORDS (2 + C) // of a term: offset, u, x u
 #define FEATURES 16   // of a neighbourhood
@@ -82,7 +78,7 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
               __global const int *restrict index_of, const int plane,
               __global const float *restrict sample, __global const int *restrict positions,
               __global const int *restrict reach, __global const int *restrict strip_reach,
-              __global const int *restrict spread, const float favour, __global const float *restrict price,
+              __global const int *restrict spread, const float discount, __global const float *restrict price,
               __global const float *restrict axes, const float middle, __global float *restrict near,
               __global int *restrict terms, __global int *restrict count,
               __global float *restrict features, __global float *restrict least,
@@ -133,7 +129,7 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
             continue;
         before = last;
         last = p;
-        const float d = canonical(here, sample + positions[p], plane, reach, N, INFINITY) * favour + price[p];
+        const float d = canonical(here, sample + positions[p], plane, reach, N, INFINITY) * discount + price[p];
         if (d < best || (d == best && p < at)) {
             best = d;
             at = p;
@@ -343,48 +339,14 @@ nearest_scan(const int S, const int N, __global const int *restrict terms, __glo
     work[(row + turn) * S + s] = done;
 }
 
-// The same without a bound, V sites side by side: every term of every candidate, in the canonical order.
-//
-// confidence (N, P), weighted (N, C, P)   from neighbourhood.cl
-// found, at  (split, P)                   out: the least d and its place
-// One work-item per (V sites, part of the blocks of BLOCK candidates).
-__kernel __attribute__((vec_type_hint(vec))) void
-nearest_plain(__global const float *restrict confidence, __global const float *restrict weighted,
-              const int N, const int P, __global const float *restrict sample, const int plane,
-              __global const int *restrict candidates, const int count,
-              __global const int *restrict reach, __global const float *restrict price, const int blocks,
-              const int split, __global float *restrict found, __global int *restrict at)
-{
-    const int s = get_global_id(0) * V, turn = get_global_id(1);
-    if (s >= P || turn >= split)
-        return;
-    vec least = INFINITY;
-    ivec where = 0;
-    const int end = (int)((long)blocks * (turn + 1) / split) * BLOCK;
-    for (int p = (int)((long)blocks * turn / split) * BLOCK; p < end; p += STEP) {
-        vec d[STEP];
-        weigh(confidence + s, weighted + s, N, P, sample, plane, candidates + p, reach, d);
-#pragma unroll
-        for (int q = 0; q < STEP; ++q) {
-            d[q] += price[p + q];
-            const ivec nearer = (d[q] < least) & (ivec)(p + q < count ? -1 : 0);
-            least = select(least, d[q], nearer);
-            where = select(where, (ivec)(p + q), nearer);
-        }
-    }
-    STORE(least, found + turn * P + s);
-    STORE(where, at + turn * P + s);
-}
-
 // The nearest of all: the first bound's, and those of every part.
 //
-// found, at (split, P)   from nearest_leaves and nearest_scan, P = S, or nearest_plain
-// work  (split, S)       from the former; not read where tallied = 0
-// tally (S,)             in and out: fma done so far for the site of this number
+// found, at, work (split, S)   from nearest_leaves and nearest_scan
+// tally (S,)                   in and out: fma done so far for the site of this number
 // One work-item per site.
-__kernel void nearest_end(const int S, const int P, __global const float *restrict least,
+__kernel void nearest_end(const int S, __global const float *restrict least,
                           __global const int *restrict where, const int split, __global const float *restrict found,
-                          __global const int *restrict at, const int tallied, __global const ulong *restrict work,
+                          __global const int *restrict at, __global const ulong *restrict work,
                           __global const float *restrict sample, const int plane,
                           __global const int *restrict positions, __global ulong *restrict tally,
                           __global int *restrict choice, __global ushort *restrict values)
@@ -395,14 +357,13 @@ __kernel void nearest_end(const int S, const int P, __global const float *restri
     float best = least[s];
     int p = where[s];
     for (int n = 0; n < split; ++n) {
-        const float d = found[n * P + s];
-        const int here = at[n * P + s];
+        const float d = found[n * S + s];
+        const int here = at[n * S + s];
         if (d < best || (d == best && here < p)) {
             best = d;
             p = here;
         }
-        if (tallied)
-            tally[s] += work[n * S + s];
+        tally[s] += work[n * S + s];
     }
     const int from = positions[p];
     choice[s] = from;

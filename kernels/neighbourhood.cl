@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma OPENCL FP_CONTRACT OFF
-#include "common/beside.h"
+#include "common/confidence.h"
 #include "common/lattice.h"
 
 // The neighbourhoods of the sites to relax, ready for the distance of equation (12).
 //
 // For site s and neighbour r = N_s[k]:  u = 1 - t_r  and  xu = x_r * (1 - t_r), exact in float32 because pixels
 // are integers below 2^12 and temperatures integer multiples of 2^-10. A neighbour outside an open lattice has u = 0.
-// With -D OWN each channel has its u, and where there are guides the site itself comes last: common/beside.h.
+// With -D OWN each channel has its u, and where there are guides the site itself comes last: common/confidence.h.
 //
 // sites       (S,)        pixel index of each site
 // values      (C, H, W)   working grey levels; the first `made` channels are no guides

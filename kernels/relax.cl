@@ -25,12 +25,12 @@
 #else
 #define LEVEL ushort
 #endif
-#include "common/beside.h"
+#include "common/confidence.h"
 #include "common/vector.h"
 #include "common/choose.h"
 #include "common/cool.h"
 #include "common/distance.h"
-#include "common/favour.h"
+#include "common/coherence.h"
 #include "common/propose.h"
 #include "common/square.h"
 
@@ -139,7 +139,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
         }
     }
     for (int k = 0; k < m; ++k)
-        d[list[k]] *= g.favour;
+        d[list[k]] *= g.discount;
     for (int p = 0; p < g.candidates; ++p)
         d[p] += price[p];
     if (g.novelty > 0.0f)
@@ -165,14 +165,14 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
 #ifndef SLOTS
 #define SLOTS 64 // candidates that a site may have
 #endif
+#define SUGGESTING 12 // nearest neighbours that suggest a candidate each
 
 // The candidates are, in this order and each of them once,
 //
-//   1. p_r + (s - r), where the sample continues the source p_r of neighbour r, r one of the `suggesting` nearest
+//   1. p_r + (s - r), where the sample continues the source p_r of neighbour r, r one of the SUGGESTING nearest
 //      neighbours that a relaxation has touched (t < 1);
 //   2. the present source of s;
-//   3. the K positions of the sample most similar to each of those so far;
-//   4. `chance` positions at random, and one where there would be none at all.
+//   3. `chance` positions at random, and one where there would be none at all.
 //
 // Lane n of a cell gets what is known at pixel r.
 #ifdef OWN
@@ -192,14 +192,13 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
 // disc    (CELLS, 16)  1 on the neighbourhood, 0 elsewhere
 // at      (count,)     place of each candidate in `levels`
 // levels  (C, plane)   grey levels of the sample, columns apart by the level's step side by side
-// similar (count, K)   numbers of the candidates most similar to each
 // weighed (area,)      in and out: candidates that each site has weighed so far
 __kernel void relax_list(__global const int *restrict sites, const int S, __global ushort *values, __global int *source,
                          __global ushort *temperature, const Level g, __global const int2 *restrict offsets,
                          __global const int *restrict reach, __global const int *restrict index_of,
                          __global const int *restrict positions, __global const float *restrict disc,
                          __global const int *restrict at, __global const ushort *restrict levels,
-                         __global const int *restrict similar, __global const float *restrict price,
+                         __global const float *restrict price,
                          __global const uint *restrict noise, __global int *restrict weighed, const uint turn,
                          __global ushort *restrict new_values,
                          __global int *restrict new_source, __global ushort *restrict new_temperature)
@@ -289,17 +288,13 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
     // The list.
     int list[SLOTS], m = 0;
     ulong seen = 0;
-    for (int k = 0; k < g.suggesting; ++k) {
+    for (int k = 0; k < min(SUGGESTING, g.neighbours); ++k) {
         const int r = NEIGHBOUR(offsets[k].x + RADIUS, offsets[k].y + RADIUS);
         if (r >= 0 && temperature[r] < UNTOUCHED)
             m = proposed(continuing(index_of, source[r], reach[k], g.pixels), list, m, &seen);
     }
     const int suggested = m;
     m = proposed(number_of(index_of, source[site]), list, m, &seen);
-    const int own = m;
-    for (int k = 0; k < own; ++k)
-        for (int n = 0; n < g.similar; ++n)
-            m = proposed(similar[list[k] * g.similar + n], list, m, &seen);
     const int draws = max(g.chance, m == 0 ? 1 : 0);
     for (int k = 0; k < draws; k += 4) {
         const uint4 bits = draw4(g.seed, g.level, turn, place, PURPOSE_SEARCH, k / 4);
@@ -309,7 +304,7 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
     }
     float d[SLOTS];
     for (int k = 0; k < m; ++k)
-        d[k] = distance_in_lanes(at[list[k]], u, xu, levels, g.plane, g.down) * (k < suggested ? g.favour : 1.0f) +
+        d[k] = distance_in_lanes(at[list[k]], u, xu, levels, g.plane, g.down) * (k < suggested ? g.discount : 1.0f) +
                price[list[k]];
 
     // 6.2.2.2

@@ -97,10 +97,8 @@ def synthesize(
     **options
         Of the method. ``mrf``: ``preset``, ``order``, ``levels``, ``overview``, ``relaxation``, ``bandwidth``,
         ``coherence``, ``balance``, ``structure``, ``novelty``, ``finish``, ``xi``, ``free_sweeps``, ``pixel``,
-        ``phases``, ``edges``, ``coarsest``, ``schedule``, ``check_schedule``, ``boundary``, ``array``, ``mapping``,
-        ``search``, ``suggesting``, ``similar``, ``chance``, ``exhaustive``, ``categorical``, ``weights``,
-        ``shares``, ``proportions``, ``data_weight``, ``guide_weight``, ``labels``,
-        ``unsure``; see
+        ``phases``, ``edges``, ``schedule``, ``boundary``, ``array``, ``search``, ``chance``, ``categorical``,
+        ``weights``, ``shares``, ``proportions``, ``data_weight``, ``guide_weight``, ``labels``; see
         `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``strain``, ``target``, ``thresholds``,
         ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``parity``, ``boundary``, ``edges``,
         ``seams``; see `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``, ``levels``, ``orientations``,
@@ -294,7 +292,7 @@ def lcpdf(
     order: int,
     bandwidth: float = 1.0,
     temperature: ArrayLike | None = None,
-    levels: int = 256,
+    greys: int = 256,
     estimator: str = "parzen",
     boundary: str = "torus",
     device: str | Machine | None = None,
@@ -303,9 +301,9 @@ def lcpdf(
 
     Parameters
     ----------
-    image : (rows, cols) array of integers, 0 .. levels - 1
+    image : (rows, cols) array of integers, 0 .. greys - 1
         x, whose neighbourhoods are looked at.
-    sample : (rows, cols) array of integers, 0 .. levels - 1
+    sample : (rows, cols) array of integers, 0 .. greys - 1
         y, which the density is estimated from.
     sites : (S, 2) array of integers
         (row, column) of the sites s.
@@ -315,7 +313,7 @@ def lcpdf(
         h in units of h_opt, equation (8). 1.0 is the paper's.
     temperature : (rows, cols) array, 0 to 1, optional
         t of equation (12), taken in steps of 1/1024; None is 0 everywhere.
-    levels : int
+    greys : int
         Number of grey levels, 2 to 4096.
     estimator : {"parzen", "histogram"}
         Equations (6) to (8), or counts of exact matches, (4) and (5); the latter disregards `bandwidth`, and
@@ -327,7 +325,7 @@ def lcpdf(
 
     Returns
     -------
-    (S, levels) float64 array
+    (S, greys) float64 array
         P(x_s = x | x_r, r in N_s); every row adds up to 1. Computed in float32: the same bits on every
         device, within 1e-5 of the formula in exact arithmetic.
 
@@ -338,24 +336,24 @@ def lcpdf(
 
     Notes
     -----
-    Cost: S x sample pixels x neighbours x 2 fma, and 12 S x levels bytes for a piece of the sites.
+    Cost: S x sample pixels x neighbours x 2 fma, and 12 S x greys bytes for a piece of the sites.
     """
     from simdtex.methods.mrf.density import lcpdf_at
 
-    whole("levels", levels, 2)
-    if levels > 4096:
-        raise ValueError(f"levels is {levels}; give 4096 or fewer")
+    whole("greys", greys, 2)
+    if greys > 4096:
+        raise ValueError(f"greys is {greys}; give 4096 or fewer")
     real("bandwidth", bandwidth, 0, above=True)
     one_of("estimator", estimator, ("parzen", "histogram"))
     one_of("boundary", boundary, ("torus", "open"))
-    x = _check_grey("image", image, levels)
-    y = _check_grey("sample", sample, levels)
+    x = _check_grey("image", image, greys)
+    y = _check_grey("sample", sample, greys)
     where = _check_sites(sites, x.shape)
     offsets = neighbourhood_offsets(order)
-    if len(offsets) * (levels - 1) ** 2 > 2**33:  # beyond which (12) is not exact: see Sample
+    if len(offsets) * (greys - 1) ** 2 > 2**33:  # beyond which (12) is not exact: see Sample
         most = 1 + isqrt(2**33 // len(offsets))
-        raise ValueError(f"levels is {levels}; give at most {most} for order {order}")
-    grey = Sample.of_levels(y, levels)
+        raise ValueError(f"greys is {greys}; give at most {most} for order {order}")
+    grey = Sample.of_levels(y, greys)
     mrf.check_fit(y.shape, int(offsets.max()), order)
 
     machine = open_machine(device)
@@ -373,15 +371,15 @@ def _check_block(shape: Any) -> tuple[int, int, int]:
     return int(depth), rows, cols
 
 
-def _check_grey(name: str, array: ArrayLike, levels: int) -> NDArray[np.int64]:
+def _check_grey(name: str, array: ArrayLike, greys: int) -> NDArray[np.int64]:
     unmasked(name, array)
     a = np.asarray(array)
     if a.ndim != 2 or not a.size:
         raise ValueError(f"{name} must be a (rows, cols) array that is not empty, not shape {a.shape}")
     if not np.issubdtype(a.dtype, np.integer) and a.dtype != np.bool_:
-        raise TypeError(f"{name} must hold integers 0 to {levels - 1}, not {a.dtype}")
-    if a.min() < 0 or a.max() >= levels:
-        raise ValueError(f"{name} holds {a.min()} to {a.max()}, beyond 0 to {levels - 1}; give levels or rescale it")
+        raise TypeError(f"{name} must hold integers 0 to {greys - 1}, not {a.dtype}")
+    if a.min() < 0 or a.max() >= greys:
+        raise ValueError(f"{name} holds {a.min()} to {a.max()}, beyond 0 to {greys - 1}; give more greys or rescale it")
     return a.astype(np.int64)
 
 

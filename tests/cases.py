@@ -16,8 +16,7 @@ from simdtex.model.sample import Sample
 from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
 from simdtex.ops.nearest import strip_of
-from simdtex.ops.neighbourhood import Beside, Field, neighbourhood
-from simdtex.ops.similar import lattice_of
+from simdtex.ops.neighbourhood import Confidences, Field, neighbourhood
 from simdtex.ops.square import square_of
 from simdtex.schedules import Setting
 
@@ -66,10 +65,10 @@ class Problem(NamedTuple):
     nowhere: float = 0.0
 
     @property
-    def beside(self):
+    def confidences(self):
         """Guides, and hard data, which count more."""
         guides = len(self.sample.guides)
-        return Beside(guides, guides > 0 or self.nowhere > 0, np.float32(2), np.float32(3.625))
+        return Confidences(guides, guides > 0 or self.nowhere > 0, np.float32(2), np.float32(3.625))
 
     @property
     def offsets(self):
@@ -84,9 +83,6 @@ class Problem(NamedTuple):
 
     def square(self, machine):
         return square_of(machine, self.sample, self.offsets, self.grid.spacing, self.phases, self.edges)
-
-    def lattice(self):
-        return lattice_of(self.sample, self.offsets, self.grid.spacing, self.phases, self.edges)
 
     def price(self, dear=1.0, every=False):
         """Of each candidate, padded to whole blocks: some cost nothing, some much in terms of a distance.
@@ -110,11 +106,11 @@ class Problem(NamedTuple):
         """The distances of equation (12), divided for coherent candidates; and the candidates."""
         sites, field, offsets = self.on(machine)
         candidates = self.candidates(machine)
-        near = neighbourhood(machine, sites, field, offsets, self.grid, self.beside)
+        near = neighbourhood(machine, sites, field, offsets, self.grid, self.confidences)
         found = lcpdf.distance(machine, near, candidates)
         if strength:
-            favour = np.float32(1 / (1 + strength))
-            found = coherence(machine, found, candidates, sites, field, offsets, self.grid, favour)
+            discount = np.float32(1 / (1 + strength))
+            found = coherence(machine, found, candidates, sites, field, offsets, self.grid, discount)
         return found, candidates
 
     def window(self, bandwidth=1.0):
@@ -185,7 +181,7 @@ def problem(
         pixels = Pictures((pixels,), usable=usable)
     heavy = 16 if guides or nowhere else 1
     values = heavy * ((channels + bool(weight) + guides) * len(offsets) + bool(guides))
-    sample = Sample(pixels, values, margin, weight, beside=[guide] if guide else [])
+    sample = Sample(pixels, values, margin, weight, guides=[guide] if guide else [])
     grid = Grid(*shape, spacing, torus)
     row, col = np.indices(shape)
     scattered = rng.integers(0, sample_shape, (*shape, 2))

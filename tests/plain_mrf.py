@@ -8,7 +8,6 @@ are the algorithm's own.
 """
 
 from copy import deepcopy
-from fractions import Fraction
 from itertools import product
 from math import exp, isqrt, log, log2, sqrt
 from types import SimpleNamespace
@@ -17,7 +16,7 @@ import numpy as np
 import plain
 from numpy import float32
 from plain_multires import within
-from plain_numbers import cumulative, exponential, fma, nearest
+from plain_numbers import cumulative, exponential
 from plain_sample import NOWHERE, UNKNOWN, lay, material, stand_ins
 from plain_schedules import below, schedule, words
 from plain_shown import finished, picture
@@ -30,19 +29,20 @@ ALL_IN_LANES = False
 LANES = 16
 CATEGORIES = 16  # different pixels of a map of categories, at most
 MOST_KEPT = 1024  # candidates of a level that knows novelty, at most
-COMPARED = 1024  # candidates of which each is compared with all, at most
+EXHAUSTIVE = 64  # candidates of a level that are all weighed, at most
+SUGGESTING = 12  # nearest neighbours that suggest a candidate
 
 DEFAULTS = {
     **{"order": 18, "levels": None, "overview": 128, "relaxation": "icm", "bandwidth": 0.15, "coherence": 0.5},
     **{"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": None, "xi": -1.0},
-    **{"free_sweeps": 2, "pixel": "source", "phases": "decimated", "edges": "auto", "coarsest": "gibbs"},
-    **{"schedule": "coloring", "boundary": "torus", "search": "auto", "suggesting": 12, "similar": 0, "chance": 4},
-    **{"exhaustive": 64, "categorical": False, "weights": None, "shares": None, "proportions": None},
+    **{"free_sweeps": 2, "pixel": "source", "phases": "decimated", "edges": "auto"},
+    **{"schedule": "coloring", "boundary": "torus", "search": "auto", "chance": 4},
+    **{"categorical": False, "weights": None, "shares": None, "proportions": None},
     **{"data_weight": 16.0, "guide_weight": 1.0, "labels": None},
 }
 PAPER = {
     **{"relaxation": "gibbs", "bandwidth": 1.0, "coherence": 0.0, "free_sweeps": 0, "pixel": "density"},
-    **{"edges": "whole", "coarsest": "same", "search": "exact", "overview": 64},
+    **{"edges": "whole", "search": "exact", "overview": 64},
     **{"balance": 0.0, "structure": 0.0, "novelty": 0.0, "finish": 0.0},
 }
 
@@ -51,7 +51,7 @@ def options(pictures, preset="default", **given):
     """All options, with what ``search="auto"`` and ``finish=None`` stand for."""
     o = SimpleNamespace(**DEFAULTS | (PAPER if preset == "paper" else {}) | given)
     if o.search == "auto":
-        o.search = "coherent" if (o.relaxation, o.pixel) == ("icm", "source") else "exact"
+        o.search = "coherent" if o.relaxation == "icm" else "exact"
     if o.finish is None:
         colours = {tuple(pixel) for y in pictures for row in y.tolist() for pixel in row}
         categories = o.categorical or len(colours) <= CATEGORIES
@@ -167,13 +167,9 @@ def relaxed(level, X, old, s, turn):
 
     if level.gibbs:  # 6.2.2.2
         values, p = drawn(level, d, numbers, s, turn)
-    elif level.o.pixel == "source":
+    else:
         p = min(zip(d, numbers, strict=True))[1]
         values = level.own[:, p]
-    elif len(level.planes) == 1 and level.eight_bit:
-        values, p = mode(level, d, numbers)
-    else:
-        values, p = mode_of_vectors(level, d, numbers)
 
     there = [t for _, _, t, _ in filter(None, near)]  # 6.2.2.3: equation (13)
     xi = min(-1, round(level.o.xi * 1024))
@@ -234,7 +230,7 @@ class Level:
         self.held = Y.given.keys() | self.stands.keys()
 
         radius, step = isqrt(o.order), 1 if o.phases == "all" else self.spacing
-        self.step, self.above, self.found = step, above, None
+        self.step, self.above = step, above
         self.places = positions(Y, self.spacing, step, o)
         self.number_of = {place: p for p, place in enumerate(self.places)}
         self.at = [(Y.tops[n] + i, j) for n, i, j in self.places]  # in the canvas
@@ -252,22 +248,20 @@ class Level:
         best = sqrt(Y.variance) * pow(4 / (n * (2 * dimensions + 1)), 1 / (dimensions + 4))  # (8)
         h = max(o.bandwidth * best, 1e-10)
         self.scale = float32(1 / (2 * h * h))
-        self.top, self.eight_bit = Y.top, Y.top == 255
+        self.top = Y.top
         self.reach = min(Y.top, int(h * sqrt(2 * log(2.0**33))))  # beyond which the Gaussian is nothing
         gauss = [exp(-k * k / (2 * h * h)) for k in range(self.reach + 1)]
-        self.gauss = np.array(gauss, float32)
         self.below_step = cumulative([gauss[abs(k)] for k in range(-self.reach, self.reach + 1)])
 
         coarsest, coherent = number == levels - 1, o.search == "coherent"
-        self.gibbs = o.relaxation == "gibbs" or (coarsest and o.coarsest == "gibbs")
-        self.all = not coherent or coarsest or n <= o.exhaustive
+        self.gibbs = o.relaxation == "gibbs" or coarsest
+        self.all = not coherent or coarsest or n <= EXHAUSTIVE
         self.lanes = LANES if ALL_IN_LANES or not self.all else 1
-        self.similar = similar(self) if not self.all and o.similar else None
 
         differing = len(self.offsets) * Y.matched * Y.variance  # two neighbourhoods that have nothing in common
         self.rate, self.strict = o.balance * differing, 2.0 * differing
         crossings = len(self.lines[0]) * len(self.lines[1])
-        anew = coarsest and crossings <= MOST_KEPT and (self.gibbs or o.pixel == "source")
+        anew = coarsest and crossings <= MOST_KEPT
         self.novelty = float32(o.novelty * min(1.0, 256 / n) * Y.matched * Y.variance if anew else 0)
 
     def pixel(self, s):
@@ -311,58 +305,6 @@ def sure(Y, place, spacing, o):
         k, m = i + a * spacing, j + b * spacing
         unknown += 0 <= k < Y.gaps[n].shape[0] and 0 <= m < Y.gaps[n].shape[1] and bool(Y.gaps[n][k, m])
     return unknown <= 0.25 * len(offsets)
-
-
-def similar(level):
-    """For each candidate the K most similar others, nearest neighbourhood first; itself where there are too few."""
-    if level.found is None:
-        everyone = range(len(level.places))
-        if len(everyone) <= COMPARED:
-            level.found = [most_similar(level, p, everyone) for p in everyone]
-        else:
-            level.found = approximately_similar(level)
-    return level.found
-
-
-def approximately_similar(level):
-    """The same of many candidates: who is like p lies to it as who is like one of p's kin lies to that."""
-    everyone, k = range(len(level.places)), level.o.similar
-    at = [i * level.Y.pitch + j for i, j in level.at]  # pixels of the sample with its margin
-    number_at = {pixel: p for p, pixel in enumerate(at)}
-
-    def moves(table, at):
-        return [[at[q] - at[p] for q in row] for p, row in enumerate(table)]
-
-    if level.above is None:
-        drawn = [[words(0, 0, 0, p, random.SEARCH, n // 4)[n % 4] * len(at) >> 32 for n in range(k)] for p in everyone]
-        kin, moved, rounds = list(everyone), moves(drawn, at), 6
-    else:
-        above = level.above
-        before = [
-            tuple(max([x for x in above.lines[axis] if x <= at[axis]] or above.lines[axis][:1]) for axis in (0, 1))
-            for at in level.at
-        ]
-        kin = [above.at.index(at) if at in above.at else 0 for at in before]
-        moved, rounds = moves(similar(above), [i * level.Y.pitch + j for i, j in above.at]), 2
-    for _ in range(rounds):
-        found = []
-        for p in everyone:
-            around = [at[p] + (a * level.Y.pitch + b) * level.step for a in (-1, 0, 1) for b in (-1, 0, 1)]
-            those = [kin[number_at[pixel]] for pixel in around if pixel in number_at]
-            there = {at[p] + move for row in those for move in moved[row]}
-            found.append(most_similar(level, p, sorted(number_at[pixel] for pixel in there & number_at.keys())))
-        kin, moved = list(everyone), moves(found, at)
-    return found
-
-
-def most_similar(level, p, numbers):
-    """The K of these most similar to p, but for those next to it; the lowest number where several are as near."""
-    (i, j), near = level.at[p], level.step
-    others = [q for q in numbers if max(abs(level.at[q][0] - i), abs(level.at[q][1] - j)) > near]
-    here = [([y[p] for y in planes], [1] * len(planes)) for planes in level.around[:-1]]
-    d = distances(level, here, others, LANES)
-    nearest = [q for _, q in sorted(zip(d, others, strict=True))][: level.o.similar]
-    return nearest + [p] * (level.o.similar - len(nearest))
 
 
 def prices(level, X):
@@ -418,7 +360,7 @@ def candidates_of(level, X, s, near, turn):
     """
     o = level.o
     suggested, charged = [], []
-    for (di, dj), r in list(zip(level.offsets, near, strict=True))[: None if level.all else o.suggesting]:
+    for (di, dj), r in list(zip(level.offsets, near, strict=True))[: None if level.all else SUGGESTING]:
         if r is None or r[2] == 1024 or r[3] == NOWHERE:  # as nothing has touched it yet
             continue
         n, i, j = r[3]
@@ -432,8 +374,6 @@ def candidates_of(level, X, s, near, turn):
     favoured = len(found)
     found.append(level.number_of.get(tuple(X.source[level.pixel(s)].tolist())))
     found = list(dict.fromkeys(p for p in found if p is not None))
-    if level.similar:
-        found += [like for p in found for like in level.similar[p]]
     for k in range(max(o.chance, not found)):
         word = words(level.seed, level.number, turn, level.index(s), random.SEARCH, k // 4)[k % 4]
         found.append(word * len(level.places) >> 32)
@@ -493,38 +433,3 @@ def mass(level, y):
     ends = [0, *level.below_step]
     low = ends[max(0, level.reach - y)]
     return low, ends[min(2 * level.reach, level.reach + level.top - y) + 1] - low
-
-
-def mode(level, d, numbers):
-    """The grey level at which equation (6) is largest, and the candidate that counts most there."""
-    w, grey = weights(level, d), level.own[0][numbers]
-    f, x = np.zeros(256, float32), np.arange(256)
-    for v in sorted({y for y, w_p in zip(grey.tolist(), w, strict=True) if w_p}):
-        total = sum(w_p for y, w_p in zip(grey, w, strict=True) if y == v)
-        reached = abs(x - v) <= level.reach
-        f[reached] = fma(nearest(Fraction(total)), level.gauss[abs(x - v)[reached]], f[reached])
-    best = int(f.argmax())
-    gaps = abs(grey - best)
-    shares = [
-        nearest(Fraction(w_p)) * level.gauss[gap] if w_p and gap <= level.reach else -1
-        for w_p, gap in zip(w, gaps, strict=True)
-    ]
-    return [best], numbers[int(np.argmax(shares))]
-
-
-def mode_of_vectors(level, d, numbers):
-    """The candidate among the 16 heaviest at whose vector equation (6) is largest."""
-    w = weights(level, d)
-    heavy = [k for k, w_p in enumerate(w) if w_p]
-    heaviest = sorted(heavy, key=lambda k: -w[k])[:16]
-    y = level.own[:, numbers]
-    density = np.zeros(len(heaviest), float32)
-    for k in heavy:
-        gap = np.zeros(len(heaviest), float32)
-        for plane in y:
-            gap = ((plane[k] - plane[heaviest]) ** 2 + gap.astype(float)).astype(float32)
-        a = gap * level.scale
-        more = fma(nearest(Fraction(w[k])), exponential(-np.minimum(a, 28)), density)
-        density = np.where(a < 28, more, density)
-    p = numbers[heaviest[int(np.argmax(density))]]
-    return level.own[:, p], p

@@ -15,15 +15,17 @@ from simdtex.options import PRESETS, preset_values
 
 SEED = 2**40 + 3
 
-BARE = {"balance": 0.0, "structure": 0.0, "novelty": 0.0, "finish": 0.0, "overview": 64, "suggesting": 24}
+BARE = {"balance": 0.0, "structure": 0.0, "novelty": 0.0, "finish": 0.0, "overview": 64}
 """Nothing but the equations of the paper in distances and pictures."""
 EXACT = BARE | {"search": "exact", "order": 2, "levels": 2, "coherence": 1.0}
-FEW = BARE | {"search": "coherent", "order": 2, "levels": 2, "exhaustive": 0, "coherence": 0.2}
+FEW = BARE | {"search": "coherent", "order": 2, "levels": 2, "coherence": 0.2}
 """Coherent search that weighs a few candidates at every level but the coarsest."""
-DENSITY = BARE | {"pixel": "density", "order": 1, "xi": -4.0, "free_sweeps": 1, "coherence": 1.0}
+DRAWN = {"relaxation": "gibbs", "pixel": "density"}
+DENSITY = BARE | DRAWN | {"order": 1, "xi": -4.0, "free_sweeps": 1, "coherence": 1.0}
 MORE = {"order": 2, "levels": 2}
 """The prices, the structure channel and the finish of the defaults, all together."""
-MORE_OF_A_DENSITY = {"relaxation": "gibbs", "balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": 1.5}
+MORE_OF_A_DENSITY = {"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": 1.5}
+PAPER_ICM = {"preset": "paper", "order": 1, "relaxation": "icm", "pixel": "source"}
 
 # sample shape, channels, type, output shape, options
 CASES = {
@@ -34,39 +36,34 @@ CASES = {
     "default-overview": ((32, 33), None, np.uint8, (9, 8), {"order": 1}),
     "default-overview-whole": ((20, 19), None, np.uint8, (9, 8), {"order": 1, "edges": "whole", "phases": "all"}),
     "paper": ((12, 11), None, np.uint8, (8, 9), {"preset": "paper", "order": 2}),
-    "paper-icm": ((12, 11), None, np.uint8, (5, 6), {"preset": "paper", "order": 1, "relaxation": "icm", "xi": -4.0}),
+    "paper-icm": ((12, 11), None, np.uint8, (5, 6), PAPER_ICM),
     "exact": ((12, 11), None, np.uint8, (8, 9), EXACT),
     "exact-order-8": ((14, 12), None, np.uint8, (9, 8), EXACT | {"order": 8, "xi": -4.0}),
     "exact-three-levels": ((13, 14), None, np.uint8, (11, 10), EXACT | {"levels": 3, "phases": "all"}),
     "exact-colour": ((10, 11), 3, np.uint8, (8, 7), EXACT | {"boundary": "open"}),
     "exact-16-bit": ((10, 11), None, np.uint16, (8, 9), EXACT | {"order": 5, "coherence": 0.5}),
-    "exact-float32": ((10, 11), None, np.float32, (9, 8), EXACT | {"coarsest": "same", "edges": "whole"}),
+    "exact-float32": ((10, 11), None, np.float32, (9, 8), EXACT | {"edges": "whole"}),
     "exact-reflect": ((20, 20), None, np.uint8, (8, 8), EXACT | {"order": 1, "edges": "reflect", "coherence": 0}),
     "exact-auto-whole": ((20, 20), None, np.uint8, (8, 8), EXACT | {"order": 1, "levels": 1, "free_sweeps": 3}),
     "gibbs": ((12, 11), None, np.uint8, (8, 9), EXACT | {"relaxation": "gibbs"}),
     "gibbs-wide": ((12, 11), None, np.uint16, (8, 9), EXACT | {"relaxation": "gibbs", "bandwidth": 0.6}),
-    "gibbs-density": ((10, 11), None, np.uint8, (8, 7), DENSITY | {"relaxation": "gibbs", "bandwidth": 1.0}),
-    "gibbs-density-colour": ((9, 8), 3, np.uint8, (6, 7), DENSITY | {"relaxation": "gibbs", "boundary": "open"}),
-    "gibbs-density-16-bit": ((9, 10), 2, np.uint16, (7, 6), DENSITY | {"relaxation": "gibbs", "levels": 2}),
-    "gibbs-density-float32": ((10, 9), None, np.float32, (7, 8), DENSITY | {"relaxation": "gibbs", "bandwidth": 0.4}),
+    "gibbs-density-colour": ((9, 8), 3, np.uint8, (6, 7), DENSITY | {"boundary": "open"}),
+    "gibbs-density-16-bit": ((9, 10), 2, np.uint16, (7, 6), DENSITY | {"levels": 2}),
+    "gibbs-density-float32": ((10, 9), None, np.float32, (7, 8), DENSITY | {"bandwidth": 0.4}),
     "density": ((9, 10), None, np.uint8, (6, 7), DENSITY | {"levels": 2, "bandwidth": 0.3}),
-    "density-colour": ((6, 7), 3, np.uint8, (4, 5), DENSITY | {"coarsest": "same", "bandwidth": 0.6}),
     "density-16-bit": ((8, 9), None, np.uint16, (5, 6), DENSITY | {"levels": 2, "bandwidth": 0.5}),
     "few": ((12, 11), None, np.uint8, (8, 9), FEW),
     "few-colour": ((10, 11), 3, np.uint8, (8, 7), FEW | {"order": 5, "boundary": "open"}),
     "few-order-18": ((11, 10), None, np.uint8, (6, 7), FEW | {"order": 18, "xi": -16.0}),
     "few-16-bit": ((12, 11), None, np.uint16, (9, 8), FEW | {"order": 8, "xi": -4.0, "coherence": 1.5}),
     "few-float32": ((12, 11), None, np.float32, (8, 9), FEW | {"order": 5, "edges": "whole", "xi": -2.5}),
-    "few-suggest": ((12, 13), None, np.uint8, (8, 9), FEW | {"order": 8, "suggesting": 3, "chance": 1, "xi": -4.0}),
-    "few-similar": ((10, 11), None, np.uint8, (8, 9), FEW | {"similar": 2, "chance": 0}),
-    "few-similar-all-phases": ((9, 8), 2, np.float32, (7, 9), FEW | {"similar": 3, "chance": 5, "phases": "all"}),
+    "few-suggest": ((12, 13), None, np.uint8, (8, 9), FEW | {"order": 8, "chance": 1, "xi": -4.0}),
     "few-chance": ((12, 11), None, np.uint8, (8, 9), FEW | {"chance": 9, "coherence": 0, "free_sweeps": 0}),
     "few-three-levels": ((13, 14), None, np.uint8, (11, 10), FEW | {"levels": 3, "edges": "reflect"}),
-    "few-exhaustive": ((13, 14), None, np.float32, (9, 10), FEW | {"levels": 3, "exhaustive": 50}),
-    "few-same": ((12, 11), None, np.uint8, (8, 9), FEW | {"coarsest": "same"}),
-    "few-gibbs": ((12, 11), None, np.uint16, (8, 9), FEW | {"relaxation": "gibbs", "bandwidth": 0.5, "suggesting": 2}),
+    "few-exhaustive": ((13, 14), None, np.float32, (9, 10), FEW | {"levels": 3}),
+    "few-gibbs": ((12, 11), None, np.uint16, (8, 9), FEW | {"relaxation": "gibbs", "bandwidth": 0.5}),
     "few-gibbs-density": ((10, 9), 2, np.uint8, (7, 8), FEW | {"relaxation": "gibbs", "pixel": "density", "chance": 6}),
-    "all-of-many": ((35, 31), None, np.float32, (5, 6), BARE | {"order": 2, "levels": 1, "coarsest": "same"}),
+    "all-of-many": ((35, 31), None, np.float32, (5, 6), BARE | {"order": 2, "levels": 1}),
     "seam": ((9, 9), None, np.uint8, (7, 11), BARE | {"search": "exact", "order": 5, "levels": 1, "xi": -8.0}),
     "a-row": ((9, 8), None, np.uint8, (1, 13), BARE | {"order": 2}),
     **{
@@ -86,7 +83,7 @@ CASES = {
         for option, value in (("balance", 0.5), ("structure", 2.0), ("novelty", 1.0), ("finish", 1.5))
         for how, options in (("exact", EXACT), ("few", FEW))
     },
-    "balance-cap": ((12, 13), None, np.uint8, (11, 10), FEW | {"balance": 0.1, "order": 1, "coarsest": "same"}),
+    "balance-cap": ((12, 13), None, np.uint8, (11, 10), FEW | {"balance": 0.1, "order": 1}),
     "balance-order-9": ((13, 14), None, np.uint8, (9, 8), FEW | {"balance": 1.0, "order": 9, "schedule": "block:3x4"}),
     "balance-all-phases": ((14, 13), None, np.uint8, (8, 9), EXACT | {"balance": 1.0, "phases": "all"}),
     "balance-gibbs": ((12, 11), 2, np.uint16, (8, 9), FEW | {"balance": 0.3, "relaxation": "gibbs", "bandwidth": 0.5}),
@@ -95,10 +92,8 @@ CASES = {
     "structure-beyond-top": ((13, 12), None, np.float32, (8, 9), FEW | {"structure": 50.0}),
     "structure-beyond-8-bit": ((13, 12), None, np.uint8, (8, 9), FEW | {"structure": 50.0}),
     "structure-density": ((10, 11), None, np.uint8, (6, 7), DENSITY | {"structure": 3.0, "levels": 2}),
-    "structure-density-gibbs": ((9, 10), None, np.uint8, (6, 7), DENSITY | {"structure": 3.0, "relaxation": "gibbs"}),
     "novelty-colour": ((12, 11), 3, np.uint8, (8, 9), EXACT | {"novelty": 0.05, "levels": 1, "boundary": "open"}),
-    "novelty-density": ((9, 10), None, np.uint8, (6, 7), DENSITY | {"novelty": 0.4, "coarsest": "same"}),
-    "novelty-no-mode": ((9, 10), None, np.uint8, (6, 7), EXACT | {"novelty": 9.0, "coarsest": "same", "levels": 1}),
+    "novelty-density": ((9, 10), None, np.uint8, (6, 7), DENSITY | {"novelty": 0.4}),
     "finish-colour": ((12, 11), 3, np.uint8, (8, 7), EXACT | {"finish": 0.8, "boundary": "open"}),
     "finish-16-bit": ((12, 11), 2, np.uint16, (8, 7), FEW | {"finish": 2.2}),
     "finish-float32": ((12, 11), None, np.float32, (3, 7), FEW | {"finish": 1.1, "levels": 1, "edges": "reflect"}),
@@ -106,26 +101,21 @@ CASES = {
     "finish-density": ((9, 10), None, np.uint8, (6, 7), DENSITY | {"finish": 1.0}),
     "more": ((14, 13), None, np.uint8, (9, 10), MORE),
     "more-three-levels": ((24, 25), None, np.uint8, (12, 11), MORE | {"levels": 3}),
-    "more-colour": ((13, 14), 3, np.uint8, (9, 8), MORE | {"boundary": "open", "exhaustive": 0}),
-    "more-16-bit": ((14, 13), None, np.uint16, (8, 9), MORE | {"order": 5, "similar": 2}),
+    "more-colour": ((13, 14), 3, np.uint8, (9, 8), MORE | {"boundary": "open"}),
+    "more-16-bit": ((14, 13), None, np.uint16, (8, 9), MORE | {"order": 5}),
     "more-float32": ((13, 12), 2, np.float32, (9, 8), MORE | {"schedule": "block:3x4", "phases": "all"}),
     "more-whole": ((16, 15), None, np.uint8, (9, 8), MORE | {"edges": "whole", "phases": "all", "balance": 2.0}),
     "more-exact": ((12, 11), None, np.uint8, (9, 8), MORE | {"search": "exact", "schedule": "random-scan", "xi": -8.0}),
     "more-gibbs": ((12, 11), None, np.uint16, (8, 9), MORE | {"relaxation": "gibbs", "bandwidth": 0.5}),
     "more-gibbs-few": ((12, 11), 2, np.float32, (8, 9), MORE | {"relaxation": "gibbs", "search": "coherent"}),
-    "more-density": ((10, 9), 2, np.uint8, (6, 7), MORE | {"pixel": "density", "xi": -4.0, "bandwidth": 0.4}),
+    "more-density": ((10, 9), 2, np.uint8, (6, 7), MORE | DRAWN | {"xi": -4.0, "bandwidth": 0.4}),
     "more-gibbs-density": ((10, 9), None, np.uint8, (7, 6), DENSITY | MORE_OF_A_DENSITY),
     "exact-of-many": ((36, 35), None, np.uint8, (6, 5), MORE | {"levels": 1, "search": "exact", "xi": -4.0}),
-    "exact-of-many-same": ((36, 35), 2, np.uint8, (5, 6), MORE | {"levels": 1, "coarsest": "same", "xi": -4.0}),
-    "similar-of-many": ((37, 36), None, np.uint8, (7, 8), FEW | {"similar": 3, "balance": 0.5}),
-    "similar-from-nowhere": ((35, 34), None, np.uint8, (6, 5), FEW | {"similar": 5, "phases": "all", "order": 1}),
-    "similar-whole": ((38, 37), None, np.uint8, (6, 5), FEW | {"similar": 2, "edges": "whole", "phases": "all"}),
-    "similar-of-too-few": ((5, 6), None, np.uint8, (8, 7), FEW | {"similar": 40, "edges": "reflect"}),
 }
 
 ON_A_DEVICE = (
-    *("exact-colour", "paper", "few-similar", "few-gibbs-density"),
-    *("more-colour", "more-density", "exact-of-many-same", "similar-of-many", "similar-of-too-few"),
+    *("exact-colour", "paper", "few-suggest", "few-gibbs-density"),
+    *("more-colour", "more-density", "exact-of-many"),
 )
 
 
@@ -177,7 +167,7 @@ CLOSE = BARE | {"order": 8, "relaxation": "gibbs", "bandwidth": 0.0005, "coheren
 SUMS = {
     "exact": (3, 1, {"search": "exact", "levels": 1}),
     "all": (2, 3, {"search": "coherent", "levels": 1}),
-    "few": (3, 1, {"search": "coherent", "levels": 2, "exhaustive": 0, "chance": 60, "order": 18}),
+    "few": (3, 1, {"search": "coherent", "levels": 2, "chance": 60, "order": 18}),
 }
 
 
@@ -224,9 +214,9 @@ CHANGES = {
     "bandwidth": [
         (FEW, 0.15, 1.0),
         (EXACT, 0.15, 1.0),
-        (EXACT | {"relaxation": "gibbs", "coarsest": "same"}, 0.5, 1.0),
-        (FEW | {"relaxation": "gibbs", "coarsest": "same"}, 0.5, 1.0),
-        (DENSITY | {"coarsest": "same"}, 0.15, 1.0),
+        (EXACT | {"relaxation": "gibbs"}, 0.5, 1.0),
+        (FEW | {"relaxation": "gibbs"}, 0.5, 1.0),
+        (DENSITY, 0.15, 1.0),
     ],
     "coherence": [(EXACT, 1.0, 0.0), (FEW, 0.2, 1.0), (FEW, 0.2, 0.0), (FEW | {"relaxation": "gibbs"}, 0.2, 3.0)],
     "overview": [({"order": 2}, 128, 90), ({"order": 2, "search": "exact"}, 91, 90)],
@@ -236,7 +226,7 @@ CHANGES = {
     "finish": [(EXACT, 0.0, None), (FEW, 0.0, 0.8), (MORE, None, 1.4), (DENSITY, None, 1.5)],
     "xi": [(EXACT, -1.0, -4.0), (FEW, -1.0, -4.0), (FEW, -1.0, -1.1)],
     "free_sweeps": [(EXACT, 2, 0), (FEW, 2, 0), (FEW | {"relaxation": "gibbs"}, 2, 1)],
-    "pixel": [(EXACT, "source", "density"), (FEW | {"relaxation": "gibbs"}, "source", "density")],
+    "pixel": [(others | {"relaxation": "gibbs"}, "source", "density") for others in (EXACT, FEW)],
     "phases": [(EXACT, "decimated", "all"), (FEW, "decimated", "all")],
     "edges": [
         (EXACT, "auto", "whole"),
@@ -244,7 +234,6 @@ CHANGES = {
         (EXACT | {"order": 1, "levels": 1}, "auto", "reflect"),
         (FEW | {"order": 1}, "auto", "reflect"),
     ],
-    "coarsest": [(EXACT, "gibbs", "same"), (FEW, "gibbs", "same"), (DENSITY, "gibbs", "same")],
     "schedule": [(EXACT, "coloring", other) for other in [*schedules.SCHEDULES][1:]]
     + [(FEW, "coloring", other) for other in [*schedules.SCHEDULES][1:]],
     "boundary": [(EXACT, "torus", "open"), (FEW, "torus", "open")],
@@ -253,10 +242,7 @@ CHANGES = {
         ({"order": 2, "levels": 2, "relaxation": "gibbs"}, "auto", "coherent"),
         ({"order": 2, "levels": 2, "coherence": 1.0}, "coherent", "exact"),
     ],
-    "suggesting": [(FEW, 24, 1), (FEW | {"order": 5}, 3, 4), (FEW | {"relaxation": "gibbs"}, 24, 2)],
-    "similar": [(FEW, 0, 1), (FEW, 2, 3), (FEW | {"relaxation": "gibbs"}, 0, 2)],
     "chance": [(FEW, 4, 0), (FEW, 4, 5), (FEW | {"relaxation": "gibbs"}, 4, 0)],
-    "exhaustive": [({"order": 2, "levels": 2}, 64, 400), ({"order": 2, "levels": 2}, 306, 305)],
 }
 
 

@@ -14,7 +14,7 @@ import simdtex
 SEED = 2**40 + 3
 
 EXACT = {"search": "exact", "order": 2, "levels": 2}
-FEW = {"search": "coherent", "order": 2, "levels": 2, "exhaustive": 0}
+FEW = {"search": "coherent", "order": 2, "levels": 2}
 OPEN = {"boundary": "open"}
 GIBBS = {"relaxation": "gibbs", "bandwidth": 0.4}
 
@@ -171,7 +171,6 @@ KINDS = {
     "weights-of-floats": ({"weights": (3.0, 1.0), "finish": 2.0}, {"channels": 2, "dtype": np.float64}),
     "proportions": ({"categorical": True, "proportions": (1.0, 2.0, 0.0)}, {"kinds": 3}),
     "proportions-alone": ({"categorical": True, "proportions": (3.0, 1.0), "balance": 0.0}, {"kinds": 2}),
-    "similar-of-two": ({"similar": 2}, TWO | {"gaps": 0.05, "dtype": np.float32, "labels": 2}),
     "data-and-guide": ({"data_weight": 40.0}, {"known": 0.1, "labels": 3, "silent": 0.3, "placed": 0.4}),
     "data-of-categories": (
         {"categorical": True, "proportions": (1.0, 1.0, 2.0)},
@@ -196,12 +195,12 @@ CASES = {
         for how in (BOTH if name in TWICE else [[*BOTH][k % 2]])
     },
     "nearly-all-known": case(FEW | {"order": 1}, known=0.9, shape=(9, 5)),  # at the coarse level all
-    "density-known": case({"pixel": "density", "search": "exact", "order": 1, "xi": -4.0}, known=0.15, shape=(6, 7)),
+    "density-known": case({"pixel": "density", "order": 1, "xi": -4.0, **GIBBS}, known=0.15, shape=(6, 7)),
     "density-two": case({"pixel": "density", "order": 1, **GIBBS}, **TWO, known=0.1, shape=(6, 7)),
     "a-density-of-gaps": case({"pixel": "density", "order": 1, **GIBBS}, gaps=0.1, dtype=np.float32, shape=(6, 7)),
     "many": case({"levels": 1, "search": "exact", "order": 2, "xi": -8.0}, samples=((25, 24), (20, 26)), shape=(5, 6)),
-    "many-known": case({"levels": 1, "coarsest": "same", "order": 2}, samples=((34, 33),), known=0.2, shape=(5, 6)),
-    "many-similar": case(FEW | {"similar": 2}, samples=((25, 24), (24, 26)), masked=0.1, shape=(5, 6)),
+    "many-known": case({"levels": 1, "order": 2}, samples=((34, 33),), known=0.2, shape=(5, 6)),
+    "many-few": case(FEW, samples=((25, 24), (24, 26)), masked=0.1, shape=(5, 6)),
     "default": case({}, known=0.1, labels=2, shape=(5, 6)),
 }
 
@@ -214,7 +213,7 @@ ON_A_DEVICE = (
             "labels-silent-few",
             "everything-exact",
             "everything-few",
-            "many-similar",
+            "many-few",
         )
     ),
 )

@@ -27,7 +27,6 @@ RUNS = {
     "defaults": ((13, 12), None, np.uint8, (11, 14), {"order": 8}),
     "exact": ((30, 31), None, np.uint8, (12, 14), {"order": 8, "search": "exact"}),
     "paper": ((14, 13), None, np.uint8, (9, 11), {"preset": "paper", "order": 2}),
-    "paper-icm": ((12, 13), None, np.uint8, (10, 9), {"preset": "paper", "order": 5, "relaxation": "icm"}),
     "gibbs-source": ((12, 12), None, np.uint8, (15, 7), {"order": 5, "relaxation": "gibbs", "boundary": "open"}),
     "gibbs-density": (
         (12, 12),
@@ -44,8 +43,6 @@ RUNS = {
         (8, 9),
         {"order": 2, "relaxation": "gibbs", "pixel": "density", "coherence": 2.0},
     ),
-    "colour-icm-density": ((11, 12), 3, np.uint8, (7, 10), {"order": 1, "pixel": "density", "bandwidth": 1.0}),
-    "16-bit-density": ((12, 12), None, np.uint16, (9, 8), {"order": 5, "pixel": "density", "bandwidth": 1.0}),
     "16-bit-two-channels": ((12, 12), 2, np.uint16, (9, 8), {"order": 8, "relaxation": "gibbs"}),
     "float32": ((12, 13), None, np.float32, (13, 7), {"order": 5}),
     "float64-density": (
@@ -76,10 +73,9 @@ RUNS = {
         (14, 11),
         COHERENT | {"order": 2, "relaxation": "gibbs", "pixel": "density", "boundary": "open", "chance": 0},
     ),
-    "coherent-similar": ((12, 13), None, np.float32, (14, 15), COHERENT | {"order": 5, "similar": 2, "phases": "all"}),
     "coherent-luby": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "schedule": "luby"}),
     "coherent-block": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "schedule": "block:5x4"}),
-    "coherent-array": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "array": "4x8", "exhaustive": 200}),
+    "coherent-array": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "array": "4x8"}),
     "multires": ((13, 11), None, np.uint8, (15, 18), MULTIRES),
     "multires-colour": (
         (11, 14),
@@ -150,8 +146,8 @@ FORMS = [
     {"scratch": 1},
     {"scratch": 5_000, "vector": 4},
 ]
-EXACT = [{}, {"split": 64, "vector": 1}, {"skip": False, "split": 3}]
-"""Of the exact search: work-items that share a site, and whether they skip."""
+EXACT = [{}, {"split": 64, "vector": 1}, {"split": 3}]
+"""Of the exact search: work-items that share a site."""
 MIXED = [
     {"work_group": 3, "vector": 4, "step": 2, "scratch": 5_000},
     {"work_group": 16, "vector": 1, "step": 8, "scratch": 40_000},
@@ -349,6 +345,7 @@ import sys
 import numpy as np
 import simdtex
 from cases import REFERENCE, assert_same_bits, texture
+import simdtex.ops.relax as rule
 from simdtex.ops import leaves
 from simdtex.machine.devices import find
 from simdtex.machine.opencl import OpenCL
@@ -358,12 +355,12 @@ info = find("oclgrind")
 colour, grey = texture((6, 5), 3), texture((7, 6))
 few = (np.indices((5, 6)).sum(0) // 2 % 3).astype(np.uint8)
 leaves.LEAST = 1  # few as the candidates are
+rule.KEPT = 40  # of finer levels, they are weighed by several kernels
 runs = [
     (grey, None, {"order": 1, "levels": 2}),
-    (texture((8, 9)), None, {"order": 5, "levels": 1, "search": "exact", "coarsest": "same"}),
+    (texture((8, 9)), None, {"order": 5, "levels": 2, "search": "exact", "novelty": 0}),
     (grey, None, {"order": 2, "levels": 1, "relaxation": "gibbs", "pixel": "density", "boundary": "open"}),
-    (grey, None, {"order": 1, "levels": 1, "pixel": "density", "bandwidth": 1.0, "coarsest": "same"}),
-    (colour, -1, {"order": 1, "levels": 2, "edges": "reflect", "pixel": "density", "coarsest": "same"}),
+    (colour, -1, {"order": 1, "levels": 2, "edges": "reflect", "pixel": "density", "relaxation": "gibbs"}),
     (grey, None, {"order": 1, "levels": 1, "schedule": "luby"}),
     (grey, None, {"order": 1, "levels": 1, "schedule": "block:2x3", "array": "2x2"}),
     (grey, None, {"method": "multires", "alpha": 0.6}),
@@ -372,14 +369,14 @@ runs = [
     (grey, None, {"method": "pyramid", "iterations": 1, "pyramid": "laplacian", "match": "lookup"}),
 ]
 machines = [OpenCL(info, work_group=3, vector=4, split=3), OpenCL(info, work_group=4, vector=1, split=64)]
-machines = [OpenCL(info), *machines, OpenCL(info, skip=False)]
+machines = [OpenCL(info), *machines]
 for number, (sample, axis, options) in enumerate(runs):
-    for machine in machines[: 4 if number < 2 else 1]:
+    for machine in machines[: 3 if number < 2 else 1]:
         options |= {"rng": 1, "channel_axis": axis} | ({} if "method" in options else {"free_sweeps": 1})
         ours = simdtex.synthesize(sample, (5, 7), device=machine, **options)
         assert_same_bits(ours, simdtex.synthesize(sample, (5, 7), device=REFERENCE, **options))
 for options in ({"temperature": np.full((5, 6), 0.5)}, {"estimator": "histogram"}):
-    options |= {"order": 1, "levels": 3}
+    options |= {"order": 1, "greys": 3}
     tables = [simdtex.lcpdf(few, few, [(2, 2), (2, 3), (1, 1)], device=m, **options) for m in (machines[0], REFERENCE)]
     assert_same_bits(*tables)
 for schedule in ("block:2x2", "raster", "synchronous"):

@@ -114,7 +114,7 @@ def sampled_on(machine, p, match, seed, ends=lambda pixels: [pixels]):
     for level in reversed(range(p.top)):
         first = 0
         for end in ends(p.pixels(level)):
-            sampled = candidates(machine, structure, sampled, level, first, end, match, seed)
+            sampled = candidates(machine, structure, sampled, level, range(first, end), match, seed)
             first = end
     return host(machine, sampled[:2])
 
@@ -123,7 +123,7 @@ def one_level(p, source, level, match, seed=0, machine=REFERENCE):
     """Source and counts of one level, given the sources of those above."""
     p = p._replace(sampled=p.sampled._replace(source=source))
     structure, sampled = p.on(machine)
-    found = candidates(machine, structure, sampled, level, 0, p.pixels(level), match, seed)
+    found = candidates(machine, structure, sampled, level, range(p.pixels(level)), match, seed)
     return [a[p.own(level)] for a in host(machine, found[:2])]
 
 
@@ -286,9 +286,9 @@ def test_nothing_but_the_range_is_written(machine):
     p = problem(5)
     for m in (REFERENCE, machine):
         structure, sampled = p.on(m)
-        candidates(m, structure, sampled, 2, 0, p.pixels(2), True, 1)
+        candidates(m, structure, sampled, 2, range(p.pixels(2)), True, 1)
         before = host(m, sampled[:2])
-        candidates(m, structure, sampled, 1, 3, 17, True, 1)
+        candidates(m, structure, sampled, 1, range(3, 17), True, 1)
         for ours, theirs in zip(host(m, sampled[:2]), before, strict=True):
             own = range(p.own(1).start + 3, p.own(1).start + 17)
             assert_same_bits(np.delete(ours, own, 0), np.delete(theirs, own, 0))

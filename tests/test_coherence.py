@@ -25,13 +25,13 @@ def run(machine, p, strength):
 
 def check_formula(p, strength):
     before, after = run(REFERENCE, p, 0), run(REFERENCE, p, strength)
-    favour = np.float32(1 / (1 + strength))
+    discount = np.float32(1 / (1 + strength))
     t = p.field.temperature
     for s, site in enumerate(p.where()):
         continuing = plain.coherent(p.source(), t, site, p.order, p.grid.spacing, p.grid.torus)
         # The neighbours' offsets are pixels of the sample, spread as the level's grid is.
         for i, position in enumerate(p.positions()):
-            expected = before[i, s] * favour if position in continuing else before[i, s]
+            expected = before[i, s] * discount if position in continuing else before[i, s]
             assert after[i, s] == expected
     return bool((before != after).any())
 
@@ -46,7 +46,7 @@ def test_the_reference_is_the_rule(p, strength):
 @pytest.mark.parametrize("spacing", [1, 2])
 def test_the_reference_is_the_rule_where_many_are_coherent(spacing, edges):
     p = problem(4, order=4, shape=(10, 11), spacing=spacing, edges=edges, sample_shape=(14, 13))
-    assert check_formula(p, 1.0), "some candidate is favoured"
+    assert check_formula(p, 1.0), "some candidate is discounted"
 
 
 @given(p=problems(), strength=strengths)
@@ -67,7 +67,7 @@ def test_neighbours_that_no_relaxation_has_touched_propose_nothing(machine):
         assert_same_bits(run(m, p, 2.0), run(m, p, 0))
 
 
-def test_many_neighbours_favour_a_candidate_once(machine):
+def test_many_neighbours_discount_a_candidate_once(machine):
     """All neighbours were taken as one piece, so all propose the same candidate."""
     p = problem(7, order=8, shape=(5, 5), sample_shape=(12, 12), temperatures="zero")
     row, col = np.indices((5, 5)) + 4
@@ -81,7 +81,7 @@ def test_many_neighbours_favour_a_candidate_once(machine):
 
 
 def test_a_distance_of_zero_stays_zero_and_is_found(machine):
-    """The mark of a favoured distance is its sign, also of 0."""
+    """The mark of a discounted distance is its sign, also of 0."""
     p = problem(8, order=2, shape=(6, 6), sample_shape=(9, 9), temperatures="zero", torus=False)
     row, col = np.indices((6, 6)) + 1 + p.sample.margin
     source = (row * p.sample.cols + col).astype(np.int32)

@@ -33,11 +33,8 @@ LARGE = {
     "brick-paper": ("brick-64", (40, 40), {"preset": "paper", "order": 8}),
     "grass-16-bit": ("grass-16", (120, 120), {}),
     "gravel-float-exact": ("gravel-float", (64, 64), {"search": "exact", "order": 8}),
-    "gravel-similar": ("gravel", (128, 128), {"similar": 2, "chance": 8, "suggesting": 60, "coherence": 1.0}),
-    "gravel-exhaustive": ("gravel", (96, 96), {"exhaustive": 1100}),
     "gravel-phases": ("gravel-64", (96, 96), {"phases": "all", "edges": "reflect", "order": 8}),
     "grass-draws": ("grass-64", (64, 64), {"relaxation": "gibbs", "search": "coherent", "order": 8}),
-    "grass-coarsest": ("grass", (96, 96), {"coarsest": "same", "free_sweeps": 0, "xi": -8.0}),
     **{
         f"{schedule}-{search}": ("brick-64", (56, 56), {"schedule": schedule, "search": search, "order": 8})
         for schedule in ("coloring-fixed", "luby", "checkerboard", "synchronous", "random-subset", "block")
@@ -66,7 +63,7 @@ GIVEN = (
 )
 """Runs of test_algorithm_given: with known values, guides, several samples, masks, gaps, and kinds of variables."""
 
-QUICK = ("brick", "coffee", "grass-16-bit", "grass-coarsest", "multires-coffee", "pyramid-coffee")
+QUICK = ("brick", "coffee", "grass-16-bit", "multires-coffee", "pyramid-coffee")
 """Those whose kernels other tests compile too."""
 
 

@@ -61,7 +61,7 @@ def test_any_tiling(tmp_path, tiles, boundary):
 
 
 VARIANTS = {
-    "coherent": {"order": 2, "exhaustive": 0, "similar": 1},
+    "coherent": {"order": 2},
     "exact": {"order": 2, "search": "exact"},
     "draws": {"order": 2, "search": "exact", "relaxation": "gibbs"},
     "density": {"order": 2, "search": "exact", "relaxation": "gibbs", "pixel": "density"},

@@ -13,7 +13,7 @@ from simdtex.methods.mrf.options import few
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Sample
 from simdtex.model.source_map import apply_source_map
-from simdtex.ops.finish import around, finish
+from simdtex.ops.finish import finish
 from simdtex.ops.neighbourhood import Field
 
 
@@ -90,7 +90,7 @@ def finished(m, p, sd, first=0, count=None):
     _, field, _ = p.on(m)
     given = m.put((p.field.source < 0).astype(np.uint8))
     where = (p.grid, p.sample.planes(m), p.sample)
-    return finish(m, field, given, *where, *around(sd), first, count or p.grid.plane)
+    return finish(m, field, given, *where, sd, first, count or p.grid.plane)
 
 
 @pytest.mark.parametrize("sd", [0.5, 1.5, 2.0])
@@ -119,7 +119,7 @@ def test_where_the_arrangement_is_coherent_nothing_changes(machine, dtype):
     for m in (REFERENCE, machine):
         values, t = sample.working[:, source], np.zeros((9, 10), np.uint16)
         field, given = Field(*(m.put(plane) for plane in (values, source, t))), m.put(np.zeros((9, 10), np.uint8))
-        by = finish(m, field, given, grid, sample.planes(m), sample, *around(1.5), 0, 90)
+        by = finish(m, field, given, grid, sample.planes(m), sample, 1.5, 0, 90)
         assert not by.any()
         assert_same_bits(sample.moved(source, by.reshape(2, 9, 10)), pixels[4:13, 4:14])
 

@@ -112,7 +112,7 @@ def test_a_sample_has_its_guide_last_and_does_not_vary_with_it():
     rng = np.random.default_rng(3)
     pixels, label = rng.integers(0, 256, (8, 9, 1)).astype(np.uint8), rng.integers(0, 4, (8, 9, 1))
     guide = Guide((label,), label[:2], True, 1.0)
-    plain, guided = Sample(pixels, 24, 2, 1.0), Sample(pixels, 24 * 6, 2, 1.0, beside=[guide])
+    plain, guided = Sample(pixels, 24, 2, 1.0), Sample(pixels, 24 * 6, 2, 1.0, guides=[guide])
     assert guide.channels == 4
     assert guided.levels.shape == (1 + 1 + 4, 8, 9)
     assert guided.levels[:2].tolist() == plain.levels.tolist()

@@ -11,26 +11,26 @@ import simdtex
 from simdtex.model.sample import Sample
 from simdtex.ops.histogram import histogram
 
-LEVELS = 3
+GREYS = 3
 
 
 def few_levels(seed, order, torus, temperatures="mixed", side=12):
     """A problem of three grey levels, so that neighbourhoods do match."""
     p = problem(seed, order=order, torus=torus, temperatures=temperatures, sample_shape=(side, side))
     rng = np.random.default_rng(seed)
-    levels = (np.indices((side, side)).sum(0) // 2 + (rng.random((side, side)) < 0.1)) % LEVELS
-    values = (np.indices(p.field.source.shape).sum(0) // 2 % LEVELS).astype(np.uint16)
-    return p._replace(sample=Sample.of_levels(levels, LEVELS), field=p.field._replace(values=values[None]))
+    levels = (np.indices((side, side)).sum(0) // 2 + (rng.random((side, side)) < 0.1)) % GREYS
+    values = (np.indices(p.field.source.shape).sum(0) // 2 % GREYS).astype(np.uint16)
+    return p._replace(sample=Sample.of_levels(levels, GREYS), field=p.field._replace(values=values[None]))
 
 
 def run(machine, p):
     distances, candidates = p.distances(machine)
-    return machine.get(histogram(machine, distances, candidates, LEVELS))
+    return machine.get(histogram(machine, distances, candidates, GREYS))
 
 
 def counted(p):
     """F(x, neighbours) of equation (4); a neighbour at temperature 1 matches anything."""
-    counts = np.zeros((p.sites.size, LEVELS), np.uint32)
+    counts = np.zeros((p.sites.size, GREYS), np.uint32)
     y = p.padded()
     for s, site in enumerate(p.where()):
         for position in plain.whole_positions(y[0].shape, p.order, p.grid.spacing):
@@ -67,7 +67,7 @@ def estimate(p, machine, sites=None):
         p.sample.levels[0],
         np.array(where),
         order=p.order,
-        levels=LEVELS,
+        greys=GREYS,
         temperature=p.temperature(),
         estimator="histogram",
         boundary="torus" if p.grid.torus else "open",
@@ -93,7 +93,7 @@ def test_no_match_is_an_error_that_names_the_site_and_the_ways_out(machine):
     sample = np.zeros((5, 6), np.uint8)
     image = np.zeros((6, 6), np.uint8)
     image[3, 4] = 1
-    options = {"order": 1, "levels": 2, "estimator": "histogram"}
+    options = {"order": 1, "greys": 2, "estimator": "histogram"}
     for m in (REFERENCE, machine):
         assert simdtex.lcpdf(image, sample, [(0, 0)], device=m, **options).tolist() == [[1, 0]]
         with pytest.raises(ValueError, match=r"equals that of site \(3, 3\); use fewer grey levels"):
@@ -104,7 +104,7 @@ def test_hot_neighbours_need_not_match():
     image = np.array([[0, 1], [1, 0]], np.uint8)
     sample = np.zeros((3, 3), np.uint8)
     ours = simdtex.lcpdf(
-        image, sample, [(0, 0)], order=2, levels=2, estimator="histogram",
+        image, sample, [(0, 0)], order=2, greys=2, estimator="histogram",
         temperature=np.ones((2, 2)), device="reference",
     )  # fmt: skip
     assert ours.tolist() == [[1, 0]]

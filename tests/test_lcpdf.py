@@ -7,7 +7,7 @@ from cases import REFERENCE, assert_same_bits, host, opencl, problem, problems, 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chisquare
-from tolerances import LCPDF, NEAR_TIE, SIGNIFICANCE
+from tolerances import LCPDF, SIGNIFICANCE
 
 import simdtex
 from simdtex.model.lattice import Grid
@@ -75,8 +75,11 @@ def test_distances_at_large_orders_have_the_references_bits(machine, channels, d
 def test_distances_and_the_least_of_what_is_given_have_the_references_bits(machine, how):
     p = problem(5, order=8, channels=2, sample_shape=(16, 15), shape=(13, 12), count=70, **how)
     assert_same_bits(distances(machine, p), distances(REFERENCE, p))
-    window, _ = p.window()
-    taken = {m.name: host(m, lcpdf.least(m, *p.distances(m), window)) for m in (REFERENCE, machine)}
+    choice, key = lcpdf.Choice(False, False, p.window()[0]), lcpdf.Key(1, 0, 1)
+    taken = {
+        m.name: host(m, lcpdf.take(m, *p.distances(m), m.put(p.sites), p.grid, choice, key))
+        for m in (REFERENCE, machine)
+    }
     first, second = taken.values()
     assert_same_bits(first, second)
     assert len(first[1]) == p.sample.channels, "a guide is never made"
@@ -120,14 +123,14 @@ def test_the_tables_of_a_bandwidth(h):
 # -- simdtex.lcpdf, equations (6) to (8) and (12) -------------------------------------------------------------
 
 
-def formula(image, sample, sites, order, bandwidth=1.0, temperature=None, levels=256, boundary="torus"):
+def formula(image, sample, sites, order, bandwidth=1.0, temperature=None, greys=256, boundary="torus"):
     t = np.zeros(image.shape) if temperature is None else np.rint(temperature * 1024) / 1024
     positions = plain.whole_positions(sample.shape, order)
     h = bandwidth * plain.optimal_bandwidth([sample], len(positions), len(plain.offsets(order)))
     rows = []
     for site in sites:
         d = [plain.distance([image], t, site, [sample], p, order, 1, boundary == "torus") for p in positions]
-        rows.append(plain.mixture(d, [sample[p] for p in positions], h, levels))
+        rows.append(plain.mixture(d, [sample[p] for p in positions], h, greys))
     return np.array(rows)
 
 
@@ -170,7 +173,7 @@ def test_lcpdf_is_the_formula_for_any_shape_and_levels(order, shape, sample_shap
     sample[0, :2] = 0, 1  # its variance is above 0
     sites = rng.integers(0, shape, (3, 2))
     check_lcpdf(
-        REFERENCE, image, sample, sites, order=order, levels=levels, boundary=boundary,
+        REFERENCE, image, sample, sites, order=order, greys=levels, boundary=boundary,
         temperature=rng.random(shape),
     )  # fmt: skip
 
@@ -180,7 +183,7 @@ def test_lcpdf_of_a_device_has_the_references_bits_and_is_the_formula(machine):
     for levels, order, boundary in [(256, 2, "torus"), (17, 8, "open"), (4096, 1, "torus")]:
         image, sample = rng.integers(0, levels, (8, 7)), rng.integers(0, levels, (9, 12))
         sites, t = rng.integers(0, (8, 7), (11, 2)), rng.random((8, 7))
-        options = {"order": order, "levels": levels, "boundary": boundary, "temperature": t}
+        options = {"order": order, "greys": levels, "boundary": boundary, "temperature": t}
         ours = check_lcpdf(machine, image, sample, sites[:2], **options)
         ours = simdtex.lcpdf(image, sample, sites, device=machine, **options)
         assert_same_bits(ours, simdtex.lcpdf(image, sample, sites, device=REFERENCE, **options))
@@ -215,9 +218,9 @@ GREY = np.arange(42, dtype=np.uint8).reshape(6, 7)
         ({"bandwidth": 0}, ValueError, "bandwidth is 0; give a number above 0"),
         ({"bandwidth": float("nan")}, ValueError, "bandwidth"),
         ({"bandwidth": "1"}, TypeError, "bandwidth must be a number"),
-        ({"levels": 1}, ValueError, "levels is 1; give 2 or more"),
-        ({"levels": 5000}, ValueError, "levels is 5000; give 4096 or fewer"),
-        ({"levels": 40}, ValueError, "holds 0 to 41, beyond 0 to 39"),
+        ({"greys": 1}, ValueError, "greys is 1; give 2 or more"),
+        ({"greys": 5000}, ValueError, "greys is 5000; give 4096 or fewer"),
+        ({"greys": 40}, ValueError, "holds 0 to 41, beyond 0 to 39"),
         ({"estimator": "kernel"}, ValueError, "choose one of: parzen, histogram"),
         ({"boundary": "mirror"}, ValueError, "choose one of: torus, open"),
         ({"image": GREY.astype(float)}, TypeError, "image must hold integers"),
@@ -250,8 +253,8 @@ def draw_many(machine, p, win, noisy, strength=0.0):
     p = p._replace(sites=np.repeat(p.sites[:1], DRAWS))
     found, candidates = p.distances(machine, strength)
     numbers = machine.put(np.arange(DRAWS, dtype=np.int32))
-    how = (found, candidates, numbers, Grid(1, DRAWS), win, noisy)
-    drawn = [host(machine, lcpdf.draw(machine, *how, seed, 1, 3)) for seed in SEEDS]
+    how = (found, candidates, numbers, Grid(1, DRAWS), lcpdf.Choice(True, noisy, win))
+    drawn = [host(machine, lcpdf.take(machine, *how, lcpdf.Key(seed, 1, 3))) for seed in SEEDS]
     choice, values = (np.concatenate(a, -1) for a in zip(*drawn, strict=True))
     return choice, values
 
@@ -370,102 +373,36 @@ def test_draws_are_legal_where_half_of_the_kernel_is_not():
         assert values.max() <= 255
 
 
-# -- iterated conditional modes -------------------------------------------------------------------------------
+# -- a device has the reference's bits ------------------------------------------------------------------------
+
+CHOICES = [(False, False), (True, False), (True, True)]
+"""Whether sites draw, and whether from the density."""
 
 
-def relaxed(machine, p, name, bandwidth, strength, noisy=True):
+def relaxed(machine, p, bandwidth, strength, draws, density):
     found, candidates = p.distances(machine, strength)
-    win, _ = p.window(bandwidth)
-    drawn = (machine.put(p.sites), p.grid, win, noisy, 2**63 + 11, 3, 2)
-    arguments = drawn if name == "draw" else (win,)
-    return host(machine, getattr(lcpdf, name)(machine, found, candidates, *arguments))
+    choice, key = lcpdf.Choice(draws, density, p.window(bandwidth)[0]), lcpdf.Key(2**63 + 11, 3, 2)
+    return host(machine, lcpdf.take(machine, found, candidates, machine.put(p.sites), p.grid, choice, key))
 
 
 bandwidths = st.sampled_from([0.15, 1.0, 3.0])
 strengths = st.sampled_from([0.0, 1.0])
 
 
-@given(problems(max_order=4, channels=(1,)), bandwidths, strengths)
-@settings(max_examples=15)
-def test_the_mode_is_the_highest_of_the_density(p, bandwidth, strength):
-    p = p._replace(sites=p.sites[:4])
-    if p.sample.top != 255:
-        return
-    choice, values = relaxed(REFERENCE, p, "mode", bandwidth, strength)
-    _, h = p.window(bandwidth)
-    h = h or 1.0
-    grey = np.array([p.padded()[0][q] for q in p.positions()], float)
-    index_of = p.candidates(REFERENCE).index_of
-    for s, site in enumerate(p.sites):
-        d = reweighted(p._replace(sites=np.array([site])), strength)
-        density = plain.mixture(d, grey, h, 256)
-        assert density[values[0, s]] >= density.max() * (1 - NEAR_TIE)
-        share = np.exp(-(d - d.min() + (grey - values[0, s]) ** 2) / (2 * h * h))
-        assert share[index_of[choice[s]]] >= share.max() * (1 - NEAR_TIE), "the source answers for most of it"
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_the_mode_of_a_texture(seed):
-    """As above, with densities of several humps, and no near-ties left out by chance."""
-    p = problem(seed, order=2, shape=(8, 8), count=12)
-    _, values = relaxed(REFERENCE, p, "mode", 1.0, 1.0)
-    _, h = p.window(1.0)
-    grey = [p.padded()[0][q] for q in p.positions()]
-    compared = 0
-    for s, site in enumerate(p.sites):
-        density = plain.mixture(reweighted(p._replace(sites=np.array([site])), 1.0), grey, h, 256)
-        second, first = np.sort(density)[-2:]
-        if second < first * (1 - NEAR_TIE):
-            assert values[0, s] == density.argmax()
-            compared += 1
-    assert compared >= 10
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_the_mode_of_a_vector_is_the_densest_of_the_heaviest(seed):
-    p = problem(seed, order=1, channels=3, shape=(7, 8), count=8)
-    choice, values = relaxed(REFERENCE, p, "mode_vector", 1.0, 1.0)
-    _, h = p.window(1.0)
-    y = np.array([[channel[q] for channel in p.padded()] for q in p.positions()])
-    index_of = p.candidates(REFERENCE).index_of
-    for s, site in enumerate(p.sites):
-        d = reweighted(p._replace(sites=np.array([site])), 1.0)
-        heaviest = np.argsort(d, kind="stable")[: lcpdf.HEAVIEST]
-        w = np.exp(-(d - d.min()) / (2 * h * h))
-        heaviest = [i for i in heaviest if w[i] >= 2.0**-40]
-        density = np.array([plain.vector_density(d, y, h, y[i]) for i in heaviest])
-        chosen = heaviest.index(index_of[choice[s]])
-        assert density[chosen] >= density.max() * (1 - NEAR_TIE)
-        assert values[:, s].tolist() == y[heaviest[chosen]].tolist()
-
-
-# -- a device has the reference's bits ------------------------------------------------------------------------
-
-
-@given(p=problems(channels=(1,)), bandwidth=bandwidths, strength=strengths)
-@settings(max_examples=15)
-def test_grey_relaxations_of_a_device_have_the_references_bits(machine, p, bandwidth, strength):
-    for name in ("draw", "mode_vector", *(["mode"] if p.sample.top == 255 else [])):
-        theirs = relaxed(REFERENCE, p, name, bandwidth, strength)
-        assert_same_bits(relaxed(machine, p, name, bandwidth, strength), theirs)
-    theirs = relaxed(REFERENCE, p, "draw", bandwidth, strength, noisy=False)
-    assert_same_bits(relaxed(machine, p, "draw", bandwidth, strength, noisy=False), theirs)
-
-
-@given(p=problems(channels=(2, 3)), bandwidth=bandwidths, strength=strengths)
-@settings(max_examples=15)
-def test_vector_relaxations_of_a_device_have_the_references_bits(machine, p, bandwidth, strength):
-    for name in ("draw", "mode_vector"):
-        theirs = relaxed(REFERENCE, p, name, bandwidth, strength)
-        assert_same_bits(relaxed(machine, p, name, bandwidth, strength), theirs)
+@given(p=problems(channels=(1, 3)), bandwidth=bandwidths, strength=strengths)
+@settings(max_examples=25)
+def test_a_device_has_the_references_bits(machine, p, bandwidth, strength):
+    for choice in CHOICES:
+        theirs = relaxed(REFERENCE, p, bandwidth, strength, *choice)
+        assert_same_bits(relaxed(machine, p, bandwidth, strength, *choice), theirs)
 
 
 @pytest.mark.parametrize("options", [{"vector": 1}, {"vector": 4}, {"work_group": 3}], **ids)
 def test_the_shape_of_a_launch_changes_no_bit(cl_device, options):
     p = problem(7, order=5, shape=(9, 10), sample_shape=(17, 16), count=53)
-    for name in ("draw", "mode", "mode_vector"):
-        theirs = relaxed(REFERENCE, p, name, 1.0, 1.0)
-        assert_same_bits(relaxed(opencl(cl_device, **options), p, name, 1.0, 1.0), theirs)
+    for choice in CHOICES:
+        theirs = relaxed(REFERENCE, p, 1.0, 1.0, *choice)
+        assert_same_bits(relaxed(opencl(cl_device, **options), p, 1.0, 1.0, *choice), theirs)
 
 
 def test_draws_near_the_ends_of_the_levels_have_the_references_bits(machine):
@@ -477,6 +414,7 @@ def test_draws_near_the_ends_of_the_levels_have_the_references_bits(machine):
 
     def run(m):
         found, candidates = p.distances(m)
-        return host(m, lcpdf.draw(m, found, candidates, m.put(p.sites), p.grid, win, True, 5, 0, 1))
+        how = (m.put(p.sites), p.grid, lcpdf.Choice(True, True, win), lcpdf.Key(5, 0, 1))
+        return host(m, lcpdf.take(m, found, candidates, *how))
 
     assert_same_bits(run(machine), run(REFERENCE))

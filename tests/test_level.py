@@ -12,6 +12,7 @@ import pytest
 from cases import REFERENCE, assert_same_bits, laid_out, opencl, sweeps, texture
 
 import simdtex
+from simdtex.machine.opencl import kernel_folder
 from simdtex.methods import mrf
 from simdtex.methods.mrf.algorithm import opened, sweep
 from simdtex.methods.mrf.level import parts
@@ -41,7 +42,7 @@ def test_a_struct_is_the_same_on_the_host_and_on_a_device(machine, kind, dtype):
     source = (
         f'#include "common/level.h"\n__kernel void look({kind} v, __global int *out) {{ out[0] = sizeof v; {lines} }}'
     )
-    kernel = cl.Kernel(cl.Program(machine.context, source).build(machine.include), "look")
+    kernel = cl.Kernel(cl.Program(machine.context, source).build(["-I", str(kernel_folder())]), "look")
     out = machine.put(np.zeros(1 + len(fields(dtype)), np.int32))
     machine.launch(kernel, (1,), np.zeros((), dtype)[()], out)
     told = machine.get(out).tolist()
@@ -61,9 +62,9 @@ def test_a_struct_names_its_numbers_as_the_header_does():
 
 
 def test_what_a_kernel_is_told_of_a_level():
-    told = constants(Grid(5, 7, 2), seed=2**63, favour=0.5, xi=-1024)
+    told = constants(Grid(5, 7, 2), seed=2**63, discount=0.5, xi=-1024)
     assert (told["lattice"]["rows"], told["lattice"]["cols"]) == (3, 4)
-    assert (told["seed"], told["favour"], told["xi"], told["radius"]) == (2**63, np.float32(0.5), -1024, 0)
+    assert (told["seed"], told["discount"], told["xi"], told["radius"]) == (2**63, np.float32(0.5), -1024, 0)
 
 
 @pytest.mark.parametrize("most", [1, 3, 4, 10, 1000])

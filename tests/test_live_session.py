@@ -135,11 +135,6 @@ CHANGES = [
     ({"finish": 0.5}, 0),
     ({}, 0),
     ({"chance": 8}, COARSEST),
-    ({"exhaustive": 4096}, COARSEST),
-    *(
-        pytest.param({name: value}, COARSEST, marks=pytest.mark.slow)
-        for name, value in (("similar", 2), ("suggesting", 4))
-    ),
     pytest.param({"search": "exact", "finish": 0}, COARSEST, marks=pytest.mark.slow),
     ({"coherence": 1.0}, None),
     pytest.param({"overview": 64}, None, marks=pytest.mark.slow),

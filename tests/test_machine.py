@@ -45,7 +45,7 @@ def test_a_run_that_does_not_fit_the_device_is_refused(any_device):
 
 def test_running_out_of_device_memory_is_a_device_error(any_device):
     machine = OpenCL(any_device)
-    greedy = Operation("greedy", lambda: None, lambda machine: machine.empty((2**46,), np.uint8))
+    greedy = Operation(lambda machine: machine.empty((2**46,), np.uint8))
     with pytest.raises(DeviceError, match="ran out of memory; give a smaller size"):
         greedy(machine)
 

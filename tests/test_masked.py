@@ -33,11 +33,11 @@ REFUSED = {
     "series": lambda _: series(masked(GREY), (9, 9), [0.1], [0], **ON),
     "mix": lambda _: simdtex.mix([GREY, masked(GREY)], (9, 9), **ON),
     "extend": lambda _: simdtex.extend(masked(GREY), left=3, **ON),
-    "lcpdf image": lambda _: simdtex.lcpdf(masked(LOW), LOW, [[1, 1]], order=1, levels=4, device="reference"),
-    "lcpdf sample": lambda _: simdtex.lcpdf(LOW, masked(LOW), [[1, 1]], order=1, levels=4, device="reference"),
-    "lcpdf sites": lambda _: simdtex.lcpdf(LOW, LOW, masked([[1, 1]]), order=1, levels=4, device="reference"),
+    "lcpdf image": lambda _: simdtex.lcpdf(masked(LOW), LOW, [[1, 1]], order=1, greys=4, device="reference"),
+    "lcpdf sample": lambda _: simdtex.lcpdf(LOW, masked(LOW), [[1, 1]], order=1, greys=4, device="reference"),
+    "lcpdf sites": lambda _: simdtex.lcpdf(LOW, LOW, masked([[1, 1]]), order=1, greys=4, device="reference"),
     "temperature": lambda _: simdtex.lcpdf(
-        LOW, LOW, [[1, 1]], order=1, levels=4, temperature=masked(np.ones((20, 20))), device="reference"
+        LOW, LOW, [[1, 1]], order=1, greys=4, temperature=masked(np.ones((20, 20))), device="reference"
     ),
     "mask": lambda _: simdtex.synthesize(GREY, (9, 9), mask=masked(GREY > 0), **ON),
     "guide": lambda _: simdtex.synthesize(GREY, (20, 20), guide=(masked(GREY), GREY), **ON),

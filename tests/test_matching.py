@@ -327,11 +327,3 @@ def test_runs_are_not_shorter_than_their_tables_of_counters(machine, monkeypatch
 def test_the_shape_of_a_launch_changes_no_bit(cl_device, work_group):
     case = picture((6, 300)), picture((3, 40))
     assert_same_bits(everything(opencl(cl_device, work_group=work_group), *case), everything(REFERENCE, *case))
-
-
-def test_segments_that_cannot_share_the_targets_are_an_error(machine):
-    values, targets = picture((4, 40)), np.sort(picture((3, 40)), 1)
-    for backend in (REFERENCE, machine):
-        for operation, arrays in ((match_ranks, (ordered(values), targets)), (match_lookup, (values, tables(targets)))):
-            with pytest.raises(ValueError, match="4 segments cannot share 3 targets evenly"):
-                on(backend, operation, *arrays)

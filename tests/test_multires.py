@@ -375,7 +375,7 @@ def test_candidates_grow_with_alpha_at_every_level(parity):
         for level, size in enumerate(found.shapes[:-1]):  # all of it is the sample itself
             source = np.concatenate([np.arange(math.prod(size), dtype=np.int32) for size in found.shapes])
             sampled = Sampled(source, counts, lattice)
-            candidates(REFERENCE, structure, sampled, level, 0, math.prod(size), parity == "match", 1)
+            candidates(REFERENCE, structure, sampled, level, range(math.prod(size)), parity == "match", 1)
         assert (counts[:, 0] >= before).all()
         before = counts[:, 0]
 

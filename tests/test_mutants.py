@@ -30,7 +30,6 @@ REFUSED = [
             "pixel": "source, density",
             "phases": "all, decimated",
             "edges": "auto, reflect, whole",
-            "coarsest": "gibbs, same",
             "boundary": "torus, open",
             "search": "auto, exact, coherent",
             "preset": "default, paper",
@@ -48,10 +47,7 @@ REFUSED = [
     ("xi", 0, "xi is 0; give a number below 0"),
     ("xi", math.nan, "xi is nan; give a number of at least -1e+06"),
     ("free_sweeps", -1, "free_sweeps is -1; give 0 or more"),
-    ("suggesting", 0, "suggesting is 0; give 1 or more"),
-    ("similar", -1, "similar is -1; give 0 or more"),
     ("chance", -1, "chance is -1; give 0 or more"),
-    ("exhaustive", -1, "exhaustive is -1; give 0 or more"),
     ("anything", 1, "unknown option 'anything' of the method 'mrf'; choose from: preset, order, "),
 ]
 
@@ -64,14 +60,14 @@ def test_every_option_is_refused_by_its_name(name, value, words):
 
 def test_the_least_of_every_option_is_accepted():
     least = {"order": 1, "levels": 1, "coherence": 0, "free_sweeps": 0}
-    mrf.Options(**least, suggesting=1, similar=0, chance=0, exhaustive=0, overview=1)
+    mrf.Options(**least, chance=0, overview=1)
     mrf.Options(balance=0, structure=0, novelty=0, finish=0)
 
 
-def test_a_list_finds_no_mode_of_a_density():
-    words = 'search="coherent" finds no mode of a density; give search="exact", pixel="source" or relaxation="gibbs"'
+def test_a_density_is_drawn_from():
+    words = 'pixel="density" draws grey levels; give relaxation="gibbs" too, or pixel="source"'
     with pytest.raises(ValueError, match=f"^{words}$"):
-        mrf.Options(search="coherent", pixel="density")
+        mrf.Options(pixel="density")
 
 
 def test_options_resolve():
@@ -81,10 +77,10 @@ def test_options_resolve():
 
     assert resolved() == ("coherent", 1.5)
     assert resolved(relaxation="gibbs") == ("exact", 1.5)
-    assert resolved(pixel="density") == ("exact", 0.0)
+    assert resolved(relaxation="gibbs", pixel="density") == ("exact", 0.0)
     assert resolved(search="exact", finish=0.5) == ("exact", 0.5)
     assert resolved(search="coherent", relaxation="gibbs", finish=0) == ("coherent", 0)
-    assert resolved(pixel="density", finish=0.5) == ("exact", 0.5)
+    assert resolved(relaxation="gibbs", pixel="density", finish=0.5) == ("exact", 0.5)
 
 
 def test_a_sample_of_sixteen_different_pixels_is_a_map_of_categories():
@@ -162,13 +158,13 @@ def test_the_memory_that_is_asked_for(monkeypatch):
     asked = []
     monkeypatch.setattr(memory, "require", lambda machine, device, host, remedy: asked.append((device, host)))
     prepared()
-    prepared(similar=3, schedule="block", levels=1, structure=0)
+    prepared(schedule="block", levels=1, structure=0)
     laid_out(REFERENCE, texture((24, 25), 3), (20, 23), mrf.Options(order=2, levels=1), 5)
     coarse, fine = (24 + 8) * (25 + 8), (24 + 2) * (25 + 2)  # with the margin of the coarsest level
     each = 14, 159  # for every channel and pixel of the sample; the structure channel is one
     assert asked == [
         (460 * (12 + 10) + coarse * (2 * each[0] + each[1]), 460 * (84 + 2 * 11) + 64 * coarse),
-        (460 * (12 + 16) + fine * (each[0] + each[1] + 3 * 4), 460 * (100 + 11) + 64 * fine),
+        (460 * (12 + 16) + fine * (each[0] + each[1]), 460 * (100 + 11) + 64 * fine),
         (460 * (12 + 14) + fine * (4 * each[0] + each[1]), 460 * (84 + 4 * 11) + 64 * fine),
     ]
 
@@ -201,9 +197,10 @@ def test_a_window_of_a_level():
     assert (run.weighed.shape, run.weighed.dtype, run.weighed.any()) == ((20, 23), np.int32, False)
 
 
-def test_a_level_with_few_candidates_weighs_them_all():
-    kinds = [type(prepared(search="coherent", exhaustive=n).level(0).proposal) for n in (599, 600)]
-    assert kinds == [Listed, Everything]
+def test_a_level_with_few_candidates_weighs_them_all(monkeypatch):
+    for most, kind in ((599, Listed), (600, Everything)):
+        monkeypatch.setattr("simdtex.methods.mrf.level.EXHAUSTIVE", most)
+        assert type(prepared(search="coherent").level(0).proposal) is kind
 
 
 def test_a_saved_state_shares_no_memory_with_the_run():
@@ -305,11 +302,8 @@ def test_a_meter_of_a_level_that_is_held_from_the_beginning():
     [
         ({"search": "exact"}, 600, 5.8),
         ({"search": "coherent"}, 13, 5.8),
-        ({"search": "coherent", "similar": 2, "chance": 0, "xi": -2.0}, 28, 3.4),
-        ({"search": "coherent", "suggesting": 3, "free_sweeps": 1}, 8, 5.8),
-        ({"search": "coherent", "suggesting": 8, "similar": 64, "chance": 99}, 600, 5.8),
-        ({"search": "coherent", "exhaustive": 600}, 600, 5.8),
-        ({"search": "coherent", "exhaustive": 599, "xi": -1e-9}, 13, 1024),
+        ({"search": "coherent", "chance": 0, "xi": -2.0}, 10, 3.4),
+        ({"search": "coherent", "chance": 999, "free_sweeps": 1}, 600, 5.8),
     ],
 )
 def test_the_work_that_is_expected(given, each, first):

@@ -11,7 +11,7 @@ from simdtex.ops.neighbourhood import neighbourhood
 
 def run(machine, p):
     sites, field, offsets = p.on(machine)
-    confidence, weighted, count = neighbourhood(machine, sites, field, offsets, p.grid, p.beside)
+    confidence, weighted, count = neighbourhood(machine, sites, field, offsets, p.grid, p.confidences)
     confidence, weighted = host(machine, (confidence, weighted))
     assert count == p.sites.size
     padding = confidence[..., count:], weighted[:, :, count:]
@@ -73,9 +73,9 @@ BESIDE = [
 def test_what_stands_beside_counts_by_itself(machine, how):
     """A guide whatever the temperature, and at the site itself; hard data more; what is unknown nothing."""
     p = problem(4, order=2, channels=2, shape=(9, 10), **how)
-    made, spacing, (values, source, t) = len(p.field.values) - p.beside.guides, p.grid.spacing, p.field
+    made, spacing, (values, source, t) = len(p.field.values) - p.confidences.guides, p.grid.spacing, p.field
     confidence, weighted = run(REFERENCE, p)
-    terms = len(p.offsets) + (p.beside.guides > 0)
+    terms = len(p.offsets) + (p.confidences.guides > 0)
     assert confidence.shape == weighted.shape == (terms, len(values), p.sites.size)
     seen = set()
     for s, (row, col) in enumerate(p.where()):

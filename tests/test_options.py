@@ -79,7 +79,7 @@ def test_any_value_of_an_option_is_taken_or_refused_in_one_sentence(method, name
 
 
 NUMBERS = ("order", "bandwidth", "coherence", "balance", "structure", "novelty", "finish", "xi", "data_weight")
-COUNTS = ("levels", "overview", "free_sweeps", "suggesting", "similar", "chance", "exhaustive")
+COUNTS = ("levels", "overview", "free_sweeps", "chance")
 TOO_MUCH = {
     **{f"mrf {name}": ("mrf", {name: 2**31}) for name in (*NUMBERS[:-1], *COUNTS)},
     **{f"mrf {name} 1e308": ("mrf", {name: 1e308}) for name in (*NUMBERS[1:7], "guide_weight")},
@@ -103,7 +103,7 @@ def test_what_is_beyond_a_range_is_refused(case):
 LARGEST = {
     "mrf": {
         **{name: GREATEST for name in ("bandwidth", "coherence", "balance", "structure", "novelty", "data_weight")},
-        **{"finish": 16, "similar": 64, "chance": 4096, "suggesting": MOST, "overview": MOST, "exhaustive": MOST},
+        **{"finish": 16, "chance": 4096, "overview": MOST},
         **{"xi": -GREATEST, "guide_weight": GREATEST, "weights": (GREATEST,), "shares": (GREATEST,)},
     },
     "multires": {"alpha": 1e308, "beta": GREATEST, "orientations": 64, "sigma": 100, "filter_size": 101},

@@ -12,33 +12,25 @@ from simdtex.machine.opencl import OpenCL
 from simdtex.ops import lcpdf
 from simdtex.ops.coloring import coloring
 from simdtex.ops.commit import commit
-from simdtex.ops.relax import Choice, Everything, Listed, Relaxation, relax, relax_apart
-from simdtex.ops.similar import most_similar
+from simdtex.ops.lcpdf import Choice
+from simdtex.ops.relax import SUGGESTING, Everything, Listed, Relaxation, relax, relax_apart
 from simdtex.schedules import Checked, Coloring
 
-PLAIN = {"suggesting": 12, "similar": 0, "chance": 4}
 
-
-def proposal(machine, p, exhaustive=False, **options):
+def proposal(machine, p, exhaustive=False, chance=4):
     """The coherent search's proposer; `exhaustive`: the exact one's."""
     if exhaustive:
         return Everything(p.candidates(machine, every=True), p.strip(machine))
-    candidates = p.candidates(machine)
-    few = PLAIN | options
-    likes = min(few["similar"], candidates.size - 1)
-    square, similar = p.square(machine), machine.put(np.zeros((1, 1), np.int32))
-    if likes:
-        similar = most_similar(machine, p.offsets, candidates, square, p.lattice(), likes).numbers
-    return Listed(candidates, square, similar, likes, min(few["suggesting"], len(p.offsets)), few["chance"])
+    return Listed(p.candidates(machine), p.square(machine), len(p.offsets), chance)
 
 
 def relaxation(machine, p, gibbs=False, noisy=False, coherence=1.0, level=0, dear=0.0, novelty=0.0, **options):
     window, _ = p.window(0.5)
-    favour, choice = np.float32(1 / (1 + coherence)), Choice(gibbs, noisy, window)
+    discount, choice = np.float32(1 / (1 + coherence)), Choice(gibbs, noisy, window)
     price = machine.put(p.price(dear, options.get("exhaustive", False)))
-    terms = (favour, np.float32(novelty * p.sample.variance), price)
+    terms = (discount, np.float32(novelty * p.sample.variance), price)
     proposed = proposal(machine, p, **options)
-    return Relaxation(p.grid, machine.put(p.offsets), proposed, *terms, choice, -1024, 2**33 + 5, level, p.beside)
+    return Relaxation(p.grid, machine.put(p.offsets), proposed, *terms, choice, -1024, 2**33 + 5, level, p.confidences)
 
 
 def counter(machine, p):
@@ -53,12 +45,12 @@ def apart(machine, p, turn=3, **how):
     return host(machine, [relaxed.choice, relaxed.values, cooled, weighed])
 
 
-def suggestions(p, site, suggesting):
+def suggestions(p, site):
     """Sample positions that the nearest neighbours suggest, each once, in the neighbours' order."""
     i, j = site[0] // p.grid.spacing, site[1] // p.grid.spacing
     near = plain.neighbours(i, j, p.order, p.grid.rows, p.grid.cols, p.grid.torus)
     found = []
-    for (di, dj), r in list(zip(plain.offsets(p.order), near, strict=True))[:suggesting]:
+    for (di, dj), r in list(zip(plain.offsets(p.order), near, strict=True))[:SUGGESTING]:
         if r is None or p.field.temperature[r[0] * p.grid.spacing, r[1] * p.grid.spacing] >= 1024:
             continue
         row, col = p.source()[r[0] * p.grid.spacing, r[1] * p.grid.spacing]
@@ -89,8 +81,6 @@ def reflecting(draw):
 
 FORMS = st.fixed_dictionaries(
     {
-        "suggesting": st.sampled_from([1, 5, 60]),
-        "similar": st.sampled_from([0, 0, 2]),
         "chance": st.sampled_from([0, 1, 4, 6]),
         "exhaustive": st.sampled_from([False, False, True]),
         "gibbs": st.booleans(),
@@ -105,13 +95,13 @@ FORMS = st.fixed_dictionaries(
 @given(p=reflecting(), form=FORMS)
 @settings(max_examples=20)
 def test_a_device_has_the_references_bits(machine, p, form):
-    form = form | {"noisy": form["noisy"] and (form["gibbs"] or form["exhaustive"])}  # a list has no mode of a density
-    if not form["exhaustive"] or (form["noisy"] and not form["gibbs"]):  # where nothing is charged for continuing
+    form = form | {"noisy": form["noisy"] and form["gibbs"]}
+    if not form["exhaustive"]:  # a list knows no novelty
         form["novelty"] = 0.0
     assert_same_bits(apart(machine, p, **form), apart(REFERENCE, p, **form))
 
 
-HOWS = [{"similar": 2}, {"gibbs": True}, {"exhaustive": True, "novelty": 2.0}, {"exhaustive": True, "gibbs": True}]
+HOWS = [{"chance": 9}, {"gibbs": True}, {"exhaustive": True, "novelty": 2.0}, {"exhaustive": True, "gibbs": True}]
 GIVEN = [
     {"nowhere": 0.3, "weight": 1.0},
     {"guides": 2, "channels": 2, "spacing": 2, "torus": False},
@@ -142,9 +132,7 @@ def test_nothing_is_taken_that_may_not_be(form):
 
 
 @pytest.mark.parametrize("options", [{"vector": 1}, {"vector": 1, "work_group": 64}, {"work_group": 3}], ids=str)
-@pytest.mark.parametrize(
-    "form", [{"similar": 3, "gibbs": True}, {"exhaustive": True}, {"exhaustive": True, "gibbs": True}], ids=str
-)
+@pytest.mark.parametrize("form", [{"gibbs": True}, {"exhaustive": True}, {"exhaustive": True, "gibbs": True}], ids=str)
 def test_the_shape_of_a_launch_changes_no_bit(cl_device, options, form):
     p = problem(5, order=8, channels=3, shape=(11, 33), count=150, edges="reflect")
     assert_same_bits(apart(opencl(cl_device, **options), p, **form), apart(REFERENCE, p, **form))
@@ -159,15 +147,15 @@ def test_a_wide_neighbourhood_takes_more_than_one_vector_a_row(machine):
 @pytest.mark.parametrize("spacing", [1, 2])
 def test_the_mode_is_the_nearest_of_what_is_suggested(seed, spacing):
     p = problem(seed, order=5, shape=(10, 11), spacing=spacing, edges="reflect", temperatures="mixed", channels=2)
-    favour = 1 / (1 + 0.7)
+    discount = 1 / (1 + 0.7)
     choice, values, cooled, weighed = apart(REFERENCE, p, chance=0, coherence=0.7)
     for s, site in enumerate(p.where()):
-        found = suggestions(p, site, PLAIN["suggesting"])
+        found = suggestions(p, site)
         own = tuple(int(n) for n in p.source()[site])
         listed = found + [own] * (own in p.positions() and own not in found)
         t, here = p.temperature(), (p.order, spacing, p.grid.torus)
         d = [plain.distance(p.image(), t, site, p.padded(), position, *here) for position in listed]
-        d = [a * (favour if position in found else 1) for a, position in zip(d, listed, strict=True)]
+        d = [a * (discount if position in found else 1) for a, position in zip(d, listed, strict=True)]
         assert weighed[site] == len(listed)
         best = listed.index(divmod(int(choice[s]), p.sample.cols))
         assert d[best] <= min(d) * (1 + 1e-5)
@@ -225,20 +213,20 @@ def test_steps_in_place_are_step_after_step(machine, monkeypatch, longest, how):
 
 
 def test_each_candidate_costs_its_price():
-    """The mode is the least of distance, favoured or not, and price."""
+    """The mode is the least of distance, discounted or not, and price."""
     p = problem(3, order=5, shape=(10, 11), edges="reflect", temperatures="mixed", channels=2)
-    price, favour = p.price(), 1 / (1 + 0.7)
+    price, discount = p.price(), 1 / (1 + 0.7)
     _, candidates = p.distances(REFERENCE)
     numbers = {int(position): n for n, position in enumerate(candidates.positions[: candidates.size])}
     dear = cheap = 0
     choice, *_ = apart(REFERENCE, p, chance=0, coherence=0.7, dear=1.0)
     for s, site in enumerate(p.where()):
-        found = suggestions(p, site, PLAIN["suggesting"])
+        found = suggestions(p, site)
         own = tuple(int(n) for n in p.source()[site])
         listed = found + [own] * (own in p.positions() and own not in found)
         t, here = p.temperature(), (p.order, 1, p.grid.torus)
         d = [plain.distance(p.image(), t, site, p.padded(), position, *here) for position in listed]
-        d = [a * (favour if position in found else 1) for a, position in zip(d, listed, strict=True)]
+        d = [a * (discount if position in found else 1) for a, position in zip(d, listed, strict=True)]
         total = [a + price[numbers[r * p.sample.cols + c]] for a, (r, c) in zip(d, listed, strict=True)]
         best = listed.index(divmod(int(choice[s]), p.sample.cols))
         assert total[best] <= min(total) * (1 + 1e-5)
@@ -333,9 +321,9 @@ def test_a_partition_with_steps_of_its_own_takes_them(cl_device):
 
 
 def test_the_work_is_counted(cl_device):
-    _, levels = run(OpenCL(cl_device), order=8, chance=2, suggesting=20)
+    _, levels = run(OpenCL(cl_device), order=8, chance=2)
     for level in levels:
-        assert 1 <= level["weighed"] <= (level["candidates"] if level is levels[0] else 23)
+        assert 1 <= level["weighed"] <= (level["candidates"] if level is levels[0] else 15)
         channels = 2  # one of them the structure channel
         assert level["fma"] == round(2 * 24 * channels * level["weighed"] * level["relaxations"])
     assert levels[0]["weighed"] == levels[0]["candidates"], "the coarsest level is exact"
@@ -345,11 +333,8 @@ def test_the_work_is_counted(cl_device):
     ("options", "message"),
     [
         ({"search": "fast"}, "search"),
-        ({"suggesting": 0}, "suggesting"),
-        ({"similar": -1}, "similar"),
         ({"chance": 1.5}, "chance"),
-        ({"exhaustive": -2}, "exhaustive"),
-        ({"pixel": "density"}, 'search="exact"'),
+        ({"pixel": "density"}, 'relaxation="gibbs"'),
     ],
     ids=str,
 )

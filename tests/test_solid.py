@@ -156,13 +156,6 @@ def test_halves_are_rounded_up_below_zero_too():
     assert solid_mean(REFERENCE, pairs).tolist() == [-1, 0, 1, 2]
 
 
-def test_a_mean_is_of_one_to_four_blocks(any_device):
-    for machine in (REFERENCE, opencl(any_device)):
-        for count in (0, 5):
-            with pytest.raises(ValueError, match="give 1 to 4"):
-                solid_mean(machine, [machine.put(block((1, 1, 1)))] * count)
-
-
 # -- machines -------------------------------------------------------------------------------------------------
 
 

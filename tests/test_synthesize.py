@@ -113,7 +113,7 @@ def test_a_sample_that_barely_fits_has_one_candidate():
 def test_a_constant_sample_gives_a_constant():
     for dtype in (np.uint8, np.uint16, np.float64):
         for pixel in ("source", "density"):
-            image = quick(np.full((6, 7), 3, dtype), (5, 6), pixel=pixel)
+            image = quick(np.full((6, 7), 3, dtype), (5, 6), relaxation="gibbs", pixel=pixel)
             if pixel == "source" or dtype != np.uint8:
                 assert (image == 3).all()
 
@@ -153,7 +153,7 @@ def test_the_whole_seed_counts():
 
 def test_adding_a_constant_to_the_levels_changes_no_arrangement():
     dark = texture((12, 11)) // 2
-    for options in ({}, {"relaxation": "gibbs"}, {"pixel": "density", "relaxation": "icm", "coarsest": "same"}):
+    for options in ({}, {"relaxation": "gibbs"}):
         plain, output = quick(dark, (10, 9), full_output=True, **options)
         bright, other = quick(dark + 100, (10, 9), full_output=True, **options)
         assert np.array_equal(output.source, other.source)

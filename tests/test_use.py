@@ -9,7 +9,7 @@ import simdtex
 from simdtex.experiments.quality import source_use
 from simdtex.model.colours import use_colours
 from simdtex.model.use import counts, effective_use
-from simdtex.ops.use import Market, price, use
+from simdtex.ops.use import FairUse, use, use_penalty
 
 
 @given(p=problems(max_order=5))
@@ -80,7 +80,7 @@ def test_the_price_is_the_excess_over_the_fair_share(radius):
     rng = np.random.default_rng(radius)
     counts = rng.integers(0, 4, (7, 9)) * (rng.random((7, 9)) < 0.3)
     counts[2, 3] = 60
-    found = price(counts.ravel(), Market((7, 9), radius), 12.5)
+    found = use_penalty(counts.ravel(), FairUse((7, 9), radius), 12.5)
     assert found.dtype == np.float32
     assert np.allclose(found, plainly(counts, radius, 12.5), rtol=1e-6, atol=1e-6)
     if radius == 1:
@@ -95,23 +95,23 @@ def test_what_is_fair_may_differ_and_nobody_is_where_nothing_is_fair():
     """Use in proportion to what is fair costs nothing; a number runs over places, or over candidates alone."""
     there = FAIR.ravel() > 0
     for listed in (False, True):
-        market = Market((3, 4), 0, FAIR.ravel(), listed)
+        fair_use = FairUse((3, 4), 0, FAIR.ravel(), listed)
         where = slice(None) if not listed else there
         used = 3 * FAIR.ravel()
-        assert not price(used[where], market, 7.0)[there[where]].any()
+        assert not use_penalty(used[where], fair_use, 7.0)[there[where]].any()
         used[0] += 8  # 14 of a total of 56, where 12 of 48 are due ... 2 of 16
-        found = price(used[where], market, 7.0)
+        found = use_penalty(used[where], fair_use, 7.0)
         assert found[0] == np.float32(7.0 * (14 * 16 / (2 * 56) - 1))
         assert np.isinf(found).tolist() == (~there[where]).tolist()
-        again = price(used[where], market, 7.0, found)
+        again = use_penalty(used[where], fair_use, 7.0, found)
         assert np.array_equal(again, found), "an infinite price stays so"
 
 
 def test_what_is_fair_counts_in_the_square_around():
-    market = Market((3, 4), 1, FAIR.ravel())
+    fair_use = FairUse((3, 4), 1, FAIR.ravel())
     used = np.zeros(12, int)
     used[0], used[8] = 6, 4
-    found = price(used, market, 1.0).reshape(3, 4)
+    found = use_penalty(used, fair_use, 1.0).reshape(3, 4)
     due, whole = {(0, 0): 2, (2, 1): 9}, 16
     assert found[0, 0] == np.float32(min(4, 6 * whole / (due[0, 0] * 10) - 1))
     assert found[2, 1] == 0.0 == np.float32(max(0, 4 * whole / (due[2, 1] * 10) - 1))
@@ -119,33 +119,37 @@ def test_what_is_fair_counts_in_the_square_around():
 
 def test_a_kind_that_is_used_too_often_costs():
     kinds = np.array([0, 0, 1, 1, 2, 2])
-    market = Market((2, 3), 0, kinds=kinds, wanted=(1.0, 2.0, 1.0), strict=10.0)
+    fair_use = FairUse((2, 3), 0, kinds=kinds, wanted=(1.0, 2.0, 1.0), strict=10.0)
     used = np.array([2, 0, 3, 3, 0, 0])  # of 8: 2, 4 and 2 are due
-    assert price(used, market, 0.0).tolist() == [0, 0, 5, 5, 0, 0]
-    assert price(used * 2, market, 0.0).tolist() == [0, 0, 5, 5, 0, 0], "in proportion"
-    assert price(np.array([0, 0, 0, 0, 9, 0]), market, 0.0).tolist() == [0, 0, 0, 0, 10, 10], "no more than that"
-    none = Market((2, 3), 0, kinds=kinds, wanted=(1.0, 0.0, 1.0), strict=10.0)
-    assert price(used, none, 0.0)[2] == 10, "what is not wanted at all"
-    both = price(used, market, 1.0)
-    assert np.allclose(both, price(used, Market((2, 3), 0), 1.0) + np.float32([0, 0, 5, 5, 0, 0]))
-    assert not price(used * 0, market, 1.0).any()
+    assert use_penalty(used, fair_use, 0.0).tolist() == [0, 0, 5, 5, 0, 0]
+    assert use_penalty(used * 2, fair_use, 0.0).tolist() == [0, 0, 5, 5, 0, 0], "in proportion"
+    assert use_penalty(np.array([0, 0, 0, 0, 9, 0]), fair_use, 0.0).tolist() == [0, 0, 0, 0, 10, 10], (
+        "no more than that"
+    )
+    none = FairUse((2, 3), 0, kinds=kinds, wanted=(1.0, 0.0, 1.0), strict=10.0)
+    assert use_penalty(used, none, 0.0)[2] == 10, "what is not wanted at all"
+    both = use_penalty(used, fair_use, 1.0)
+    assert np.allclose(both, use_penalty(used, FairUse((2, 3), 0), 1.0) + np.float32([0, 0, 5, 5, 0, 0]))
+    assert not use_penalty(used * 0, fair_use, 1.0).any()
 
 
 def test_fair_use_costs_nothing():
-    assert not price(np.full(20, 3), Market((4, 5), 1), 7.0).any()
+    assert not use_penalty(np.full(20, 3), FairUse((4, 5), 1), 7.0).any()
 
 
 def test_a_price_is_the_mean_of_two_sweeps():
     counts, before = np.array([8, 0, 0, 0]), np.array([2, 4, 0, 6, 99], np.float32)
-    assert price(counts, Market((2, 2), 0), 1.0).tolist() == [3, 0, 0, 0]
-    assert price(counts, Market((2, 2), 0), 1.0, before).tolist() == [2.5, 2, 0, 3]
+    assert use_penalty(counts, FairUse((2, 2), 0), 1.0).tolist() == [3, 0, 0, 0]
+    assert use_penalty(counts, FairUse((2, 2), 0), 1.0, before).tolist() == [2.5, 2, 0, 3]
 
 
 def test_where_nothing_is_known_nothing_costs():
     nobody = np.zeros(6, np.int32)
-    assert price(nobody, Market((2, 3), 1), 5.0).tolist() == [0] * 6
-    assert price(nobody + 1, Market((2, 3), 1), 0.0).tolist() == [0] * 6
-    assert price(nobody, Market((2, 3), 1), 5.0, np.full(6, 4, np.float32)).tolist() == [2] * 6, "and a price fades"
+    assert use_penalty(nobody, FairUse((2, 3), 1), 5.0).tolist() == [0] * 6
+    assert use_penalty(nobody + 1, FairUse((2, 3), 1), 0.0).tolist() == [0] * 6
+    assert use_penalty(nobody, FairUse((2, 3), 1), 5.0, np.full(6, 4, np.float32)).tolist() == [2] * 6, (
+        "and a price fades"
+    )
 
 
 def test_a_run_uses_the_sample_more_evenly(cl_device):

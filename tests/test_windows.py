@@ -15,8 +15,8 @@ from simdtex.schedules import SCHEDULES, get
 
 WINDOWS = [name for name in SCHEDULES if get(name).windows]
 SEARCHES = {
-    "coherent": {"search": "coherent", "exhaustive": 0, "similar": 1},
-    "coherent draws": {"search": "coherent", "exhaustive": 0, "relaxation": "gibbs"},
+    "coherent": {"search": "coherent"},
+    "coherent draws": {"search": "coherent", "relaxation": "gibbs"},
     "exact": {"search": "exact"},
     "exact draws": {"search": "exact", "relaxation": "gibbs", "pixel": "density"},
 }

@@ -13,13 +13,11 @@ typedef struct {
     int neighbours;               // N
     int pixels;                   // of the sample with its margin
     int candidates;               // of the level
-    int suggesting;               // nearest neighbours whose sources suggest a candidate
-    int similar;                  // candidates more for each of these
     int chance;                   // candidates at random
     int plane, down;              // of the sample with its columns side by side: pixels to a channel, and to a row
     int first, pitch, size;       // of the strip: the first candidate, pixels to a row, and to a channel
     int strip_rows, strip_cols;   // rows and columns of candidates
-    float favour;                 // 1 / (1 + coherence)
+    float discount;                 // 1 / (1 + coherence)
     float scale;                  // 1 / 2h^2 of equation (7)
     int radius;                   // of its kernel over grey levels; -1 where a pixel is the sample's own
     int top;                      // highest legal grey level

@@ -5,7 +5,7 @@
 // and n + 8 are added, n and n + 4, n and n + 2, n and n + 1.
 #ifndef SIMDTEX_SQUARE_H
 #define SIMDTEX_SQUARE_H
-#include "common/beside.h"
+#include "common/confidence.h"
 #include "common/distance.h"
 #include "common/lattice.h"
 

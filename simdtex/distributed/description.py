@@ -60,6 +60,6 @@ def restored(text: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Plan:
     pixels, guided = those("pixels"), those("guide")
     assert pixels is not None
     pictures = options.of(Pictures(pixels, those("unknown"), those("usable")))
-    sample = Sample(pictures, **text["layout"], beside=[Ready(list(guided))] if guided else [])
+    sample = Sample(pictures, **text["layout"], guides=[Ready(list(guided))] if guided else [])
     shape, offsets = (text["shape"][0], text["shape"][1]), neighbourhood_offsets(options.order)
     return Plan(sample, shape, offsets, options, schedules.get(options.schedule), text["levels"])

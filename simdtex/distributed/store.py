@@ -32,7 +32,7 @@ from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Held
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.tiles import Tally, Tile
 from simdtex.model.lattice import Grid
-from simdtex.ops.neighbourhood import Beside, Field
+from simdtex.ops.neighbourhood import Confidences, Field
 
 FORMAT = 2
 """Of the store; another one is not gone on with."""
@@ -67,14 +67,14 @@ class Turn(NamedTuple):
 class Work(NamedTuple):
     """What a store makes: the ``plan``, without conditioning data; the ``seed``; the tiles' ``layout``.
 
-    ``beside`` which channels are guides; ``held``, ``given`` whether there are conditioning data or guides, and whether
-    there are data.
+    ``confidences`` which channels are guides; ``held``, ``given`` whether there are conditioning data or
+    guides, and whether there are data.
     """
 
     plan: Plan
     seed: int
     layout: Layout
-    beside: Beside
+    confidences: Confidences
     held: bool
     given: bool
 
@@ -133,7 +133,7 @@ class Store:
         work.attrs["about"] = {
             **{"format": FORMAT, "version": own, "name": secrets.token_hex(8), "run": text, "seed": seed},
             **{"sides": [one.side for one in layout.levels], "workers": layout.workers},
-            **{"beside": [float(one) for one in conditions.beside], "held": held, "given": given is not None},
+            **{"confidences": [float(one) for one in conditions.confidences], "held": held, "given": given is not None},
         }
         store.save(first_turn(layout))
         root.attrs["simdtex"] = {"version": own, "seed": seed, "options": asdict(options)}
@@ -155,10 +155,10 @@ class Store:
         inputs = self.root["work/input"]
         arrays = {name: inputs[name][...] for name in inputs.array_keys()}
         plan, seed = restored(about["run"], arrays), about["seed"]
-        guides, own, centre, hard = about["beside"]
-        beside = Beside(int(guides), bool(own), np.float32(centre), np.float32(hard))
+        guides, own, centre, hard = about["confidences"]
+        confidences = Confidences(int(guides), bool(own), np.float32(centre), np.float32(hard))
         layout = laid(plan, seed, about["sides"], about["workers"])
-        return Work(plan, seed, layout, beside, about["held"], about["given"])
+        return Work(plan, seed, layout, confidences, about["held"], about["given"])
 
     # -- turns ----------------------------------------------------------------------------------------------------
 
@@ -292,7 +292,7 @@ class Stored(Conditions):
     """Conditioning data and guides of an output, window by window out of a store."""
 
     def __init__(self, store: Store, work: Work) -> None:
-        super().__init__(len(work.layout.levels), work.beside)
+        super().__init__(len(work.layout.levels), work.confidences)
         self._store, self._work = store, work
 
     def at(self, number: int, grid: Grid) -> Held | None:

@@ -17,7 +17,7 @@ from simdtex.distributed.store import PLANES, Store, Stored, Turn, phase_of
 from simdtex.machine import Machine
 from simdtex.methods.mrf.level import Lattices
 from simdtex.methods.mrf.record import expected_work
-from simdtex.ops.use import price
+from simdtex.ops.use import use_penalty
 from simdtex.run import Callback, Output, Tiling
 
 Execute = Callable[[Turn, Sequence[int]], Iterator[int]]
@@ -102,7 +102,7 @@ class Run:
             before = store.price(turn) if turn.phase == "sweep" else None
             rate = lattices.options.balance * lattices.usual
             after = Turn(number, "sweep", turn.level, read, 1 - read, cooling, free, active, heat)
-            store.save(after, price(counts, lattices.market(turn.level), rate, before))
+            store.save(after, use_penalty(counts, lattices.fair_use(turn.level), rate, before))
         elif turn.level:
             after = Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1, read)
             store.save(after)

@@ -8,7 +8,7 @@ from simdtex.machine.interface import Machine
 __all__ = ["Machine", "open_machine"]
 
 
-def open_machine(device: str | Machine | None = None, *, profile: bool = False, skip: bool = True) -> Machine:
+def open_machine(device: str | Machine | None = None, *, profile: bool = False) -> Machine:
     """Open a device.
 
     Parameters
@@ -18,8 +18,6 @@ def open_machine(device: str | Machine | None = None, *, profile: bool = False, 
         SIMDTEX_DEVICE names, else a GPU, else a CPU. A machine is returned as it is.
     profile : bool
         Whether an OpenCL machine measures the time of every kernel.
-    skip : bool
-        Whether an OpenCL machine skips candidates that a bound rules out. It changes no bit of any result.
 
     Raises
     ------
@@ -40,4 +38,4 @@ def open_machine(device: str | Machine | None = None, *, profile: bool = False, 
         return Reference()
     from simdtex.machine.opencl import OpenCL
 
-    return OpenCL(info, profile=profile, skip=skip)
+    return OpenCL(info, profile=profile)

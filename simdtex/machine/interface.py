@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import update_wrapper
 from typing import TYPE_CHECKING, Any, Concatenate, Generic, ParamSpec, TypeAlias, TypeVar
 
 from simdtex.machine.log import Work, touching
@@ -28,25 +28,29 @@ Array = Any
 """An array of a machine: `simdtex.machine.opencl.DeviceArray`, or `numpy.ndarray` on the reference."""
 
 
-@dataclass(frozen=True)
 class Operation(Generic[P, R]):
-    """A whole-array step, written twice.
+    """A whole-array step, written as one function that launches kernels or, as their twin, computes in NumPy.
 
     Parameters
     ----------
-    name : str
-        Its name; also the stem of the module, of the kernel file and of the test.
-    reference : callable
-        The twin: NumPy arrays in, NumPy arrays out.
-    launch : callable
-        The launcher: the OpenCL machine first, then the same arguments as device arrays.
+    function : callable
+        Its first argument is an OpenCL machine, or None for the twin; the others are arrays of that machine, or of
+        NumPy, and numbers. Its module, its kernel file and its test have one name.
     """
 
-    name: str
-    reference: Callable[P, R]
-    launch: Callable[Concatenate[Any, P], R]
+    def __init__(self, function: Callable[Concatenate[Any, P], R]) -> None:
+        update_wrapper(self, function)
+        self._function = function
 
     def __call__(self, machine: Machine, *args: P.args, **kwargs: P.kwargs) -> R:
         """Run the operation on a machine."""
         result: R = machine.run(self, *args, **kwargs)
         return result
+
+    def reference(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Compute in NumPy."""
+        return self._function(None, *args, **kwargs)
+
+    def launch(self, machine: Launcher, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Launch kernels; `simdtex.machine.opencl.OpenCL.run` calls this."""
+        return self._function(machine, *args, **kwargs)

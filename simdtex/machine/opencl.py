@@ -103,8 +103,6 @@ class OpenCL:
         Vectors kept in registers at a time, a divisor of 64.
     split : int, optional
         Work-items that share a site's candidates.
-    skip : bool
-        Whether to skip candidates that a bound rules out.
     profile : bool
         Whether to measure the time of every kernel.
     """
@@ -118,7 +116,6 @@ class OpenCL:
         vector: int | None = None,
         step: int | None = None,
         split: int | None = None,
-        skip: bool = True,
         profile: bool = False,
     ) -> None:
         runtimes.check_fork()
@@ -137,7 +134,6 @@ class OpenCL:
         if BLOCK % self.step:
             raise ValueError(f"step is {self.step}; give a divisor of {BLOCK}")
         self.scratch = scratch or (2**28 if on_gpu else 2**24)
-        self.skip = skip
         self._split = split
         self._occupied = info.compute_units * (2048 if on_gpu else 64)  # work-items that keep the device busy
         self._abreast = 64 if on_gpu else 1  # of a site: neighbours in a row of the sample

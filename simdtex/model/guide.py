@@ -36,8 +36,8 @@ class Planes(NamedTuple):
     output: NDArray[np.uint16]
 
 
-class Beside(Protocol):
-    """Something that has planes beside those of the pixels."""
+class AnyGuide(Protocol):
+    """A guide, whose planes are matched with those of the pixels."""
 
     @property
     def channels(self) -> int:

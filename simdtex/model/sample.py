@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.model.guide import Beside
+from simdtex.model.guide import AnyGuide
 from simdtex.model.pictures import Pictures
 from simdtex.model.scale import Scale, highest
 from simdtex.model.structure import structure
@@ -78,8 +78,8 @@ class Sample:
         Of the structure channel (`simdtex.model.structure`), which is matched like the others and never shown; 0: none.
     step : int
         Pixels from site to site at the coarsest level; every picture begins at a multiple.
-    beside : sequence of Beside
-        Guides: their channels come last.
+    guides : sequence of AnyGuide
+        Their channels come last.
     apart : int
         Pixels between two pictures at least, where more than their margins: what looks so far from a pixel of one sees
         no other.
@@ -111,7 +111,7 @@ class Sample:
         margin: int = 0,
         weight: float = 0.0,
         step: int = 1,
-        beside: Sequence[Beside] = (),
+        guides: Sequence[AnyGuide] = (),
         apart: int = 0,
     ) -> None:
         self.pictures = pixels if isinstance(pixels, Pictures) else Pictures((pixels,))
@@ -126,15 +126,15 @@ class Sample:
         self.top, self.unit, self.direct = self.scale.top, self.scale.unit, self.scale.direct
         levels = [self.scale.levels(picture) for picture in self.pictures.pixels]
         self.shown, spread = len(levels[0]), variance(*levels)
-        guides = [one.planes(self.scale, spread * self.shown, highest(values)) for one in beside]
+        guiding = [one.planes(self.scale, spread * self.shown, highest(values)) for one in guides]
         if weight:
             more = structure(levels, weight, spread, max(self.top, STEPS))
             levels = [np.concatenate([here, one[None]]) for here, one in zip(levels, more, strict=True)]
         channels = len(levels[0])
-        self.guided = [np.concatenate(those) for those in zip(*(guide.samples for guide in guides), strict=True)]
-        for guide in guides:
+        self.guided = [np.concatenate(those) for those in zip(*(guide.samples for guide in guiding), strict=True)]
+        for guide in guiding:
             levels = [np.concatenate(pair) for pair in zip(levels, guide.samples, strict=True)]
-        self.guides = np.concatenate([guide.output for guide in guides]) if guides else np.zeros((0, 1, 1), np.uint16)
+        self.guides = np.concatenate([guide.output for guide in guiding]) if guiding else np.zeros((0, 1, 1), np.uint16)
         self._lay(levels, margin, step, apart)
         self.channels = channels
         self.pixels = self._stacked(list(self.pictures.pixels), self.pictures.pixels[0].flat[0])

@@ -46,25 +46,6 @@ class Sampled(NamedTuple):
     lattice: Array
 
 
-def _reference(
-    structure: Structure,
-    sampled: Sampled,
-    level: int,
-    first: int,
-    end: int,
-    match: bool,
-    seed: int,
-) -> Sampled:
-    begin = int(sampled.lattice[level, 2])
-    step = max(1, TOGETHER // (4 * int(structure.lattice[level + 1, :2].prod())))
-    for s in range(first, end, step):
-        sites = np.arange(s, min(end, s + step))
-        choice, counts = _drawn(structure, sampled, level, sites, match, seed)
-        sampled.source[begin + sites] = choice
-        sampled.counts[begin + sites] = counts
-    return sampled
-
-
 def _drawn(
     structure: Structure, sampled: Sampled, level: int, sites: NDArray[np.intp], match: bool, seed: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -117,34 +98,39 @@ def _children(
     return np.repeat(np.arange(row.size), 4)[there], child_row[there], child_col[there]
 
 
-def _launch(
-    machine: Launcher,
+@Operation
+def candidates(
+    machine: Launcher | None,
     structure: Structure,
     sampled: Sampled,
     level: int,
-    first: int,
-    end: int,
+    sites: range,
     match: bool,
     seed: int,
 ) -> Sampled:
+    """Draw a candidate for each of some pixels; ``sampled`` is changed in place.
+
+    With ``match`` a candidate's row and column are even or odd as the pixel's are, and its parent stands for as many
+    pixels of the sample as the pixel's parent does, which those at its edge may not; without, any child of a node that
+    passes is one. Cost: at most nodes x M comparisons for four pixels, and about a sixteenth of that more for each that
+    is drawn from many candidates; 12 bytes of memory a pixel.
+    """
+    if machine is None:
+        begin = int(sampled.lattice[level, 2])
+        step = max(1, TOGETHER // (4 * int(structure.lattice[level + 1, :2].prod())))
+        for first in range(sites.start, sites.stop, step):
+            here = np.arange(first, min(sites.stop, first + step))
+            choice, counts = _drawn(structure, sampled, level, here, match, seed)
+            sampled.source[begin + here] = choice
+            sampled.counts[begin + here] = counts
+        return sampled
     levels, features = structure.threshold.shape
-    items = -(-(end - first) // 4)  # one for four siblings; where these are fewer, an item takes several
+    items = -(-len(sites) // 4)  # one for four siblings; where these are fewer, an item takes several
     machine.launch(
         machine.kernel("candidates", "candidates", FEATURES=features),
         (items,),
         *(np.uint64(seed), np.int32(level), np.int32(levels - 1), np.int32(match)),
         *(structure.lattice, structure.features, structure.threshold, sampled.lattice),
-        *(np.int32(first), np.int32(end), np.int32(items), sampled.source, sampled.counts),
+        *(np.int32(sites.start), np.int32(sites.stop), np.int32(items), sampled.source, sampled.counts),
     )
     return sampled
-
-
-candidates = Operation("candidates", _reference, _launch)
-"""``candidates(machine, structure, sampled, level, first, end, match, seed)``: pixels first .. end-1.
-
-``sampled`` is changed in place. With ``match`` a candidate stands where the pixel
-does among its siblings, in an even or odd row and column, and below a node that stands for as many pixels of the sample
-as the pixel's parent does, which those at its edge may not; else any child of a node that passes is one. Cost: at most
-nodes x M comparisons for four pixels, and about a sixteenth of that more for each that is drawn from many candidates;
-12 bytes of memory a pixel.
-"""

@@ -14,56 +14,45 @@ from simdtex.ops.neighbourhood import Field
 
 
 def sources(r: NDArray[np.int32], field: Field) -> NDArray[np.int32]:
-    """The sources of neighbours (N, S); -1 where there is no neighbour, or one that no relaxation has touched."""
+    """Return the sources of neighbours (N, S); -1 for no neighbour, or one that no relaxation has touched."""
     touched = (r >= 0) & (field.temperature.ravel()[r] < 1024)
     found: NDArray[np.int32] = np.where(touched, field.source.ravel()[r], np.int32(-1))
     return found
 
 
 def continuing(candidates: Candidates, source: NDArray[np.int32]) -> NDArray[np.int32]:
-    """The number of the candidate that continues the source of neighbour k, (N, S); -1 where there is none."""
+    """Return the number of the candidate that continues the source of neighbour k, (N, S); -1 if there is none."""
     p = source - candidates.reach[: len(source), None]
     inside = (source >= 0) & (p >= 0) & (p < candidates.index_of.size)
     numbers: NDArray[np.int32] = np.where(inside, candidates.index_of[np.where(inside, p, 0)], -1)
     return numbers
 
 
-def _reference(
-    distances: Distances,
-    candidates: Candidates,
-    sites: NDArray[np.int32],
-    field: Field,
-    offsets: NDArray[np.int32],
-    grid: Grid,
-    favour: np.float32,
-) -> Distances:
-    p = continuing(candidates, sources(grid.neighbours(sites, offsets), field))
-    k, s = np.nonzero(p >= 0)
-    coherent = np.zeros(distances.distance.shape, bool)
-    coherent[p[k, s], s] = True
-    d = distances.distance
-    return distances._replace(distance=np.where(coherent, d * favour, d))
-
-
-def _launch(
-    machine: Launcher,
+@Operation
+def coherence(
+    machine: Launcher | None,
     distances: Distances,
     candidates: Candidates,
     sites: Array,
     field: Field,
     offsets: Array,
     grid: Grid,
-    favour: np.float32,
+    factor: np.float32,
 ) -> Distances:
+    """Multiply the distance of candidates that continue a neighbour's source by a factor, a device in place."""
+    if machine is None:
+        p = continuing(candidates, sources(grid.neighbours(sites, offsets), field))
+        k, s = np.nonzero(p >= 0)
+        coherent = np.zeros(distances.distance.shape, bool)
+        coherent[p[k, s], s] = True
+        d = distances.distance
+        return distances._replace(distance=np.where(coherent, d * factor, d))
     machine.launch(
         machine.kernel("coherence", "coherence", BLOCK=BLOCK),
         (sites.size,),
         *(sites, np.int32(sites.size), np.int32(distances.distance.shape[1])),
         *(field.source, field.temperature, offsets, np.int32(offsets.shape[0]), grid.struct),
-        *(candidates.reach, candidates.index_of, np.int32(candidates.index_of.size), favour),
+        *(candidates.reach, candidates.index_of, np.int32(candidates.index_of.size), factor),
         *(distances.distance, distances.nearest),
     )
     return distances
-
-
-coherence = Operation("coherence", _reference, _launch)

@@ -1,26 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The end of a step: what the relaxed sites have become goes into the field, all at once."""
+"""The end of a step: the new values of the sites that have relaxed go into the field, all at once."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.ops.lcpdf import Relaxed
 from simdtex.ops.neighbourhood import Field
 
 
-def _reference(field: Field, sites: NDArray[np.int32], relaxed: Relaxed, cooled: NDArray[np.uint16]) -> Field:
-    made = len(relaxed.values)
-    field.values.reshape(len(field.values), -1)[:made, sites] = relaxed.values
-    field.source.ravel()[sites] = relaxed.choice
-    field.temperature.ravel()[sites] = cooled
-    return field
-
-
-def _launch(machine: Launcher, field: Field, sites: Array, relaxed: Relaxed, cooled: Array) -> Field:
+@Operation
+def commit(machine: Launcher | None, field: Field, sites: Array, relaxed: Relaxed, cooled: Array) -> Field:
+    """Write what sites have become into the field, in place."""
     (channels, _), (_, height, width) = relaxed.values.shape, field.values.shape
+    if machine is None:
+        field.values.reshape(len(field.values), -1)[:channels, sites] = relaxed.values
+        field.source.ravel()[sites] = relaxed.choice
+        field.temperature.ravel()[sites] = cooled
+        return field
     machine.launch(
         machine.kernel("commit", "commit"),
         (sites.size,),
@@ -28,6 +26,3 @@ def _launch(machine: Launcher, field: Field, sites: Array, relaxed: Relaxed, coo
         *(relaxed.values, relaxed.choice, cooled, *field),
     )
     return field
-
-
-commit = Operation("commit", _reference, _launch)

@@ -49,27 +49,28 @@ def bank(orientations: int, sigma: float, side: int) -> NDArray[np.int32]:
     return np.array(taps, np.int32).reshape(-1, side, side)
 
 
-def _reference(
-    picture: NDArray[np.int32], band: NDArray[np.int32], taps: NDArray[np.int32], torus: bool
-) -> NDArray[np.int32]:
-    _, rows, cols = picture.shape
-    reach = taps.shape[1] // 2
-    row, col = (within(np.arange(-reach, n + reach), n, torus) for n in (rows, cols))
-    features = []
-    for g, own in zip(picture, band, strict=True):
-        around = g[np.ix_(row, col)].astype(np.int64)
-        features.append(own)
-        for f in taps:
-            total = np.zeros((rows, cols), np.int64)
-            for a, b in np.ndindex(f.shape):
-                total += f[a, b] * around[a : a + rows, b : b + cols]
-            features.append((total + (1 << UNIT_BITS - 1)) >> UNIT_BITS)
-    return np.stack(features, -1).reshape(rows * cols, -1).astype(np.int32)
+@Operation
+def filters(machine: Launcher | None, picture: Array, band: Array, taps: Array, torus: bool) -> Array:
+    """Return F^0, F^1, ... of equation (7), (rows * cols, planes * (1 + filters)) int32.
 
-
-def _launch(machine: Launcher, picture: Array, band: Array, taps: Array, torus: bool) -> Array:
+    ``picture`` and ``band`` (planes, rows, cols) int32 are G and L of a level; ``taps`` comes from `bank`. Cost:
+    side**2 multiply-adds of 64 bits for each pixel, plane and filter.
+    """
     planes, rows, cols = picture.shape
-    count, side = taps.shape[0], taps.shape[1]
+    count, side, _ = taps.shape
+    if machine is None:
+        reach = side // 2
+        row, col = (within(np.arange(-reach, n + reach), n, torus) for n in (rows, cols))
+        found = []
+        for g, own in zip(picture, band, strict=True):
+            around = g[np.ix_(row, col)].astype(np.int64)
+            found.append(own)
+            for f in taps:
+                total = np.zeros((rows, cols), np.int64)
+                for a, b in np.ndindex(f.shape):
+                    total += f[a, b] * around[a : a + rows, b : b + cols]
+                found.append((total + (1 << UNIT_BITS - 1)) >> UNIT_BITS)
+        return np.stack(found, -1).reshape(rows * cols, -1).astype(np.int32)
     features = machine.empty((rows * cols, planes * (1 + count)), np.int32)
     machine.launch(
         machine.kernel("filters", "filters"),
@@ -79,11 +80,3 @@ def _launch(machine: Launcher, picture: Array, band: Array, taps: Array, torus: 
         work=touching(picture, band, features, fma=picture.size * taps.size),
     )
     return features
-
-
-filters = Operation("filters", _reference, _launch)
-"""``filters(machine, picture, band, taps, torus)``: (rows * cols, planes * (1 + filters)) int32, F^0, F^1, ... (7).
-
-``picture`` and ``band`` (planes, rows, cols) int32 are G and L of a level; ``taps`` comes from `bank`. Cost: side**2
-multiply-adds of 64 bits for each pixel, plane and filter.
-"""

@@ -19,42 +19,34 @@ def folded(n: int) -> NDArray[np.intp]:
     return np.arange(n if n % 2 else n // 2) * 2 % n
 
 
-def _fold(picture: NDArray[np.int32]) -> NDArray[np.int32]:
-    _, rows, cols = picture.shape
-    return np.ascontiguousarray(picture[:, folded(rows)[:, None], folded(cols)])
-
-
-def _unfold(coarse: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[np.int32]:
-    rows, cols = shape
-    picture = np.zeros((len(coarse), rows, cols), np.int32)
-    picture[:, folded(rows)[:, None], folded(cols)] = coarse
-    return picture
-
-
-def _launch_fold(machine: Launcher, picture: Array) -> Array:
+@Operation
+def fold(machine: Launcher | None, picture: Array) -> Array:
+    """Return every second row and column of (planes, rows, cols) int32; of an odd number, all."""
     planes, rows, cols = picture.shape
-    coarse = machine.empty((planes, folded(rows).size, folded(cols).size), np.int32)
+    row, col = folded(rows), folded(cols)
+    if machine is None:
+        return np.ascontiguousarray(picture[:, row[:, None], col])
+    coarse = machine.empty((planes, row.size, col.size), np.int32)
     machine.launch(
         machine.kernel("fold", "fold"),
-        (coarse.shape[1] * coarse.shape[2], planes),
+        (row.size * col.size, planes),
         *(picture, np.int32(planes), np.int32(rows), np.int32(cols), coarse),
     )
     return coarse
 
 
-def _launch_unfold(machine: Launcher, coarse: Array, shape: tuple[int, ...]) -> Array:
-    rows, cols = shape
-    picture = machine.empty((coarse.shape[0], rows, cols), np.int32)
+@Operation
+def unfold(machine: Launcher | None, coarse: Array, shape: tuple[int, ...]) -> Array:
+    """Return a picture (planes, rows, cols) with these pixels at their place and 0 between them."""
+    planes, (rows, cols) = coarse.shape[0], shape
+    if machine is None:
+        spread = np.zeros((planes, rows, cols), np.int32)
+        spread[:, folded(rows)[:, None], folded(cols)] = coarse
+        return spread
+    picture = machine.empty((planes, rows, cols), np.int32)
     machine.launch(
         machine.kernel("fold", "fold_back"),
-        (rows * cols, coarse.shape[0]),
-        *(coarse, np.int32(coarse.shape[0]), np.int32(rows), np.int32(cols), picture),
+        (rows * cols, planes),
+        *(coarse, np.int32(planes), np.int32(rows), np.int32(cols), picture),
     )
     return picture
-
-
-fold = Operation("fold", _fold, _launch_fold)
-"""``fold(machine, picture)``: every second row and column of (planes, rows, cols) int32; of an odd number, all."""
-
-unfold = Operation("fold", _unfold, _launch_unfold)
-"""``unfold(machine, coarse, shape)``: a picture (planes, rows, cols) with these at their place and 0 between them."""

@@ -47,52 +47,35 @@ def heat_bath_chances(temperatures: Sequence[float], neighbours: int) -> NDArray
     return whole
 
 
-def _relax(
-    spins: NDArray[np.uint8],
-    sites: NDArray[np.int32],
-    offsets: NDArray[np.int32],
-    grid: Grid,
-    chances: NDArray[np.uint32],
-    seed: int,
-    turn: int,
-) -> NDArray[np.uint8]:
-    temperature, chain = divmod(np.arange(len(spins))[:, None], len(spins) // len(chances))
-    r = grid.neighbours(sites, offsets)
-    there = r >= 0
-    up = np.where(there, spins.reshape(len(spins), -1)[:, r], 0).sum(1, dtype=np.intp)
-    bits = random.draw4(seed, 0, turn, grid.places(sites), random.DRAW, chain)[0]
-    relaxed: NDArray[np.uint8] = (bits < chances[temperature, there.sum(0), up]).astype(np.uint8)
-    return relaxed
-
-
-def _commit(spins: NDArray[np.uint8], sites: NDArray[np.int32], relaxed: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    spins.reshape(len(spins), -1)[:, sites] = relaxed
-    return spins
-
-
-def _sequence(
-    spins: NDArray[np.uint8],
-    queue: NDArray[np.int32],
-    offsets: NDArray[np.int32],
-    grid: Grid,
-    chances: NDArray[np.uint32],
-    seed: int,
-) -> NDArray[np.uint8]:
-    for site, turn in queue:
-        _commit(spins, site[None], _relax(spins, site[None], offsets, grid, chances, seed, int(turn)))
-    return spins
-
-
 def _model(offsets: Array, grid: Grid, chances: Array, seed: int) -> tuple[Any, ...]:
     return offsets, np.int32(offsets.shape[0]), grid.struct, chances, np.uint64(seed)
 
 
-def _launch_relax(
-    machine: Launcher, spins: Array, sites: Array, offsets: Array, grid: Grid, chances: Array, seed: int, turn: int
+@Operation
+def ising_relax(
+    machine: Launcher | None,
+    spins: Array,
+    sites: Array,
+    offsets: Array,
+    grid: Grid,
+    chances: Array,
+    seed: int,
+    turn: int,
 ) -> Array:
+    """Return the new spins of the sites of a step, (chains, S) uint8, from the old ones.
+
+    Cost: O(chains S N), 10 rounds of Philox each.
+    """
     chains, temperatures = int(spins.shape[0]), int(chances.shape[0])
-    relaxed = machine.empty((chains, sites.size), np.uint8)
     seeds = chains // temperatures
+    if machine is None:
+        temperature, chain = divmod(np.arange(chains)[:, None], seeds)
+        r = grid.neighbours(sites, offsets)
+        there = r >= 0
+        up = np.where(there, spins.reshape(chains, -1)[:, r], 0).sum(1, dtype=np.intp)
+        bits = random.draw4(seed, 0, turn, grid.places(sites), random.DRAW, chain)[0]
+        return (bits < chances[temperature, there.sum(0), up]).astype(np.uint8)
+    relaxed = machine.empty((chains, sites.size), np.uint8)
     machine.launch(
         machine.kernel("ising", "ising_relax"),
         (sites.size, seeds, temperatures),
@@ -102,8 +85,13 @@ def _launch_relax(
     return relaxed
 
 
-def _launch_commit(machine: Launcher, spins: Array, sites: Array, relaxed: Array) -> Array:
-    chains = int(spins.shape[0])  # which temperature is whose does not matter here
+@Operation
+def ising_commit(machine: Launcher | None, spins: Array, sites: Array, relaxed: Array) -> Array:
+    """Write the new spins of a step, in place."""
+    chains = int(spins.shape[0])  # of any temperature
+    if machine is None:
+        spins.reshape(chains, -1)[:, sites] = relaxed
+        return spins
     machine.launch(
         machine.kernel("ising", "ising_commit"),
         (sites.size, chains, 1),
@@ -112,9 +100,20 @@ def _launch_commit(machine: Launcher, spins: Array, sites: Array, relaxed: Array
     return spins
 
 
-def _launch_sequence(
-    machine: Launcher, spins: Array, queue: Array, offsets: Array, grid: Grid, chances: Array, seed: int
+@Operation
+def ising_sequence(
+    machine: Launcher | None, spins: Array, queue: Array, offsets: Array, grid: Grid, chances: Array, seed: int
 ) -> Array:
+    """Take steps of one site each, in place.
+
+    ``queue`` (Q, 2) int32 is the site and the turn of each step, in order. The same bits as Q times `ising_relax` and
+    `ising_commit`, in one launch.
+    """
+    if machine is None:
+        for site, turn in queue:
+            relaxed = ising_relax.reference(spins, site[None], offsets, grid, chances, seed, int(turn))
+            ising_commit.reference(spins, site[None], relaxed)
+        return spins
     temperatures = chances.shape[0]
     seeds = spins.shape[0] // temperatures
     machine.launch(
@@ -124,20 +123,3 @@ def _launch_sequence(
         *_model(offsets, grid, chances, seed),
     )
     return spins
-
-
-ising_relax = Operation("ising", _relax, _launch_relax)
-"""``ising_relax(machine, spins, sites, offsets, grid, chances, seed, turn)``: what the sites of a step become.
-
-Old values are read. Returns (chains, S) uint8. Cost: O(chains S N), 10 rounds of Philox each.
-"""
-
-ising_commit = Operation("ising", _commit, _launch_commit)
-"""``ising_commit(machine, spins, sites, relaxed)``: the end of a step, in place."""
-
-ising_sequence = Operation("ising", _sequence, _launch_sequence)
-"""``ising_sequence(machine, spins, queue, offsets, grid, chances, seed)``: steps of one site each, in place.
-
-``queue`` (Q, 2) int32 is the site and the turn of each step, in order. The same bits as Q times `ising_relax` and
-`ising_commit`, in one launch.
-"""

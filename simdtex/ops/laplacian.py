@@ -15,31 +15,27 @@ from numpy.typing import NDArray
 from simdtex.machine.interface import Array, Launcher, Operation, touching
 
 
+def sizes(*numbers: int) -> tuple[np.int32, ...]:
+    """Return numbers as a kernel takes them."""
+    return tuple(np.int32(n) for n in numbers)
+
+
 def half(shape: tuple[int, ...]) -> tuple[int, int]:
-    """Rows and columns of the level above one of these rows and columns."""
+    """Return rows and columns of the level above a level of this shape."""
     return -(-shape[0] // 2), -(-shape[1] // 2)
 
 
 def within(index: NDArray[np.intp], n: int, torus: bool) -> NDArray[np.intp]:
-    """Indices brought to 0 .. n-1, as on a torus or in a mirror on the outer pixels (kernels/common/border.h)."""
+    """Return indices within 0 .. n-1, as on a torus or in a mirror on the outer pixels (kernels/common/border.h)."""
     period = n if torus else max(1, 2 * n - 2)
     index = index % period
     return np.where(index < n, index, period - index)
 
 
-def _reduce(fine: NDArray[np.int32], torus: bool) -> NDArray[np.int32]:
-    g = fine.astype(np.int64)
-    for axis in (1, 2):
-        n = g.shape[axis]
-        near = [g.take(within(np.arange(0, n, 2) + a, n, torus), axis) for a in range(-2, 3)]
-        g = near[0] + 4 * near[1] + 6 * near[2] + 4 * near[3] + near[4]
-    return ((g + 128) >> 8).astype(np.int32)
-
-
 def _expanded(
     coarse: NDArray[np.int32], shape: tuple[int, ...], tile: tuple[int, ...], torus: bool
 ) -> NDArray[np.int64]:
-    """2up(G_{i+1}) at a level of these rows and columns, made of tiles of those."""
+    """Return 2up(G_{i+1}) at a level of this shape, made of tiles of another shape."""
     g = coarse.astype(np.int64)
     for axis in (1, 2):
         n = g.shape[axis]
@@ -51,24 +47,12 @@ def _expanded(
     return (g + 32) >> 6
 
 
-def _band(fine: NDArray[np.int32], coarse: NDArray[np.int32], torus: bool) -> NDArray[np.int32]:
-    shape = fine.shape[1:]
-    return (fine - _expanded(coarse, shape, shape, torus)).astype(np.int32)
-
-
-def _collapse(
-    band: NDArray[np.int32], source: NDArray[np.int32], coarse: NDArray[np.int32], torus: bool
-) -> NDArray[np.int32]:
-    taken = band.reshape(len(band), -1)[:, source]
-    return (taken + _expanded(coarse, source.shape, band.shape[1:], torus)).astype(np.int32)
-
-
 def _joined(band: NDArray[np.int32], source: NDArray[np.int32], torus: bool) -> NDArray[np.int64]:
-    """L_i of the output, (planes, rows, cols), where pieces of the sample that meet fade into each other."""
+    """Return L_i of the output, (planes, rows, cols): pieces of the sample that meet fade into each other."""
     rows, cols = band.shape[1:]
     place, total = np.divmod(source, np.int32(cols)), np.zeros((len(band), *source.shape), np.int64)
     for a, b in product((-1, 0, 1), repeat=2):
-        near, step = zip(*(beside(n, d, torus) for n, d in zip(source.shape, (a, b), strict=True)), strict=True)
+        near, step = zip(*(shifted(n, d, torus) for n, d in zip(source.shape, (a, b), strict=True)), strict=True)
         row, col = (
             within(own[np.ix_(*near)].astype(np.intp) - by, n, torus)
             for own, by, n in zip(place, (step[0][:, None], step[1]), (rows, cols), strict=True)
@@ -77,85 +61,83 @@ def _joined(band: NDArray[np.int32], source: NDArray[np.int32], torus: bool) -> 
     return (total + 8) >> 4
 
 
-def beside(n: int, by: int, torus: bool) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The neighbours of n pixels in a line on one side, and how far they are: without a torus the last has itself."""
+def shifted(n: int, by: int, torus: bool) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the neighbours of n pixels in a line on one side, and their offsets; an end may be its own."""
     own = np.arange(n)
     near = own + by
     return (near % n, np.full(n, by)) if torus else (np.clip(near, 0, n - 1), np.clip(near, 0, n - 1) - own)
 
 
-def _blend(
-    band: NDArray[np.int32], source: NDArray[np.int32], coarse: NDArray[np.int32], torus: bool
-) -> NDArray[np.int32]:
-    made = _joined(band, source, torus) + _expanded(coarse, source.shape, band.shape[1:], torus)
-    return made.astype(np.int32)
-
-
-def _sizes(*numbers: int) -> tuple[np.int32, ...]:
-    return tuple(np.int32(n) for n in numbers)
-
-
-def _launch_reduce(machine: Launcher, fine: Array, torus: bool) -> Array:
-    planes, rows, cols = fine.shape
-    coarse = machine.empty((planes, *half((rows, cols))), np.int32)
-    machine.launch(
-        machine.kernel("laplacian", "laplacian_reduce"),
-        (coarse.shape[1] * coarse.shape[2], planes),
-        *(fine, *_sizes(planes, rows, cols, torus), coarse),
-        work=touching(fine, coarse, fma=25 * coarse.size),
-    )
-    return coarse
-
-
-def _launch_band(machine: Launcher, fine: Array, coarse: Array, torus: bool) -> Array:
-    planes, rows, cols = fine.shape
-    band = machine.empty(fine.shape, np.int32)
-    machine.launch(
-        machine.kernel("laplacian", "laplacian_band"),
-        (rows * cols, planes),
-        *(fine, coarse, *_sizes(planes, rows, cols, torus), band),
-        work=touching(fine, coarse, band, fma=25 / 4 * band.size),
-    )
-    return band
-
-
-def _launch_collapse(machine: Launcher, band: Array, source: Array, coarse: Array, torus: bool) -> Array:
-    return _launch_up(machine, "laplacian_collapse", 25 / 4, band, source, coarse, torus)
-
-
-def _launch_blend(machine: Launcher, band: Array, source: Array, coarse: Array, torus: bool) -> Array:
-    return _launch_up(machine, "laplacian_blend", 25 / 4 + 9, band, source, coarse, torus)
-
-
-def _launch_up(
-    machine: Launcher, kernel: str, each: float, band: Array, source: Array, coarse: Array, torus: bool
-) -> Array:
+def _up(machine: Launcher, kernel: str, each: float, band: Array, source: Array, coarse: Array, torus: bool) -> Array:
     rows, cols = source.shape
     fine = machine.empty((band.shape[0], rows, cols), np.int32)
     machine.launch(
         machine.kernel("laplacian", kernel),
         (rows * cols, band.shape[0]),
-        *(band, *_sizes(*band.shape, torus), source, *_sizes(rows, cols), coarse, *_sizes(*coarse.shape[1:]), fine),
+        *(band, *sizes(*band.shape, torus), source, *sizes(rows, cols), coarse, *sizes(*coarse.shape[1:]), fine),
         work=touching(band, source, coarse, fine, fma=each * fine.size),
     )
     return fine
 
 
-laplacian_reduce = Operation("laplacian", _reduce, _launch_reduce)
-"""``laplacian_reduce(machine, fine, torus)``: G_{i+1} of G_i, equation (6). Cost: 25 multiply-adds a pixel of it."""
+@Operation
+def laplacian_reduce(machine: Launcher | None, fine: Array, torus: bool) -> Array:
+    """Return G_{i+1} of G_i, equation (6). Cost: 25 multiply-adds a pixel of it."""
+    if machine is None:
+        g = fine.astype(np.int64)
+        for axis in (1, 2):
+            n = g.shape[axis]
+            near = [g.take(within(np.arange(0, n, 2) + a, n, torus), axis) for a in range(-2, 3)]
+            g = near[0] + 4 * near[1] + 6 * near[2] + 4 * near[3] + near[4]
+        return ((g + 128) >> 8).astype(np.int32)
+    planes, rows, cols = fine.shape
+    coarse = machine.empty((planes, *half((rows, cols))), np.int32)
+    machine.launch(
+        machine.kernel("laplacian", "laplacian_reduce"),
+        (coarse.shape[1] * coarse.shape[2], planes),
+        *(fine, *sizes(planes, rows, cols, torus), coarse),
+        work=touching(fine, coarse, fma=25 * coarse.size),
+    )
+    return coarse
 
-laplacian_band = Operation("laplacian", _band, _launch_band)
-"""``laplacian_band(machine, fine, coarse, torus)``: L_i of G_i and G_{i+1}, equation (5)."""
 
-laplacian_collapse = Operation("laplacian", _collapse, _launch_collapse)
-"""``laplacian_collapse(machine, band, source, coarse, torus)``: G_i of L_i and G_{i+1}.
+@Operation
+def laplacian_band(machine: Launcher | None, fine: Array, coarse: Array, torus: bool) -> Array:
+    """Return L_i of G_i and G_{i+1}, equation (5)."""
+    planes, rows, cols = fine.shape
+    if machine is None:
+        return (fine - _expanded(coarse, (rows, cols), (rows, cols), torus)).astype(np.int32)
+    band = machine.empty(fine.shape, np.int32)
+    machine.launch(
+        machine.kernel("laplacian", "laplacian_band"),
+        (rows * cols, planes),
+        *(fine, coarse, *sizes(planes, rows, cols, torus), band),
+        work=touching(fine, coarse, band, fma=25 / 4 * band.size),
+    )
+    return band
 
-``source`` (rows, cols) int32 are the pixels of ``band`` that make up L_i, which may be of another size.
-"""
 
-laplacian_blend = Operation("laplacian", _blend, _launch_blend)
-"""``laplacian_blend(machine, band, source, coarse, torus)``: as `laplacian_collapse`, without hard seams.
+@Operation
+def laplacian_collapse(machine: Launcher | None, band: Array, source: Array, coarse: Array, torus: bool) -> Array:
+    """Return G_i of L_i and G_{i+1}.
 
-Where neighbours are not neighbours in the band, a pixel of L_i is the mean, by (1, 2, 1) / 4 in each direction, of what
-the band has there if each neighbour's piece goes on; elsewhere it is the band's own pixel, to the bit.
-"""
+    ``source`` (rows, cols) int32 are the pixels of ``band`` that make up L_i, which may be of another size.
+    """
+    if machine is None:
+        taken = band.reshape(len(band), -1)[:, source]
+        return (taken + _expanded(coarse, source.shape, band.shape[1:], torus)).astype(np.int32)
+    return _up(machine, "laplacian_collapse", 25 / 4, band, source, coarse, torus)
+
+
+@Operation
+def laplacian_blend(machine: Launcher | None, band: Array, source: Array, coarse: Array, torus: bool) -> Array:
+    """Return G_i as `laplacian_collapse` does, without hard seams.
+
+    Where neighbours are not neighbours in the band, a pixel of L_i is the mean, by (1, 2, 1) / 4 in each direction, of
+    the pixels of the band at which each neighbour's piece would go on; elsewhere it is the band's own pixel, to the
+    bit.
+    """
+    if machine is None:
+        joined = _joined(band, source, torus)
+        return (joined + _expanded(coarse, source.shape, band.shape[1:], torus)).astype(np.int32)
+    return _up(machine, "laplacian_blend", 25 / 4 + 9, band, source, coarse, torus)

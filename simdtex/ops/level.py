@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What stays the same for all relaxations of a level, as kernels take it: one struct instead of thirty arguments."""
+"""The constants of a level as kernels take them: one struct instead of thirty arguments."""
 
 from __future__ import annotations
 
@@ -14,12 +14,9 @@ LEVEL = np.dtype(
         ("lattice", LATTICE),
         ("seed", np.uint64),
         ("level", np.uint32),
-        *(
-            (name, np.int32)
-            for name in ("area", "neighbours", "pixels", "candidates", "suggesting", "similar", "chance")
-        ),
+        *((name, np.int32) for name in ("area", "neighbours", "pixels", "candidates", "chance")),
         *((name, np.int32) for name in ("plane", "down", "first", "pitch", "size", "strip_rows", "strip_cols")),
-        *((name, np.float32) for name in ("favour", "scale")),
+        *((name, np.float32) for name in ("discount", "scale")),
         *((name, np.int32) for name in ("radius", "top", "draws", "xi")),
         ("novelty", np.float32),
         ("centre", np.float32),
@@ -31,7 +28,7 @@ LEVEL = np.dtype(
 
 
 def constants(grid: Grid, **values: Any) -> np.void:
-    """A value of the type `LEVEL`: the grid, and the fields that are given by name; the others are 0."""
+    """Return a value of the type `LEVEL` with the grid and the fields that are given by name; the others are 0."""
     numbers = np.zeros((), LEVEL)
     numbers["lattice"] = grid.struct
     for name, value in values.items():

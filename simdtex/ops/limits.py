@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Operation, touching
 from simdtex.ops.arithmetic import fma32
@@ -16,17 +15,21 @@ WIDTHS = (1, 4, 8, 16)
 """Values side by side in a work-item that may be asked for; the number of values is a multiple of it."""
 
 
-def _peak(values: NDArray[np.float32], rounds: int, width: int) -> NDArray[np.float32]:
-    total = np.zeros_like(values)
-    for i in range(CHAINS):
-        chain = values + np.float32(i)
-        for _ in range(rounds):
-            chain = fma32(chain, np.float32(0.5), np.float32(0.1))
-        total += chain
-    return total
+@Operation
+def peak(machine: Launcher | None, values: Array, rounds: int, width: int) -> Array:
+    """Return for each value the sum of `CHAINS` chains, (n,) float32.
 
-
-def _launch_peak(machine: Launcher, values: Array, rounds: int, width: int) -> Array:
+    A chain begins at the value plus its number and becomes a / 2 + 0.1, by fma, ``rounds`` times. Cost: `CHAINS` rounds
+    fma a value. ``width`` values are side by side in a work-item; it changes no bit, and divides n.
+    """
+    if machine is None:
+        total = np.zeros_like(values)
+        for i in range(CHAINS):
+            chain = values + np.float32(i)
+            for _ in range(rounds):
+                chain = fma32(chain, np.float32(0.5), np.float32(0.1))
+            total += chain
+        return total
     result, items = machine.empty(values.shape, np.float32), values.size // width
     machine.launch(
         machine.kernel("limits", "limits_peak", V=width, CHAINS=CHAINS),
@@ -37,11 +40,11 @@ def _launch_peak(machine: Launcher, values: Array, rounds: int, width: int) -> A
     return result
 
 
-def _copy(values: NDArray[np.float32], width: int) -> NDArray[np.float32]:
-    return values.copy()
-
-
-def _launch_copy(machine: Launcher, values: Array, width: int) -> Array:
+@Operation
+def copy(machine: Launcher | None, values: Array, width: int) -> Array:
+    """Return the values (n,) float32. Cost: 8 bytes a value."""
+    if machine is None:
+        return values.copy()
     result, items = machine.empty(values.shape, np.float32), values.size // width
     machine.launch(
         machine.kernel("limits", "limits_copy", V=width, CHAINS=CHAINS),
@@ -50,14 +53,3 @@ def _launch_copy(machine: Launcher, values: Array, width: int) -> Array:
         work=touching(values, result),
     )
     return result
-
-
-peak = Operation("limits", _peak, _launch_peak)
-"""``peak(machine, values, rounds, width)``: (n,) float32, for each value the sum of `CHAINS` chains.
-
-A chain begins at the value plus its number and becomes a / 2 + 0.1, by fma, `rounds` times. Cost: `CHAINS` rounds fma a
-value. ``width`` values are side by side in a work-item; it changes no bit, and divides n.
-"""
-
-copy = Operation("limits", _copy, _launch_copy)
-"""``copy(machine, values, width)``: the values (n,) float32. Cost: 8 bytes a value."""

@@ -16,26 +16,27 @@ ROUNDS = 4
 """Rounds between two looks at what is left; further rounds change nothing."""
 
 
-def _reference(
-    grid: Grid, offsets: NDArray[np.int32], active: NDArray[np.uint8], seed: int, level: int, count: int
+@Operation
+def luby(
+    machine: Launcher | None, grid: Grid, offsets: Array, active: Array, seed: int, level: int, count: int
 ) -> NDArray[np.uint8]:
-    priority = random.draw4(seed, level, count, np.arange(active.size), random.SCHEDULE)[0].astype(np.int64)
-    state = np.where(active.ravel(), UNDECIDED, OUT).astype(np.uint8)
-    while (undecided := np.flatnonzero(state == UNDECIDED).astype(np.int32)).size:
-        r = grid.flat.neighbours(undecided, offsets)
-        there = r >= 0
-        beaten = there & (state[r] == IN)
-        above = (priority[r] > priority[undecided]) | ((priority[r] == priority[undecided]) & (r > undecided))
-        rival = there & (state[r] == UNDECIDED) & above
-        state[undecided] = np.where(beaten.any(0), OUT, np.where(rival.any(0), UNDECIDED, IN))
-    chosen: NDArray[np.uint8] = (state == IN).astype(np.uint8)
-    return chosen.reshape(active.shape)
+    """Return the members of the set, (rows, cols) uint8, on the host: a schedule wants them there.
 
-
-def _launch(
-    machine: Launcher, grid: Grid, offsets: Array, active: Array, seed: int, level: int, count: int
-) -> NDArray[np.uint8]:
+    ``active`` (rows, cols) uint8 says which sites may be members. The set is that of the greedy choice in the order of
+    priorities, so it does not depend on the rounds. Cost: O(rows cols N) a round, some 5 to 10 rounds.
+    """
     sites = grid.rows * grid.cols
+    if machine is None:
+        draws = random.draw4(seed, level, count, np.arange(sites), random.SCHEDULE)[0].astype(np.int64)
+        host = np.where(active.ravel(), UNDECIDED, OUT).astype(np.uint8)
+        while (undecided := np.flatnonzero(host == UNDECIDED).astype(np.int32)).size:
+            r = grid.flat.neighbours(undecided, offsets)
+            there = r >= 0
+            beaten = there & (host[r] == IN)
+            above = (draws[r] > draws[undecided]) | ((draws[r] == draws[undecided]) & (r > undecided))
+            rival = there & (host[r] == UNDECIDED) & above
+            host[undecided] = np.where(beaten.any(0), OUT, np.where(rival.any(0), UNDECIDED, IN))
+        return np.asarray(host == IN, np.uint8).reshape(active.shape)
     priority = machine.empty((sites,), np.uint32)
     state, following = (machine.empty((grid.rows, grid.cols), np.uint8) for _ in range(2))
     machine.launch(
@@ -53,14 +54,4 @@ def _launch(
             state, following = following, state
         host = machine.get(state)
         if not (host == UNDECIDED).any():
-            chosen: NDArray[np.uint8] = (host == IN).astype(np.uint8)
-            return chosen
-
-
-luby = Operation("luby", _reference, _launch)
-"""``luby(machine, grid, offsets, active, seed, level, count)``.
-
-``active`` (rows, cols) uint8 says which sites may be members. Returns such an array of the members, on the host: a
-schedule wants them there. The set is that of the greedy choice in the order of priorities, so it does not depend on
-the rounds. Cost: O(rows cols N) a round, some 5 to 10 rounds.
-"""
+            return np.asarray(host == IN, np.uint8)

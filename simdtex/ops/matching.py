@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.machine.interface import Array, Launcher, Operation, touching
+from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.ops.sort import local, run_length
 
 FRACTION = 20
@@ -50,62 +50,48 @@ def inverse_cdf(sorted_values: NDArray[np.int32], bins: int = BINS) -> NDArray[n
     return np.array(table, np.int32)
 
 
-def each_of(segments: int, targets: int) -> int:
-    """Segments that share a target."""
-    if segments % targets:
-        raise ValueError(f"{segments} segments cannot share {targets} targets evenly")
-    return segments // targets
-
-
 def _bins_of(above: NDArray[np.int64], width: NDArray[np.int64] | np.int64, bins: int) -> NDArray[np.int64]:
     """The bins of values so far above the least; the greatest stands at the end of the last."""
     number: NDArray[np.int64] = np.minimum(above * bins // np.maximum(width, 1), bins - 1)
     return number
 
 
-def _ranks(order: NDArray[np.int32], targets: NDArray[np.int32]) -> NDArray[np.int32]:
-    (segments, n), m = order.shape, targets.shape[1]
-    rank = (2 * np.arange(n, dtype=np.int64) + 1) * m // (2 * n)
-    values = np.empty_like(order)
-    np.put_along_axis(values, order, targets[:, rank].repeat(each_of(segments, len(targets)), 0), 1)
-    return values
+@Operation
+def match_ranks(machine: Launcher | None, order: Array, targets: Array) -> Array:
+    """Return values with the histograms of the targets, (segments, n) int32.
 
-
-def _launch_ranks(machine: Launcher, order: Array, targets: Array) -> Array:
+    ``order`` (segments, n) comes from `simdtex.ops.sort.sort`, ``targets`` (T, m) int32 are sorted. Out of n, the value
+    of rank k becomes the target's of rank (2 k + 1) m // (2 n) out of m.
+    """
     (segments, n), m = order.shape, targets.shape[1]
-    each = each_of(segments, targets.shape[0])
+    each = segments // targets.shape[0]
+    if machine is None:
+        rank = (2 * np.arange(n, dtype=np.int64) + 1) * m // (2 * n)
+        matched = np.empty_like(order)
+        np.put_along_axis(matched, order, targets[:, rank].repeat(each, 0), 1)
+        return matched
     values = machine.empty(order.shape, np.int32)
     machine.launch(
         machine.kernel("matching", "matching_ranks"),
         (n, segments),
         *(order, np.int32(segments), np.int32(n), targets, np.int32(each), np.int32(m), values),
-        work=touching(order, targets, values),
     )
     return values
 
 
-def _lookup(values: NDArray[np.int32], tables: NDArray[np.int32]) -> NDArray[np.int32]:
-    (segments, n), bins = values.shape, tables.shape[1] - 1
-    each = each_of(segments, len(tables))
-    result = np.empty_like(values)
-    for segment, own in enumerate(values.astype(np.int64)):
-        table = tables[segment // each].astype(np.int64)
-        above, width = own - own.min(), own.max() - own.min()
-        place = np.full(n, bins << FRACTION - 1, np.int64)
-        if width > 0:
-            b = _bins_of(above, width, bins)
-            below = np.concatenate(([0], np.cumsum(np.bincount(b, minlength=bins))))
-            part = ((above * bins - b * width) << FRACTION) // width
-            place = ((below[b] << FRACTION) + (below[b + 1] - below[b]) * part) * bins // n
-        k = np.minimum(place >> FRACTION, bins - 1)
-        rise = (table[k + 1] - table[k]) * (place - (k << FRACTION))
-        result[segment] = table[k] + ((rise + (1 << FRACTION - 1)) >> FRACTION)
-    return result
+@Operation
+def match_lookup(machine: Launcher | None, values: Array, tables: Array) -> Array:
+    """Return values with the histograms of the targets, through tables (T, bins + 1) int32, each from `inverse_cdf`.
 
-
-def _launch_lookup(machine: Launcher, values: Array, tables: Array) -> Array:
+    A segment's cdf is that of as many equal bins over its own range, even within each. The place of a value in its bin,
+    and then in the table, is rounded down to 2**-20 of a bin; the result is linear between entries, rounded to the
+    nearest, halves up. A constant segment takes the middle of the table, the target's median. 2 to 4096 bins.
+    """
     (segments, n), bins = values.shape, tables.shape[1] - 1
-    each = each_of(segments, tables.shape[0])
+    each = segments // tables.shape[0]
+    if machine is None:
+        looked = [_looked_up(own, tables[segment // each], bins) for segment, own in enumerate(values.astype(np.int64))]
+        return np.array(looked, np.int32)
     runs, shape = _runs(machine, segments, n, bins)
     ranges, spans = machine.empty((segments, runs, 2), np.int32), machine.empty((segments, 2), np.int32)
     counts, cdf = machine.empty((segments, runs, bins), np.uint32), machine.empty((segments, bins + 1), np.uint32)
@@ -117,63 +103,46 @@ def _launch_lookup(machine: Launcher, values: Array, tables: Array) -> Array:
     machine.launch(machine.kernel("matching", "matching_count"), size, values, *shape, spans, b, counts, local=group)
     machine.launch(machine.kernel("matching", "matching_total"), (bins, segments), counts, s, r, b, cdf)
     machine.launch(machine.kernel("matching", "matching_cdf"), (segments,), s, b, cdf)
-    machine.launch(
-        machine.kernel("matching", "matching_lookup"),
-        (n, segments),
-        *(values, s, np.int32(n), spans, b, cdf, tables, np.int32(each), result),
-        work=touching(values, result),
-    )
+    arguments = (values, s, np.int32(n), spans, b, cdf, tables, np.int32(each), result)
+    machine.launch(machine.kernel("matching", "matching_lookup"), (n, segments), *arguments)
     return result
 
 
-def _distance(before: NDArray[np.int32], after: NDArray[np.int32]) -> NDArray[np.int64]:
-    total: NDArray[np.int64] = abs(before.astype(np.int64) - after).sum(1)
-    return total
+def _looked_up(own: NDArray[np.int64], targets: NDArray[np.int32], bins: int) -> NDArray[np.int64]:
+    table, n = targets.astype(np.int64), own.size
+    above, width = own - own.min(), own.max() - own.min()
+    place = np.full(n, bins << FRACTION - 1, np.int64)
+    if width > 0:
+        b = _bins_of(above, width, bins)
+        below = np.concatenate(([0], np.cumsum(np.bincount(b, minlength=bins))))
+        part = ((above * bins - b * width) << FRACTION) // width
+        place = ((below[b] << FRACTION) + (below[b + 1] - below[b]) * part) * bins // n
+    k = np.minimum(place >> FRACTION, bins - 1)
+    rise = (table[k + 1] - table[k]) * (place - (k << FRACTION))
+    return np.asarray(table[k] + ((rise + (1 << FRACTION - 1)) >> FRACTION))
 
 
-def _launch_distance(machine: Launcher, before: Array, after: Array) -> Array:
+@Operation
+def distance(machine: Launcher | None, before: Array, after: Array) -> Array:
+    """Return the sum of |before - after| over each segment, (segments,) int64.
+
+    After `match_ranks` it is n times the Wasserstein-1 distance of the two histograms.
+    """
+    if machine is None:
+        return abs(before.astype(np.int64) - after).sum(1)
     segments, n = before.shape
     runs, shape = _runs(machine, segments, n)
     sums, totals = machine.empty((segments, runs), np.int64), machine.empty((segments,), np.int64)
-    machine.launch(
-        machine.kernel("matching", "matching_distance"),
-        (segments * runs,),
-        *(before, after, *shape, sums),
-        work=touching(before, after),
-        local=local(machine),
-    )
-    machine.launch(
-        machine.kernel("matching", "matching_sum"),
-        (segments,),
-        *(sums, np.int32(segments), np.int32(runs), totals),
-    )
+    size = (segments * runs,)
+    kernel = machine.kernel("matching", "matching_distance")
+    machine.launch(kernel, size, before, after, *shape, sums, local=local(machine))
+    summing = (sums, np.int32(segments), np.int32(runs), totals)
+    machine.launch(machine.kernel("matching", "matching_sum"), (segments,), *summing)
     return totals
 
 
 def _runs(machine: Launcher, segments: int, n: int, table: int = 0) -> tuple[int, NDArray[np.int32]]:
-    """Runs of a segment, no shorter than the table that each fills; and what a kernel over runs is told."""
+    """Return the runs of a segment, no shorter than the table of each, and their shape as kernels take it."""
     length = min(n, max(run_length(machine, segments, n), table))
     runs = -(-n // length)
     return runs, np.array([segments, n, runs, length], np.int32)
-
-
-match_ranks = Operation("matching", _ranks, _launch_ranks)
-"""``match_ranks(machine, order, targets)``: (segments, n) int32 with the histograms of the targets.
-
-``order`` (segments, n) comes from `simdtex.ops.sort.sort`, ``targets`` (T, m) int32 are sorted. Out of n, the value of
-rank k becomes the target's of rank (2 k + 1) m // (2 n) out of m.
-"""
-
-match_lookup = Operation("matching", _lookup, _launch_lookup)
-"""``match_lookup(machine, values, tables)``: the same through tables (T, bins + 1) int32, each from `inverse_cdf`.
-
-A segment's cdf is that of as many equal bins over its own range, even within each. The place of a value in its bin, and
-then in the table, is rounded down to 2**-20 of a bin; the result is linear between entries, rounded to the nearest,
-halves up. A constant segment takes the middle of the table, the target's median. 2 to 4096 bins.
-"""
-
-distance = Operation("matching", _distance, _launch_distance)
-"""``distance(machine, before, after)``: (segments,) int64, the sum of |before - after| over each segment.
-
-After `match_ranks` it is n times the Wasserstein-1 distance of the two histograms.
-"""

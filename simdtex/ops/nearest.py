@@ -2,7 +2,7 @@
 """ICM over sample positions: each site's nearest candidate, found without keeping a distance.
 
 The twin weighs everything and takes the least. A device first weighs the few candidates that continue a neighbour's
-source, and then drops whatever is proved to lie beyond the best so far: ``docs/concepts/skipping.rst``.
+source, and then skips candidates that are proved to lie beyond the best so far: ``docs/concepts/skipping.rst``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Machine, Operation
 from simdtex.model.lattice import Grid
-from simdtex.model.sample import BLOCK, Candidates, Sample
+from simdtex.model.sample import Candidates, Sample
 from simdtex.ops import coherence, lcpdf, neighbourhood
 from simdtex.ops.charge import charge
 from simdtex.ops.lcpdf import Relaxed
@@ -52,7 +52,7 @@ class Strip(NamedTuple):
 def strip_of(
     machine: Machine, sample: Sample, offsets: NDArray[np.int32], spacing: int, phases: str, edges: str
 ) -> Strip:
-    """The strip of a level's candidates: see `simdtex.model.sample.Sample.positions`."""
+    """Return the strip of a level's candidates: see `simdtex.model.sample.Sample.positions`."""
     positions = sample.everywhere(offsets, spacing, phases, edges)
     step = spacing if phases == "decimated" else 1
     row, col = (int(n) for n in divmod(positions[0], sample.cols))
@@ -69,7 +69,7 @@ def strip_of(
 
 
 def slack(terms: int) -> np.float32:
-    """The factor by which a sum of so many squares may exceed the same sum in another order, generously.
+    """Return the factor by which a sum of so many squares may exceed the same sum in another order, generously.
 
     Either differs from the exact sum by a factor within (1 + 2**-24)**terms, so they differ by less than
     1 + 4 terms 2**-24; rounding the product of bound and factor is within the rest.
@@ -79,7 +79,7 @@ def slack(terms: int) -> np.float32:
 
 @lru_cache(maxsize=16)
 def _spread(offsets: bytes) -> NDArray[np.int32]:
-    """An order of neighbours in which each is as far as can be from those before: close ones say much the same."""
+    """Return an order of neighbours in which each is far from those before: close ones differ by much the same."""
     place = np.frombuffer(offsets, np.int32).reshape(-1, 2).astype(np.int64)
     gap = np.full(len(place), np.iinfo(np.int64).max)
     order = []
@@ -90,39 +90,30 @@ def _spread(offsets: bytes) -> NDArray[np.int32]:
     return np.array(order, np.int32)
 
 
-def _reference(
-    sites: NDArray[np.int32],
-    field: Field,
-    offsets: NDArray[np.int32],
-    grid: Grid,
-    candidates: Candidates,
-    strip: Strip,
-    favour: np.float32,
-    price: NDArray[np.float32],
-) -> Relaxed:
-    near = neighbourhood.neighbourhood.reference(sites, field, offsets, grid)
-    distances = lcpdf.distance.reference(near, candidates)
-    distances = coherence.coherence.reference(distances, candidates, sites, field, offsets, grid, favour)
-    distances = charge.reference(distances, candidates, price)
-    choice = candidates.positions[distances.distance.argmin(0)]
-    return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
-
-
-def _launch(
-    machine: Launcher,
+@Operation
+def nearest(
+    machine: Launcher | None,
     sites: Array,
     field: Field,
     offsets: Array,
     grid: Grid,
     candidates: Candidates,
     strip: Strip,
-    favour: np.float32,
+    discount: np.float32,
     price: Array,
 ) -> Relaxed:
+    """Return the nearest candidate of each site, its distance discounted by coherence plus its penalty."""
+    if machine is None:
+        around = neighbourhood.neighbourhood.reference(sites, field, offsets, grid)
+        distances = lcpdf.distance.reference(around, candidates)
+        distances = coherence.coherence.reference(distances, candidates, sites, field, offsets, grid, discount)
+        distances = charge.reference(distances, candidates, price)
+        choice = candidates.positions[distances.distance.argmin(0)]
+        return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
     count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
     plane = np.int32(candidates.rows * candidates.cols)
     defines = {"V": machine.vector, "C": channels, "STEP": machine.step, "CHECK": CHECK}
-    f, i, leaves = np.float32, np.int32, strip.leaves() if machine.skip else None
+    f, i, leaves = np.float32, np.int32, strip.leaves()
     near = machine.empty((count, neighbours * (1 + channels)), f)
     terms = machine.empty((count, neighbours * (2 + channels)), i)
     least, certain = machine.empty((count,), f), machine.empty((count,), f)
@@ -135,74 +126,36 @@ def _launch(
         *(sites, i(count), i(neighbours), *field, i(prod(field.values.shape[1:])), offsets, grid.struct),
         *(candidates.index_of, plane),
         *(candidates.pixels, candidates.positions, candidates.reach, strip.reach),
-        *(machine.constant(_spread(strip.offsets)), favour, price, axes, f(leaves.middle if leaves else 0)),
+        *(machine.constant(_spread(strip.offsets)), discount, price, axes, f(leaves.middle if leaves else 0)),
         *(near, terms, used, features, least, where, certain),
     )
-    if machine.skip:
-        split = machine.split(count, -(-strip.cols // (machine.vector * machine.step)) * strip.rows)
-        pitch, row = count, split if leaves else 0  # the leaves' results come first
-        parts = row + split
-        found, at, work, wanted = (machine.empty((parts, count), t) for t in (f, i, np.uint64, i))
-        if leaves:
-            machine.launch(
-                machine.kernel("nearest", "nearest_leaves", **defines),
-                (count * split,),
-                *(
-                    i(count),
-                    i(neighbours),
-                    near,
-                    features,
-                    least,
-                    where,
-                    certain,
-                    leaves.box,
-                    leaves.rows,
-                    leaves.order,
-                ),
-                *(
-                    i(leaves.number),
-                    f(leaves.blur),
-                    candidates.pixels,
-                    plane,
-                    candidates.positions,
-                    candidates.reach,
-                    price,
-                ),
-                *(i(split), found, at, work, wanted),
-            )
-        shape = (strip.first, strip.pitch, strip.rows, strip.cols)
+    split = machine.split(count, -(-strip.cols // (machine.vector * machine.step)) * strip.rows)
+    row = split if leaves else 0  # the leaves' results come first
+    parts = row + split
+    found, at, work, wanted = (machine.empty((parts, count), t) for t in (f, i, np.uint64, i))
+    if leaves:
         machine.launch(
-            machine.kernel("nearest", "nearest_scan", **defines),
+            machine.kernel("nearest", "nearest_leaves", **defines),
             (count * split,),
-            *(i(count), i(neighbours), terms, used, near, least, where),
-            *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach, price),
-            *(slack(neighbours * channels), i(split), i(leaves is None), wanted, i(row), found, at, work),
+            *(i(count), i(neighbours), near, features, least, where, certain),
+            *(leaves.box, leaves.rows, leaves.order, i(leaves.number), f(leaves.blur)),
+            *(candidates.pixels, plane, candidates.positions, candidates.reach, price),
+            *(i(split), found, at, work, wanted),
         )
-    else:
-        blocks = candidates.positions.size // BLOCK
-        around = neighbourhood.neighbourhood(machine, sites, field, offsets, grid)
-        pitch = around.weighted.shape[2]
-        parts = machine.split(pitch // machine.vector, blocks)
-        found, at = machine.empty((parts, pitch), f), machine.empty((parts, pitch), i)
-        work = where
-        machine.launch(
-            machine.kernel("nearest", "nearest_plain", **defines),
-            (pitch // machine.vector, parts),
-            *(around.confidence, around.weighted, i(neighbours), i(pitch)),
-            *(candidates.pixels, plane, candidates.positions, i(candidates.size)),
-            *(candidates.reach, price, i(blocks), i(parts), found, at),
-            local=machine.tile,
-        )
-    expected = 2 * count * candidates.size * neighbours * channels if machine.skip else 0
-    tally = machine.fma_counters(count, expected)
+    shape = (strip.first, strip.pitch, strip.rows, strip.cols)
+    machine.launch(
+        machine.kernel("nearest", "nearest_scan", **defines),
+        (count * split,),
+        *(i(count), i(neighbours), terms, used, near, least, where),
+        *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach, price),
+        *(slack(neighbours * channels), i(split), i(leaves is None), wanted, i(row), found, at, work),
+    )
+    tally = machine.fma_counters(count, 2 * count * candidates.size * neighbours * channels)
     out = Relaxed(machine.empty((count,), np.int32), machine.empty((channels, count), np.uint16))
     machine.launch(
         machine.kernel("nearest", "nearest_end", **defines),
         (count,),
-        *(i(count), i(pitch), least, where, i(parts), found, at),
-        *(i(machine.skip), work, candidates.pixels, plane, candidates.positions, tally, *out),
+        *(i(count), least, where, i(parts), found, at),
+        *(work, candidates.pixels, plane, candidates.positions, tally, *out),
     )
     return out
-
-
-nearest = Operation("nearest", _reference, _launch)

@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Operation
-from simdtex.ops.matching import distance, each_of, match_ranks
+from simdtex.ops.matching import distance, match_ranks
 from simdtex.ops.sort import SCRATCH, local, sort
 
 COUNTERS = 3 * 2**11
@@ -27,19 +26,22 @@ def alone(machine: Launcher, segments: int, n: int) -> bool:
     return n <= (LONG if 2 * segments >= machine.info.compute_units else SHORT)
 
 
-def _reference(
-    values: NDArray[np.int32], first: NDArray[np.int32], targets: NDArray[np.int32]
-) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    matched = match_ranks.reference(sort.reference(values, first), targets)
-    return matched, distance.reference(values, matched)
+@Operation
+def ranking(machine: Launcher | None, values: Array, first: Array, targets: Array) -> tuple[Array, Array]:
+    """Return values (segments, n) int32 with the histograms of the targets, and how far they have moved.
 
-
-def _launch(machine: Launcher, values: Array, first: Array, targets: Array) -> tuple[Array, Array]:
+    ``values`` (segments, n) int32, equal ones in the order of the permutation ``first`` (n,) int32; ``targets`` (T, m)
+    int32 are sorted. The second result, (segments,) int64, is the sum of |before - after| over each segment. Cost: two
+    to four passes over the values, 16 bytes of scratch for each of 2**22 at a time.
+    """
+    if machine is None:
+        matched = match_ranks.reference(sort.reference(values, first), targets)
+        return matched, distance.reference(values, matched)
     segments, n = values.shape
     if not alone(machine, segments, n):
-        matched = match_ranks.launch(machine, sort.launch(machine, values, first), targets)
-        return matched, distance.launch(machine, values, matched)
-    each, m = each_of(segments, targets.shape[0]), targets.shape[1]
+        matched = match_ranks(machine, sort(machine, values, first), targets)
+        return matched, distance(machine, values, matched)
+    each, m = segments // targets.shape[0], targets.shape[1]
     most = min(segments, max(1, SCRATCH // max(n, COUNTERS // 2)))
     pairs, counts = machine.empty((2, most, n, 2), np.uint32), machine.empty((most, COUNTERS), np.uint32)
     matched, moved = machine.empty((segments, n), np.int32), machine.empty((segments,), np.int64)
@@ -54,12 +56,3 @@ def _launch(machine: Launcher, values: Array, first: Array, targets: Array) -> t
             local=local(machine),
         )
     return matched, moved
-
-
-ranking = Operation("ranking", _reference, _launch)
-"""``ranking(machine, values, first, targets)``: (segments, n) int32 with the histograms of the targets, and how far.
-
-``values`` (segments, n) int32, equal ones in the order of the permutation ``first`` (n,) int32; ``targets`` (T, m)
-int32 are sorted. The second result, (segments,) int64, is the sum of |before - after| over each segment. Cost: two to
-four passes over the values, 16 bytes of scratch for each of 2**22 at a time.
-"""

@@ -1,25 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A picture and an older copy of it below: what tiles that relax on their own see of one another."""
+"""A picture with an older copy of it below, which tiles that relax on their own read of one another."""
 
 from __future__ import annotations
 
 from math import prod
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Operation
 
 TYPES = {"uint8": "uchar", "uint16": "ushort", "int32": "int"}
 
 
-def _reference(picture: NDArray[Any], height: int) -> NDArray[Any]:
-    now = picture[..., :height, :]
-    return np.ascontiguousarray(np.concatenate([now, now], -2))  # rows may have been laid out in any way
-
-
-def _launch(machine: Launcher, picture: Array, height: int) -> Array:
+@Operation
+def snapshot(machine: Launcher | None, picture: Array, height: int) -> Array:
+    """Return (..., height, W), or a stack made before, as a stack (..., 2 height, W)."""
+    if machine is None:
+        now = picture[..., :height, :]
+        return np.ascontiguousarray(np.concatenate([now, now], -2))  # rows may have been laid out in any way
     *planes, rows, width = picture.shape
     plane, count = height * width, prod(planes)
     stacked = picture if rows == 2 * height else machine.empty((*planes, 2 * height, width), picture.dtype)
@@ -29,7 +27,3 @@ def _launch(machine: Launcher, picture: Array, height: int) -> Array:
         *(picture, np.int32(plane), np.int32(count), np.int32(rows * width), stacked),
     )
     return stacked
-
-
-snapshot = Operation("snapshot", _reference, _launch)
-"""``snapshot(machine, picture, height)``: (..., height, W), or a stack made before, to (..., 2 height, W)."""

@@ -4,9 +4,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from simdtex.machine.interface import Array, Launcher, Operation, Work
+from simdtex.machine.interface import Array, Launcher, Operation
 
 SCRATCH = 2**22
 """Values that are sorted together, unless one segment has more: 16 bytes each for keys and indices, twice."""
@@ -31,46 +30,34 @@ def local(machine: Launcher) -> tuple[int]:
     return (64,) if machine.info.kind == "gpu" else (1,)
 
 
-def _reference(values: NDArray[np.int32], first: NDArray[np.int32]) -> NDArray[np.int32]:
-    return first[np.argsort(values[:, first], axis=1, kind="stable")]
+@Operation
+def sort(machine: Launcher | None, values: Array, first: Array) -> Array:
+    """Return the index in each segment of its k-th smallest value, (segments, n) int32.
 
-
-def _launch(machine: Launcher, values: Array, first: Array) -> Array:
+    ``values`` is (segments, n) int32. Equal values come in the order of the permutation ``first`` (n,) int32.
+    """
     segments, n = values.shape
+    if machine is None:
+        return first[np.argsort(values[:, first], axis=1, kind="stable")]
     order = machine.empty((segments, n), np.int32)
     most = min(segments, max(1, SCRATCH // max(n, DIGITS)))
     pairs, moved = (machine.empty((most, n, 2), np.uint32) for _ in range(2))
     length = run_length(machine, most, n)
     runs = -(-n // length)
     counts, totals = machine.empty((most, runs, DIGITS), np.uint32), machine.empty((most, DIGITS), np.uint32)
-    group = local(machine)
+    group, last = local(machine), 24
     read, count, scan, scatter = (
         machine.kernel("sort", f"sort_{name}") for name in ("read", "count", "scan", "scatter")
     )
     for begin in range(0, segments, most):
-        pieces = min(most, segments - begin)
-        shape = np.array([pieces, n, runs, length], np.int32)
-        size = (pieces * runs,)
-        once = 8.0 * pieces * n  # bytes of keys and their indices
-        machine.launch(
-            read, size, values, np.int32(begin), first, *shape, pairs, local=group, work=Work(None, 2 * once)
-        )
-        for shift in range(0, 32, 8):
-            machine.launch(count, size, pairs, *shape, np.int32(shift), counts, local=group, work=Work(None, once))
+        pieces, at = min(most, segments - begin), np.int32(begin)
+        shape, size = np.array([pieces, n, runs, length], np.int32), (pieces * runs,)
+        machine.launch(read, size, values, at, first, *shape, pairs, local=group)
+        for bits in range(0, 32, 8):
+            shift = np.int32(bits)
+            machine.launch(count, size, pairs, *shape, shift, counts, local=group)
             machine.launch(scan, (pieces * DIGITS,), np.int32(pieces), np.int32(runs), counts, totals)
-            machine.launch(
-                scatter,
-                size,
-                *(pairs, *shape, np.int32(shift), counts, totals, moved, np.int32(shift == 24), order, np.int32(begin)),
-                local=group,
-                work=Work(None, 2 * once),
-            )
+            moving = (pairs, *shape, shift, counts, totals, moved, np.int32(bits == last), order, at)
+            machine.launch(scatter, size, *moving, local=group)
             pairs, moved = moved, pairs
     return order
-
-
-sort = Operation("sort", _reference, _launch)
-"""``sort(machine, values, first)``: (segments, n) int32, the index in each segment of its k-th smallest value.
-
-``values`` is (segments, n) int32. Equal values come in the order of the permutation ``first`` (n,) int32.
-"""

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.machine.interface import Array, Launcher, Operation, Work
-from simdtex.ops.laplacian import within
+from simdtex.machine.interface import Array, Launcher, Operation, touching
+from simdtex.ops.laplacian import sizes, within
 
 PADDED = 2**24
 """Most float32 values that are laid out at a time, fewer where the machine's scratch memory is smaller."""
@@ -26,52 +26,24 @@ ROWS = {1: 4, 2: 4, 4: 2, 6: 2}
 
 
 def _around(picture: NDArray[np.int32], reach: int, torus: bool) -> NDArray[np.float64]:
-    """The pictures, rounded to float32, with so many pixels of what lies beyond the border on each side."""
+    """Return the pictures, rounded to float32, with so many pixels beyond the border on each side."""
     row, col = (within(np.arange(-reach, n + reach), n, torus) for n in picture.shape[1:])
     return picture[:, row[:, None], col].astype(np.float32).astype(np.float64)
 
 
 def _fma(tap: Any, x: NDArray[np.float64], total: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A product and a sum, exact in double precision, rounded once."""
+    """Return a product plus a sum, exact in double precision, rounded once."""
     result: NDArray[np.float32] = (tap.astype(np.float64) * x + total).astype(np.float32)
     return result
 
 
-def _split(picture: NDArray[np.int32], taps: NDArray[np.float32], torus: bool, step: int) -> NDArray[np.int32]:
-    _, rows, cols = picture.shape
-    around = _around(picture, taps.shape[1] // 2, torus)
-    total = np.zeros((len(taps), *picture[:, ::step, ::step].shape), np.float32)
-    for a, b in np.ndindex(taps.shape[1:]):
-        total = _fma(taps[:, a, b, None, None, None], around[:, a : a + rows : step, b : b + cols : step], total)
-    return np.rint(total).astype(np.int32)
-
-
-def _join(
-    terms: Sequence[tuple[NDArray[np.int32], NDArray[np.float32], int]], shape: tuple[int, int], torus: bool
-) -> NDArray[np.int32]:
-    rows, cols = shape
-    total = np.zeros((terms[0][0].shape[1], rows, cols), np.float32)
-    for bands, taps, step in terms:
-        for band, f in zip(bands, taps[:, ::-1, ::-1], strict=True):
-            spread = np.zeros(total.shape, np.int32)
-            spread[:, ::step, ::step] = band
-            around = _around(spread, taps.shape[1] // 2, torus)
-            for a, b in np.ndindex(f.shape):
-                total = _fma(f[a, b], around[:, a : a + rows, b : b + cols], total)
-    return np.rint(total).astype(np.int32)
-
-
 def _up(n: int, unit: int) -> int:
-    """The next multiple of a unit."""
+    """Return the next multiple of a unit."""
     return -(-n // unit) * unit
 
 
-def _sizes(*numbers: int) -> tuple[np.int32, ...]:
-    return tuple(np.int32(n) for n in numbers)
-
-
 def _pieces(machine: Launcher, planes: int, rows: int, line: int, extra: int, unit: int) -> Iterator[tuple[int, ...]]:
-    """Planes, or rows of a plane, that fit in scratch memory: first plane, planes, first row, rows.
+    """Yield planes, or rows of a plane, that fit in scratch memory: first plane, planes, first row, rows.
 
     A row takes `line` values, and a piece `extra` rows more than its own, which are whole units.
     """
@@ -83,9 +55,21 @@ def _pieces(machine: Launcher, planes: int, rows: int, line: int, extra: int, un
             yield first, min(together, planes - first), first_row, min(strip, rows - first_row)
 
 
-def _launch_split(machine: Launcher, picture: Array, taps: Array, torus: bool, step: int) -> Array:
+@Operation
+def steerable_split(machine: Launcher | None, picture: Array, taps: Array, torus: bool, step: int) -> Array:
+    """Return the picture correlated with each of the filters, at every step-th row and column from 0.
+
+    ``step`` is 1 or 2: (bands, planes, rows, cols) int32, sizes rounded up. Beyond the border comes the other side of a
+    ``torus``, or the mirror image. Cost: side**2 multiply-adds a value.
+    """
     planes, *size = picture.shape
     count, side, _ = taps.shape
+    if machine is None:
+        around, (rows, cols) = _around(picture, side // 2, torus), size
+        found = np.zeros((count, *picture[:, ::step, ::step].shape), np.float32)
+        for a, b in np.ndindex(side, side):
+            found = _fma(taps[:, a, b, None, None, None], around[:, a : a + rows : step, b : b + cols : step], found)
+        return np.rint(found).astype(np.int32)
     rows, cols = (-(-n // step) for n in size)
     bands = machine.empty((count, planes, rows, cols), np.int32)
     v, unit = machine.vector, ROWS.get(count, 1)
@@ -101,26 +85,40 @@ def _launch_split(machine: Launcher, picture: Array, taps: Array, torus: bool, s
         machine.launch(
             pad,
             (height * step * pitch // v, together),
-            *(picture, *_sizes(*size, torus, side // 2, 1, planes, first, step * first_row, together, height, pitch)),
+            *(picture, *sizes(*size, torus, side // 2, 1, planes, first, step * first_row, together, height, pitch)),
             padded,
-            work=Work(None, 8.0 * together * height * step * pitch),
         )
         machine.launch(
             split,
             (_up(some, unit) // unit * across // v, together),
-            *(padded, *_sizes(together, height, pitch), taps, *_sizes(side, planes, rows, cols)),
-            *(*_sizes(first, first_row, some), bands),
-            work=Work(
-                together * some * cols * taps.size, 4.0 * together * (height * step * pitch + some * cols * count)
-            ),
+            *(padded, *sizes(together, height, pitch), taps, *sizes(side, planes, rows, cols)),
+            *(*sizes(first, first_row, some), bands),
+            work=touching(padded, bands, fma=together * some * cols * taps.size),
         )
     return bands
 
 
-def _launch_join(
-    machine: Launcher, terms: Sequence[tuple[Array, Array, int]], shape: tuple[int, int], torus: bool
+@Operation
+def steerable_join(
+    machine: Launcher | None, terms: Sequence[tuple[Array, Array, int]], shape: tuple[int, int], torus: bool
 ) -> Array:
+    """Return the sum over all bands of all terms, (planes, rows, cols) int32.
+
+    ``terms`` are (bands, taps, step): a band is spread over ``shape``, (rows, cols), with zeros between if the step is
+    2, and correlated with its filter turned by 180 degrees. Cost: side**2 multiply-adds a pixel and band; half as many
+    for a step of 2, but on a torus of an odd number of rows.
+    """
     planes, (rows, cols) = terms[0][0].shape[1], shape
+    if machine is None:
+        sums = np.zeros((planes, rows, cols), np.float32)
+        for bands, taps, step in terms:
+            for band, f in zip(bands, taps[:, ::-1, ::-1], strict=True):
+                spread = np.zeros(sums.shape, np.int32)
+                spread[:, ::step, ::step] = band
+                around = _around(spread, taps.shape[1] // 2, torus)
+                for a, b in np.ndindex(f.shape):
+                    sums = _fma(f[a, b], around[:, a : a + rows, b : b + cols], sums)
+        return np.rint(sums).astype(np.int32)
     picture = machine.empty((planes, rows, cols), np.int32)
     v, unit = machine.vector, 2 * ROWS[1]
     across = _up(cols, v)
@@ -136,40 +134,20 @@ def _launch_join(
             total = padded if len(terms) == 1 else machine.empty(together * some * across, np.float32)
         for number, (bands, taps, step) in enumerate(terms):
             count, own = taps.shape[:2]
-            # Every other row is zeros, but where the rows repeat after an odd number even ones meet odd ones.
+            # Every other row is zeros, but if the rows repeat after an odd number even ones meet odd ones.
             skip = 1 if rows == 1 or (torus and rows % 2) else step
             machine.launch(
                 machine.kernel("steerable", "steerable_pad", V=v, SPREAD=step, APART=1),
                 (height * pitch // v, count * together),
-                *(bands, *_sizes(rows, cols, torus, own // 2, count, planes, first, first_row)),
-                *(*_sizes(together, height, pitch), padded),
-                work=Work(None, 4.0 * count * together * height * pitch * (1 + 1 / step**2)),
+                *(bands, *sizes(rows, cols, torus, own // 2, count, planes, first, first_row)),
+                *(*sizes(together, height, pitch), padded),
             )
             machine.launch(
                 join,
                 (_up(some, ROWS[1] * skip) // ROWS[1] * across // v, together),
-                *(padded, *_sizes(together, height, pitch), taps, *_sizes(count, own, skip)),
-                *_sizes(number == 0, number == len(terms) - 1),
-                *(total, *_sizes(rows, cols, first, first_row, some), picture),
-                work=Work(
-                    count * together * some * cols * own**2 / skip,
-                    4.0 * together * (count * height * pitch + some * across),
-                ),
+                *(padded, *sizes(together, height, pitch), taps, *sizes(count, own, skip)),
+                *sizes(number == 0, number == len(terms) - 1),
+                *(total, *sizes(rows, cols, first, first_row, some), picture),
+                work=touching(padded, picture, fma=count * together * some * cols * own**2 / skip),
             )
     return picture
-
-
-steerable_split = Operation("steerable", _split, _launch_split)
-"""``steerable_split(machine, picture, taps, torus, step)``: the picture correlated with each of the filters.
-
-At every step-th row and column from 0, where ``step`` is 1 or 2: (bands, planes, rows, cols) int32, sizes rounded up.
-Beyond the border comes the other side of a ``torus``, or the mirror image. Cost: side**2 multiply-adds a value.
-"""
-
-steerable_join = Operation("steerable", _join, _launch_join)
-"""``steerable_join(machine, terms, shape, torus)``: (planes, rows, cols) int32, the sum over all bands of all terms.
-
-``terms`` are (bands, taps, step): a band is spread over ``shape``, (rows, cols), with zeros between where the step is
-2, and correlated with its filter turned by 180 degrees. Cost: side**2 multiply-adds a pixel and band; half as many for
-a step of 2, but on a torus of an odd number of rows.
-"""

@@ -4,24 +4,20 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.lattice import Grid
 from simdtex.ops.neighbourhood import Field
 
 
-def _reference(
-    sites: NDArray[np.int32], field: Field, offsets: NDArray[np.int32], grid: Grid, xi: int
-) -> NDArray[np.uint16]:
-    r = grid.neighbours(sites, offsets)
-    t = np.where(r < 0, 0, field.temperature.ravel()[r].astype(np.int32))
-    members = np.maximum(1, (r >= 0).sum(0))
-    cooled: NDArray[np.uint16] = (np.maximum(0, xi + t.sum(0)) // members).astype(np.uint16)
-    return cooled
-
-
-def _launch(machine: Launcher, sites: Array, field: Field, offsets: Array, grid: Grid, xi: int) -> Array:
+@Operation
+def temperature(machine: Launcher | None, sites: Array, field: Field, offsets: Array, grid: Grid, xi: int) -> Array:
+    """Return the new temperatures of sites in 1/1024, (S,) uint16; ``xi`` in 1/1024 too."""
+    if machine is None:
+        r = grid.neighbours(sites, offsets)
+        t = np.where(r < 0, 0, field.temperature.ravel()[r].astype(np.int32))
+        members = np.maximum(1, (r >= 0).sum(0))
+        return (np.maximum(0, xi + t.sum(0)) // members).astype(np.uint16)
     cooled = machine.empty((sites.size,), np.uint16)
     machine.launch(
         machine.kernel("temperature", "temperature"),
@@ -30,6 +26,3 @@ def _launch(machine: Launcher, sites: Array, field: Field, offsets: Array, grid:
         *(grid.struct, np.int32(xi), cooled),
     )
     return cooled
-
-
-temperature = Operation("temperature", _reference, _launch)

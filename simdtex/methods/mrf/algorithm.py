@@ -22,12 +22,12 @@ from simdtex.model.lattice import Grid
 from simdtex.model.sample import BLOCK
 from simdtex.ops import active
 from simdtex.ops.commit import commit
-from simdtex.ops.finish import around, finish
+from simdtex.ops.finish import finish
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import Relaxation, relax, relax_apart
 from simdtex.ops.snapshot import snapshot
 from simdtex.ops.start import start
-from simdtex.ops.use import price, use
+from simdtex.ops.use import use, use_penalty
 from simdtex.run import Callback, Output
 
 AT_ONCE = 2**20
@@ -102,7 +102,7 @@ class Run(Lattices):
 def opened(level: Level, field: Field) -> State:
     """Return the state of a level before its first sweep."""
     count, heat = active.survey(level.machine, level.grid, field.temperature)
-    penalty = price(counted(level, field, level.grid), level.market, level.rate, None)
+    penalty = use_penalty(counted(level, field, level.grid), level.fair_use, level.rate, None)
     return State(*field, penalty, level.schedule.init(level.setting), level.number, active=count, heat=heat)
 
 
@@ -126,7 +126,7 @@ def sweep(level: Level, state: State, watch: Watch = ignore) -> tuple[State, lis
     free = not state.active
     field, memory, chosen = swept(level, state, free, watch)
     count, heat = active.survey(level.machine, level.grid, field.temperature)
-    penalty = price(counted(level, field, level.grid), level.market, level.rate, state.price)
+    penalty = use_penalty(counted(level, field, level.grid), level.fair_use, level.rate, state.price)
     cooling, freed = state.cooling + (not free), state.free + free
     return State(*field, penalty, memory, level.number, cooling, freed, count, heat), chosen
 
@@ -148,7 +148,7 @@ def swept(level: Level, state: State, free: bool, watch: Watch = ignore) -> tupl
 def counted(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
     """Return how often each candidate is used, (n,); zeros if nothing depends on it."""
     candidates = level.proposal.candidates
-    if not (level.rate or level.market.kinds is not None):
+    if not (level.rate or level.fair_use.kinds is not None):
         return np.zeros(candidates.size, np.int32)
     found: NDArray[np.int32] = use(level.machine, field, grid, candidates)
     return found
@@ -160,9 +160,9 @@ def rule(level: Level, price: NDArray[np.float32]) -> Relaxation:
         grid=level.grid,
         offsets=level.offsets,
         proposal=level.proposal,  # 6.2.2.1 the LCPDF, equations (6) and (12), of these candidates
-        favour=level.favour,
+        discount=level.discount,
         novelty=level.novelty,
-        beside=level.beside,
+        confidences=level.confidences,
         price=level.machine.put(np.pad(price, (0, -price.size % BLOCK))),
         choice=level.choice,  # 6.2.2.2 a draw from it, or its mode
         xi=level.xi,  # 6.2.2.3 the temperature, equation (13)
@@ -227,12 +227,12 @@ def finished(
     if not run.options.finish:
         values = grid.view(run.machine.get(field.values))[:, first : first + len(seen)]
         return sample.picture(values, seen)
-    ring, rows = around(run.options.finish), max(1, AT_ONCE // grid.cols)
+    sd, rows = run.options.finish, max(1, AT_ONCE // grid.cols)
     picture = np.empty((*seen.shape, sample.shown), sample.pixels.dtype)
     given = run.machine.put((np.zeros((grid.height, grid.width), bool) if known is None else known).view(np.uint8))
     for top in range(0, len(seen), rows):
         here = seen[top : top + rows]
-        by = finish(run.machine, field, given, grid, run.planes, sample, *ring, (first + top) * grid.cols, here.size)
+        by = finish(run.machine, field, given, grid, run.planes, sample, sd, (first + top) * grid.cols, here.size)
         picture[top : top + rows] = sample.moved(here, by.reshape(-1, *here.shape))
     return picture
 

@@ -14,7 +14,7 @@ from simdtex.machine.interface import Array, Machine
 from simdtex.model.given import NOBODY, Planes, Stand, stand_ins
 from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import Grid
-from simdtex.ops.neighbourhood import UNTOUCHED, Beside, Field
+from simdtex.ops.neighbourhood import UNTOUCHED, Confidences, Field
 
 FREE, KNOWN, STANDING = 0, 1, 2
 """Site kinds: free, known, or standing in for an off-grid datum."""
@@ -39,12 +39,12 @@ class Conditions(ABC):
     ----------
     levels : int
         M of Algorithm 1.
-    beside : Beside
+    confidences : Confidences
         Which channels are guides, whether values have confidences of their own, and the weights.
     """
 
-    def __init__(self, levels: int, beside: Beside) -> None:
-        self.levels, self.beside = levels, beside
+    def __init__(self, levels: int, confidences: Confidences) -> None:
+        self.levels, self.confidences = levels, confidences
 
     @abstractmethod
     def at(self, number: int, grid: Grid) -> Held | None:
@@ -66,9 +66,9 @@ class Conditions(ABC):
             above = self.at(number + 1, coarse)
             released = temperature[grid.within.top % 2 :: 2, grid.within.left % 2 :: 2]
             released[above is not None and above.kind == STANDING] = UNTOUCHED
-        matched, known = len(values) - self.beside.guides, held.kind != FREE
-        if self.beside.guides:
-            values[matched:] = held.values[-self.beside.guides :]
+        matched, known = len(values) - self.confidences.guides, held.kind != FREE
+        if self.confidences.guides:
+            values[matched:] = held.values[-self.confidences.guides :]
         if known.any():
             values[:matched, known] = held.values[:matched, known]
             source[known], temperature[known] = held.source[known], 0
@@ -106,7 +106,7 @@ class Conditioning(Conditions):
         hard = planes is not None and bool((planes.source < 0)[planes.known].any())
         centre = np.float32(max(1, round(sqrt(neighbours) / 2)))
         weight = np.float32(round(8 * sqrt(data_weight)) / 8)  # in eighths, so that sums stay exact
-        super().__init__(levels, Beside(len(guides), len(guides) > 0 or hard, centre, weight))
+        super().__init__(levels, Confidences(len(guides), len(guides) > 0 or hard, centre, weight))
         self.guides, self.planes = guides, planes
         self._held: dict[int, Held] = {}
 

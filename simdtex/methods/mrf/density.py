@@ -50,7 +50,7 @@ def lcpdf_at(
 
     Returns
     -------
-    (S, levels) float64 array
+    (S, greys) float64 array
         Every row adds up to 1.
 
     Raises
@@ -58,14 +58,14 @@ def lcpdf_at(
     ValueError
         No neighbourhood of the sample matches that of a site.
     """
-    levels = sample.top + 1
+    greys = sample.top + 1
     values, source = image[None].astype(np.uint16), np.zeros(image.shape, np.int32)
     field = Field(*(machine.put(array) for array in (values, source, temperature)))
     candidates = sample.candidates(machine, offsets, 1)
     h = bandwidth * lcpdf.optimal_bandwidth(sample.variance, candidates.size, len(offsets) + 1)
     window = lcpdf.window(h, sample.top)
     device_offsets = machine.put(offsets)
-    rows = [np.zeros((0, levels))]
+    rows = [np.zeros((0, greys))]
     step = min(machine.chunk(candidates.size, len(offsets), 1), AT_ONCE)
     for first in range(0, len(sites), step):
         here = machine.put(sites[first : first + step])
@@ -75,7 +75,7 @@ def lcpdf_at(
             density = machine.get(lcpdf.density(machine, distances, candidates, window)).astype(np.float64)
             rows.append(density / np.cumsum(density, 1)[:, -1:])
         else:
-            counts = machine.get(histogram(machine, distances, candidates, levels))
+            counts = machine.get(histogram(machine, distances, candidates, greys))
             rows.append(_shares(counts, sites[first : first + step], grid))
     return np.concatenate(rows)
 

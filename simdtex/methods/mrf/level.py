@@ -19,12 +19,12 @@ from simdtex.model.given import Given, Planes
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates, Sample
 from simdtex.ops import active, lcpdf
+from simdtex.ops.lcpdf import Choice
 from simdtex.ops.nearest import strip_of
-from simdtex.ops.neighbourhood import Beside, Field
-from simdtex.ops.relax import KEPT, Choice, Everything, Listed
-from simdtex.ops.similar import Table, lattice_of, most_similar
-from simdtex.ops.square import Square, square_of
-from simdtex.ops.use import Market
+from simdtex.ops.neighbourhood import Confidences, Field
+from simdtex.ops.relax import EXHAUSTIVE, KEPT, Everything, Listed
+from simdtex.ops.square import square_of
+from simdtex.ops.use import FairUse
 from simdtex.schedules import Setting
 
 WHOLE = 256
@@ -184,7 +184,6 @@ class Lattices:
         self.conditions = conditions or Conditioning(
             plan.levels, plan.sample.guides, plan.planes, len(plan.offsets), plan.options.data_weight
         )
-        self._tables: dict[int, Table] = {}
         self._last: Level | None = None
 
     def grid(self, number: int) -> Grid:
@@ -228,18 +227,13 @@ class Lattices:
             every = sample.candidates(machine, *self.where(number), self.planes, every=True)
             proposal = Everything(every, strip_of(machine, sample, *self.where(number)))
         else:
-            candidates = self.candidates(number)
-            likes, square = options.similar, square_of(machine, sample, *self.where(number))
-            nobody = np.zeros((1, 1), np.int32)
-            similar = self.similar(number, candidates, square).numbers if likes else machine.put(nobody)
-            few = (min(options.suggesting, len(offsets)), options.chance)
-            proposal = Listed(candidates, square, similar, likes, *few)
+            square = square_of(machine, sample, *self.where(number))
+            proposal = Listed(self.candidates(number), square, len(offsets), options.chance)
         dimensions = sample.channels * (len(offsets) + 1)
         variance = sample.variance
         h = options.bandwidth * lcpdf.optimal_bandwidth(variance, count, dimensions)  # (8)
-        draws = options.relaxation == "gibbs" or (coarsest and options.coarsest == "gibbs")
-        anew = coarsest and proposal.slots <= KEPT and (draws or options.pixel == "source")
-        novelty = options.novelty * min(1.0, WHOLE / count) if anew else 0.0
+        draws = options.relaxation == "gibbs" or coarsest
+        novelty = options.novelty * min(1.0, WHOLE / count) if coarsest and proposal.slots <= KEPT else 0.0
         return Level(
             number=number,
             setting=Setting(machine, grid, offsets, options.order, self.seed, number),
@@ -248,11 +242,11 @@ class Lattices:
             schedule=self.plan.schedule,
             proposal=proposal,
             choice=Choice(draws, options.pixel == "density", lcpdf.window(h, sample.top)),
-            favour=np.float32(1 / (1 + options.coherence)),
+            discount=np.float32(1 / (1 + options.coherence)),
             novelty=np.float32(novelty * sample.channels * variance),
             rate=options.balance * self.usual,
-            market=self.market(number),
-            beside=self.conditions.beside,
+            fair_use=self.fair_use(number),
+            confidences=self.conditions.confidences,
             xi=min(-1, round(options.xi * 1024)),
             in_place=self._in_place(grid),
             weighed=self.weighed,
@@ -271,18 +265,17 @@ class Lattices:
 
     def exhaustive(self, number: int) -> bool:
         """Whether a site of a level weighs all its candidates."""
-        options, coarsest = self.options, number == self.levels - 1
-        if options.search == "exact" or coarsest:
+        if self.options.search == "exact" or number == self.levels - 1:
             return True
-        return bool(self.sample.positions(*self.where(number)).size <= options.exhaustive)
+        return bool(self.sample.positions(*self.where(number)).size <= EXHAUSTIVE)
 
-    def market(self, number: int) -> Market:
-        """Who competes for the sites of a level."""
+    def fair_use(self, number: int) -> FairUse:
+        """Return where the candidates of a level lie, and how much use of each is fair."""
         step = 2**number if self.options.phases == "all" else 1
         rows, cols = self.sample.lines(*self.where(number))
         fair, kinds = self.sample.fair(*self.where(number)), (*self._kinds(number), STRICT * self.usual)
         around = int(self.offsets.max()) * step
-        return Market((rows.size, cols.size), around, fair, not self.exhaustive(number), *kinds)
+        return FairUse((rows.size, cols.size), around, fair, not self.exhaustive(number), *kinds)
 
     def _kinds(self, number: int) -> tuple[NDArray[np.intp] | None, tuple[float, ...]]:
         """The category of each place where candidates may lie, and the shares that are asked for."""
@@ -299,20 +292,6 @@ class Lattices:
     def candidates(self, number: int) -> Candidates:
         """The candidates of a level."""
         return self.sample.candidates(self.machine, *self.where(number), self.planes)
-
-    def similar(self, number: int, candidates: Candidates | None = None, square: Square | None = None) -> Table:
-        """The candidates of a level most similar to each: made with the help of the level above, once.
-
-        ``candidates`` and ``square`` are those of the level where somebody has them already.
-        """
-        if number not in self._tables:
-            above = self.similar(number + 1) if number < self.levels - 1 else None
-            lattice = lattice_of(self.sample, *self.where(number))
-            candidates = candidates or self.candidates(number)
-            square = square or square_of(self.machine, self.sample, *self.where(number))
-            likes = self.options.similar
-            self._tables[number] = most_similar(self.machine, self.offsets, candidates, square, lattice, likes, above)
-        return self._tables[number]
 
 
 @dataclass(frozen=True)
@@ -332,18 +311,18 @@ class Level:
     schedule : simdtex.schedules.Schedule
     proposal : Everything or Listed
         Which candidates a site weighs.
-    choice : simdtex.ops.relax.Choice
+    choice : simdtex.ops.lcpdf.Choice
         What it takes of them.
-    favour : float32
+    discount : float32
         1 / (1 + coherence).
     novelty : float32
         What a candidate costs for each neighbour whose source it continues; at levels but the coarsest 0.
     rate : float
         lambda N C sigma^2: what a candidate costs whose surroundings are used twice as often as their share.
-    market : simdtex.ops.use.Market
+    fair_use : simdtex.ops.use.FairUse
         Where the candidates lie, and how much of each is fair.
-    beside : simdtex.ops.neighbourhood.Beside
-        Which channels are guides, and whether each value may be unknown.
+    confidences : simdtex.ops.neighbourhood.Confidences
+        Which channels are guides, and how much each value counts.
     xi : int
         Of equation (13), in 1/1024.
     in_place : bool
@@ -364,11 +343,11 @@ class Level:
     schedule: schedules.Schedule
     proposal: Everything | Listed
     choice: Choice
-    favour: np.float32
+    discount: np.float32
     novelty: np.float32
     rate: float
-    market: Market
-    beside: Beside
+    fair_use: FairUse
+    confidences: Confidences
     xi: int
     in_place: bool
     weighed: Array
@@ -390,7 +369,7 @@ class Level:
     def at_once(self) -> int:
         """Sites that are relaxed between two looks at the clock, as far as scratch memory holds what they need."""
         channels, neighbours = int(self.proposal.candidates.pixels.shape[0]), len(self.setting.offsets)
-        stores = isinstance(self.proposal, Everything) and (self.choice.stores or self.beside.own)
+        stores = isinstance(self.proposal, Everything) and (self.choice.draws or self.confidences.own)
         most = self.machine.chunk(self.proposal.slots, neighbours, channels, stores)
         return max(most, TOGETHER) if isinstance(self.proposal, Listed) and self.in_place else most
 

@@ -38,10 +38,10 @@ FINISH = 1.5
 NARROWEST, WIDEST = 0.01, 16.0
 """The least and the largest standard deviation of a finish."""
 
-SIMILAR, CHANCE = 64, 4096
-"""The most of the candidates that a search by coherence weighs for each suggestion, and at random."""
+CHANCE = 4096
+"""The most candidates that a coherent search weighs at random."""
 
-SEARCHED = ("search", "suggesting", "similar", "chance", "exhaustive")
+SEARCHED = ("search", "chance")
 """The options that say how candidates are searched for, which makes no difference at the coarsest level."""
 
 
@@ -181,24 +181,10 @@ class Options:
         Choice(("auto", "exact", "coherent")),
         "Weigh all candidates (exact), or only a few, which is much faster (coherent), or as it suits (auto)",
         more="``coherent`` weighs, at all but the coarsest level, the candidates that continue the source of a "
-        'neighbour, the site\'s own source and some more. ``auto`` is ``coherent`` for ``relaxation="icm"`` with '
-        '``pixel="source"``, and ``exact`` if a site draws or takes the mode of a density.',
+        "neighbour, the site's own source and some more, unless a level has 64 candidates or fewer. ``auto`` is "
+        '``coherent`` for ``relaxation="icm"``, and ``exact`` if a site draws.',
         paper="exact",
         jobs={"schedules": "exact"},
-    )
-    suggesting: int = searching(
-        12,
-        Whole(1),
-        "Let this many nearest neighbours suggest a candidate each, in a coherent search",
-        slider=(1, 24, 1),
-        shown=(),
-    )
-    similar: int = searching(
-        0,
-        Whole(0, SIMILAR),
-        "Weigh this many more candidates that are like each of these, in a coherent search",
-        slider=(0, 8, 1),
-        shown=(),
     )
     chance: int = searching(
         4,
@@ -208,17 +194,11 @@ class Options:
         slider=(0, 32, 1),
         shown=(),
     )
-    exhaustive: int = searching(
-        64,
-        Whole(0),
-        "Weigh all candidates at levels with this many or fewer, in a coherent search",
-        slider=(0, 1024, 16),
-        shown=(),
-    )
     relaxation: str = sampling(
         "icm",
         Choice(("icm", "gibbs")),
-        "Take the LCPDF's mode (icm), or draw from it (gibbs)",
+        "Take the LCPDF's mode (icm), or draw from it (gibbs); the coarsest level always draws",
+        more="Its mode says nothing while all is unknown.",
         symbol="Algorithm 1",
         paper="gibbs",
     )
@@ -251,17 +231,10 @@ class Options:
     pixel: str = sampling(
         "source",
         Choice(("source", "density")),
-        "Take pixels of the sample (source), or grey levels of the Parzen density, whose kernel also spreads over the "
-        "site itself (density)",
+        "Take pixels of the sample (source), or draw grey levels of the Parzen density, whose kernel also spreads over "
+        "the site itself (density)",
+        more='``density`` goes with ``relaxation="gibbs"``.',
         paper="density",
-    )
-    coarsest: str = sampling(
-        "gibbs",
-        Choice(("gibbs", "same")),
-        "Let the coarsest level draw (gibbs), or relax as the others (same)",
-        more="Its mode says nothing while all is unknown.",
-        paper="same",
-        shown=(),
     )
     schedule: str | schedules.Schedule = parallel(
         "coloring",
@@ -332,11 +305,8 @@ class Options:
         check(self)
         if self.finish and self.finish < NARROWEST:
             raise ValueError(f"finish is {self.finish}; give 0, or a number of at least {NARROWEST}")
-        if (self.search, self.relaxation, self.pixel) == ("coherent", "icm", "density"):
-            raise ValueError(
-                'search="coherent" finds no mode of a density; '
-                'give search="exact", pixel="source" or relaxation="gibbs"'
-            )
+        if (self.relaxation, self.pixel) == ("icm", "density"):
+            raise ValueError('pixel="density" draws grey levels; give relaxation="gibbs" too, or pixel="source"')
         if self.pixel == "density" and (self.categorical or self.weights):
             raise ValueError('categories and weights go with pixels of the sample; give pixel="source"')
         if self.categorical and self.finish:
@@ -363,8 +333,8 @@ class Options:
 
         The grey levels of a density are nobody's, so nothing says how far from an edge they are: no structure channel.
         """
-        nearest = (self.relaxation, self.pixel) == ("icm", "source")
-        search = ("coherent" if nearest else "exact") if self.search == "auto" else self.search
+        usual = "coherent" if self.relaxation == "icm" else "exact"
+        search = usual if self.search == "auto" else self.search
         finish = self.finish
         if finish is None:
             categories = (pictures.categorical and any(pictures.categorical)) or few(pictures.pixels)

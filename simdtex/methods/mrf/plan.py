@@ -16,7 +16,7 @@ from simdtex.methods.mrf.level import Input, number_of_levels
 from simdtex.methods.mrf.options import CATEGORIES as MOST
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given, planes
-from simdtex.model.guide import Beside, Guide, GuidePair
+from simdtex.model.guide import AnyGuide, Guide, GuidePair
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import NothingUsable, Sample
@@ -39,7 +39,7 @@ class Plan(Input):
         Notes
         -----
         Memory on the device, in bytes: 18 + 2 channels per output pixel (24 + 4 channels with the schedule ``block``),
-        14 channels + 4 similar + 159 per pixel of the sample with its margin, and the machine's scratch memory or, if
+        14 channels + 159 per pixel of the sample with its margin, and the machine's scratch memory or, if
         that is more, 65 per candidate. On the host, which includes a CPU's device memory: 84 per output pixel (100
         with ``block``) and 10 + 1.5 n for each of its channels, n the bytes of a value of the sample, and 64 per pixel
         of the sample (benchmarks/memory.py).
@@ -49,7 +49,7 @@ class Plan(Input):
         within_32_bits(self.shape, channels * copies, TILED)
         field, held = copies * (6 + 2 * channels), self.sample.rows * self.sample.cols
         each = 68 + 16 * copies + channels * (10 + 3 * self.sample.pixels.dtype.itemsize // 2)
-        device = pixels * (12 + field) + held * (14 * channels + 159 + 4 * self.options.similar)
+        device = pixels * (12 + field) + held * (14 * channels + 159)
         memory.require(machine, device, pixels * each + 64 * held, TILED)
         return Run(self, machine, seed)
 
@@ -84,15 +84,15 @@ def plan(
     offsets = neighbourhood_offsets(options.order)
     levels = number_of_levels([picture.shape[:2] for picture in pictures.pixels], offsets, shape, options)  # 1
     levels = levels if most is None or options.levels is not None else min(levels, most)
-    beside: list[Beside] = [check_guide(guide, options)] if guide else []
+    guides: list[AnyGuide] = [check_guide(guide, options)] if guide else []
     if given and given.partly:
         if options.pixel == "density":
             raise ValueError('sites that are known in part choose among pixels of the sample; give pixel="source"')
-        beside.append(given.colocated(pictures.pixels))
-    channels = pictures.channels + bool(options.structure) + sum(one.channels for one in beside)
-    heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or beside else 1.0  # in sums of squares
-    values = round(heavy * (channels * len(offsets) + len(beside)))
-    levels, sample = sampled(pictures, levels, offsets, values, options, beside)
+        guides.append(given.colocated(pictures.pixels))
+    channels = pictures.channels + bool(options.structure) + sum(one.channels for one in guides)
+    heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or guides else 1.0  # in sums of squares
+    values = round(heavy * (channels * len(offsets) + len(guides)))
+    levels, sample = sampled(pictures, levels, offsets, values, options, guides)
     known = planes(given, sample) if given and given.whole.any() else None
     return Plan(sample, shape, offsets, options, schedules.get(options.schedule), levels, given, known)
 
@@ -103,14 +103,14 @@ def sampled(
     offsets: NDArray[np.int32],
     values: int,
     options: Options,
-    beside: Sequence[Beside],
+    guides: Sequence[AnyGuide],
 ) -> tuple[int, Sample]:
     """Return the number of levels and the sample: fewer levels if one has no candidate and their number is open."""
     far = int(around(options.finish)[0].max()) if options.finish else 0
     for fewer in range(levels, 0, -1):
         step = 2 ** (fewer - 1)
         margin = int(offsets.max()) * step
-        sample = Sample(pictures, values, margin, options.structure, step, beside, far)
+        sample = Sample(pictures, values, margin, options.structure, step, guides, far)
         try:
             for number in range(fewer):
                 sample.allowed(offsets, 2**number, options.phases, options.edges)

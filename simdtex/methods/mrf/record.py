@@ -18,7 +18,7 @@ from simdtex.model.lattice import Grid
 from simdtex.model.use import effective_use
 from simdtex.ops import active
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.relax import Listed
+from simdtex.ops.relax import Listed, most_listed
 from simdtex.run import Callback, Output, Relaxing, Stage
 
 
@@ -282,9 +282,8 @@ def expected_work(run: Lattices) -> dict[int, tuple[float, float]]:
         coarsest = number == run.levels - 1
         sweeps = min(1024, 1 - 0.6 * len(run.offsets) / options.xi) if coarsest else 6 * 0.75
         candidates = run.sample.positions(*run.where(number)).size
-        if options.search == "coherent" and not coarsest and candidates > options.exhaustive:
-            own = min(options.suggesting, len(run.offsets)) + 1
-            candidates = min(candidates, own * (1 + options.similar) + max(1, options.chance))
+        if not run.exhaustive(number):
+            candidates = min(candidates, most_listed(len(run.offsets), options.chance))
         sites = grid.rows * grid.cols * candidates
         work[number] = (sites * sweeps, float(sites * options.free_sweeps))
     return work

@@ -153,7 +153,7 @@ class Run:
         if state.done < pixels([self.shapes[level]]):  # Loop x', y'
             first, end = next(self._launches)
             match = self.options.parity == "match"
-            sampled = candidates(self.machine, self._structure, sampled, level, first, end, match, self.seed)
+            sampled = candidates(self.machine, self._structure, sampled, level, range(first, end), match, self.seed)
             self.machine.sync()
             return state._replace(done=end, source=sampled.source, counts=sampled.counts), Info(level, end)
         analysis = self.analysis

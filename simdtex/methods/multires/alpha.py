@@ -19,7 +19,7 @@ from simdtex.methods.multires.levels import (
 )
 from simdtex.methods.multires.options import Options
 from simdtex.ops.candidates import candidates
-from simdtex.ops.laplacian import beside, within
+from simdtex.ops.laplacian import shifted, within
 from simdtex.run import paced
 
 STEPS = 100
@@ -106,7 +106,7 @@ def strain(machine: Machine, analysis: Analysis, options: Options, alpha: float)
     strains = []
     for level in reversed(range(top)):
         for first, end in paced(pixels([shapes[level]]), first_launch(analysis, level)):
-            sampled = candidates(machine, structure, sampled, level, first, end, options.parity == "match", 0)
+            sampled = candidates(machine, structure, sampled, level, range(first, end), options.parity == "match", 0)
             machine.sync()
         if level < max(1, top // 2):
             band = np.moveaxis(machine.get(analysis.bands[level]) >> COARSENED, 0, -1).astype(np.int64)
@@ -121,7 +121,7 @@ def _strain(band: NDArray[np.int64], source: NDArray[np.int32], torus: bool) -> 
         return 0.0
     place, differences = places(source, source.shape[1]), 0
     for axis, n in enumerate(source.shape):
-        near, by = beside(n, 1, torus)
+        near, by = shifted(n, 1, torus)
         other, own = place.take(near, axis), place.copy()
         moved = own[..., axis] + by.reshape((-1, 1) if axis == 0 else -1)
         own[..., axis] = within(moved, n, torus)

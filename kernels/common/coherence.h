@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A preference for coherence, which the 1998 paper lacks: neighbour r of site s was taken from sample position p_r, so
-// p_r + (s - r) continues it. The squared distance of such a candidate is multiplied by `favour` = 1 / (1 + coherence),
+// p_r + (s - r) continues it. The squared distance of such a candidate is multiplied by `discount` = 1 / (1 + coherence),
 // once however many neighbours propose it. Neighbours that no relaxation has touched (t = 1) propose none.
-#ifndef SIMDTEX_FAVOUR_H
-#define SIMDTEX_FAVOUR_H
+#ifndef SIMDTEX_COHERENCE_H
+#define SIMDTEX_COHERENCE_H
 
 #define UNTOUCHED 1024 // t = 1 in 1/1024
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Channels beside those of the pixels. The last G of C channels are guides: they are matched and never made. With -D OWN
+// Confidences. The last G of C channels are guides: they are matched and never made. With -D OWN
 // every channel has a confidence of its own: a guide's is 1 whatever the temperature, and `centre` at the site itself;
 // what nobody knows has 0.
-#ifndef SIMDTEX_BESIDE_H
-#define SIMDTEX_BESIDE_H
+#ifndef SIMDTEX_CONFIDENCE_H
+#define SIMDTEX_CONFIDENCE_H
 
 #ifndef G
 #define G 0
