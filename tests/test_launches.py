@@ -1,0 +1,61 @@
+"""The page that says which launch runs when names every function of every kernel, and no other."""
+
+import re
+from pathlib import Path
+
+import pytest
+from cases import texture
+
+import simdtex
+from simdtex.machine.opencl import OpenCL
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = (ROOT / "docs" / "concepts" / "launches.rst").read_text(encoding="utf-8")
+KERNEL = re.compile(r"__kernel\s+(?:__attribute__\s*\(\(.*?\)\)\s*)?void\s+(\w+)", re.DOTALL)
+
+
+def functions():
+    """Every kernel function -> its file."""
+    return {name: path.stem for path in (ROOT / "kernels").glob("*.cl") for name in KERNEL.findall(path.read_text())}
+
+
+def named():
+    """The names in the first column of the page's tables and in its text that could be functions."""
+    first = re.findall(r"^   \* - (.*(?:\n       .*)*)", PAGE, re.MULTILINE)
+    return {name for cell in first for name in re.findall(r"``([a-z]+(?:_[a-z]+)*)``", cell)}
+
+
+def test_every_function_of_a_kernel_is_named_and_every_name_is_one():
+    known = functions()
+    assert len(known) > 50
+    assert known.keys() - named() == {"lcpdf_density", "histogram"}, "which the text names"
+    assert {"lcpdf_density", "histogram"} <= set(re.findall(r"``(\w+)``", PAGE))
+    assert named() <= known.keys()
+
+
+def test_the_page_is_in_the_index():
+    assert "\n   launches\n" in (ROOT / "docs" / "concepts" / "index.rst").read_text(encoding="utf-8")
+
+
+ALWAYS = {"start", "active_survey"}
+GROUPS = {"active_count", "active_keep"}
+STAGES = {"neighbourhood", "lcpdf_distance", "coherence", "charge", "lcpdf_draw", "temperature", "commit"}
+NEAREST = {"nearest_begin", "nearest_leaves", "nearest_scan", "nearest_end"}
+RUNS = {
+    "default": ({}, GROUPS | {"use", "relax_all", "relax_list"}),
+    "exact": ({"search": "exact", "balance": 0}, GROUPS | {"relax_all"}),
+    "in stages": ({"search": "exact", "kept": 10, "novelty": 0}, GROUPS | STAGES | NEAREST | {"use"}),
+    "luby": ({"schedule": "luby"}, {"use", "relax_all", "relax_list", "luby_priority", "luby_round"}),
+}
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_a_run_launches_what_the_page_says(cl_device, monkeypatch, name):
+    options, expected = RUNS[name]
+    options = {"order": 8, "levels": 2, "finish": 0.0} | options
+    if kept := options.pop("kept", None):
+        monkeypatch.setattr("simdtex.ops.relax.KEPT", kept)
+    machine = OpenCL(cl_device, profile=True)
+    _, output = simdtex.synthesize(texture((30, 31)), (30, 26), rng=1, device=machine, full_output=True, **options)
+    launched = {kernel["name"] for kernel in output.statistics["kernels"]}
+    assert launched - {"active_total"} == ALWAYS | expected
