@@ -11,10 +11,9 @@ from cases import REFERENCE, laid_out, sweeps, texture
 import simdtex
 from simdtex.machine import memory
 from simdtex.methods import mrf
-from simdtex.methods.mrf import record as record_module
 from simdtex.methods.mrf.level import Active, check_fit, number_of_levels, parts
-from simdtex.methods.mrf.record import Meter, expected_work
-from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.methods.mrf.record import Record, expected_work
+from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.ops.relax import Everything, Listed
@@ -242,59 +241,26 @@ def test_grey_levels_are_as_fine_as_the_channels_and_neighbours_allow():
 # -- what is counted ------------------------------------------------------------------------------------------------
 
 
-def test_a_meter(monkeypatch):
-    clock = SimpleNamespace(now=100.0)
-    monkeypatch.setattr(record_module, "time", SimpleNamespace(perf_counter=lambda: clock.now))
-    meter = Meter({1: (100.0, 20.0), 0: (300.0, 40.0)})
-    assert (meter.fraction, meter.reports) == (0, [])
-    clock.now = 102.0
-    meter.begin(1, Grid(8, 6, 2), 10, 4)
-    done = []
+def test_how_far_a_run_is():
+    run = prepared(search="exact", free_sweeps=2)
+    record = Record(run, None)
+    record._expected = {2: (100.0, 20.0), 1: (300.0, 40.0), 0: (500.0, 40.0)}
 
-    def one(phase, left, *those):
-        number = meter.sweep(phase, left)
-        for relaxed, steps, share in those:
-            step = meter.step(steps)
-            meter.add(relaxed, 20 * relaxed, share)
-            done.append((number, step, round(meter.fraction * 460, 6)))
+    def after(level, left, share, free=0):
+        record._first_left = record._first_left or left
+        state = SimpleNamespace(active=left > 0, free=free)
+        record._advance(level, state, left, share)
+        return round(record._fraction * 1000, 6)
 
-    one("relax", 1.0, (6, 3, 0.5), (6, 1, 1.0))  # of the first no more is known than that it is one of many
-    one("relax", 0.25, (6, 2, 0.5))  # half of all
-    one("relax", 0.04, (1, 1, 1.0))  # no further than to the end
-    one("free", 0.0, (2, 1, 0.5), (10, 1, 1.0))
-    clock.now = 107.0
-    meter.end(7, (50, 3))
-    assert done == [(1, 3, 5), (1, 4, 10), (2, 6, 75), (3, 7, 100), (4, 8, 108), (4, 9, 120)]
-    done.clear()
-    meter.begin(0, Grid(8, 6), 5)
-    one("relax", 0.5, (2, 1, 0.5))
-    one("relax", 0.32, (1, 1, 0.0))
-    one("relax", 0.405, (1, 1, 0.0))  # warmer again, and yet no less is done
-    one("free", 0.0, (2, 1, 0.5))
-    clock.now = 111.0
-    meter.end(0)
-    assert done == [(1, 1, 135), (2, 2, 180), (3, 3, 180), (4, 4, 430)]
-    assert meter.reports == [
-        {
-            "level": 1, "rows": 4, "cols": 3, "candidates": 10, "sweeps": 4, "steps": 9, "relaxations": 31,
-            "equilibrium": {"sweeps": 3, "steps": 7, "relaxations": 19},
-            "fma": 20 * 31 + 150, "weighed": 50 / 31, "skipped": 7, "seconds": 5.0,
-        },
-        {
-            "level": 0, "rows": 8, "cols": 6, "candidates": 5, "sweeps": 4, "steps": 4, "relaxations": 6,
-            "equilibrium": {"sweeps": 3, "steps": 3, "relaxations": 4},
-            "fma": 20 * 6, "weighed": 5.0, "skipped": 0, "seconds": 4.0,
-        },
-    ]  # fmt: skip
-    assert isinstance(meter.reports[1]["weighed"], float)
-
-
-def test_a_meter_of_a_level_that_is_held_from_the_beginning():
-    meter = Meter({0: (300.0, 100.0)})
-    meter.begin(0, Grid(2, 2), 5)
-    assert meter.sweep("free", 0.0) == 1
-    meter.add(4, 0, 1.0)
-    assert meter.fraction == 320 / 400
+    assert after(2, 1.0, 0.5) == 5  # of the first sweep no more is known than that it is one of many
+    assert after(2, 1.0, 1.0) == 10
+    assert after(2, 0.25, 0.5) == 55  # half of all, and half a tenth
+    assert after(2, 0.0025, 1.0) == 100  # no further than to the end
+    assert [after(2, 0.0, 0.5), after(2, 0.0, 1.0, 1)] == [105, 120]
+    assert after(1, 0.0, 1.0, 1) == 460  # a level that is known from the beginning
+    record._first_left = 0.0
+    assert [after(0, 0.5, 0.0), after(0, 0.32, 0.0), after(0, 0.405, 0.0)] == [460, 560, 560]  # it never falls
+    assert after(0, 0.0, 1.0, 2) == 1000
 
 
 @pytest.mark.parametrize(

@@ -22,97 +22,6 @@ from simdtex.ops.relax import Listed, most_listed
 from simdtex.run import Callback, Output, Relaxing, Stage
 
 
-class Meter:
-    """Counts the work of a run, level by level, and estimates how far the run has come.
-
-    Parameters
-    ----------
-    expected : dict
-        Level -> expected work of its cooling and of its free sweeps, in relaxations times candidates.
-    """
-
-    def __init__(self, expected: dict[int, tuple[float, float]]) -> None:
-        self.reports: list[dict[str, Any]] = []
-        self._expected = expected
-        self._ended = self._fraction = self._cooled = 0.0
-        self._sweep_share = self._first_left = 0.0
-        self._free = self._weighed = 0
-        self._cooling = True
-        self._level_began = time.perf_counter()
-
-    def save(self) -> dict[str, Any]:
-        """Return all counts, with the seconds of the level so far in place of its beginning."""
-        saved = {name: value for name, value in vars(self).items() if name != "_expected"}
-        return saved | {"_level_began": time.perf_counter() - self._level_began}
-
-    def load(self, saved: dict[str, Any]) -> None:
-        """Go on from what `save` returned."""
-        vars(self).update(saved | {"_level_began": time.perf_counter() - saved["_level_began"]})
-
-    def begin(self, level: int, grid: Grid, candidates: int, weighed: int | None = None) -> None:
-        """Begin a level; a relaxation weighs about `weighed` of its candidates, or all."""
-        self._weighed = candidates if weighed is None else weighed
-        self._level_began = time.perf_counter()
-        self._cooled = self._sweep_share = self._first_left = 0.0
-        self._free = 0
-        sizes = {"level": level, "rows": grid.rows, "cols": grid.cols, "candidates": candidates}
-        counts = {"sweeps": 0, "steps": 0, "relaxations": 0}
-        self.reports.append({**sizes, **counts, "equilibrium": dict(counts), "fma": 0, "seconds": 0.0})
-
-    def sweep(self, phase: str, left: float) -> int:
-        """Begin a sweep at this mean temperature; return its number within the level, from 1.
-
-        The share of the level's cooling that is done is about 1 - sqrt(t / t_0).
-        """
-        self._cooling = phase == "relax"
-        self._count("sweeps", 1)
-        self._first_left = self._first_left or left
-        cooled = 1 - sqrt(left / self._first_left) if left else 1.0
-        like_the_last = cooled - self._cooled or 0.1
-        self._sweep_share, self._cooled = min(like_the_last, 1 - cooled), cooled
-        return int(self.reports[-1]["sweeps"])
-
-    def step(self, steps: int = 1) -> int:
-        """Begin one step, or several that go together; return the last one's number within the level, from 1."""
-        self._count("steps", steps)
-        return int(self.reports[-1]["steps"])
-
-    def add(self, relaxations: int, fma: int, share: float) -> None:
-        """Count relaxed sites, with which `share` of the sweep is done."""
-        report = self.reports[-1]
-        self._count("relaxations", relaxations)
-        report["fma"] += fma
-        cooling, free = self._expected[report["level"]]
-        done = (self._cooled + self._sweep_share * share) * cooling
-        if self._cooled == 1:
-            self._free += relaxations * self._weighed
-            done = cooling + min(self._free, free)
-        total = sum(sum(work) for work in self._expected.values())
-        self._fraction = max(self._fraction, min(1.0, (self._ended + done) / total))
-
-    def end(self, skipped: int, weighed: tuple[int, int] | None = None) -> None:
-        """End the level: so many fma were skipped, or so many candidates weighed at so many fma."""
-        report = self.reports[-1]
-        report["weighed"] = float(report["candidates"])
-        if weighed is not None:
-            report["weighed"] = weighed[0] / max(1, report["relaxations"])  # of none, if all of the level is known
-            report["fma"] += weighed[0] * weighed[1]
-        report["skipped"] = skipped
-        report["seconds"] = time.perf_counter() - self._level_began
-        self._ended += sum(self._expected[report["level"]])
-
-    def _count(self, what: str, number: int) -> None:
-        report = self.reports[-1]
-        report[what] += number
-        if self._cooling:
-            report["equilibrium"][what] += number
-
-    @property
-    def fraction(self) -> float:
-        """Share of the expected work that is done, 0 to 1; never falls."""
-        return self._fraction
-
-
 class Record:
     """Sees every part and every end of a sweep, and changes nothing.
 
@@ -126,7 +35,8 @@ class Record:
     ----------
     stages : list of Stage
         Each level's picture at its end.
-    meter : Meter
+    reports : list of dict
+        The counts of each level, see `simdtex.run.Output`.
     account : Account
     launches : int
         Kernels that the machine had launched before the run.
@@ -135,12 +45,14 @@ class Record:
     def __init__(self, run: Lattices, callback: Callback | None) -> None:
         options = run.options
         self.stages: list[Stage] = []
-        self.meter = Meter(expected_work(run))
+        self.reports: list[dict[str, Any]] = []
         array = parse_array(options.array or "maspar-mp1-16k")
         self.account = Account(array, packed=options.array is None)
         self.launches = run.machine.launches
         self._run, self._callback = run, callback
-        self._number: int | None = None  # of the level that has begun
+        self._expected = expected_work(run)
+        self._fraction = 0.0
+        self._began, self._first_left = time.perf_counter(), 0.0  # of the present level
         self._slots, self._listed = 0, False  # candidates that a relaxation weighs; whether they are listed
         self._done = 0  # sites of the present sweep that are relaxed
         self._ended = True  # the next part begins a sweep
@@ -148,36 +60,50 @@ class Record:
 
     def part(self, level: Level, state: State, part: Part) -> None:
         """Count a part of a sweep, and report it to the callback."""
-        if level.number != self._number:
+        if not self.reports or level.number != self.reports[-1]["level"]:
             self._begin(level)
         free, sites = not state.active, level.grid.rows * level.grid.cols
         left = state.heat / (1024 * sites)
-        phase = "free" if free else "relax"
-        if self._ended:
-            self.meter.sweep(phase, left)
-            self._done = 0
-        self._ended = part.last
-        self._done += part.sites
-        step = self.meter.step(part.steps)
-        fma = 0 if isinstance(level.proposal, Listed) else level.work * part.sites
-        self.meter.add(part.sites, fma, min(1.0, self._done / max(1, state.active or sites)))
+        self._done = part.sites + (0 if self._ended else self._done)
+        report = self.reports[-1]
+        for what, number in {"sweeps": self._ended, "steps": part.steps, "relaxations": part.sites}.items():
+            report[what] += int(number)
+            report["equilibrium"][what] += 0 if free else int(number)
+        report["fma"] += 0 if self._listed else level.work * part.sites
+        self._ended, self._first_left = part.last, self._first_left or left
+        self._advance(level.number, state, left, min(1.0, self._done / max(1, state.active or sites)))
         if self._callback:
             read = (self._run, level.grid, part.field)
             self._callback(
                 Relaxing(
                     level=level.number,
                     levels=self._run.levels,
-                    fraction=self.meter.fraction,
+                    fraction=self._fraction,
                     image=partial(picture, *read),
                     sweep=state.cooling + state.free + 1,
-                    step=step,
-                    phase=phase,
+                    step=report["steps"],
+                    phase="free" if free else "relax",
                     temperature_left=left,
                     end_of_sweep=part.last,
                     temperature=partial(temperatures, *read),
                     source=partial(sources, *read),
                 )
             )
+
+    def _advance(self, level: int, state: State, left: float, share: float) -> None:
+        """Estimate the share of the run that is done, once ``share`` of a sweep is, begun at this mean temperature.
+
+        The share of a level's cooling that is done is about 1 - sqrt(t / t_0); a sweep cools by about a tenth.
+        """
+        cooling, free = self._expected[level]
+        if state.active:
+            cooled = 1 - sqrt(left / self._first_left)
+            done = cooling * (cooled + min(0.1, 1 - cooled) * share)
+        else:
+            done = cooling + free * min(1.0, (state.free + share) / max(1, self._run.options.free_sweeps))
+        before = sum(sum(work) for number, work in self._expected.items() if number > level)
+        total = sum(map(sum, self._expected.values()))
+        self._fraction = max(self._fraction, min(1.0, (before + done) / total))
 
     def step(self, state: State, info: Info) -> None:
         """Count what a sweep would cost on an array; at a level's end, keep its picture."""
@@ -189,22 +115,31 @@ class Record:
                 for step in chosen.apart(machine):
                     self.account.step(step.sites)
         if info.ended:
-            level = self._run.level(info.level)
-            before, self._weighed = self._weighed, self._total()
+            level, report = self._run.level(info.level), self.reports[-1]
             self.stages.append(Stage(level.number, picture(self._run, level.grid, state.field)))
-            weighed = (self._weighed - before, level.work // level.proposal.slots) if self._listed else None
-            self.meter.end(machine.spared - self._skipped, weighed)
+            if self._listed:
+                before, self._weighed = self._weighed, self._total()
+                weighed = self._weighed - before
+                report["weighed"] = weighed / max(1, report["relaxations"])  # of none, if all of the level is known
+                report["fma"] += weighed * (level.work // level.proposal.slots)
+            report["skipped"] = machine.spared - self._skipped
+            report["seconds"] = time.perf_counter() - self._began
 
     def _total(self) -> int:
         """Return how many candidates all sites have weighed so far, if the level weighs listed ones."""
-        if self._number is None or not self._listed:
+        if not self._listed:
             return self._weighed
-        return active.total(self._run.machine, self._run.grid(self._number), self._run.weighed)
+        return active.total(self._run.machine, self._run.grid(self.reports[-1]["level"]), self._run.weighed)
 
     def _begin(self, level: Level) -> None:
-        self._number, self._skipped = level.number, level.machine.spared
+        """Begin the report of a level."""
+        self._began, self._first_left, self._skipped = time.perf_counter(), 0.0, level.machine.spared
         self._slots, self._listed = level.proposal.slots, isinstance(level.proposal, Listed)
-        self.meter.begin(level.number, level.grid, level.proposal.candidates.size, self._slots)
+        grid, candidates = level.grid, level.proposal.candidates.size
+        sizes = {"level": level.number, "rows": grid.rows, "cols": grid.cols, "candidates": candidates}
+        counts = {"sweeps": 0, "steps": 0, "relaxations": 0}
+        work = {"fma": 0, "weighed": float(candidates), "skipped": 0, "seconds": 0.0}
+        self.reports.append({**sizes, **counts, "equilibrium": dict(counts), **work})
         self.account.begin(*self._costs(level.number))
 
     def _costs(self, number: int) -> tuple[Grid, NDArray[np.int32], int, int, int]:
@@ -217,19 +152,21 @@ class Record:
         """Return all that was seen, as plain arrays and numbers."""
         return {
             "stages": [(stage.level, stage.image) for stage in self.stages],
-            **{"meter": self.meter.save(), "account": self.account.total},
-            **{"number": self._number, "slots": self._slots, "listed": self._listed},
+            **{"reports": self.reports, "account": self.account.total, "fraction": self._fraction},
+            **{"slots": self._slots, "listed": self._listed, "first_left": self._first_left},
             **{"weighed": self._total() - self._weighed, "skipped": self._run.machine.spared - self._skipped},
+            "seconds": time.perf_counter() - self._began,
         }
 
     def load(self, saved: dict[str, Any]) -> None:
         """Go on from what `save` returned."""
         self.stages[:] = [Stage(*stage) for stage in saved["stages"]]
-        self.meter.load(saved["meter"])
-        self._number, self._slots, self._listed = saved["number"], saved["slots"], saved["listed"]
+        self.reports, self._fraction, self._first_left = saved["reports"], saved["fraction"], saved["first_left"]
+        self._slots, self._listed = saved["slots"], saved["listed"]
         self._skipped, self._weighed = self._run.machine.spared - saved["skipped"], -saved["weighed"]
-        if self._number is not None:
-            self.account.begin(*self._costs(self._number))
+        self._began = time.perf_counter() - saved["seconds"]
+        if self.reports:
+            self.account.begin(*self._costs(self.reports[-1]["level"]))
         self.account.total.update(saved["account"])
 
 
@@ -240,7 +177,7 @@ def output(run: Lattices, state: State, source: NDArray[np.int32], record: Recor
     statistics = {
         "options": vars(run.options) | {"levels": run.levels, "schedule": run.plan.schedule.name},
         "accounting": record.account.report() | {"launches": launches},
-        "levels": record.meter.reports,
+        "levels": record.reports,
         "use": None,
     }
     taken = place[..., 0] >= 0
