@@ -19,7 +19,7 @@ QUALITY = tuple(field.name for field in fields(simdtex.quality.Quality))
 FIGURES = (*QUALITY, "repeats_beyond_own", "seconds")
 """The columns of the table; `repeats_beyond_own` is what an output repeats beyond what its sample does."""
 
-LESS_IS_WORSE = {"source_share", "source_entropy", "innovation", "effective_share"}
+LESS_IS_WORSE = {"innovation", "effective_share"}
 ONE_IS_BEST = {"salt", "contrast"}
 AS_PNG = ("uint8", "uint16")
 

@@ -10,7 +10,6 @@ from click.testing import CliRunner
 import simdtex
 from simdtex.cli import main
 from simdtex.cli.options import numbers
-from simdtex.experiments.thresholds import series
 from simdtex.io import image
 from simdtex.model.source_map import load_source_map
 
@@ -161,32 +160,3 @@ def test_numbers(text, expected):
 def test_numbers_that_are_none(text):
     with pytest.raises(ValueError, match=r"--alpha .* must be numbers parted by commas"):
         numbers("--alpha", text)
-
-
-# ---------------------------------------------------------------- series
-
-
-def test_a_series_is_its_pictures_one_by_one():
-    sample, told = texture((16, 12), 3), []
-    found = series(
-        np.moveaxis(sample, -1, 0),
-        (18, 20),
-        [0.2, 0.8],
-        [0, 1],
-        channel_axis=0,
-        rng=7,
-        device="reference",
-        callback=lambda *now: told.append(now),
-        orientations=2,
-    )
-    assert [(member.alpha, member.beta) for member in found] == [(0.2, 0), (0.8, 0), (0.2, 1), (0.8, 1)]
-    for member in found:
-        options = {"alpha": member.alpha, "beta": member.beta, "orientations": 2, "rng": 7, "device": "reference"}
-        alone = simdtex.synthesize(sample, (18, 20), method="multires", channel_axis=-1, **options)
-        np.testing.assert_array_equal(np.moveaxis(member.image, 0, -1), alone)
-        assert [level["level"] for level in member.levels] == [4, 3, 2, 1, 0] and member.seconds > 0
-    shares = [share for share, _ in told]
-    assert shares == sorted(shares) and shares[-1] == 1
-    assert told[0][1] is None and told[-1][1] is found[2]
-    with pytest.raises(ValueError, match="no alpha or no beta"):
-        series(sample, (5, 5), [], channel_axis=-1)

@@ -6,7 +6,6 @@ from cases import texture
 
 import simdtex
 from simdtex.experiments.ensemble.arrays import as_ensemble, as_image
-from simdtex.experiments.thresholds import series
 from simdtex.io import image, volume
 from simdtex.model.source_map import apply_source_map, save_source_map
 
@@ -30,7 +29,6 @@ REFUSED = {
     "pyramid": lambda _: simdtex.synthesize(masked(GREY), (9, 9), method="pyramid", **ON),
     "start": lambda _: simdtex.synthesize(GREY, (9, 9), method="pyramid", start=masked(np.ones((9, 9))), **ON),
     "suggest_alpha": lambda _: simdtex.suggest_alpha(masked(GREY), device="reference"),
-    "series": lambda _: series(masked(GREY), (9, 9), [0.1], [0], **ON),
     "mix": lambda _: simdtex.mix([GREY, masked(GREY)], (9, 9), **ON),
     "extend": lambda _: simdtex.extend(masked(GREY), left=3, **ON),
     "lcpdf image": lambda _: simdtex.lcpdf(masked(LOW), LOW, [[1, 1]], order=1, greys=4, device="reference"),

@@ -104,7 +104,7 @@ def test_an_earlier_study_is_what_was_before(folder, monkeypatch, capsys):
         ("grey", "after"),
         ("red", "after"),
     ]
-    assert rows[0]["coverage"] == rows[1]["coverage"] and rows[0]["source_share"] == "" != rows[1]["source_share"]
+    assert rows[0]["coverage"] == rows[1]["coverage"] and rows[0]["effective_share"] == "" != rows[1]["effective_share"]
     assert "red" in capsys.readouterr().out
     assert "before" not in {name.partition("/")[0] for name in names(second)}
     assert holds(read(second / "sheets" / "grey.png").pixels, read(first / "grey.png").pixels)

@@ -6,7 +6,6 @@ from cases import REFERENCE, opencl, problem, problems
 from hypothesis import given, settings
 
 import simdtex
-from simdtex.experiments.quality import source_use
 from simdtex.model.colours import use_colours
 from simdtex.model.use import counts, effective_use
 from simdtex.ops.use import FairUse, use, use_penalty
@@ -210,7 +209,7 @@ def test_errors_of_counting():
 def test_a_sample_that_nothing_is_taken_from():
     none = np.full((3, 3, 2), -1)
     assert not counts(none, (4, 4)).any()
-    for figure in (effective_use, source_use):
+    for figure in (effective_use,):
         with pytest.raises(ValueError, match="no pixel was taken from the sample"):
             figure(none, (4, 4))
     with pytest.raises(ValueError, match="no pixel was taken"):

@@ -79,18 +79,13 @@ def schedules(
     pixels, channel_axis = _sample(sample)
     began = time.perf_counter()
     with progress_bar(quiet) as show:
-
-        def tell(now: Any) -> None:
-            job = f"run {now.run} of {now.runs}: {now.schedule}, seed {now.seed}"
-            show(now.fraction, now.progress.doing, job)
-
         found = compare(
             pixels,
             shape,
             chosen,
             seeds=range(seed, seed + seeds),
             channel_axis=channel_axis,
-            callback=tell,
+            callback=lambda fraction, job, progress: show(fraction, progress.doing, job),
             **given(options),
         )
     with afterwards():

@@ -20,7 +20,7 @@ from simdtex.cli.places import READ, WRITE
     ("sheet gravel.png -o sheet.png --alpha 0.1,0.2,0.4", "Three thresholds."),
 )
 @click.argument("sample", type=READ)
-@click.option("-o", "--output", required=True, type=WRITE, help="Write this sheet.")
+@click.option("-o", "--output", "output_path", required=True, type=WRITE, help="Write this sheet.")
 @click.option(
     "--alpha",
     "alphas",
@@ -44,7 +44,7 @@ from simdtex.cli.places import READ, WRITE
 @click.option("-q", "--quiet", is_flag=True, help="Show no progress bar and no numbers.")
 def sheet(
     sample: Path,
-    output: Path,
+    output_path: Path,
     alphas: str,
     betas: str,
     size: str | None,
@@ -56,39 +56,39 @@ def sheet(
 
     Below each picture stand the mean candidates of its levels, coarse to fine.
     """
-    from simdtex.experiments.thresholds import series
     from simdtex.io import image
+    from simdtex.machine import open_machine
     from simdtex.random import as_seed
     from simdtex.report.sheet import contact_sheet
+    from simdtex.synthesis import synthesize
 
-    image.check_writable(output, np.uint8, 3)
+    image.check_writable(output_path, np.uint8, 3)
     picture = image.read(sample)
     height, width = picture.pixels.shape[:2]
     shape = output_shape(size, picture.pixels)
-    across = numbers("--alpha", alphas)
-    seed = as_seed(seed)
-    with progress_bar(quiet) as show:
-        made = series(
-            picture.pixels,
-            shape,
-            across,
-            numbers("--beta", betas),
-            channel_axis=picture.channel_axis,
-            rng=seed,
-            callback=lambda fraction, _: show(fraction, "sampling", ""),
-            **given(options),
-        )
+    pairs = [(alpha, beta) for beta in numbers("--beta", betas) for alpha in numbers("--alpha", alphas)]
+    columns, machine = len(numbers("--alpha", alphas)), open_machine(options.pop("device"))
+    how = {"method": "multires", "channel_axis": picture.channel_axis, "rng": as_seed(seed), "device": machine}
     limits = float(picture.pixels.min()), float(picture.pixels.max())
     cells, captions = [], []
-    for number, member in enumerate(made):
-        if number % len(across) == 0:
-            cells.append((sample.name, image.to_display(picture.pixels, limits)))
-            captions.append(f"{width}x{height}, candidates coarse to fine:")
-        label, counts = f"alpha {member.alpha:g}, beta {member.beta:g}", candidates_per_level(member.levels)
-        cells.append((label, image.to_display(member.image, limits)))
-        captions.append(counts)
-        if not quiet:
-            click.echo(f"{label}: candidates {counts}, {member.seconds:.2f} s")
-    contact_sheet(cells, output, columns=1 + len(across), captions=captions)
+    with progress_bar(quiet) as show:
+        for number, (alpha, beta) in enumerate(pairs):
+            if number % columns == 0:
+                cells.append((sample.name, image.to_display(picture.pixels, limits)))
+                captions.append(f"{width}x{height}, candidates coarse to fine:")
+
+            def tell(progress: Any, number: int = number) -> None:
+                show((number + progress.fraction) / len(pairs), "sampling")
+
+            given_here = {**how, **given(options), "alpha": alpha, "beta": beta}
+            made, output = synthesize(picture.pixels, shape, callback=tell, full_output=True, **given_here)
+            label, counts = f"alpha {alpha:g}, beta {beta:g}", candidates_per_level(output.statistics["levels"])
+            cells.append((label, image.to_display(made, limits)))
+            captions.append(counts)
+            if not quiet:
+                click.echo(f"{label}: candidates {counts}, {output.statistics['seconds']:.2f} s")
+    contact_sheet(cells, output_path, columns=1 + columns, captions=captions)
     if not quiet:
-        click.echo(f"{output}: {len(made)} pictures of {shape[1]}x{shape[0]} from {width}x{height}, seed {seed}")
+        click.echo(
+            f"{output_path}: {len(pairs)} pictures of {shape[1]}x{shape[0]} from {width}x{height}, seed {how['rng']}"
+        )

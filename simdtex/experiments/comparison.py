@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parallel schedules compared: the same job under each, what it took, how it moved and what came of it."""
+"""Parallel schedules compared: the same job under each, what it took, how it changed its picture, and the result."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from functools import partial
+from dataclasses import asdict, dataclass, field
 from math import isfinite, isqrt
 from statistics import mean, stdev
 from typing import Any
@@ -16,22 +16,138 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex import schedules as known
 from simdtex.driver import check_shape
 from simdtex.experiments.quality import COPIED_PATCH, Quality, measure
-from simdtex.experiments.recorder import Noted, Recorder, Sweep
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, open_machine
 from simdtex.methods.mrf import Options
+from simdtex.model.lattice import Grid
 from simdtex.options import resolve
 from simdtex.random import as_seed
 from simdtex.run import Relaxing
-from simdtex.schedules import Schedule
+from simdtex.schedules import Info, Schedule, Setting, Watched, neighbours_in
 from simdtex.synthesis import synthesize
 
-__all__ = ["FIGURES", "Comparison", "Entry", "Now", "Recorder", "Run", "Spread", "Sweep", "compare"]
-
-Tell = Callable[[Relaxing], Any]
+__all__ = ["FIGURES", "Comparison", "Entry", "Recorder", "Run", "Spread", "Sweep", "compare"]
 
 MEASURED = "plausibility", "coverage", "copying", "histogram_distance", "seam"
 """The figures of merit of each run, out of `simdtex.experiments.quality.FIGURES`."""
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What a sweep of a level did.
+
+    Attributes
+    ----------
+    level, sweep : int
+        The level, 0 the finest, and the sweep within it, from 1.
+    phase : str
+        ``"relax"`` until equilibrium, then ``"free"``.
+    steps : int
+        Steps of the level until its end.
+    before, left : float
+        Mean temperature of the level's sites when it began and when it ended, 0 to 1.
+    changed : float or None
+        Share of the level's sites whose pixel is another than a sweep ago; None in the first sweep.
+    returned : float or None
+        The oscillation index: share of the level's sites whose pixel is another than a sweep ago, and the same as two
+        sweeps ago; None in the first two sweeps.
+    """
+
+    level: int
+    sweep: int
+    phase: str
+    steps: int
+    before: float
+    left: float
+    changed: float | None
+    returned: float | None
+
+
+class Recorder:
+    """A callback that compares the pictures after every sweep of a level; it holds the last two.
+
+    Parameters
+    ----------
+    channel_axis : int, optional
+        Of the pictures.
+    then : callable, optional
+        Called with every progress, before it is recorded.
+    wait : callable, optional
+        Called before the recorder's own time is taken; waits for the device.
+
+    Attributes
+    ----------
+    sweeps : list of Sweep
+    seconds : float
+        What the recording itself took.
+    """
+
+    def __init__(
+        self,
+        channel_axis: int | None = None,
+        then: Callable[[Relaxing], Any] = lambda progress: None,
+        wait: Callable[[], Any] = lambda: None,
+    ) -> None:
+        self.sweeps: list[Sweep] = []
+        self.seconds = 0.0
+        self._axis, self._then, self._wait = channel_axis, then, wait
+        self._last: list[NDArray[Any]] = []
+
+    def __call__(self, progress: Relaxing) -> None:
+        """Record if a sweep has ended."""
+        self._then(progress)
+        if not progress.end_of_sweep:
+            return
+        self._wait()
+        began = time.perf_counter()
+        image = progress.image()
+        if not self.sweeps or progress.level != self.sweeps[-1].level:
+            self._last = []
+        moved = [image != earlier for earlier in self._last]  # from one and from two sweeps ago
+        moved = [one if self._axis is None else one.any(self._axis) for one in moved]
+        self.sweeps.append(
+            Sweep(
+                progress.level,
+                progress.sweep,
+                progress.phase,
+                progress.step,
+                float(progress.temperature_left),
+                float(progress.temperature().mean()),
+                float(moved[0].mean()) if moved else None,
+                float((moved[0] & ~moved[1]).mean()) if len(moved) > 1 else None,
+            )
+        )
+        self._last = [image, *self._last][:2]
+        self.seconds += time.perf_counter() - began
+
+
+class Noted(Watched):
+    """A schedule whose steps are kept, to be checked when the clock has stopped."""
+
+    def __init__(self, schedule: Schedule) -> None:
+        super().__init__(schedule)
+        self.claims: list[bool] = []
+        self.levels: list[tuple[int, Grid, NDArray[np.int32], list[NDArray[np.int32]]]] = []
+
+    def init(self, setting: Setting) -> Any:
+        """Return the schedule's own state."""
+        self.claims.append(bool(self.independent(setting.grid, setting.offsets)))
+        self.levels.append((setting.level, setting.grid, setting.offsets, []))
+        return self.schedule.init(setting)
+
+    def look(self, setting: Setting, info: Info) -> None:
+        """Keep a step."""
+        if self.claims[-1] and len(info.sites) > 1:  # a site alone meets nobody
+            self.levels[-1][3].append(info.sites)
+
+    def met(self) -> tuple[int, int, int] | None:
+        """Return a level and two neighbours that relaxed together against the schedule's claim of equation (14), or None."""
+        for level, grid, offsets, steps in self.levels:
+            for sites in steps:
+                pair = neighbours_in(grid, offsets, sites)
+                if pair:
+                    return level, *pair
+        return None
 
 
 @dataclass(frozen=True)
@@ -78,61 +194,38 @@ class Run:
         return tuple(sweep for sweep in self.sweeps if sweep.level == 0)
 
     def figure(self, name: str) -> float | None:
-        """One of `FIGURES`; None where the run has none of it."""
-        value = FIGURES[name](self)
-        return None if value is None else float(value)
+        """Return one of `FIGURES`; None if the run has none of it."""
+        return _figures(self)[name]
 
 
-def _equilibrium(what: str, *, every_level: bool = False, per_site: bool = False) -> Callable[[Run], float]:
-    def count(run: Run) -> float:
-        levels = run.levels if every_level else [level for level in run.levels if level["level"] == 0]
-        finest = next(level for level in run.levels if level["level"] == 0)
-        sites = finest["rows"] * finest["cols"] if per_site else 1
-        return float(sum(level["equilibrium"][what] for level in levels) / sites)
-
-    return count
-
-
-def _cooling(what: str) -> Callable[[Run], float | None]:
-    def average(run: Run) -> float | None:
-        found = [getattr(sweep, what) for sweep in run.finest if sweep.phase == "relax"]
-        found = [value for value in found if value is not None]
-        return mean(found) if found else None
-
-    return average
+FIGURES = (
+    *("steps", "sweeps", "relaxations_per_site", "all_steps", "all_sweeps", "all_relaxations_per_site"),
+    *("seconds", "device_seconds", "utilisation", "model_seconds", "passes"),
+    *("changed_cooling", "oscillation_cooling", "changed_free", "oscillation_free"),
+    *("plausibility", "coverage", "histogram_distance", "copying", "seam"),
+)
+"""The names of a run's figures; `compare` says what each is."""
 
 
-def _free(what: str, least: int) -> Callable[[Run], float | None]:
-    def last(run: Run) -> float | None:
-        free = [sweep for sweep in run.finest if sweep.phase == "free"]
-        return getattr(free[-1], what) if len(free) >= least else None
-
-    return last
-
-
-FIGURES: dict[str, Callable[[Run], float | None]] = {
-    "steps": _equilibrium("steps"),
-    "sweeps": _equilibrium("sweeps"),
-    "relaxations_per_site": _equilibrium("relaxations", per_site=True),
-    "all_steps": _equilibrium("steps", every_level=True),
-    "all_sweeps": _equilibrium("sweeps", every_level=True),
-    "all_relaxations_per_site": _equilibrium("relaxations", every_level=True, per_site=True),
-    "seconds": lambda run: run.seconds,
-    "device_seconds": lambda run: run.device_seconds,
-    "utilisation": lambda run: run.accounting["utilisation"],
-    "model_seconds": lambda run: run.accounting["model_seconds"],
-    "passes": lambda run: run.accounting["passes"],
-    "changed_cooling": _cooling("changed"),
-    "oscillation_cooling": _cooling("returned"),
-    "changed_free": _free("changed", 1),
-    "oscillation_free": _free("returned", 2),  # so that both the change and the return were free
-    "plausibility": lambda run: run.quality.plausibility,
-    "coverage": lambda run: run.quality.coverage,
-    "histogram_distance": lambda run: run.quality.histogram_distance,
-    "copying": lambda run: run.quality.copying,
-    "seam": lambda run: run.quality.seam,
-}
-"""The figures of a run by name; `compare` says what each is."""
+def _figures(run: Run) -> dict[str, float | None]:
+    """Return the figures of a run by name; None if the run has none of it."""
+    finest = next(level for level in run.levels if level["level"] == 0)
+    found: dict[str, Any] = {"seconds": run.seconds, "device_seconds": run.device_seconds}
+    for what in ("steps", "sweeps", "relaxations"):
+        sites = finest["rows"] * finest["cols"] if what == "relaxations" else 1
+        name = f"{what}_per_site" if what == "relaxations" else what
+        found[name] = finest["equilibrium"][what] / sites
+        found[f"all_{name}"] = sum(level["equilibrium"][what] for level in run.levels) / sites
+    found |= {name: run.accounting[name] for name in ("utilisation", "model_seconds", "passes")}
+    free = [sweep for sweep in run.finest if sweep.phase == "free"]
+    for name, what, least in (("changed", "changed", 1), ("oscillation", "returned", 2)):
+        cooling = [getattr(sweep, what) for sweep in run.finest if sweep.phase == "relax"]
+        cooling = [value for value in cooling if value is not None]
+        found[f"{name}_cooling"] = mean(cooling) if cooling else None
+        # of a change and its return, both are to be free
+        found[f"{name}_free"] = getattr(free[-1], what) if len(free) >= least else None
+    found |= {name: getattr(run.quality, name) for name in MEASURED}
+    return {name: None if found[name] is None else float(found[name]) for name in FIGURES}
 
 
 @dataclass(frozen=True)
@@ -244,22 +337,6 @@ def _entry_results(entry: Entry) -> dict[str, Any]:
     }
 
 
-@dataclass(frozen=True)
-class Now:
-    """Where a comparison stands.
-
-    ``schedule`` and ``seed`` of the present run, ``run`` its number from 1 out of ``runs``, ``progress`` where it
-    stands itself, and ``fraction`` of the whole, 0 to 1.
-    """
-
-    schedule: str
-    seed: int
-    run: int
-    runs: int
-    progress: Relaxing
-    fraction: float
-
-
 def compare(
     sample: ArrayLike,
     shape: tuple[int, int],
@@ -268,7 +345,7 @@ def compare(
     seeds: Sequence[int] = (1, 2, 3),
     channel_axis: int | None = None,
     device: str | Machine | None = None,
-    callback: Callable[[Now], Any] | None = None,
+    callback: Callable[[float, str, Relaxing], Any] | None = None,
     **options: Any,
 ) -> Comparison:
     """Run the same job under several schedules, and measure each.
@@ -288,7 +365,8 @@ def compare(
     device : str, optional
         As in `simdtex.synthesize`; all runs are on one machine.
     callback : callable, optional
-        Called with a `Now` several times a second; an exception ends the comparison.
+        ``callback(fraction, job, progress)``, called several times a second: the share of all runs that is done, 0 to
+        1, the present run in words, and where that stands. An exception ends the comparison.
     **options
         Of the method ``mrf``, see `simdtex.methods.mrf.Options`, which says what defaults differ in ``schedules``:
         ``search`` is ``"exact"``, since a schedule is judged by the model, not by a list of candidates.
@@ -338,47 +416,47 @@ def compare(
     settled = resolve(Options, "schedules", options)
     pixels = check_sample(sample, channel_axis)
     size = _check_sides(pixels.shape[:2], shape)
-    job = _Job(np.asarray(sample), pixels, channel_axis, open_machine(device, profile=True), vars(settled))
-    found: dict[str, list[tuple[Run, tuple[bool, ...]]]] = {name: [] for name in names}
+    machine, found, settings = open_machine(device, profile=True), {name: list[Any]() for name in names}, vars(settled)
+    call = _Call(np.asarray(sample), pixels, channel_axis, machine, settings)
     turns = [(seed, schedule) for seed in keys for schedule in chosen]  # a slow hour then slows all schedules alike
-    for number, (seed, schedule) in enumerate(turns, 1):
-        tell = None if callback is None else partial(_tell, callback, schedule.name, seed, number, len(turns))
+    for number, (seed, schedule) in enumerate(turns):
+
+        def tell(progress: Relaxing, number: int = number, seed: int = seed, name: str = schedule.name) -> None:
+            if callback:
+                job = f"run {number + 1} of {len(turns)}: {name}, seed {seed}"
+                callback((number + progress.fraction) / len(turns), job, progress)
+
         if not found[schedule.name]:
-            job.warm_up(schedule, size, tell)
-        found[schedule.name].append(job.run(schedule, seed, size, tell))
+            call.build_kernels(schedule, size)
+        run, claims, settings = call.run(schedule, seed, size, tell)
+        found[schedule.name].append((run, claims))
     entries = [Entry(name, done[0][1], tuple(run for run, _ in done)) for name, done in found.items()]
-    settings = {name: value for name, value in job.settings.items() if name != "schedule"}
-    return Comparison(job.sample, size, channel_axis, tuple(keys), job.machine.name, settings, tuple(entries))
+    settings = {name: value for name, value in settings.items() if name != "schedule"}
+    return Comparison(call.sample, size, channel_axis, tuple(keys), machine.name, settings, tuple(entries))
 
 
-class _Job:
-    """What is the same for every run."""
+@dataclass(frozen=True)
+class _Call:
+    """What is the same for every run: the sample as given, its pixels with channels last, and the options."""
 
-    def __init__(
-        self,
-        sample: NDArray[Any],
-        pixels: NDArray[Any],
-        channel_axis: int | None,
-        machine: Machine,
-        options: dict[str, Any],
-    ) -> None:
-        self.sample, self.channel_axis, self.machine, self.options = sample, channel_axis, machine, options
-        self.settings: dict[str, Any] = {}
-        self._grey = pixels if channel_axis is not None else pixels[..., 0]  # channels last, as the quality wants them
+    sample: NDArray[Any]
+    pixels: NDArray[Any]
+    channel_axis: int | None
+    machine: Machine
+    options: dict[str, Any]
 
     def run(
-        self, schedule: Schedule, seed: int, size: tuple[int, int], tell: Tell | None
-    ) -> tuple[Run, tuple[bool, ...]]:
-        """One run, and at which levels the schedule claims equation (14)."""
+        self, schedule: Schedule, seed: int, size: tuple[int, int], tell: Callable[[Relaxing], None]
+    ) -> tuple[Run, tuple[bool, ...], dict[str, Any]]:
+        """Return a run, at which levels the schedule claims equation (14), and the options as they were executed."""
         noted, recorder = Noted(schedule), Recorder(self.channel_axis, tell, self.machine.sync)
-        image, said = self._synthesize(noted, seed, size, recorder, self.options)
-        self.settings = said["options"]
-        made = image if self.channel_axis is None else np.moveaxis(image, self.channel_axis, -1)
+        image, said = self._synthesize(noted, seed, size, callback=recorder)
+        made = image[..., None] if self.channel_axis is None else np.moveaxis(image, self.channel_axis, -1)
         run = Run(
             schedule.name,
             seed,
             image,
-            measure(self._grey, made, figures=MEASURED),
+            measure(self.pixels, made, figures=MEASURED),
             tuple(recorder.sweeps),
             said["levels"],
             said["seconds"] - recorder.seconds,
@@ -386,33 +464,21 @@ class _Job:
             said["accounting"],
             noted.met(),
         )
-        return run, tuple(noted.claims)
+        return run, tuple(noted.claims), said["options"]
 
-    def warm_up(self, schedule: Schedule, size: tuple[int, int], tell: Tell | None) -> None:
+    def build_kernels(self, schedule: Schedule, size: tuple[int, int]) -> None:
         """Build every kernel that the schedule needs, by a small picture of at most two levels."""
         side, levels = 4 * isqrt(self.options["order"]) + 1, self.options["levels"]
         small = (min(size[0], side), min(size[1], side))
-        fewer = {} if levels is None else {"levels": min(levels, 2)}
-        self._synthesize(schedule, 0, small, tell and (lambda progress: tell(replace(progress, fraction=0.0))), fewer)
+        self._synthesize(schedule, 0, small, **({} if levels is None else {"levels": min(levels, 2)}))
 
     def _synthesize(
-        self, schedule: Schedule, seed: int, size: tuple[int, int], callback: Tell | None, changed: dict[str, Any]
+        self, schedule: Schedule, seed: int, size: tuple[int, int], **more: Any
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        image, output = synthesize(
-            self.sample,
-            size,
-            channel_axis=self.channel_axis,
-            rng=seed,
-            device=self.machine,
-            callback=callback,
-            full_output=True,
-            **{**self.options, **changed, "schedule": schedule},
-        )
+        given = {"channel_axis": self.channel_axis, "rng": seed, "device": self.machine}
+        options = {**self.options, "schedule": schedule, **more}
+        image, output = synthesize(self.sample, size, full_output=True, **given, **options)
         return image, output.statistics
-
-
-def _tell(callback: Callable[[Now], Any], schedule: str, seed: int, number: int, runs: int, progress: Relaxing) -> None:
-    callback(Now(schedule, seed, number, runs, progress, (number - 1 + progress.fraction) / runs))
 
 
 def _check_distinct(what: str, given: Sequence[Any]) -> None:
@@ -424,7 +490,7 @@ def _check_distinct(what: str, given: Sequence[Any]) -> None:
 
 
 def _check_sides(sample: tuple[int, ...], shape: tuple[int, int]) -> tuple[int, int]:
-    """The output's shape, where both pictures are large enough to be measured."""
+    """Return the output's shape; raise unless both pictures are large enough to be measured."""
     if min(sample) < COPIED_PATCH:
         raise ValueError(
             f"the sample of {sample[0]} rows x {sample[1]} columns is too small to compare with; "

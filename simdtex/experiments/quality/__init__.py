@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike
 
 from simdtex.experiments.quality.likeness import coverage, innovation, plausibility
 from simdtex.experiments.quality.repetition import APART, REPEATED_PATCH, Repeats, repeats
-from simdtex.experiments.quality.sources import SourceUse, source_use
 from simdtex.experiments.quality.values import BLOCK, Tones, histogram_distance, salt, seam, tones
 from simdtex.experiments.quality.verbatim import COPIED_PATCH, copying
 from simdtex.model.use import MostUsed, Use, effective_use
@@ -30,7 +29,6 @@ __all__ = [
     "MostUsed",
     "Quality",
     "Repeats",
-    "SourceUse",
     "Tones",
     "Use",
     "copying",
@@ -43,14 +41,13 @@ __all__ = [
     "repeats",
     "salt",
     "seam",
-    "source_use",
     "tones",
 ]
 
 LEAST = {"repeats": REPEATED_PATCH + APART, "tones": 2 * BLOCK}
 """Sides that pictures must have for these figures, pixels; `COPIED_PATCH` is enough for all others."""
 
-OF_SOURCE = {"source_use", "effective_use"}
+OF_SOURCE = {"effective_use"}
 """The figures that need a source map."""
 
 
@@ -66,8 +63,6 @@ class Quality:
         Share of the output's patches, 0 to 1.
     seam : float or None
         Ratio; 1 is a seam that does not show.
-    source_share, source_entropy : float or None
-        `source_use`, 0 to 1; None where no source map was given.
     repeats, own_repeats : float or None
         Share of the output's patches that stand in it again, and of the sample's in the sample, 0 to 1; None where a
         picture is smaller than 48 x 48 pixels.
@@ -88,8 +83,6 @@ class Quality:
     copying: float | None = None
     histogram_distance: float | None = None
     seam: float | None = None
-    source_share: float | None = None
-    source_entropy: float | None = None
     repeats: float | None = None
     own_repeats: float | None = None
     salt: float | None = None
@@ -164,11 +157,6 @@ def _repeats(job: _Job) -> dict[str, float]:
     return {"repeats": found.share, "own_repeats": found.own}
 
 
-def _source_use(job: _Job) -> dict[str, float]:
-    found = source_use(*job.use)
-    return {"source_share": found.share, "source_entropy": found.entropy}
-
-
 def _effective_use(job: _Job) -> dict[str, float]:
     found = effective_use(*job.use)
     return {"effective_share": found.effective_share, "most_used": found.most_used.times_fair_share}
@@ -184,7 +172,6 @@ _COMPUTED: dict[str, Callable[[_Job], dict[str, float]]] = {
     "salt": lambda job: {"salt": salt(job.sample, job.output)},
     "tones": lambda job: tones(job.sample, job.output)._asdict(),
     "innovation": lambda job: {"innovation": innovation(job.sample, job.output)},
-    "source_use": _source_use,
     "effective_use": _effective_use,
 }
 

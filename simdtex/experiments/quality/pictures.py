@@ -13,9 +13,6 @@ from simdtex.io.image import check_sample
 Array = NDArray[Any]
 Planes = NDArray[np.float32]
 
-HUGE, SMALLER = 2.0**500, 2.0**1000
-"""Values above the first are divided by the second, since no float holds their squares; figures have no unit."""
-
 
 def as_planes(array: ArrayLike) -> Array:
     """A picture as (rows, cols, channels), checked."""
@@ -49,17 +46,7 @@ def as_pair(sample: ArrayLike, output: ArrayLike, side: int, *, keep_type: bool 
             raise ValueError(
                 f"the {name} is {planes.shape[0]} x {planes.shape[1]} pixels: give at least {side} x {side}"
             )
-    if keep_type:
-        return first, second
-    first, second = moderate(first, second)
-    return first, second
-
-
-def moderate(*pictures: Array) -> tuple[Array, ...]:
-    """Pictures in double precision, in a larger unit where no float would hold the squares of their values."""
-    largest = max(float(np.abs(planes, dtype=np.float64).max()) for planes in pictures)
-    unit = SMALLER if largest > HUGE else 1.0
-    return tuple(planes.astype(np.float64) / unit for planes in pictures)
+    return (first, second) if keep_type else (first.astype(np.float64), second.astype(np.float64))
 
 
 def spread(planes: Array) -> float:

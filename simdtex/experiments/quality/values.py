@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import median_filter
+from scipy.stats import wasserstein_distance
 
-from simdtex.experiments.quality.pictures import Array, as_pair, as_planes, deviation, moderate, spread
+from simdtex.experiments.quality.pictures import Array, as_pair, as_planes, deviation, spread
 
 ODD = 0.005  # share of the sample's pixels that count as odd
 BLOCK = 16  # side of the blocks of the coarse scale, pixels
@@ -38,17 +39,8 @@ def histogram_distance(sample: ArrayLike, output: ArrayLike) -> float:
     """
     first, second = as_pair(sample, output, 1)
     channels = range(first.shape[2])
-    moved = [_earth_moved(first[..., k].ravel(), second[..., k].ravel()) for k in channels]
+    moved = [wasserstein_distance(first[..., k].ravel(), second[..., k].ravel()) for k in channels]
     return float(np.mean(moved) / deviation(first))
-
-
-def _earth_moved(a: Array, b: Array) -> float:
-    # the area between the two cumulative distributions
-    a, b = np.sort(a), np.sort(b)
-    values = np.unique(np.concatenate([a, b]))
-    below_a = np.searchsorted(a, values[:-1], side="right") / len(a)
-    below_b = np.searchsorted(b, values[:-1], side="right") / len(b)
-    return float(np.sum(np.abs(below_a - below_b) * np.diff(values)))
 
 
 def seam(output: ArrayLike) -> float:
@@ -71,7 +63,6 @@ def seam(output: ArrayLike) -> float:
     planes = as_planes(output).astype(np.float64)
     if min(planes.shape[:2]) < 2:
         raise ValueError("the output is less than 2 pixels wide or high: give at least 2 x 2")
-    (planes,) = moderate(planes)
     return float(np.mean([_seam_along(planes, axis) for axis in (0, 1)]))
 
 
