@@ -10,7 +10,7 @@ from cases import texture
 from simdtex.experiments.comparison import Entry, Recorder, Spread, compare
 from simdtex.report.page import Figure
 from simdtex.report.schedules import reading, sections, tables
-from simdtex.schedules import Checkerboard, Coloring
+from simdtex.schedules import Checkerboard
 
 
 def feed(recorder, pictures, level=0, phase="free", **more):
@@ -207,15 +207,8 @@ def test_colour_and_channels_on_any_axis(axis):
 
 
 def test_progress_runs_from_0_to_1():
-    seen = []
-    compare(
-        SAMPLE,
-        (12, 12),
-        ["coloring", Coloring.name + "-fixed"],
-        seeds=(1, 2),
-        callback=lambda *now: seen.append(now),
-        **JOB,
-    )
+    seen, names = [], ("coloring", "coloring-fixed")
+    compare(SAMPLE, (12, 12), names, seeds=(1, 2), callback=lambda *now: seen.append(now), **JOB)
     fractions = [fraction for fraction, *_ in seen]
     assert fractions == sorted(fractions) and fractions[-1] == pytest.approx(1) and fractions[0] < 0.1
     jobs = [f"run {1 + 2 * s + n} of 4: {names[n]}, seed {s + 1}" for s in range(2) for n in range(2)]

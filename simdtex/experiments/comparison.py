@@ -141,7 +141,7 @@ class Noted(Watched):
             self.levels[-1][3].append(info.sites)
 
     def met(self) -> tuple[int, int, int] | None:
-        """Return a level and two neighbours that relaxed together against the schedule's claim of equation (14), or None."""
+        """Return a level and two neighbours that relaxed together against a claim of equation (14), or None."""
         for level, grid, offsets, steps in self.levels:
             for sites in steps:
                 pair = neighbours_in(grid, offsets, sites)
