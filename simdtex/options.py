@@ -2,7 +2,7 @@
 """The table of options: what a field of a method's `Options` declares, and the checks of values.
 
 An option is declared once, by `option`, as a field of the frozen dataclass ``Options`` of its method. From there come
-its check, its place in the docstring, in ``simdtex/typed_options.py``, on the command line, on the live page and in the
+its check, its place in the docstring, in ``simdtex/methods/typed_options.py``, on the command line, on the live page and in the
 reference pages.
 """
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from functools import partial
 from importlib import import_module
 from math import isqrt
-from typing import Any, Literal, overload
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,18 +24,43 @@ from simdtex.model.sample import Sample
 from simdtex.options import one_of, real, resolve, unmasked, whole
 from simdtex.run import Callback, Output
 
+if TYPE_CHECKING:
+    from typing import Unpack
+
+    from simdtex.methods.typed_options import AnyOptions, SolidOptions
+
 METHODS = ("mrf", "multires", "pyramid")
 """The packages of `simdtex.methods`; each is loaded when it is asked for first."""
 
 
 @overload
 def synthesize(
-    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[True], **options: Any
+    sample: ArrayLike,
+    shape: tuple[int, int],
+    *,
+    method: str = ...,
+    mask: Any = ...,
+    known: Any = ...,
+    known_source: ArrayLike | None = ...,
+    guide: tuple[Any, Any] | None = ...,
+    full_output: Literal[True],
+    **options: Unpack[AnyOptions],
 ) -> tuple[NDArray[Any], Output]: ...
 
 
 @overload
-def synthesize(sample: ArrayLike, shape: tuple[int, int], **options: Any) -> NDArray[Any]: ...
+def synthesize(
+    sample: ArrayLike,
+    shape: tuple[int, int],
+    *,
+    method: str = ...,
+    mask: Any = ...,
+    known: Any = ...,
+    known_source: ArrayLike | None = ...,
+    guide: tuple[Any, Any] | None = ...,
+    full_output: Literal[False] = ...,
+    **options: Unpack[AnyOptions],
+) -> NDArray[Any]: ...
 
 
 def synthesize(
@@ -95,14 +120,8 @@ def synthesize(
         A file that keeps the state of the run. If the file is of a run of the same call that was stopped, the run goes
         on from there, to the same bytes. The file is removed when the function returns.
     **options
-        Of the method. ``mrf``: ``preset``, ``order``, ``levels``, ``overview``, ``relaxation``, ``bandwidth``,
-        ``coherence``, ``balance``, ``structure``, ``novelty``, ``finish``, ``xi``, ``free_sweeps``, ``pixel``,
-        ``phases``, ``edges``, ``schedule``, ``boundary``, ``array``, ``search``, ``chance``, ``categorical``,
-        ``weights``, ``shares``, ``proportions``, ``data_weight``, ``guide_weight``, ``labels``; see
-        `simdtex.methods.mrf.Options`. ``multires``: ``alpha``, ``beta``, ``strain``, ``target``, ``thresholds``,
-        ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``parity``, ``boundary``, ``edges``,
-        ``seams``; see `simdtex.methods.multires.Options`. ``pyramid``: ``pyramid``, ``levels``, ``orientations``,
-        ``iterations``, ``match``, ``bins``, ``edges``, ``color``, ``start``; see `simdtex.methods.pyramid.Options`.
+        Of the method, and ``preset``: see `simdtex.methods.mrf.Options`, `simdtex.methods.multires.Options` and
+        `simdtex.methods.pyramid.Options`.
 
     Returns
     -------
@@ -158,6 +177,22 @@ def synthesize(
     return execute("synthesize", partial(drive, plan), identity, channel_axis, call)
 
 
+@overload
+def synthesize_solid(
+    sample: ArrayLike, shape: tuple[int, int, int], *, full_output: Literal[True], **options: Unpack[SolidOptions]
+) -> tuple[NDArray[Any], Output]: ...
+
+
+@overload
+def synthesize_solid(
+    sample: ArrayLike,
+    shape: tuple[int, int, int],
+    *,
+    full_output: Literal[False] = ...,
+    **options: Unpack[SolidOptions],
+) -> NDArray[Any]: ...
+
+
 def synthesize_solid(
     sample: ArrayLike,
     shape: tuple[int, int, int],
@@ -189,10 +224,9 @@ def synthesize_solid(
     checkpoint
         As in `synthesize`.
     **options
-        ``pyramid``, ``levels``, ``orientations``, ``iterations``, ``match``, ``bins``, ``edges``, ``color``,
-        ``start`` (a block, channels last), ``solids``, ``slices``; see `simdtex.methods.pyramid.solid.Options`. With
-        ``pyramid="steerable"`` the 3-D Laplacian pyramid and the steerable pyramids of all x-y, x-z and y-z slices are
-        matched; ``"laplacian"`` is the first alone.
+        See `simdtex.methods.pyramid.solid.Options`; ``start`` is a block, channels last. With ``pyramid="steerable"``
+        the 3-D Laplacian pyramid and the steerable pyramids of all x-y, x-z and y-z slices are matched;
+        ``"laplacian"`` is the first alone.
 
     Returns
     -------

@@ -475,7 +475,7 @@ class _Call:
     def _synthesize(
         self, schedule: Schedule, seed: int, size: tuple[int, int], **more: Any
     ) -> tuple[NDArray[Any], dict[str, Any]]:
-        given = {"channel_axis": self.channel_axis, "rng": seed, "device": self.machine}
+        given: dict[str, Any] = {"channel_axis": self.channel_axis, "rng": seed, "device": self.machine}
         options = {**self.options, "schedule": schedule, **more}
         image, output = synthesize(self.sample, size, full_output=True, **given, **options)
         return image, output.statistics

@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, log2, prod
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,6 +25,11 @@ from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures
 from simdtex.options import resolve, whole, within_32_bits
 from simdtex.run import Callback, Output
+
+if TYPE_CHECKING:
+    from typing import Unpack
+
+    from simdtex.methods.typed_options import MrfOptions
 
 REACH = 128
 """How far around its window a hole is filled from, at least, pixels."""
@@ -77,6 +82,30 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
         rows, cols = (np.flatnonzero(near.any(axis)) for axis in (1, 0))
         found = [(slice(int(rows[0]), int(rows[-1]) + 1), slice(int(cols[0]), int(cols[-1]) + 1))]
     return [Window(r, c, wanted) for r, c in found]
+
+
+@overload
+def fill(
+    image: ArrayLike,
+    mask: ArrayLike | None = ...,
+    *,
+    sample: ArrayLike | None = ...,
+    reach: int | None = ...,
+    full_output: Literal[True],
+    **options: Unpack[MrfOptions],
+) -> tuple[NDArray[Any], Output]: ...
+
+
+@overload
+def fill(
+    image: ArrayLike,
+    mask: ArrayLike | None = ...,
+    *,
+    sample: ArrayLike | None = ...,
+    reach: int | None = ...,
+    full_output: Literal[False] = ...,
+    **options: Unpack[MrfOptions],
+) -> NDArray[Any]: ...
 
 
 def fill(
@@ -159,6 +188,36 @@ def fill(
     chosen = resolve(Options, "fill", options)
     job = Filling(pixels, hole, given, reach, chosen)
     return execute("fill", job.run, job.inputs, channel_axis, Call(rng, device, callback, full_output, checkpoint))
+
+
+@overload
+def extend(
+    image: ArrayLike,
+    *,
+    top: int = ...,
+    bottom: int = ...,
+    left: int = ...,
+    right: int = ...,
+    seamless: bool | str = ...,
+    band: int | None = ...,
+    full_output: Literal[True],
+    **options: Unpack[MrfOptions],
+) -> tuple[NDArray[Any], Output]: ...
+
+
+@overload
+def extend(
+    image: ArrayLike,
+    *,
+    top: int = ...,
+    bottom: int = ...,
+    left: int = ...,
+    right: int = ...,
+    seamless: bool | str = ...,
+    band: int | None = ...,
+    full_output: Literal[False] = ...,
+    **options: Unpack[MrfOptions],
+) -> NDArray[Any]: ...
 
 
 def extend(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from numbers import Integral
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +24,48 @@ from simdtex.model.stretched import Stretched
 from simdtex.options import one_of, real, resolve, whole
 from simdtex.run import Callback, Output
 
+if TYPE_CHECKING:
+    from typing import Unpack
+
+    from simdtex.methods.typed_options import PyramidOptions
+
 __all__ = ["mix"]
+
+
+@overload
+def mix(
+    samples: Sequence[ArrayLike],
+    shape: tuple[int, int],
+    *,
+    palette: int | None = ...,
+    pattern: int | None = ...,
+    average: Sequence[float] | None = ...,
+    low: int | None = ...,
+    high: int | None = ...,
+    split: int | None = ...,
+    blend: str = ...,
+    pixels: str = ...,
+    full_output: Literal[True],
+    **options: Unpack[PyramidOptions],
+) -> tuple[NDArray[Any], Output]: ...
+
+
+@overload
+def mix(
+    samples: Sequence[ArrayLike],
+    shape: tuple[int, int],
+    *,
+    palette: int | None = ...,
+    pattern: int | None = ...,
+    average: Sequence[float] | None = ...,
+    low: int | None = ...,
+    high: int | None = ...,
+    split: int | None = ...,
+    blend: str = ...,
+    pixels: str = ...,
+    full_output: Literal[False] = ...,
+    **options: Unpack[PyramidOptions],
+) -> NDArray[Any]: ...
 
 
 def mix(
