@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.ops import nearest as module
+from simdtex.ops.leaves import FEATURES
 from simdtex.ops.nearest import nearest
 
 strengths = st.sampled_from([0.0, 0.5, 1.0, 7.0])
@@ -115,6 +116,22 @@ def test_nothing_is_skipped_where_nothing_is_known(cl_device):
     p = p._replace(field=p.field._replace(source=np.zeros_like(p.field.source)))  # no candidate
     machine = opencl(cl_device, split=1)
     assert_same_bits(run(machine, p), run(REFERENCE, p))
+
+
+@pytest.mark.parametrize("options", FORMS[:2], ids=str)
+def test_a_candidate_just_within_the_bound_is_found(cl_device, options):
+    """Sixteen values to a neighbourhood, so features are all of it; and every site's source is the second nearest."""
+    p = problem(1, order=2, channels=2, sample_shape=(30, 31), shape=(12, 13), temperatures="zero")
+    assert len(p.offsets) * 2 == FEATURES and p.strip(REFERENCE).leaves() is not None
+    found, candidates = p.distances(REFERENCE)
+    first, second = np.argsort(found.distance, 0, kind="stable")[:2]
+    near, bound = (np.take_along_axis(found.distance, which[None], 0)[0] for which in (first, second))
+    assert np.count_nonzero((near < bound) & (near > 0.95 * bound)) > 10
+    source = p.field.source.copy()
+    source.ravel()[p.sites] = candidates.positions[second]
+    p = p._replace(field=p.field._replace(source=source))
+    choice, _ = run(opencl(cl_device, **options), p, 0.0, dear=0.0)
+    assert_same_bits(choice, candidates.positions[first])
 
 
 @pytest.mark.parametrize("order", [1, 8, 18, 50])
