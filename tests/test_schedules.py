@@ -13,7 +13,8 @@ from scipy import stats
 
 from simdtex import schedules
 from simdtex.model.lattice import Grid, neighbourhood_offsets
-from simdtex.schedules import SCHEDULES, Checked, Info, Masked, get, neighbours_in
+from simdtex.schedules import SCHEDULES, Checked, Coloring, Info, Masked, get, neighbours_in
+from simdtex.schedules.trimmed import Trimmed
 
 
 class Claim(NamedTuple):
@@ -501,3 +502,15 @@ def test_a_package_brings_schedules_as_entry_points(monkeypatch):
         get("another")
     with pytest.raises(TypeError, match="a schedule must be a name, or an object"):
         get("nothing")
+
+
+def test_a_trimmed_sweep_keeps_the_rows_that_reach_its_tile():
+    told = setting(Grid(40, 9, 1, False), order=4)
+    whole, trimmed = Coloring(), Trimmed(Coloring(), 18, 21)
+    (_, every), (_, some) = (one.step(told, one.init(told), Masked(told.grid)) for one in (whole, trimmed))
+    steps = list(zip(every.apart(REFERENCE), some.apart(REFERENCE), strict=True))
+    assert len(steps) > 4
+    for left, (before, after) in enumerate(reversed(steps)):
+        rows = before.sites // 9
+        kept = (rows >= 18 - 2 * left) & (rows < 21 + 2 * left)  # neighbours are two rows away at most
+        assert after.sites.tolist() == before.sites[kept].tolist()
