@@ -4,40 +4,40 @@
 // Solid textures, Heeger and Bergen section 4: the Laplacian pyramid of a block in integers, the block turned so
 // that its slices lie the other way, and the mean of several blocks. The Gaussian is (1, 4, 6, 4, 1) / 16 in each
 // direction. Every level is rounded, so a band and what it was taken from add up exactly.
-// Around a torus an odd number of slices, rows or columns is folded as in fold.cl: every second one goes around twice and
+// Blocks wrap around. An odd number of slices, rows or columns is folded as in fold.cl: every second one goes around twice and
 // meets each once, so that no seam is squeezed. Blocks are (depth, rows, cols). A launch is of the slices from `first` on: work-items (pixels of a slice, slices).
 // Two directions are summed in 32 bits, the third in 64: right up to |fine| < 2^23 and |coarse| < 2^25.
 
 // Index i, most often one of 0 .. n-1 already: a comparison is cheaper than a division.
-inline int inside(const int i, const int n, const int torus)
+inline int inside(const int i, const int n)
 {
-    return i >= 0 && i < n ? i : within(i, n, torus);
+    return i >= 0 && i < n ? i : within(i, n, 1);
 }
 
 // How many slices, rows or columns the level above n of them has.
-inline int above(const int n, const int torus)
+inline int above(const int n)
 {
-    return torus && n % 2 ? n : (n + 1) / 2;
+    return n % 2 ? n : n / 2;
 }
 
 // G_{i+1} = 2down(G_i * g) in three directions.
 __kernel void solid_reduce(__global const int *restrict fine, const int first, const int depth, const int rows,
-                           const int cols, const int torus, __global int *restrict coarse)
+                           const int cols, __global int *restrict coarse)
 {
-    const int half_rows = above(rows, torus), half_cols = above(cols, torus);
+    const int half_rows = above(rows), half_cols = above(cols);
     const int s = get_global_id(0), slice = first + (int)get_global_id(1);
-    if (s >= half_rows * half_cols || slice >= above(depth, torus))
+    if (s >= half_rows * half_cols || slice >= above(depth))
         return;
     const int i = 2 * (s / half_cols), j = 2 * (s % half_cols);
     int row[5], col[5];
     for (int a = 0; a < 5; ++a) {
-        row[a] = inside(i + a - 2, rows, torus) * cols;
-        col[a] = inside(j + a - 2, cols, torus);
+        row[a] = inside(i + a - 2, rows) * cols;
+        col[a] = inside(j + a - 2, cols);
     }
     const int weight[5] = {1, 4, 6, 4, 1};
     long sum = 0;
     for (int c = 0; c < 5; ++c) {
-        __global const int *g = fine + (size_t)inside(2 * slice + c - 2, depth, torus) * rows * cols;
+        __global const int *g = fine + (size_t)inside(2 * slice + c - 2, depth) * rows * cols;
         int flat = 0;
         for (int a = 0; a < 5; ++a) {
             __global const int *p = g + row[a];
@@ -51,14 +51,14 @@ __kernel void solid_reduce(__global const int *restrict fine, const int first, c
 // 2up(G_{i+1}) at the eight children of voxel (slice, i, j) of G_{i+1}, child 4 a + 2 b + c at a slices, b rows and
 // c columns on. In each direction the first child takes (1, 6, 1) / 8 around its parent, the second (4, 4) / 8.
 inline void expanded(__global const int *restrict coarse, const int depth, const int rows, const int cols,
-                     const int torus, const int slice, const int i, const int j, int *up)
+                     const int slice, const int i, const int j, int *up)
 {
     int row[3], flat[3][4];
     for (int b = 0; b < 3; ++b)
-        row[b] = inside(i + b - 1, rows, torus) * cols;
-    const int left = inside(j - 1, cols, torus), right = inside(j + 1, cols, torus);
+        row[b] = inside(i + b - 1, rows) * cols;
+    const int left = inside(j - 1, cols), right = inside(j + 1, cols);
     for (int a = 0; a < 3; ++a) {
-        __global const int *g = coarse + (size_t)inside(slice + a - 1, depth, torus) * rows * cols;
+        __global const int *g = coarse + (size_t)inside(slice + a - 1, depth) * rows * cols;
         int one[3], two[3];
         for (int b = 0; b < 3; ++b) {
             __global const int *p = g + row[b];
@@ -76,41 +76,23 @@ inline void expanded(__global const int *restrict coarse, const int depth, const
     }
 }
 
-// What both directions share: out = in + sign * 2up(coarse), one work-item per voxel of `coarse`, so that its eight
-// children share the sums. `in` and `out` are depth x rows x cols.
-inline void add_expanded(__global const int *restrict in, __global const int *restrict coarse, const int first,
-                         const int depth, const int rows, const int cols, const int torus, const int sign,
-                         __global int *restrict out)
+// out = in + sign * 2up(coarse), G_i of L_i and G_{i+1} or L_i of G_i: one work-item per voxel of `coarse`, so that its
+// eight children share the sums. All sides of `in` and `out` are even.
+__kernel void solid_expanded(__global const int *restrict in, __global const int *restrict coarse, const int first,
+                             const int depth, const int rows, const int cols, const int sign,
+                             __global int *restrict out)
 {
-    const int half_depth = (depth + 1) / 2, half_rows = (rows + 1) / 2, half_cols = (cols + 1) / 2;
     const int s = get_global_id(0), slice = first + (int)get_global_id(1);
-    if (s >= half_rows * half_cols || slice >= half_depth)
+    if (s >= rows * cols / 4 || slice >= depth / 2)
         return;
-    const int i = s / half_cols, j = s % half_cols;
+    const int i = s / (cols / 2), j = s % (cols / 2);
     int up[8];
-    expanded(coarse, half_depth, half_rows, half_cols, torus, slice, i, j, up);
+    expanded(coarse, depth / 2, rows / 2, cols / 2, slice, i, j, up);
     for (int c = 0; c < 8; ++c) {
         const int z = 2 * slice + (c >> 2), y = 2 * i + (c >> 1 & 1), x = 2 * j + (c & 1);
-        if (z < depth && y < rows && x < cols) {
-            const size_t voxel = ((size_t)z * rows + y) * cols + x;
-            out[voxel] = in[voxel] + sign * up[c];
-        }
+        const size_t voxel = ((size_t)z * rows + y) * cols + x;
+        out[voxel] = in[voxel] + sign * up[c];
     }
-}
-
-// L_i = G_i - 2up(G_{i+1}).
-__kernel void solid_band(__global const int *restrict fine, __global const int *restrict coarse, const int first,
-                         const int depth, const int rows, const int cols, const int torus, __global int *restrict band)
-{
-    add_expanded(fine, coarse, first, depth, rows, cols, torus, -1, band);
-}
-
-// G_i = L_i + 2up(G_{i+1}).
-__kernel void solid_collapse(__global const int *restrict band, __global const int *restrict coarse, const int first,
-                             const int depth, const int rows, const int cols, const int torus,
-                             __global int *restrict fine)
-{
-    add_expanded(band, coarse, first, depth, rows, cols, torus, 1, fine);
 }
 
 // The voxels of the level above, and their weights in 2^-`bits`, that slice, row or column i of n takes on a torus.
@@ -127,7 +109,7 @@ inline int taken(const int i, const int n, int *from, int *weight, int *bits)
     return count;
 }
 
-// out = in + sign * 2up(coarse) on a torus of which some side is odd: one work-item per voxel of `in` and `out`.
+// out = in + sign * 2up(coarse) where some side is odd: one work-item per voxel of `in` and `out`.
 __kernel void solid_folded(__global const int *restrict in, __global const int *restrict coarse, const int first,
                            const int depth, const int rows, const int cols, const int sign, __global int *restrict out)
 {
@@ -137,7 +119,7 @@ __kernel void solid_folded(__global const int *restrict in, __global const int *
     int z[5], y[5], x[5], u[5], v[5], w[5], bits = 0;
     const int zs = taken(slice, depth, z, u, &bits), ys = taken(s / cols, rows, y, v, &bits);
     const int xs = taken(s % cols, cols, x, w, &bits);
-    const int up_rows = above(rows, 1), up_cols = above(cols, 1);
+    const int up_rows = above(rows), up_cols = above(cols);
     long sum = 0;
     for (int a = 0; a < zs; ++a)
         for (int b = 0; b < ys; ++b) {

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Blocks of solid textures: their Laplacian pyramid in integers, their slices the other ways, their mean.
 
-Blocks are (depth, rows, cols) int32. A level has half the slices, rows and columns of the one below it, rounded up;
-around a torus an odd number of them is folded instead, see `simdtex.ops.fold`.
+Blocks are (depth, rows, cols) int32 and wrap around. A level has half the slices, rows and columns of the one below it;
+an odd number of them is folded instead, see `simdtex.ops.fold`.
 Results are right where what is reduced is below 2**23 and what is expanded below 2**25, positive or negative.
 """
 
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.ops.fold import folded
-from simdtex.ops.laplacian import sizes, within
+from simdtex.ops.laplacian import sizes
 
 MOST_ITEMS = 2**21
 """Work-items of a launch, about: so that none is long on a slow device."""
@@ -24,29 +24,29 @@ MOST_BLOCKS = 4
 """Blocks that `solid_mean` takes."""
 
 
-def above(shape: tuple[int, ...], torus: bool) -> tuple[int, ...]:
+def above(shape: tuple[int, ...]) -> tuple[int, ...]:
     """Return the shape of the level above one of this shape."""
-    return tuple(n if torus and n % 2 else -(-n // 2) for n in shape)
+    return tuple(n if n % 2 else n // 2 for n in shape)
 
 
 def _weighted(near: list[NDArray[np.int64]], weights: Sequence[int]) -> NDArray[np.int64]:
     return np.asarray(sum(w * g for w, g in zip(weights, near, strict=True)))
 
 
-def _expanded(coarse: NDArray[np.int32], shape: tuple[int, ...], torus: bool) -> NDArray[np.int64]:
+def _expanded(coarse: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[np.int64]:
     """Return 2up(G_{i+1}) at a level of this shape."""
     g, bits = coarse.astype(np.int64), 0
     for axis in range(3):
         n = g.shape[axis]
-        bits += 4 if torus and shape[axis] % 2 else 3
-        if torus and shape[axis] % 2:
+        bits += 4 if shape[axis] % 2 else 3
+        if shape[axis] % 2:
             whole = np.empty_like(g)
             whole[(slice(None),) * axis + (folded(n),)] = g  # back where they were
             g = _weighted([np.roll(whole, -a, axis) for a in range(-2, 3)], (1, 4, 6, 4, 1))
             continue
-        near = [g.take(within(np.arange(n) + a, n, torus), axis) for a in (-1, 0, 1)]
+        near = [np.roll(g, -a, axis) for a in (-1, 0, 1)]
         children = np.stack([_weighted(near, (1, 6, 1)), _weighted(near, (0, 4, 4))], axis + 1)
-        g = children.reshape(*g.shape[:axis], 2 * n, *g.shape[axis + 1 :]).take(range(shape[axis]), axis)
+        g = children.reshape(*g.shape[:axis], 2 * n, *g.shape[axis + 1 :])
     return (g + (1 << bits - 1)) >> bits
 
 
@@ -57,54 +57,47 @@ def _parts(slices: int, pixels: int) -> Iterator[tuple[np.int32, tuple[int, int]
         yield np.int32(first), (pixels, min(step, slices - first))
 
 
-def _launch_expanded(machine: Launcher, function: str, known: Array, coarse: Array, torus: bool) -> Array:
-    result = machine.empty(known.shape, np.int32)
-    if torus and any(n % 2 for n in known.shape):
-        sign = 1 if function == "solid_collapse" else -1
-        depth, rows, cols = known.shape
-        for first, size in _parts(depth, rows * cols):
-            arguments = (known, coarse, first, *sizes(*known.shape, sign), result)
-            machine.launch(machine.kernel("solid", "solid_folded"), size, *arguments)
-        return result
-    depth, rows, cols = coarse.shape
+def _launch_expanded(machine: Launcher, sign: int, known: Array, coarse: Array) -> Array:
+    result, odd = machine.empty(known.shape, np.int32), any(n % 2 for n in known.shape)
+    kernel = machine.kernel("solid", "solid_folded" if odd else "solid_expanded")
+    depth, rows, cols = known.shape if odd else coarse.shape
     for first, size in _parts(depth, rows * cols):
-        arguments = (known, coarse, first, *sizes(*known.shape, torus), result)
-        machine.launch(machine.kernel("solid", function), size, *arguments)
+        machine.launch(kernel, size, known, coarse, first, *sizes(*known.shape, sign), result)
     return result
 
 
 @Operation
-def solid_reduce(machine: Launcher | None, fine: Array, torus: bool) -> Array:
+def solid_reduce(machine: Launcher | None, fine: Array) -> Array:
     """Return G_{i+1} of the block G_i. Cost: 125 multiply-adds a voxel."""
     if machine is None:
         g = fine.astype(np.int64)
         for axis in range(3):
             n = g.shape[axis]
-            center = 2 * np.arange(above((n,), torus)[0])
-            g = _weighted([g.take(within(center + a, n, torus), axis) for a in range(-2, 3)], (1, 4, 6, 4, 1))
+            center = 2 * np.arange(above((n,))[0])
+            g = _weighted([g.take(center + a, axis, mode="wrap") for a in range(-2, 3)], (1, 4, 6, 4, 1))
         return ((g + 2**11) >> 12).astype(np.int32)
-    depth, rows, cols = above(fine.shape, torus)
+    depth, rows, cols = above(fine.shape)
     coarse = machine.empty((depth, rows, cols), np.int32)
     for first, size in _parts(depth, rows * cols):
-        arguments = (fine, first, *sizes(*fine.shape, torus), coarse)
+        arguments = (fine, first, *sizes(*fine.shape), coarse)
         machine.launch(machine.kernel("solid", "solid_reduce"), size, *arguments)
     return coarse
 
 
 @Operation
-def solid_band(machine: Launcher | None, fine: Array, coarse: Array, torus: bool) -> Array:
+def solid_band(machine: Launcher | None, fine: Array, coarse: Array) -> Array:
     """Return L_i of G_i and G_{i+1}. Cost: 12 multiply-adds a voxel of L_i."""
     if machine is None:
-        return (fine - _expanded(coarse, fine.shape, torus)).astype(np.int32)
-    return _launch_expanded(machine, "solid_band", fine, coarse, torus)
+        return (fine - _expanded(coarse, fine.shape)).astype(np.int32)
+    return _launch_expanded(machine, -1, fine, coarse)
 
 
 @Operation
-def solid_collapse(machine: Launcher | None, band: Array, coarse: Array, torus: bool) -> Array:
+def solid_collapse(machine: Launcher | None, band: Array, coarse: Array) -> Array:
     """Return G_i of L_i and G_{i+1}, to the bit if they are its own."""
     if machine is None:
-        return (band + _expanded(coarse, band.shape, torus)).astype(np.int32)
-    return _launch_expanded(machine, "solid_collapse", band, coarse, torus)
+        return (band + _expanded(coarse, band.shape)).astype(np.int32)
+    return _launch_expanded(machine, 1, band, coarse)
 
 
 @Operation

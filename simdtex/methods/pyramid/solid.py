@@ -124,14 +124,14 @@ def _matched_block(machine: Machine, block: Array, wanted: list[Wanted], matcher
     """The 3-D Laplacian pyramid of a block, matched and collapsed."""
     gaussian = [block]
     while len(gaussian) < len(wanted):
-        gaussian.append(solid_reduce(machine, gaussian[-1], True))
-    bands = [solid_band(machine, fine, coarse, True) for fine, coarse in pairwise(gaussian)]
+        gaussian.append(solid_reduce(machine, gaussian[-1]))
+    bands = [solid_band(machine, fine, coarse) for fine, coarse in pairwise(gaussian)]
     names = [*(f"solid level {level}" for level in range(len(bands))), "solid low"]
     synthesis_pyr = [band.reshape((1, 1, *band.shape)) for band in [*bands, gaussian[-1]]]
     matched = match_subbands(matcher, names, synthesis_pyr, wanted)
     *fine, collapsed = (band.reshape(band.shape[2:]) for band in matched)
     for band in reversed(fine):
-        collapsed = solid_collapse(machine, band, collapsed, True)
+        collapsed = solid_collapse(machine, band, collapsed)
     return collapsed
 
 
