@@ -74,15 +74,17 @@ class Problem(NamedTuple):
     def offsets(self):
         return neighbourhood_offsets(self.order)
 
+    def places(self):
+        return self.sample.places(self.offsets, self.grid.spacing, self.phases, self.edges)
+
     def candidates(self, machine, every=False):
-        where = (self.offsets, self.grid.spacing, self.phases, self.edges)
-        return self.sample.candidates(machine, *where, every=every)
+        return self.sample.candidates(machine, self.places(), every=every)
 
     def strip(self, machine):
-        return strip_of(machine, self.sample, self.offsets, self.grid.spacing, self.phases, self.edges)
+        return strip_of(machine, self.sample, self.places())
 
     def square(self, machine):
-        return square_of(machine, self.sample, self.offsets, self.grid.spacing, self.phases, self.edges)
+        return square_of(machine, self.sample, self.places())
 
     def price(self, dear=1.0, every=False):
         """Of each candidate, padded to whole blocks: some cost nothing, some much in terms of a distance.
@@ -92,7 +94,7 @@ class Problem(NamedTuple):
         candidates = self.candidates(REFERENCE, every)
         scale = dear * self.sample.variance * len(self.offsets) * self.sample.channels
         price = scale * np.random.default_rng(candidates.size).choice([0, 0, 0.1, 1, 2], candidates.positions.size)
-        allowed = self.sample.allowed(self.offsets, self.grid.spacing, self.phases, self.edges)
+        allowed = self.places().allowed
         if every and allowed is not None:
             price[: candidates.size][~allowed] = np.inf
         return price.astype(np.float32)

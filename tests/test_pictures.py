@@ -114,7 +114,7 @@ def test_candidates_are_those_of_each_picture_alone(edges, spacing, phases):
     pictures = [rng.integers(0, 9, (*mask.shape, 1)).astype(np.uint8) for mask in masks]
     sample = Sample(Pictures(tuple(pictures), usable=tuple(masks)), 8, 2, step=2)
     offsets, step = neighbourhood_offsets(1), 1 if phases == "all" else spacing
-    found = [tuple(p) for p in sample.place(sample.positions(offsets, spacing, phases, edges)).tolist()]
+    found = [tuple(p) for p in sample.place(sample.places(offsets, spacing, phases, edges).positions).tolist()]
     every = [(i, j, n) for n, mask in enumerate(masks) for i, j in np.ndindex(mask.shape) if mask[i, j]]
     every = [(i, j, n) for i, j, n in every if i % step == j % step == 0]
     whole = [
@@ -135,7 +135,7 @@ def test_a_candidate_knows_enough_of_its_neighbours(monkeypatch):
     for unsure in (0.0, 0.25, 0.5):
         monkeypatch.setattr("simdtex.model.sample.UNSURE", unsure)
         sample = Sample(Pictures(pixels, unknown=(~known,)), 4, 1)
-        found[unsure] = {tuple(p) for p in sample.place(sample.positions(offsets, 1, "all", "reflect")).tolist()}
+        found[unsure] = {tuple(p) for p in sample.place(sample.places(offsets, 1, "all", "reflect").positions).tolist()}
     everywhere = {(i, j) for i, j in np.ndindex(9, 9) if known[i, j]}
     beside = {(3, 4), (5, 4), (4, 3), (3, 5), (5, 5), (4, 6)}  # each sees one of the two
     assert found == {0.0: everywhere - beside, 0.25: everywhere, 0.5: everywhere}
@@ -146,9 +146,11 @@ def test_what_is_fair_is_in_proportion_to_shares():
     where = (offsets, 1, "all", "reflect")
     first, second = np.zeros((4, 5, 1), np.uint8), np.zeros((8, 5, 1), np.uint8)
     sample = Sample(Pictures((first, second), shares=(3.0, 1.0)), 4, 1)
-    fair, picture = sample.fair(*where), sample.picture_of(sample.everywhere(*where))
+    places = sample.places(*where)
+    fair, picture = sample.fair(places), sample.picture_of(places.everywhere)
     assert fair[picture == 0].sum() == pytest.approx(3 * fair[picture == 1].sum(), rel=1e-4)
     assert (fair > 0).sum() == 60
-    alike = Sample(Pictures((first, second)), 4, 1).fair(*where)
+    several, one = Sample(Pictures((first, second)), 4, 1), Sample(Pictures((first,)), 4, 1)
+    alike = several.fair(several.places(*where))
     assert sorted(set(alike.tolist())) == [0, 1]
-    assert Sample(Pictures((first,)), 4, 1).fair(*where) is None
+    assert one.fair(one.places(*where)) is None

@@ -25,7 +25,7 @@ def starts(draw):
     channels, margin = draw(st.integers(1, 3)), draw(st.integers(0, 3))
     dtype = draw(st.sampled_from([np.uint8, np.uint16, np.float32]))
     sample = Sample(texture((draw(side), draw(side)), channels, dtype, 1), 8, margin)
-    positions = sample.positions(np.zeros((1, 2), np.int32), 1)
+    positions = sample.places(np.zeros((1, 2), np.int32), 1).positions
     return sample, positions, (draw(side), draw(side)), draw(st.integers(0, 2**64 - 1))
 
 
@@ -54,12 +54,12 @@ def test_a_device_has_the_references_bits(machine, case):
 @pytest.mark.parametrize("work_group", [3, 16])
 def test_the_shape_of_a_launch_changes_no_bit(cl_device, work_group):
     sample = Sample(texture((9, 7), 3), 8)
-    case = sample, sample.positions(np.zeros((1, 2), np.int32), 1), (10, 13), 5
+    case = sample, sample.places(np.zeros((1, 2), np.int32), 1).positions, (10, 13), 5
     assert_same_bits(run(opencl(cl_device, work_group=work_group), *case), run(REFERENCE, *case))
 
 
 def test_every_pixel_is_as_likely():
     sample = Sample(texture((5, 4), 1), 8)
-    positions = sample.positions(np.zeros((1, 2), np.int32), 1)
+    positions = sample.places(np.zeros((1, 2), np.int32), 1).positions
     _, source, _ = run(REFERENCE, sample, positions, (100, 100), 11)
     assert chisquare(np.bincount(source.ravel(), minlength=20)).pvalue > SIGNIFICANCE

@@ -71,7 +71,7 @@ def test_a_window_relaxes_as_the_whole(any_device, name, how, boundary, number):
 def test_a_window_begins_as_the_whole(request, machine_):
     machine = REFERENCE if machine_ == "reference" else opencl(request.getfixturevalue("any_device"))
     run = laid_out(machine, texture((12, 13))[..., None], (22, 27), mrf.Options(order=2, levels=2), 3)
-    everywhere = machine.put(run.sample.positions(np.zeros((1, 2), np.int32), 1))
+    everywhere = machine.put(run.sample.places(np.zeros((1, 2), np.int32), 1).positions)
     whole = [np.array(machine.get(plane)) for plane in run.begin().field]
     for number in (0, 1):
         grid = run.grid(number)

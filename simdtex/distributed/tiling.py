@@ -83,9 +83,8 @@ class Run:
         """Return how many candidates a tile counts the use of."""
         if turn.phase in ("whole", "show"):
             return 0
-        lattices, where = self.lattices, self.lattices.where(turn.level)
-        sample, every = lattices.sample, lattices.exhaustive(turn.level)
-        return int((sample.everywhere(*where) if every else sample.positions(*where)).size)
+        places = self.lattices.places(turn.level)
+        return int((places.everywhere if self.lattices.exhaustive(turn.level) else places.positions).size)
 
     def _complete(self, turn: Turn) -> Turn:
         """Return the next turn, now that all tiles have had this one; the store goes on to it."""

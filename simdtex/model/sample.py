@@ -35,6 +35,30 @@ class NothingUsable(ValueError):
     """No pixel of a sample is a candidate of some level."""
 
 
+class Places(NamedTuple):
+    """The places of a level's candidates: the crossings of some rows and columns of the sample.
+
+    ``offsets`` (N, 2) the neighbourhood; ``spacing`` 2**level, by which it is spread; ``step`` pixels of the sample
+    from one crossing to the next; ``row`` and ``col`` of the crossings; ``everywhere`` (n,) int32 the pixel index of
+    each, row by row; ``allowed`` (n,) whether each is a candidate, or None if all are; ``reach`` (N,) int32 pixel
+    offset of each neighbour.
+    """
+
+    offsets: NDArray[np.int32]
+    spacing: int
+    step: int
+    row: NDArray[np.int32]
+    col: NDArray[np.int32]
+    everywhere: NDArray[np.int32]
+    allowed: NDArray[np.bool_] | None
+    reach: NDArray[np.int32]
+
+    @property
+    def positions(self) -> NDArray[np.int32]:
+        """Pixel index of every candidate, row by row."""
+        return self.everywhere if self.allowed is None else self.everywhere[self.allowed]
+
+
 class Candidates(NamedTuple):
     """The sample positions p that a site may be taken from, at one level.
 
@@ -151,7 +175,7 @@ class Sample:
 
     def _lay(self, levels: Sequence[NDArray[np.uint16]], margin: int, step: int = 1, apart: int = 0) -> None:
         self.margin, self.channels, self.boxes = margin, len(levels[0]), []
-        self._allowed: dict[tuple[Any, ...], NDArray[np.bool_] | None] = {}
+        self._places: dict[tuple[Any, ...], Places] = {}
         self.__dict__.pop("variance", None)
         top = 0
         for one in levels:
@@ -189,14 +213,13 @@ class Sample:
         """sigma^2 of equation (8): the mean over the matched channels of the variance of the working levels."""
         return variance(*(self.levels[: self.channels, top : top + rows, :cols] for top, rows, cols in self.boxes))
 
-    def positions(
-        self,
-        offsets: NDArray[np.int32],
-        spacing: int,
-        phases: str = "decimated",
-        edges: str = "whole",
-    ) -> NDArray[np.int32]:
-        """Pixel index of every candidate of a level, row by row.
+    def places(
+        self, offsets: NDArray[np.int32], spacing: int, phases: str = "decimated", edges: str = "whole"
+    ) -> Places:
+        """Return the places of the candidates of a level.
+
+        Places outside the pictures, unknown or unusable ones, and those with too large a share of unknown neighbours
+        (`UNSURE`) are no candidates.
 
         Parameters
         ----------
@@ -207,67 +230,20 @@ class Sample:
         phases : {"decimated", "all"}
             The pixels of the decimated sample, equation (10), or every pixel.
         edges : {"whole", "reflect", "auto"}
-            Those whose neighbourhood lies in the sample, equation (4); all, where the margin is wide enough; or
-            the former at the finest level, where they are three quarters of all or more, else the latter.
+            Those whose neighbourhood lies in their picture, equation (4); all, if the margin is wide enough; or the
+            former at the finest level, if they are three quarters of all or more, else the latter.
+
+        Raises
+        ------
+        NothingUsable
+            No pixel of several pictures, or of one with gaps, is a candidate.
         """
-        where, allowed = (offsets, spacing, phases, edges), self.allowed(offsets, spacing, phases, edges)
-        return self.everywhere(*where) if allowed is None else self.everywhere(*where)[allowed]
-
-    def everywhere(
-        self, offsets: NDArray[np.int32], spacing: int, phases: str = "decimated", edges: str = "whole"
-    ) -> NDArray[np.int32]:
-        """The same with what lies between them and may not be used: the crossings of `lines`, row by row."""
-        row, col = self.lines(offsets, spacing, phases, edges)
-        row, col = row + np.int32(self.margin), col + np.int32(self.margin)
-        positions: NDArray[np.int32] = (row[:, None] * np.int32(self.cols) + col[None, :]).ravel()
-        return positions
-
-    def lines(
-        self, offsets: NDArray[np.int32], spacing: int, phases: str = "decimated", edges: str = "whole"
-    ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Rows and columns of the user's sample at whose crossings the candidates of a level lie; see `positions`."""
-        (top, left), (bottom, right) = offsets.min(0) * spacing, offsets.max(0) * spacing
-        step = 1 if phases == "all" else spacing
-        row = np.arange(0, self.height, step, dtype=np.int32)
-        col = np.arange(0, self.width, step, dtype=np.int32)
-        if not self.pictures.clean:
-            return row, col
-        whole_row = row[(row + top >= 0) & (row + bottom < self.height)]
-        whole_col = col[(col + left >= 0) & (col + right < self.width)]
-        few = whole_row.size * whole_col.size < ENOUGH_WHOLE * row.size * col.size
-        if not (edges == "reflect" or (edges == "auto" and (spacing > 1 or few))):
-            row, col = whole_row, whole_col
-        return row, col
-
-    def allowed(
-        self, offsets: NDArray[np.int32], spacing: int, phases: str = "decimated", edges: str = "whole"
-    ) -> NDArray[np.bool_] | None:
-        """Which of `everywhere` are candidates, (n,); None where all are.
-
-        Those that are no pixel of a picture, unknown or not to be used are none, nor are those of whose neighbours a
-        larger share than `UNSURE` is unknown; where neighbourhoods must be whole, each counts within its own picture.
-        """
-        if self.pictures.clean:
-            return None
         key = (offsets.tobytes(), spacing, phases, edges)
-        if key not in self._allowed:
-            row, col = self.lines(offsets, spacing, phases, edges)
-            found = self._permitted(offsets, spacing, edges, row, col)
-            if not found.any():
-                raise NothingUsable("nothing of the sample may be used at some level; give more of it, or fewer levels")
-            self._allowed[key] = found.ravel()
-        return self._allowed[key]
-
-    def _permitted(
-        self,
-        offsets: NDArray[np.int32],
-        spacing: int,
-        edges: str,
-        row: NDArray[np.int32],
-        col: NDArray[np.int32],
-    ) -> NDArray[np.bool_]:
-        margin, crossing = self.margin, np.ix_(row + self.margin, col + self.margin)
-        found: NDArray[np.bool_] = self.inside[crossing].copy()
+        if key in self._places:
+            return self._places[key]
+        step, margin = 1 if phases == "all" else spacing, self.margin
+        row, col = (np.arange(0, n, step, dtype=np.int32) for n in (self.height, self.width))
+        found: NDArray[np.bool_] = self.inside[np.ix_(row + margin, col + margin)]
         (up, left), (down, right) = offsets.min(0) * spacing, offsets.max(0) * spacing
         whole = np.zeros_like(found)
         for top, rows, cols in self.boxes:
@@ -276,25 +252,40 @@ class Sample:
         few = np.count_nonzero(found & whole) < ENOUGH_WHOLE * np.count_nonzero(found)
         if not (edges == "reflect" or (edges == "auto" and (spacing > 1 or few))):
             found &= whole
-        if self.pictures.known:
-            missing = self._stacked([~known for known in self.pictures.known], False)
-            padded = np.pad(missing, margin)
-            lines = np.flatnonzero(padded.any(1))
-            near = (row + margin + down >= lines[0]) & (row + margin + up <= lines[-1])  # who can see one
-            count = np.zeros((int(near.sum()), col.size), np.int16)
-            for a, b in offsets * spacing:
-                count += padded[np.ix_(row[near] + margin + a, col + margin + b)]
-            found[near] &= count <= UNSURE * len(offsets)
+        if self.pictures.clean:
+            row, col, allowed = row[found.any(1)], col[found.any(0)], None
+        else:
+            if self.pictures.known:
+                found &= self._sure(offsets * spacing, row + margin, col + margin)
+            if not found.any():
+                raise NothingUsable("nothing of the sample may be used at some level; give more of it, or fewer levels")
+            allowed = found.ravel()
+        everywhere = ((row + margin)[:, None] * np.int32(self.cols) + (col + margin)[None, :]).astype(np.int32).ravel()
+        reach = (offsets @ np.array([self.cols, 1], np.int32) * np.int32(spacing)).astype(np.int32)
+        self._places[key] = Places(offsets, spacing, step, row, col, everywhere, allowed, reach)
+        return self._places[key]
+
+    def _sure(self, offsets: NDArray[np.int32], row: NDArray[np.int32], col: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """Return which crossings have few unknown neighbours, all in pixels of the sample with its margin."""
+        assert self.pictures.known is not None
+        missing = np.pad(self._stacked([~known for known in self.pictures.known], False), self.margin)
+        lines = np.flatnonzero(missing.any(1))
+        near = (row + offsets[:, 0].max() >= lines[0]) & (row + offsets[:, 0].min() <= lines[-1])  # who can see one
+        count = np.zeros((int(near.sum()), col.size), np.int16)
+        for a, b in offsets:
+            count += missing[np.ix_(row[near] + a, col + b)]
+        found = np.ones((row.size, col.size), bool)
+        found[near] = count <= UNSURE * len(offsets)
         return found
 
-    def fair(self, offsets: NDArray[np.int32], spacing: int, phases: str, edges: str) -> NDArray[np.int64] | None:
-        """How much each of `everywhere` is to be used, (n,) whole numbers in one unit; None where all alike."""
-        allowed = self.allowed(offsets, spacing, phases, edges)
+    def fair(self, places: Places) -> NDArray[np.int64] | None:
+        """Return how much each place is to be used, (n,) whole numbers in one unit; None if all alike."""
+        allowed = places.allowed
         if allowed is None:
             return None
         if not self.pictures.shares:
             return allowed.astype(np.int64)
-        picture = self.picture_of(self.everywhere(offsets, spacing, phases, edges))
+        picture = self.picture_of(places.everywhere)
         counts = np.bincount(picture[allowed], minlength=len(self.boxes))
         total, fair = sum(self.pictures.shares), np.zeros(allowed.size, np.int64)
         for number, share in enumerate(self.pictures.shares):
@@ -309,41 +300,27 @@ class Sample:
         found: NDArray[np.intp] = np.maximum(np.searchsorted(tops, row, "right") - 1, 0)
         return found
 
-    def reach(self, offsets: NDArray[np.int32], spacing: int) -> NDArray[np.int32]:
-        """Pixel offset of each neighbour, (N,), at a level whose sites are `spacing` pixels apart."""
-        reach: NDArray[np.int32] = (offsets @ np.array([self.cols, 1], np.int32) * np.int32(spacing)).astype(np.int32)
-        return reach
-
     def planes(self, machine: Any) -> Any:
         """The working levels as an array (C, rows * cols) of a machine, float32."""
         return machine.put(self.working.astype(np.float32))
 
-    def candidates(
-        self,
-        machine: Any,
-        offsets: NDArray[np.int32],
-        spacing: int,
-        phases: str = "decimated",
-        edges: str = "whole",
-        planes: Any | None = None,
-        every: bool = False,
-    ) -> Candidates:
-        """The candidates of a level (see `positions`) as arrays of a machine, which may have the planes already.
+    def candidates(self, machine: Any, places: Places, planes: Any | None = None, every: bool = False) -> Candidates:
+        """Return the candidates of a level as arrays of a machine, which may have the planes already.
 
-        With ``every`` the list is that of `everywhere`, and ``index_of`` knows the candidates among them.
+        With ``every`` the list is that of all places, and ``index_of`` knows the candidates among them.
         """
-        positions = self.positions(offsets, spacing, phases, edges)
+        positions = places.positions
         index_of = np.full(self.rows * self.cols, -1, np.int32)
         index_of[positions] = np.arange(positions.size, dtype=np.int32)
-        if every and (allowed := self.allowed(offsets, spacing, phases, edges)) is not None:
-            index_of[positions] = np.flatnonzero(allowed)
-            positions = self.everywhere(offsets, spacing, phases, edges)
+        if every and places.allowed is not None:
+            index_of[positions] = np.flatnonzero(places.allowed)
+            positions = places.everywhere
         padding = np.full(-positions.size % BLOCK, positions[0], np.int32)
         return Candidates(
             self.planes(machine) if planes is None else planes,
             machine.put(np.concatenate([positions, padding])),
             positions.size,
-            machine.put(np.pad(self.reach(offsets, spacing), (0, bool(len(self.guides))))),  # a guide's site itself
+            machine.put(np.pad(places.reach, (0, bool(len(self.guides))))),  # a guide's site itself
             machine.put(index_of),
             self.rows,
             self.cols,

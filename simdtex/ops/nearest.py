@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Machine, Operation
 from simdtex.model.lattice import Grid
-from simdtex.model.sample import Candidates, Sample
+from simdtex.model.sample import Candidates, Places, Sample
 from simdtex.ops import coherence, lcpdf, neighbourhood
 from simdtex.ops.charge import charge
 from simdtex.ops.lcpdf import Relaxed
@@ -49,12 +49,9 @@ class Strip(NamedTuple):
     leaves: Callable[[], Leaves | None]
 
 
-def strip_of(
-    machine: Machine, sample: Sample, offsets: NDArray[np.int32], spacing: int, phases: str, edges: str
-) -> Strip:
-    """Return the strip of a level's candidates: see `simdtex.model.sample.Sample.positions`."""
-    positions = sample.everywhere(offsets, spacing, phases, edges)
-    step = spacing if phases == "decimated" else 1
+def strip_of(machine: Machine, sample: Sample, places: Places) -> Strip:
+    """Return the strip of a level's candidates."""
+    offsets, positions, spacing, step = places.offsets, places.everywhere, places.spacing, places.step
     row, col = (int(n) for n in divmod(positions[0], sample.cols))
     planes = sample.working.reshape(-1, sample.rows, sample.cols)[:, row % step :: step, col % step :: step]
     pitch = planes.shape[2]
@@ -63,8 +60,7 @@ def strip_of(
     wide = int(np.searchsorted(positions, (row + 1) * sample.cols))
     first, reaches = row // step * pitch + col // step, machine.put(reach.astype(np.int32))
     shape = (first, pitch, positions.size // wide, wide)
-    spread = (offsets[:, 0] * np.int32(sample.cols) + offsets[:, 1]) * np.int32(spacing)
-    leaves = cache(partial(grow, machine, sample.working, positions, spread, sample.top))
+    leaves = cache(partial(grow, machine, sample.working, positions, places.reach, sample.top))
     return Strip(machine.put(pixels), *shape, reaches, offsets.tobytes(), leaves)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Machine
-from simdtex.model.sample import Sample
+from simdtex.model.sample import Places, Sample
 from simdtex.ops.arithmetic import fma32
 
 LANES = 16
@@ -56,10 +56,9 @@ class Square(NamedTuple):
         return np.where(numbers < 0, np.float32(np.inf), d[0])
 
 
-def square_of(
-    machine: Machine, sample: Sample, offsets: NDArray[np.int32], step: int, phases: str, edges: str
-) -> Square:
-    """Lay out a level whose sites are ``step`` pixels of the sample apart."""
+def square_of(machine: Machine, sample: Sample, places: Places) -> Square:
+    """Lay out the candidates of a level."""
+    offsets, step = places.offsets, places.spacing
     radius, rows, cols = int(offsets.max()), sample.rows, sample.cols
     side, columns = 2 * radius + 1, -(-(2 * radius + 1) // LANES) * LANES
     disc = np.zeros((side, columns), np.float32)
@@ -68,7 +67,7 @@ def square_of(
     around = ((0, 0), (0, 0), (0, wide * step - cols))
     working = np.pad(sample.working.reshape(-1, rows, cols), around, mode="edge").reshape(-1, rows, wide, step)
     levels = working.swapaxes(2, 3).reshape(len(working), -1)
-    row, col = np.divmod(sample.positions(offsets, step, phases, edges), np.int32(cols))
+    row, col = np.divmod(places.positions, np.int32(cols))
     at = (row * np.int32(step) + col % np.int32(step)) * np.int32(wide) + col // np.int32(step)
     return Square(
         machine.put(at),

@@ -47,7 +47,7 @@ class Run(Lattices):
 
     def begin(self) -> State:
         """Return the state at the beginning of the coarsest level: sample pixels drawn at random, t = 1."""
-        everywhere = self.machine.put(self.sample.positions(np.zeros((1, 2), np.int32), 1))
+        everywhere = self.machine.put(self.sample.places(np.zeros((1, 2), np.int32), 1).positions)
         field = start(self.machine, self.planes, everywhere, Grid(*self.plan.shape), self.seed)  # 2, 5
         return self.enter(self.levels - 1, field)
 

@@ -61,7 +61,7 @@ def lcpdf_at(
     greys = sample.top + 1
     values, source = image[None].astype(np.uint16), np.zeros(image.shape, np.int32)
     field = Field(*(machine.put(array) for array in (values, source, temperature)))
-    candidates = sample.candidates(machine, offsets, 1)
+    candidates = sample.candidates(machine, sample.places(offsets, 1))
     h = bandwidth * lcpdf.optimal_bandwidth(sample.variance, candidates.size, len(offsets) + 1)
     window = lcpdf.window(h, sample.top)
     device_offsets = machine.put(offsets)

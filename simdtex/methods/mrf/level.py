@@ -17,7 +17,7 @@ from simdtex.methods.mrf.conditioning import Conditioning, Conditions
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given, Planes
 from simdtex.model.lattice import Grid
-from simdtex.model.sample import Candidates, Sample
+from simdtex.model.sample import Candidates, Places, Sample
 from simdtex.ops import active, lcpdf
 from simdtex.ops.lcpdf import Choice
 from simdtex.ops.nearest import strip_of
@@ -221,13 +221,13 @@ class Lattices:
     def _level(self, number: int) -> Level:
         options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
         grid = self.grid(number)
-        coarsest, count = number == self.levels - 1, sample.positions(*self.where(number)).size
+        coarsest, count = number == self.levels - 1, self.places(number).positions.size
         proposal: Everything | Listed
         if self.exhaustive(number):
-            every = sample.candidates(machine, *self.where(number), self.planes, every=True)
-            proposal = Everything(every, strip_of(machine, sample, *self.where(number)))
+            every = sample.candidates(machine, self.places(number), self.planes, every=True)
+            proposal = Everything(every, strip_of(machine, sample, self.places(number)))
         else:
-            square = square_of(machine, sample, *self.where(number))
+            square = square_of(machine, sample, self.places(number))
             proposal = Listed(self.candidates(number), square, len(offsets), options.chance)
         dimensions = sample.channels * (len(offsets) + 1)
         variance = sample.variance
@@ -267,31 +267,30 @@ class Lattices:
         """Whether a site of a level weighs all its candidates."""
         if self.options.search == "exact" or number == self.levels - 1:
             return True
-        return bool(self.sample.positions(*self.where(number)).size <= EXHAUSTIVE)
+        return bool(self.places(number).positions.size <= EXHAUSTIVE)
 
     def fair_use(self, number: int) -> FairUse:
         """Return where the candidates of a level lie, and how much use of each is fair."""
         step = 2**number if self.options.phases == "all" else 1
-        rows, cols = self.sample.lines(*self.where(number))
-        fair, kinds = self.sample.fair(*self.where(number)), (*self._kinds(number), STRICT * self.usual)
+        places = self.places(number)
+        fair, kinds = self.sample.fair(places), (*self._kinds(places), STRICT * self.usual)
         around = int(self.offsets.max()) * step
-        return FairUse((rows.size, cols.size), around, fair, not self.exhaustive(number), *kinds)
+        return FairUse((places.row.size, places.col.size), around, fair, not self.exhaustive(number), *kinds)
 
-    def _kinds(self, number: int) -> tuple[NDArray[np.intp] | None, tuple[float, ...]]:
+    def _kinds(self, places: Places) -> tuple[NDArray[np.intp] | None, tuple[float, ...]]:
         """The category of each place where candidates may lie, and the shares that are asked for."""
         categories, wanted = self.sample.pictures.categories(0), self.options.proportions
         if categories is None or wanted is None:
             return None, ()
-        row, col = self.sample.lines(*self.where(number))
-        return np.searchsorted(categories, self.sample.pixels[np.ix_(row, col)][..., 0].ravel()), wanted
+        return np.searchsorted(categories, self.sample.pixels[np.ix_(places.row, places.col)][..., 0].ravel()), wanted
 
-    def where(self, number: int) -> tuple[NDArray[np.int32], int, str, str]:
-        """What says where the candidates of a level lie: see `simdtex.model.sample.Sample.positions`."""
-        return self.offsets, 2**number, self.options.phases, self.options.edges
+    def places(self, number: int) -> Places:
+        """Return the places of the candidates of a level."""
+        return self.sample.places(self.offsets, 2**number, self.options.phases, self.options.edges)
 
     def candidates(self, number: int) -> Candidates:
         """The candidates of a level."""
-        return self.sample.candidates(self.machine, *self.where(number), self.planes)
+        return self.sample.candidates(self.machine, self.places(number), self.planes)
 
 
 @dataclass(frozen=True)

@@ -113,7 +113,7 @@ def sampled(
         sample = Sample(pictures, values, margin, options.structure, step, guides, far)
         try:
             for number in range(fewer):
-                sample.allowed(offsets, 2**number, options.phases, options.edges)
+                sample.places(offsets, 2**number, options.phases, options.edges)
         except NothingUsable:
             if fewer == 1 or options.levels is not None:
                 raise

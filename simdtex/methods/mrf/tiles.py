@@ -132,7 +132,7 @@ def relaxed(
 def _entered(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Level, Field]:
     machine, level = run.machine, run.level(number, tile)
     grid = level.setting.grid
-    everywhere = machine.put(run.sample.positions(np.zeros((1, 2), np.int32), 1))
+    everywhere = machine.put(run.sample.places(np.zeros((1, 2), np.int32), 1).positions)
     field = start(machine, run.planes, everywhere, grid, run.seed)
     if above is not None:
         planes = _off(machine, field)
