@@ -201,8 +201,10 @@ def test_errors_of_counting():
         counts(one, (4, 4), sample=1)
     with pytest.raises(ValueError, match="sample is -1: give 0 or more"):
         counts(three, (4, 4), sample=-1)
-    for bad in (np.array([[[-1, 0]]]), np.array([[[0, -1]]]), np.array([[[-2, -2]]]), np.array([[[0, 4]]]), one[:0]):
-        with pytest.raises(ValueError, match="outside a sample of 4 x 4"):
+    with pytest.raises(ValueError, match="outside a sample of 4 x 4"):
+        counts(np.array([[[0, 4]]]), (4, 4))
+    for bad in (np.array([[[-1, 0]]]), np.array([[[0, -1]]]), np.array([[[-2, -2]]]), one[:0]):
+        with pytest.raises(ValueError, match="source map"):
             counts(bad, (4, 4))
 
 

@@ -61,8 +61,6 @@ def source_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
     ndarray of uint8, (rows, cols, 3)
     """
     positions = np.asarray(source)
-    if positions.ndim != 3 or positions.shape[2] != 2:
-        raise ValueError("the source map is not (rows, cols, 2): pass the one of the run")
     extent = np.maximum(np.asarray(sample_shape[:2]) - 1, 1)
     across = np.clip(positions / extent, 0.0, 1.0) - 0.5
     colours = _srgb(np.full(positions.shape[:2], 0.72), 0.19 * across[..., 0], 0.19 * across[..., 1])

@@ -22,13 +22,12 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex.io.atomic import atomic_path
 from simdtex.io.image import check_writable, read, write
 from simdtex.io.limits import TooLarge, max_pixels_or_default, read_npz
+from simdtex.model.use import SourceMap, checked
 from simdtex.options import unmasked
 
 __all__ = ["SOURCE_SUFFIXES", "apply_source_map", "load_source_map", "save_source_map"]
 
 PathLike = str | os.PathLike[str]
-SourceMap = NDArray[np.int32]
-
 SOURCE_SUFFIXES = (".npz", ".npy", ".png")
 
 
@@ -70,7 +69,7 @@ def apply_source_map(
         `other_map` is not as large as the sample, there are not as many maps as samples, a pixel has no source and
         there is no `fill`, or an argument has another shape.
     """
-    positions = _checked(source)
+    positions = checked(source)
     maps, shapes = _maps(positions, other_map, sample_shape)
     first = maps[0]
     none = positions[..., 0] < 0
@@ -178,7 +177,7 @@ def save_source_map(path: PathLike, source: ArrayLike) -> None:
         The path cannot be written, `source` is no source map, or a PNG cannot hold it.
     """
     check_writable(path, suffixes=SOURCE_SUFFIXES)
-    positions = _checked(source)
+    positions = checked(source)
     suffix = Path(path).suffix.lower()
     if suffix == ".npy":
         write(path, positions)
@@ -230,37 +229,6 @@ def load_source_map(path: PathLike, *, max_pixels: int | None = None) -> SourceM
         except (KeyError, NotImplementedError, OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error):
             raise ValueError(f"{name} holds no source map: give one saved by simdtex") from None
     try:
-        return _checked(pixels)
+        return checked(pixels)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
-
-
-def _checked(source: ArrayLike) -> SourceMap:
-    unmasked("the source map", source)
-    positions = np.asarray(source)
-    if (
-        positions.ndim != 3
-        or positions.shape[2] not in (2, 3)
-        or positions.size == 0
-        or positions.dtype.kind not in "iu"
-    ):
-        raise ValueError(
-            f"a source map is (rows, cols, 2) or (rows, cols, 3) integers, not {positions.shape} of "
-            f"{positions.dtype}: pass the one of a run"
-        )
-    low, high = int(positions.min()), int(positions.max())
-    if low < -1 or high > np.iinfo(np.int32).max:
-        wrong = low if low < -1 else high
-        raise ValueError(f"the source map has the position {wrong}: pass the one of a finished run")
-    if low < 0 and not _is_whole(positions < 0):
-        raise ValueError(
-            "the source map has the position -1 in a row, column or sample alone, and no source is -1 in both row and "
-            "column: pass the one of a finished run"
-        )
-    return np.ascontiguousarray(positions, dtype=np.int32)
-
-
-def _is_whole(negative: NDArray[np.bool_]) -> bool:
-    """Whether row and column are negative together, and a sample only with them."""
-    none = negative[..., 0]
-    return bool((none == negative[..., 1]).all() and (negative[..., 2:] <= none[..., np.newaxis]).all())

@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.options import unmasked
 
-__all__ = ["MostUsed", "Use", "counts", "effective_use"]
+__all__ = ["MostUsed", "SourceMap", "Use", "checked", "counts", "effective_use"]
+
+SourceMap = NDArray[np.int32]
 
 PIECE = 8  # side of a piece of the sample, pixels
 
@@ -36,6 +38,33 @@ class Use(NamedTuple):
         return {"effective_share": self.effective_share, "most_used": self.most_used._asdict()}
 
 
+def checked(source: ArrayLike) -> SourceMap:
+    """Return a source map as (rows, cols, 2 or 3) int32; raise if it is none."""
+    unmasked("the source map", source)
+    positions = np.asarray(source)
+    if (
+        positions.ndim != 3
+        or positions.shape[2] not in (2, 3)
+        or positions.size == 0
+        or positions.dtype.kind not in "iu"
+    ):
+        raise ValueError(
+            f"a source map is (rows, cols, 2) or (rows, cols, 3) integers, not {positions.shape} of "
+            f"{positions.dtype}: pass the one of a run"
+        )
+    low, high = int(positions.min()), int(positions.max())
+    if low < -1 or high > np.iinfo(np.int32).max:
+        wrong = low if low < -1 else high
+        raise ValueError(f"the source map has the position {wrong}: pass the one of a finished run")
+    none = positions < 0
+    if (none[..., 0] != none[..., 1]).any() or (none[..., 2:] > none[..., :1]).any():
+        raise ValueError(
+            "the source map has the position -1 in a row, column or sample alone, and no source is -1 in both row and "
+            "column: pass the one of a finished run"
+        )
+    return np.ascontiguousarray(positions, dtype=np.int32)
+
+
 def counts(source: ArrayLike, sample_shape: tuple[int, ...], *, sample: int | None = None) -> NDArray[np.intp]:
     """How many output pixels each pixel of the sample was taken for.
 
@@ -59,10 +88,7 @@ def counts(source: ArrayLike, sample_shape: tuple[int, ...], *, sample: int | No
         `source` is no source map, points outside the sample, or is of several samples and none is named.
     """
     rows, cols = sample_shape[:2]
-    unmasked("the source map", source)
-    positions = np.asarray(source)
-    if positions.ndim != 3 or positions.shape[2] not in (2, 3) or positions.dtype.kind not in "iu":
-        raise ValueError("the source map is not (rows, cols, 2) or (rows, cols, 3) integers: pass the one of the run")
+    positions = checked(source)
     several = positions.shape[2] == 3
     if several and sample is None:
         raise ValueError("the source map is of several samples: say which is counted with sample=0, sample=1 and so on")
@@ -70,13 +96,11 @@ def counts(source: ArrayLike, sample_shape: tuple[int, ...], *, sample: int | No
         raise ValueError(
             f"sample is {sample}: {'give 0 or more' if several else 'give None, the source map is of one'}"
         )
-    row, col = (positions[..., axis].astype(np.intp) for axis in (0, 1))
-    counted = (row != -1) | (col != -1)
+    counted = positions[..., 0] >= 0
     if several:
         counted &= positions[..., 2] == sample
-    row, col = row[counted], col[counted]
-    low, last_row, last_col = (np.minimum(row, col).min(initial=0), row.max(initial=0), col.max(initial=0))
-    if positions.size == 0 or low < 0 or last_row >= rows or last_col >= cols:
+    row, col = positions[counted].T[:2].astype(np.intp)
+    if row.max(initial=0) >= rows or col.max(initial=0) >= cols:
         raise ValueError(
             f"the source map points outside a sample of {rows} x {cols} pixels: pass the sample that it was made from"
         )
