@@ -23,7 +23,7 @@ from simdtex.experiments.quality import seam
 from simdtex.methods.multires.algorithm import tiled
 from simdtex.methods.multires.analysis import pyramid
 from simdtex.methods.multires.mend import mend
-from simdtex.model.colours import heat, source_colours
+from simdtex.model.colours import source_colours, temperature_colours
 from simdtex.model.stretched import TOP, Stretched
 from simdtex.ops.filters import UNIT_BITS, bank, filters
 from simdtex.report.plots import DPI, FAINT, INK, figure_png, new_figure
@@ -260,7 +260,7 @@ def candidates(machine, gravel):
     _, output = run(machine, gravel, CELL, alpha=0.3)
     stages = [stage for stage in output.stages if stage.level < 6]
     most = max(stage.candidates.max() for stage in stages)
-    colours = ListedColormap(heat(np.linspace(0, 1, 256)) / 255)
+    colours = ListedColormap(temperature_colours(np.linspace(0, 1, 256)) / 255)
     gap, strip, scale = 8, 20, 46
     width, height = gap + len(stages) * (CELL + gap), 2 * (strip + CELL) + gap + scale
     figure = new_figure(width / DPI, height / DPI)

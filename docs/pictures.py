@@ -20,7 +20,7 @@ from skimage.transform import downscale_local_mean
 import simdtex
 from simdtex.experiments import ensemble
 from simdtex.io.image import write
-from simdtex.model.colours import heat, source_colours
+from simdtex.model.colours import source_colours, temperature_colours
 from simdtex.model.source_map import apply_source_map
 from simdtex.report.sheet import contact_sheet
 
@@ -194,7 +194,7 @@ def geoscience():
         ("what nobody knows", hidden * 255),
         ("realisation 0", maps[0] * 255),
         ("realisation 1", maps[1] * 255),
-        ("share of channel in 20", heat(maps.mean(axis=0))),
+        ("share of channel in 20", temperature_colours(maps.mean(axis=0))),
     ]
 
 

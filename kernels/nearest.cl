@@ -2,10 +2,10 @@
 // ICM over sample positions without keeping a distance: for each site the candidate of the least squared distance of
 // equation (12), divided where it continues a neighbour's source, and of several the first.
 //
-//   d_p = sum_r ((x_r - y_r)(1 - t_r))^2,   d'_p = discount d_p + price_p, discount = 1 unless p is coherent
+//   d_p = sum_r ((x_r - y_r)(1 - t_r))^2,   d'_p = discount d_p + penalty_p, discount = 1 unless p is coherent
 //
 // Whoever is proved to lie beyond the best so far is skipped. Three facts make that exact: partial sums never fall, no
-// price is below 0, and a sum in another order differs by less than SLACK. What survives is weighed again in the
+// penalty is below 0, and a sum in another order differs by less than SLACK. What survives is weighed again in the
 // canonical order.
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/distance.h"
@@ -62,7 +62,7 @@ inline float canonical(__global const float *site, __global const float *y, cons
 //
 // spread   (N,)                      order in which neighbours are best looked at: far from one another
 // near     (S, N * (1 + C))          out: u and x u in canonical order
-// price    (count,)                  what each candidate costs beside its distance
+// penalty    (count,)                  what each candidate costs beside its distance
 // terms    (S, N * (2 + C))          out: offset in the strip, bits of u and x u; the most certain first, not u = 0
 // count    (S,)                      out: terms, a multiple of CHECK
 // axes     (N * C, FEATURES)         orthonormal directions: see nearest_leaves
@@ -78,7 +78,7 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
               __global const int *restrict index_of, const int plane,
               __global const float *restrict sample, __global const int *restrict positions,
               __global const int *restrict reach, __global const int *restrict strip_reach,
-              __global const int *restrict spread, const float discount, __global const float *restrict price,
+              __global const int *restrict spread, const float discount, __global const float *restrict penalty,
               __global const float *restrict axes, const float middle, __global float *restrict near,
               __global int *restrict terms, __global int *restrict count,
               __global float *restrict features, __global float *restrict least,
@@ -119,7 +119,7 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
     float best = INFINITY;
     int at = 0x7fffffff;
     if (own >= 0) {
-        best = canonical(here, sample + positions[own], plane, reach, N, INFINITY) + price[own];
+        best = canonical(here, sample + positions[own], plane, reach, N, INFINITY) + penalty[own];
         at = own;
     }
     int last = -1, before = -1;
@@ -129,7 +129,7 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
             continue;
         before = last;
         last = p;
-        const float d = canonical(here, sample + positions[p], plane, reach, N, INFINITY) * discount + price[p];
+        const float d = canonical(here, sample + positions[p], plane, reach, N, INFINITY) * discount + penalty[p];
         if (d < best || (d == best && p < at)) {
             best = d;
             at = p;
@@ -178,7 +178,7 @@ nearest_leaves(const int S, const int N, __global const float *restrict near, __
                __global const float *restrict rows, __global const int *restrict order, const int leaves,
                const float blur, __global const float *restrict sample, const int plane,
                __global const int *restrict positions, __global const int *restrict reach,
-               __global const float *restrict price, const int split, __global float *restrict found, __global int *restrict at, __global ulong *restrict work,
+               __global const float *restrict penalty, const int split, __global float *restrict found, __global int *restrict at, __global ulong *restrict work,
                __global int *restrict open)
 {
     const int s = get_global_id(0) / split, turn = get_global_id(0) % split;
@@ -232,7 +232,7 @@ nearest_leaves(const int S, const int N, __global const float *restrict near, __
                         if (one[w] > radius || (best == 0.0f && p >= best_at))
                             continue;
                         __global const float *y = sample + positions[p];
-                        const float d_p = canonical(near + s * (N * (1 + C)), y, plane, reach, N, best) + price[p];
+                        const float d_p = canonical(near + s * (N * (1 + C)), y, plane, reach, N, best) + penalty[p];
                         ++weighed;
                         if (d_p < best || (d_p == best && p < best_at)) {
                             best = d_p;
@@ -267,7 +267,7 @@ nearest_scan(const int S, const int N, __global const int *restrict terms, __glo
              __global const float *restrict near, __global const float *restrict least,
              __global const int *restrict where, __global const float *restrict strip, const int size,
              const int first, const int pitch, const int rows, const int cols,
-             __global const int *restrict strip_reach, __global const float *restrict price, const float slack,
+             __global const int *restrict strip_reach, __global const float *restrict penalty, const float slack,
              const int split,
              const int all, __global const int *restrict open, const int row,
              __global float *restrict found, __global int *restrict at,
@@ -325,7 +325,7 @@ nearest_scan(const int S, const int N, __global const int *restrict terms, __glo
                 if (col >= cols || as_int(one[v]) >= limit)
                     continue;
                 const float exact =
-                    canonical(near + s * (N * (1 + C)), y + q * V + v, size, strip_reach, N, best) + price[p];
+                    canonical(near + s * (N * (1 + C)), y + q * V + v, size, strip_reach, N, best) + penalty[p];
                 if (exact < best || (exact == best && p < best_at)) {
                     best = exact;
                     best_at = p;

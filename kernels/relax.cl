@@ -17,7 +17,7 @@
 // reach    (N,)         pixel offset of each in the sample
 // index_of (pixels,)    number of the candidate at a pixel of the sample, -1 where there is none
 // positions (count,)    pixel index of each candidate
-// price    (count,)     what each candidate costs beside its distance
+// penalty    (count,)     what each candidate costs beside its distance
 // noise                 the kernel of equation (7) over grey levels, as in lcpdf.cl
 #pragma OPENCL FP_CONTRACT OFF
 #ifdef ALL
@@ -75,7 +75,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
                         __global ushort *temperature, const Level g, __global const int2 *restrict offsets,
                         __global const int *restrict reach, __global const int *restrict index_of,
                         __global const int *restrict positions, __global const float *restrict strip,
-                        __global const int *restrict strip_reach, __global const float *restrict price,
+                        __global const int *restrict strip_reach, __global const float *restrict penalty,
                         __global const uint *restrict noise, const uint turn,
                         __global ushort *restrict new_values, __global int *restrict new_source,
                         __global ushort *restrict new_temperature)
@@ -141,7 +141,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
     for (int k = 0; k < m; ++k)
         d[list[k]] *= g.discount;
     for (int p = 0; p < g.candidates; ++p)
-        d[p] += price[p];
+        d[p] += penalty[p];
     if (g.novelty > 0.0f)
         for (int k = 0; k < neighbours; ++k) {
             if (next[k] >= 0)
@@ -198,7 +198,7 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
                          __global const int *restrict reach, __global const int *restrict index_of,
                          __global const int *restrict positions, __global const float *restrict disc,
                          __global const int *restrict at, __global const ushort *restrict levels,
-                         __global const float *restrict price,
+                         __global const float *restrict penalty,
                          __global const uint *restrict noise, __global int *restrict weighed, const uint turn,
                          __global ushort *restrict new_values,
                          __global int *restrict new_source, __global ushort *restrict new_temperature)
@@ -305,7 +305,7 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
     float d[SLOTS];
     for (int k = 0; k < m; ++k)
         d[k] = distance_in_lanes(at[list[k]], u, xu, levels, g.plane, g.down) * (k < suggested ? g.discount : 1.0f) +
-               price[list[k]];
+               penalty[list[k]];
 
     // 6.2.2.2
 #define NUMBER(k) list[k]

@@ -86,18 +86,18 @@ class Problem(NamedTuple):
     def square(self, machine):
         return square_of(machine, self.sample, self.places())
 
-    def price(self, dear=1.0, every=False):
+    def penalty(self, dear=1.0, every=False):
         """Of each candidate, padded to whole blocks: some cost nothing, some much in terms of a distance.
 
         With ``every`` of each place, infinity where no candidate is.
         """
         candidates = self.candidates(REFERENCE, every)
         scale = dear * self.sample.variance * len(self.offsets) * self.sample.channels
-        price = scale * np.random.default_rng(candidates.size).choice([0, 0, 0.1, 1, 2], candidates.positions.size)
+        penalty = scale * np.random.default_rng(candidates.size).choice([0, 0, 0.1, 1, 2], candidates.positions.size)
         allowed = self.places().allowed
         if every and allowed is not None:
-            price[: candidates.size][~allowed] = np.inf
-        return price.astype(np.float32)
+            penalty[: candidates.size][~allowed] = np.inf
+        return penalty.astype(np.float32)
 
     def on(self, machine):
         """Sites, field and offsets as arrays of a machine."""

@@ -77,7 +77,7 @@ def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, 
     for number in reversed(range(levels)):  # 6.
         level = Level(number, levels, Y, shape, seed, o, level)  # 3., 4., 6.1
         place_stand_ins(level, X, Y)
-        level.price = prices(level, X)
+        level.penalty = penalties(level, X)
         cooling = True
 
         def active(level=level):
@@ -133,7 +133,7 @@ def place_stand_ins(level, X, Y):
 
 
 def sweep(level, X, steps):
-    """Steps of a schedule until it says that its sweep ends; prices are the same for all of them, and then settle."""
+    """Steps of a schedule until it says that its sweep ends; its penalties are the same, and then settle."""
     old = deepcopy(X)  # what tiles see of one another
     for sites, turn, last in steps:  # 6.2.1
         new = [relaxed(level, X, old, s, turn) for s in sites]  # 6.2.2, in parallel: none sees another
@@ -143,7 +143,7 @@ def sweep(level, X, steps):
             X.source[level.pixel(s)] = source
             X.t[level.pixel(s)] = t
         if last:
-            level.price = (prices(level, X) + level.price) / float32(2)
+            level.penalty = (penalties(level, X) + level.penalty) / float32(2)
             return
 
 
@@ -161,7 +161,7 @@ def relaxed(level, X, old, s, turn):
         itself = [(x, [0] * level.Y.matched + [level.Y.centre * u for u in certain[level.Y.matched :]])]
     d = distances(level, near + itself, numbers, level.lanes)
     d = np.where(favoured, d * float32(1 / (1 + level.o.coherence)), d)
-    d = d + level.price[numbers]
+    d = d + level.penalty[numbers]
     for p, times in charged if level.novelty else []:  # neighbour by neighbour; the numbers are all candidates
         d[p] += float32(times) * level.novelty
 
@@ -307,7 +307,7 @@ def sure(Y, place, spacing, o):
     return unknown <= 0.25 * len(offsets)
 
 
-def prices(level, X):
+def penalties(level, X):
     """What each candidate costs, lambda N C sigma^2 min(4, max(0, u - 1)).
 
     u is the use of the square around it over its fair share: the square is as wide as the neighbourhood, as far as it
@@ -322,12 +322,12 @@ def prices(level, X):
         p = level.number_of.get(tuple(X.source[level.pixel(s)].tolist()))
         if X.t[level.pixel(s)] < 1024 and p is not None:
             used[crossing[p]] += 1
-    total, price = int(used.sum()), np.zeros(len(crossing), float32)
+    total, penalty = int(used.sum()), np.zeros(len(crossing), float32)
     for p, (a, b) in enumerate(crossing) if total else []:
         square = (slice(max(0, a - level.blur), a + level.blur + 1), slice(max(0, b - level.blur), b + level.blur + 1))
         u = int(used[square].sum()) * int(due.sum()) / (int(due[square].sum()) * total)
-        price[p] = float32(level.rate * min(4, max(0, u - 1)))
-    return price + of_kinds(level, [int(used[at]) for at in crossing]) if level.o.proportions and total else price
+        penalty[p] = float32(level.rate * min(4, max(0, u - 1)))
+    return penalty + of_kinds(level, [int(used[at]) for at in crossing]) if level.o.proportions and total else penalty
 
 
 def shares(level):

@@ -23,7 +23,7 @@ FEW = BARE | {"search": "coherent", "order": 2, "levels": 2, "coherence": 0.2}
 DRAWN = {"relaxation": "gibbs", "pixel": "density"}
 DENSITY = BARE | DRAWN | {"order": 1, "xi": -4.0, "free_sweeps": 1, "coherence": 1.0}
 MORE = {"order": 2, "levels": 2}
-"""The prices, the structure channel and the finish of the defaults, all together."""
+"""The penalties, the structure channel and the finish of the defaults, all together."""
 MORE_OF_A_DENSITY = {"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": 1.5}
 PAPER_ICM = {"preset": "paper", "order": 1, "relaxation": "icm", "pixel": "source"}
 

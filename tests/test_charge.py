@@ -1,4 +1,4 @@
-"""Prices are added to distances that are kept."""
+"""Penalties are added to distances that are kept."""
 
 import numpy as np
 from cases import REFERENCE, assert_same_bits, problems
@@ -10,12 +10,12 @@ from simdtex.ops.charge import charge
 
 @given(p=problems(max_order=4), strength=st.sampled_from([0.0, 1.0]))
 @settings(max_examples=15)
-def test_each_candidate_costs_its_price(machine, p, strength):
+def test_each_candidate_has_its_penalty(machine, p, strength):
     found, candidates = p.distances(REFERENCE, strength)
-    expected = found.distance + p.price()[: candidates.size, None]
+    expected = found.distance + p.penalty()[: candidates.size, None]
     for m in (REFERENCE, machine):
         distances, candidates = p.distances(m, strength)
-        charged = charge(m, distances, candidates, m.put(p.price()))
+        charged = charge(m, distances, candidates, m.put(p.penalty()))
         distance = np.asarray(m.get(charged.distance))[: candidates.size, : charged.sites]
         assert_same_bits(distance, expected)
         if charged.nearest is not None:  # the least of each block of candidates

@@ -68,14 +68,14 @@ VARIANTS = {
     "fixed": {"order": 1, "schedule": "coloring-fixed"},
     "checkerboard": {"order": 2, "schedule": "checkerboard"},
     "synchronous": {"order": 2, "schedule": "synchronous"},
-    "one level, no price": {"order": 2, "levels": 1, "balance": 0.0},
+    "one level, no penalty": {"order": 2, "levels": 1, "balance": 0.0},
     "no free sweep, no finish": {"order": 2, "free_sweeps": 0, "finish": 0.0},
     "all phases": {"order": 1, "phases": "all", "levels": 2},
     "wide finish": {"order": 1, "finish": 3.0},
 }
 
 
-QUICK = ("coherent", "draws", "checkerboard", "one level, no price")
+QUICK = ("coherent", "draws", "checkerboard", "one level, no penalty")
 
 
 @pytest.mark.parametrize("name", [name if name in QUICK else pytest.param(name, marks=slow) for name in VARIANTS])
@@ -251,7 +251,7 @@ def test_a_tile_that_is_done_twice_changes_nothing(tmp_path):
     assert_same_bits(store.root["image"][...], whole)
 
 
-@pytest.mark.parametrize("moment", ["price", "attribute", "removal", "tally", "planes"])
+@pytest.mark.parametrize("moment", ["penalty", "attribute", "removal", "tally", "planes"])
 def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeypatch, moment):
     """Turns are changed in one piece: stopped before or after each of the writes around that, a run goes on."""
     whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, xi=-8.0, device=REFERENCE)
@@ -281,7 +281,7 @@ def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeyp
                     raise Stop
 
         def create_array(self, name, **given):
-            kind = "price" if name.startswith("price") else "tally" if "tally" in name else "planes"
+            kind = "penalty" if name.startswith("penalty") else "tally" if "tally" in name else "planes"
             self._stop(kind)
             return self._group.create_array(name, **given)
 

@@ -111,7 +111,7 @@ def test_a_run_goes_on_from_any_state_on_another_machine(cl_device, schedule, se
             after = [again.save(state) for _, state, _ in sweeps(again, again.load(kept))]
             for mine, theirs in zip(after, whole[number + 1 :], strict=True):
                 assert list(mine.values())[5:] == list(theirs.values())[5:]
-                assert_same_bits(mine["price"], theirs["price"])
+                assert_same_bits(mine["penalty"], theirs["penalty"])
             for name in ("values", "source", "temperature"):
                 assert_same_bits(after[-1][name], whole[-1][name])
 
@@ -120,7 +120,7 @@ def test_a_state_tells_what_is_left():
     run = prepared(REFERENCE)
     for level, state, info in sweeps(run):
         t = level.grid.view(state.temperature)
-        assert (state.active, state.heat) == ((t > 0).sum(), t.sum(dtype=int))
+        assert (state.active, state.temperature_sum) == ((t > 0).sum(), t.sum(dtype=int))
         assert info.sweep == state.cooling + state.free
         assert info.ended == (not state.active and state.free == run.options.free_sweeps)
 

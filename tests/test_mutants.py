@@ -301,7 +301,7 @@ def test_a_run_is_counted(given):
             level.number,
             state.cooling + state.free + 1,
             "relax" if state.active else "free",
-            state.heat / (1024 * level.grid.rows * level.grid.cols),
+            state.temperature_sum / (1024 * level.grid.rows * level.grid.cols),
             part.last,
         )
         for level, state, part in told

@@ -12,7 +12,7 @@ from simdtex.ops.leaves import FEATURES
 from simdtex.ops.nearest import nearest
 
 strengths = st.sampled_from([0.0, 0.5, 1.0, 7.0])
-prices = st.sampled_from([0.0, 0.1, 1.0])
+penalties = st.sampled_from([0.0, 0.1, 1.0])
 FORMS = [
     {"vector": 1, "step": 1, "split": 64},  # a GPU's
     {"vector": 4, "step": 2, "split": 3},
@@ -23,23 +23,23 @@ FORMS = [
 
 def run(machine, p, strength=1.0, dear=0.1):
     sites, field, offsets = p.on(machine)
-    terms = (np.float32(1 / (1 + strength)), machine.put(p.price(dear)))
+    terms = (np.float32(1 / (1 + strength)), machine.put(p.penalty(dear)))
     candidates, strip = p.candidates(machine), p.strip(machine)
     return host(machine, nearest(machine, sites, field, offsets, p.grid, candidates, strip, *terms))
 
 
-@given(problems(max_order=5), strengths, prices)
+@given(problems(max_order=5), strengths, penalties)
 @settings(max_examples=20)
 def test_the_reference_is_the_nearest_of_the_rule_the_first_of_several(p, strength, dear):
     choice, values = run(REFERENCE, p, strength, dear)
     found, candidates = p.distances(REFERENCE, strength)
     for s in range(p.sites.size):
-        column = (found.distance[:, s] + p.price(dear)[: candidates.size]).tolist()
+        column = (found.distance[:, s] + p.penalty(dear)[: candidates.size]).tolist()
         assert choice[s] == candidates.positions[column.index(min(column))]
     assert np.array_equal(values, p.sample.working[:, choice])
 
 
-@given(p=problems(max_order=18), strength=strengths, dear=prices)
+@given(p=problems(max_order=18), strength=strengths, dear=penalties)
 @settings(max_examples=25)
 def test_a_device_has_the_references_bits(machine, p, strength, dear):
     assert_same_bits(run(machine, p, strength, dear), run(REFERENCE, p, strength, dear))
@@ -52,7 +52,7 @@ def test_places_that_may_not_be_taken_cost_infinity(machine, masked):
     found = {}
     for m in (REFERENCE, machine):
         sites, field, offsets = p.on(m)
-        terms = (np.float32(0.5), m.put(p.price(0.1, every=True)))
+        terms = (np.float32(0.5), m.put(p.penalty(0.1, every=True)))
         outcome = nearest(m, sites, field, offsets, p.grid, p.candidates(m, every=True), p.strip(m), *terms)
         found[m.name] = host(m, outcome)
     first, second = found.values()

@@ -27,8 +27,8 @@ def proposal(machine, p, exhaustive=False, chance=4):
 def relaxation(machine, p, gibbs=False, noisy=False, coherence=1.0, level=0, dear=0.0, novelty=0.0, **options):
     window, _ = p.window(0.5)
     discount, choice = np.float32(1 / (1 + coherence)), Choice(gibbs, noisy, window)
-    price = machine.put(p.price(dear, options.get("exhaustive", False)))
-    terms = (discount, np.float32(novelty * p.sample.variance), price)
+    penalty = machine.put(p.penalty(dear, options.get("exhaustive", False)))
+    terms = (discount, np.float32(novelty * p.sample.variance), penalty)
     proposed = proposal(machine, p, **options)
     return Relaxation(p.grid, machine.put(p.offsets), proposed, *terms, choice, -1024, 2**33 + 5, level, p.confidences)
 
@@ -212,10 +212,10 @@ def test_steps_in_place_are_step_after_step(machine, monkeypatch, longest, how):
     assert_same_bits(first, [*field, weighed])
 
 
-def test_each_candidate_costs_its_price():
-    """The mode is the least of distance, discounted or not, and price."""
+def test_each_candidate_has_its_penalty():
+    """The mode is the least of distance, discounted or not, and penalty."""
     p = problem(3, order=5, shape=(10, 11), edges="reflect", temperatures="mixed", channels=2)
-    price, discount = p.price(), 1 / (1 + 0.7)
+    penalty, discount = p.penalty(), 1 / (1 + 0.7)
     _, candidates = p.distances(REFERENCE)
     numbers = {int(position): n for n, position in enumerate(candidates.positions[: candidates.size])}
     dear = cheap = 0
@@ -227,12 +227,12 @@ def test_each_candidate_costs_its_price():
         t, here = p.temperature(), (p.order, 1, p.grid.torus)
         d = [plain.distance(p.image(), t, site, p.padded(), position, *here) for position in listed]
         d = [a * (discount if position in found else 1) for a, position in zip(d, listed, strict=True)]
-        total = [a + price[numbers[r * p.sample.cols + c]] for a, (r, c) in zip(d, listed, strict=True)]
+        total = [a + penalty[numbers[r * p.sample.cols + c]] for a, (r, c) in zip(d, listed, strict=True)]
         best = listed.index(divmod(int(choice[s]), p.sample.cols))
         assert total[best] <= min(total) * (1 + 1e-5)
         dear += d[best] > min(d)
         cheap += d[best] == min(d)
-    assert dear, "a price decides somewhere"
+    assert dear, "a penalty decides somewhere"
     assert cheap, "and somewhere does not"
 
 

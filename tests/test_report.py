@@ -115,13 +115,13 @@ def test_an_animation_is_bounded_and_checked(tmp_path):
 
 
 def test_heat_grows_in_lightness():
-    found = colours.heat(np.linspace(0, 1, 256)).astype(float)
+    found = colours.temperature_colours(np.linspace(0, 1, 256)).astype(float)
     assert found.shape == (256, 3)
     grey = found @ [0.2126, 0.7152, 0.0722]
     assert (np.diff(grey) > -1.0).all()  # rounding to 8 bits
     assert grey[0] < 30
     assert grey[-1] > 220
-    np.testing.assert_array_equal(colours.heat([-1.0, 2.0]), colours.heat([0.0, 1.0]))
+    np.testing.assert_array_equal(colours.temperature_colours([-1.0, 2.0]), colours.temperature_colours([0.0, 1.0]))
 
 
 def test_source_colours_tell_positions_apart():
@@ -204,7 +204,7 @@ def test_stages_of_levels_without_sweeps(tmp_path):
     assert set(os.listdir(folder)) == names | {"sheet.png", "animation.gif"}
     np.testing.assert_array_equal(image.read(folder / "level1.png").pixels, full[::2, ::2])
     few, some, most = image.read(folder / "candidates-level0.png").pixels[0, :3]
-    np.testing.assert_array_equal([few, some, most], colours.heat([0, 0.5, 1]))
+    np.testing.assert_array_equal([few, some, most], colours.temperature_colours([0, 0.5, 1]))
     StageWriter(folder)  # an earlier run's files may be replaced
 
 

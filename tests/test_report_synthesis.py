@@ -13,7 +13,7 @@ from test_page import assert_needs_nothing_else, read_page
 import simdtex
 from simdtex.cli import main
 from simdtex.io import image
-from simdtex.model.colours import heat, source_colours, use_colours
+from simdtex.model.colours import source_colours, temperature_colours, use_colours
 from simdtex.model.use import counts, effective_use
 from simdtex.report.page import Figure
 from simdtex.report.synthesis import FRAME, _frame, _use, use_sentences
@@ -79,7 +79,7 @@ def test_a_tiling_uses_all_alike():
 def test_the_map_of_use():
     source = np.array([[[0, 0], [0, 0], [0, 0]], [[1, 2], [0, 0], [0, 0]], [[0, 0], [0, 0], [0, 1]]])
     expected = np.log1p([[7, 1, 0], [0, 0, 1]]) / np.log(8)
-    np.testing.assert_array_equal(use_colours(source, (2, 3)), heat(expected))
+    np.testing.assert_array_equal(use_colours(source, (2, 3)), temperature_colours(expected))
     assert expected[0, 0] == pytest.approx(1) and expected[1, 0] == 0
     with pytest.raises(ValueError, match="outside a sample of 2 x 2"):
         use_colours(source, (2, 2))

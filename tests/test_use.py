@@ -1,4 +1,4 @@
-"""The price on use: how often each candidate is a source, and what it costs for that."""
+"""The penalty on use: how often each candidate is a source, and what it costs for that."""
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ def test_what_is_from_nowhere_uses_nothing(machine, how, every):
 
 
 def plainly(counts, radius, rate):
-    """The price in Python numbers."""
+    """The penalty in Python numbers."""
     rows, cols = counts.shape
     found = np.zeros(counts.shape)
     for i in range(rows):
@@ -103,7 +103,7 @@ def test_what_is_fair_may_differ_and_nobody_is_where_nothing_is_fair():
         assert found[0] == np.float32(7.0 * (14 * 16 / (2 * 56) - 1))
         assert np.isinf(found).tolist() == (~there[where]).tolist()
         again = use_penalty(used[where], fair_use, 7.0, found)
-        assert np.array_equal(again, found), "an infinite price stays so"
+        assert np.array_equal(again, found), "an infinite penalty stays so"
 
 
 def test_what_is_fair_counts_in_the_square_around():
@@ -147,12 +147,12 @@ def test_where_nothing_is_known_nothing_costs():
     assert use_penalty(nobody, FairUse((2, 3), 1), 5.0).tolist() == [0] * 6
     assert use_penalty(nobody + 1, FairUse((2, 3), 1), 0.0).tolist() == [0] * 6
     assert use_penalty(nobody, FairUse((2, 3), 1), 5.0, np.full(6, 4, np.float32)).tolist() == [2] * 6, (
-        "and a price fades"
+        "and a penalty fades"
     )
 
 
 def test_a_run_uses_the_sample_more_evenly(cl_device):
-    """A bright corner of a gradient that nothing but the price would use."""
+    """A bright corner of a gradient that nothing but the penalty would use."""
     row, col = np.indices((48, 48))
     sample = (row * 2 + col * 2 + np.random.default_rng(1).integers(0, 40, (48, 48))).astype(np.uint8)
     share = {}

@@ -55,7 +55,7 @@ def test_a_window_relaxes_as_the_whole(any_device, name, how, boundary, number):
             small = run.level(number, (top, left, rows, cols))
             window = small.setting.grid
             inner = opened(small, Field(*map(machine.put, cut(before, run.grid(number), window))))
-            inner = inner._replace(price=before["price"], active=before["active"])  # those of the whole
+            inner = inner._replace(penalty=before["penalty"], active=before["active"])  # those of the whole
             inner = inner._replace(schedule=inner.schedule._replace(sweep=before["schedule"].sweep))
             inner, _ = sweep(small, inner)
             ours = [np.array(machine.get(plane)) for plane in inner.field]

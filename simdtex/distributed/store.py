@@ -6,8 +6,9 @@
         input/       the plan's arrays (`simdtex.distributed.description`)
         given/       values and which are known, of the output; held0, held1, ... what is given of each level
         level0/a, b  values, source, temperature: before a sweep and after it, turn about
-        price7       of each candidate during turn 7
-        tally7       a row for each tile that has had its turn 7: 1, active, heat, and the use of each candidate
+        penalty7       of each candidate during turn 7
+        tally7       a row for each tile that has had its turn 7: 1, active, sum of temperatures, use of
+                     each candidate
 
 A turn is one thing done to every tile: a level begun, a sweep, the picture. Whatever is written in a turn goes where
 nobody reads, so a turn that was broken off is done again, or only its tiles that are missing. The attribute ``turn`` of
@@ -50,7 +51,7 @@ class Turn(NamedTuple):
 
     ``number`` from 1; ``phase`` ``"begin"``, ``"whole"`` (a level of one tile), ``"sweep"``, ``"show"`` or ``"done"``;
     ``level``; ``read``, ``write`` 0 or 1, the state before and the one after; ``cooling``, ``free`` sweeps of the level
-    done; ``active`` sites of the level now, and their ``heat``.
+    done; ``active`` sites of the level now, and their ``temperature_sum``.
     """
 
     number: int
@@ -61,7 +62,7 @@ class Turn(NamedTuple):
     cooling: int = 0
     free: int = 0
     active: int = 0
-    heat: int = 0
+    temperature_sum: int = 0
 
 
 class Work(NamedTuple):
@@ -168,13 +169,13 @@ class Store:
         work = _zarr().open_group(self.where, path="work", mode="r") if "work" in self.root else None
         return Turn(*work.attrs["turn"]) if work is not None else Turn(0, "done", 0)
 
-    def save(self, turn: Turn, price: NDArray[np.float32] | None = None) -> None:
+    def save(self, turn: Turn, penalty: NDArray[np.float32] | None = None) -> None:
         """Go on to a turn: from now on this is what is to be done."""
         work = self.root["work"]
-        if price is not None:
-            work.create_array(f"price{turn.number}", data=price, overwrite=True)
+        if penalty is not None:
+            work.create_array(f"penalty{turn.number}", data=penalty, overwrite=True)
         work.attrs["turn"] = list(turn)
-        for name in (f"price{turn.number - 1}", f"tally{turn.number - 1}"):
+        for name in (f"penalty{turn.number - 1}", f"tally{turn.number - 1}"):
             if name in work:
                 del work[name]
 
@@ -202,19 +203,19 @@ class Store:
         if "work" in self.root:
             del self.root["work"]
 
-    def price(self, turn: Turn) -> NDArray[np.float32]:
+    def penalty(self, turn: Turn) -> NDArray[np.float32]:
         """What each candidate costs during a turn."""
-        return np.asarray(self.root[f"work/price{turn.number}"][...])
+        return np.asarray(self.root[f"work/penalty{turn.number}"][...])
 
     def told(self, turn: Turn, number: int, tally: Tally) -> None:
         """Note that a tile has had its turn."""
-        row = np.concatenate([np.array([1, tally.active, tally.heat], np.int64), tally.counts])
+        row = np.concatenate([np.array([1, tally.active, tally.temperature_sum], np.int64), tally.counts])
         self._at(f"tally{turn.number}")[number] = row
 
     def tally(self, turn: Turn, number: int) -> Tally | None:
         """What was noted of a tile, if it has had its turn."""
-        there, active, heat, *_ = row = self._at(f"tally{turn.number}")[number]
-        return Tally(row[3:], int(active), int(heat)) if there else None
+        there, active, temperature_sum, *_ = row = self._at(f"tally{turn.number}")[number]
+        return Tally(row[3:], int(active), int(temperature_sum)) if there else None
 
     def done(self, turn: Turn, count: int) -> NDArray[np.bool_]:
         """Which of so many tiles have had their turn."""
@@ -222,8 +223,8 @@ class Store:
 
     def total(self, turn: Turn, count: int) -> Tally:
         """The sum of what was noted of all tiles."""
-        _, active, heat, *counts = sum(rows.sum(0) for rows in self._rows(turn, count))
-        return Tally(np.array(counts, np.int64), int(active), int(heat))
+        _, active, temperature_sum, *counts = sum(rows.sum(0) for rows in self._rows(turn, count))
+        return Tally(np.array(counts, np.int64), int(active), int(temperature_sum))
 
     def _rows(self, turn: Turn, count: int) -> Iterator[NDArray[np.int64]]:
         """What was noted, many tiles at once: one by one they take longer."""

@@ -86,9 +86,9 @@ def _whole(here: Context, turn: Turn, tile: Tile) -> Tally:
 def _sweep(here: Context, turn: Turn, tile: Tile) -> Tally:
     level = here.work.layout.levels[turn.level]
     frame = framed(level.lattice, tile, level.halo)
-    before, price = here.store.read(level, turn.read, frame.window), here.store.price(turn)
+    before, penalty = here.store.read(level, turn.read, frame.window), here.store.penalty(turn)
     done, free = turn.cooling + turn.free, not turn.active
-    field, tally = tiles.relaxed(here.run, turn.level, tile, frame, before, price, done, free)
+    field, tally = tiles.relaxed(here.run, turn.level, tile, frame, before, penalty, done, free)
     here.store.write(level, turn.write, tile, field)
     return tally
 

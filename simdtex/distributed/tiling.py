@@ -93,14 +93,14 @@ class Run:
             after = turn._replace(number=turn.number + 1, phase="done")
             store.save(after)
             return after
-        counts, active, heat = store.total(turn, levels[turn.level].count)
+        counts, active, temperature_sum = store.total(turn, levels[turn.level].count)
         cooling = turn.cooling + (turn.phase == "sweep" and turn.active > 0)
         free = turn.free + (turn.phase == "sweep" and turn.active == 0)
         number, read = turn.number + 1, turn.write
         if turn.phase != "whole" and (active or free < lattices.options.free_sweeps):
-            before = store.price(turn) if turn.phase == "sweep" else None
+            before = store.penalty(turn) if turn.phase == "sweep" else None
             rate = lattices.options.balance * lattices.usual
-            after = Turn(number, "sweep", turn.level, read, 1 - read, cooling, free, active, heat)
+            after = Turn(number, "sweep", turn.level, read, 1 - read, cooling, free, active, temperature_sum)
             store.save(after, use_penalty(counts, lattices.fair_use(turn.level), rate, before))
         elif turn.level:
             after = Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1, read)
@@ -170,7 +170,7 @@ class Watch:
             first = (
                 1.0 if turn.level == self._run.lattices.levels - 1 else 0.75
             )  # mean temperature where the level began
-            left = turn.heat / (1024 * level.rows * level.cols * first)
+            left = turn.temperature_sum / (1024 * level.rows * level.cols * first)
             over += cooling * min(1.0, 1 - sqrt(left) + 0.1 * part)
         elif turn.phase == "whole":
             over += (cooling + free) * part

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.io.image import to_display
-from simdtex.model.colours import heat, source_colours, use_colours
+from simdtex.model.colours import source_colours, temperature_colours, use_colours
 from simdtex.options import true_or_false, whole
 
 Array = NDArray[Any]
@@ -107,7 +107,7 @@ def layers(
         used = (sample.shape[0], sample.shape[1])
         found["use"] = lambda: Layer(used, use_colours(source()[..., :2], sample.shape), np.asarray)
     if temperature:
-        found["temperature"] = lambda: Layer(shape, temperature(), heat)
+        found["temperature"] = lambda: Layer(shape, temperature(), temperature_colours)
     return found
 
 

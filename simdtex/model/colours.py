@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.model.use import counts
 
-__all__ = ["heat", "source_colours", "use_colours"]
+__all__ = ["source_colours", "temperature_colours", "use_colours"]
 
 Picture = NDArray[np.uint8]
 
 
-def heat(temperature: ArrayLike) -> Picture:
+def temperature_colours(temperature: ArrayLike) -> Picture:
     """Show temperatures as colours from near black (0, cold) to pale yellow (1, hot).
 
     Parameters
@@ -30,11 +30,11 @@ def heat(temperature: ArrayLike) -> Picture:
         sRGB. Lightness grows in equal perceptual steps, so the map also reads in grey.
     """
     share = np.clip(np.asarray(temperature, dtype=np.float64), 0.0, 1.0)
-    return _heat_table()[np.round(share * 255.0).astype(np.intp)]
+    return _temperature_table()[np.round(share * 255.0).astype(np.intp)]
 
 
 @cache
-def _heat_table() -> Picture:
+def _temperature_table() -> Picture:
     t = np.linspace(0.0, 1.0, 256)
     # a path through OKLab: lightness a straight line, hue from violet over red to yellow
     lightness = 0.16 + 0.79 * t
@@ -81,7 +81,7 @@ def use_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
     Returns
     -------
     ndarray of uint8, (sample rows, sample cols, 3)
-        The colours of `heat` for log(1 + u) / log(1 + max u), where u is how often: near black for
+        The colours of `temperature_colours` for log(1 + u) / log(1 + max u), where u is how often: near black for
         a pixel that was never taken, pale yellow for the one that was taken most.
 
     Raises
@@ -90,7 +90,7 @@ def use_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
         `source` is no source map, or points outside the sample.
     """
     uses = np.log1p(counts(source, sample_shape))
-    return heat(uses / (uses.max() or 1.0))
+    return temperature_colours(uses / (uses.max() or 1.0))
 
 
 def _srgb(lightness: NDArray[Any], a: NDArray[Any], b: NDArray[Any]) -> Picture:

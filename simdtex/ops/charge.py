@@ -11,15 +11,15 @@ from simdtex.ops.lcpdf import Distances
 
 
 @Operation
-def charge(machine: Launcher | None, distances: Distances, candidates: Candidates, price: Array) -> Distances:
-    """Return d_p + price_p, (n, P); ``price`` (n or more,) float32. A device changes the distances in place."""
+def charge(machine: Launcher | None, distances: Distances, candidates: Candidates, penalty: Array) -> Distances:
+    """Return d_p + penalty_p, (n, P); ``penalty`` (n or more,) float32. A device changes the distances in place."""
     if machine is None:
-        return distances._replace(distance=distances.distance + price[: candidates.size, None])
+        return distances._replace(distance=distances.distance + penalty[: candidates.size, None])
     blocks, padded = distances.nearest.shape
     machine.launch(
         machine.kernel("charge", "charge", BLOCK=BLOCK),
         (distances.sites, blocks),
-        *(np.int32(distances.sites), np.int32(padded), np.int32(candidates.size), np.int32(blocks), price),
+        *(np.int32(distances.sites), np.int32(padded), np.int32(candidates.size), np.int32(blocks), penalty),
         *(distances.distance, distances.nearest),
     )
     return distances

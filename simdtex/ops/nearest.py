@@ -96,14 +96,14 @@ def nearest(
     candidates: Candidates,
     strip: Strip,
     discount: np.float32,
-    price: Array,
+    penalty: Array,
 ) -> Relaxed:
     """Return the nearest candidate of each site, its distance discounted by coherence plus its penalty."""
     if machine is None:
         around = neighbourhood.neighbourhood.reference(sites, field, offsets, grid)
         distances = lcpdf.distance.reference(around, candidates)
         distances = coherence.coherence.reference(distances, candidates, sites, field, offsets, grid, discount)
-        distances = charge.reference(distances, candidates, price)
+        distances = charge.reference(distances, candidates, penalty)
         choice = candidates.positions[distances.distance.argmin(0)]
         return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
     count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
@@ -122,7 +122,7 @@ def nearest(
         *(sites, i(count), i(neighbours), *field, i(prod(field.values.shape[1:])), offsets, grid.struct),
         *(candidates.index_of, plane),
         *(candidates.pixels, candidates.positions, candidates.reach, strip.reach),
-        *(machine.constant(_spread(strip.offsets)), discount, price, axes, f(leaves.middle if leaves else 0)),
+        *(machine.constant(_spread(strip.offsets)), discount, penalty, axes, f(leaves.middle if leaves else 0)),
         *(near, terms, used, features, least, where, certain),
     )
     split = machine.split(count, -(-strip.cols // (machine.vector * machine.step)) * strip.rows)
@@ -135,7 +135,7 @@ def nearest(
             (count * split,),
             *(i(count), i(neighbours), near, features, least, where, certain),
             *(leaves.box, leaves.rows, leaves.order, i(leaves.number), f(leaves.blur)),
-            *(candidates.pixels, plane, candidates.positions, candidates.reach, price),
+            *(candidates.pixels, plane, candidates.positions, candidates.reach, penalty),
             *(i(split), found, at, work, wanted),
         )
     shape = (strip.first, strip.pitch, strip.rows, strip.cols)
@@ -143,7 +143,7 @@ def nearest(
         machine.kernel("nearest", "nearest_scan", **defines),
         (count * split,),
         *(i(count), i(neighbours), terms, used, near, least, where),
-        *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach, price),
+        *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach, penalty),
         *(slack(neighbours * channels), i(split), i(leaves is None), wanted, i(row), found, at, work),
     )
     tally = machine.fma_counters(count, 2 * count * candidates.size * neighbours * channels)

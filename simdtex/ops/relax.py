@@ -65,7 +65,7 @@ class Everything(NamedTuple):
         found = lcpdf.distance.reference(near, self.candidates)
         where = (sites, field, relaxation.offsets, relaxation.grid)
         found = coherence.reference(found, self.candidates, *where, relaxation.discount)
-        found = charge.reference(found, self.candidates, relaxation.price)
+        found = charge.reference(found, self.candidates, relaxation.penalty)
         if relaxation.novelty > 0:
             source = sources(relaxation.grid.neighbours(sites, relaxation.offsets), field)
             same = np.where(source >= 0, self.candidates.index_of[source], -1)
@@ -102,7 +102,7 @@ class Listed(NamedTuple):
         if relaxation.confidences.guides:
             offsets = np.concatenate([offsets, np.zeros((1, 2), np.int32)])
         d = self.square.distance(numbers, *gathered(sites, r, field, relaxation.confidences), offsets)
-        d = np.where(suggested, d * relaxation.discount, d) + relaxation.price[np.maximum(numbers, 0)]
+        d = np.where(suggested, d * relaxation.discount, d) + relaxation.penalty[np.maximum(numbers, 0)]
         return numbers, Distances(d, None, sites.size)
 
     def _list(
@@ -143,7 +143,7 @@ class Relaxation(NamedTuple):
 
     ``grid``, ``offsets`` its lattice and neighbourhood; ``proposal`` the candidates; ``discount`` 1 / (1 + coherence),
     the factor of the distance of candidates that continue a neighbour's source; ``novelty`` the penalty for each
-    neighbour whose source is continued, and `AGAIN` times that for each whose source the candidate is; ``price``
+    neighbour whose source is continued, and `AGAIN` times that for each whose source the candidate is; ``penalty``
     (n or more,) float32 the penalty of each candidate (`simdtex.ops.use`); ``choice`` among them; ``confidences`` how
     much values count; ``xi`` of equation (13) in 1/1024; ``seed`` and ``level`` the keys of its random numbers.
     """
@@ -153,7 +153,7 @@ class Relaxation(NamedTuple):
     proposal: Everything | Listed
     discount: np.float32
     novelty: np.float32
-    price: Array
+    penalty: Array
     choice: Choice
     xi: int
     seed: int
@@ -237,14 +237,14 @@ def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxatio
     assert isinstance(proposal, Everything)
     candidates = proposal.candidates
     if not (choice.draws or relaxation.confidences.own):
-        terms = (relaxation.discount, relaxation.price)
+        terms = (relaxation.discount, relaxation.penalty)
         relaxed = nearest(machine, sites, field, offsets, grid, candidates, proposal.strip, *terms)
     else:
         near = neighbourhood(machine, sites, field, offsets, grid, relaxation.confidences)
         distances = lcpdf.distance(machine, near, candidates)
         if relaxation.discount != 1:
             distances = coherence(machine, distances, candidates, sites, field, offsets, grid, relaxation.discount)
-        distances = charge(machine, distances, candidates, relaxation.price)
+        distances = charge(machine, distances, candidates, relaxation.penalty)
         key = Key(relaxation.seed, relaxation.level, turn)
         relaxed = lcpdf.take(machine, distances, candidates, sites, grid, choice, key)
     return relaxed, temperature(machine, sites, field, offsets, grid, relaxation.xi)
@@ -274,11 +274,11 @@ def _fused(
         level |= {"strip_rows": strip.rows, "strip_cols": strip.cols}
         most = 256 if proposal.slots <= 256 else KEPT  # so that few programs serve all
         defines |= {"ALL": most, "N": -(-offsets.shape[0] // 64) * 64, "STEP": machine.step}
-        name, own = "relax_all", [strip.pixels, strip.reach, relaxation.price, noise, key]
+        name, own = "relax_all", [strip.pixels, strip.reach, relaxation.penalty, noise, key]
     else:
         square = proposal.square
         level |= {"plane": square.levels.shape[1], "down": square.down, "chance": proposal.chance}
         defines |= {"RADIUS": square.disc.shape[0] // 2, "SLOTS": -(-proposal.slots // 64) * 64}
-        name, own = "relax_list", [square.disc, square.at, square.levels, relaxation.price, noise, weighed, key]
+        name, own = "relax_list", [square.disc, square.at, square.levels, relaxation.penalty, noise, weighed, key]
     arguments = [sites, np.int32(sites.size), *field, constants(grid, **level), *common, *own]
     return name, defines, arguments

@@ -93,7 +93,7 @@ def use_penalty(
     Notes
     -----
     Penalties are the potentials of a transport problem: to give all output sites the nearest candidates while each
-    candidate serves as many sites as any other is semi-discrete optimal transport, and its dual raises the price of
+    candidate serves as many sites as any other is semi-discrete optimal transport, and its dual raises the penalty of
     candidates that are used too often. Cost: some ten passes over the candidates, on the host.
     """
     places, total = fair_use.shape[0] * fair_use.shape[1], int(counts.sum())

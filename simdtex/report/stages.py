@@ -12,7 +12,7 @@ import numpy as np
 import PIL.Image
 
 from simdtex.io.image import to_display, write
-from simdtex.model.colours import heat
+from simdtex.model.colours import temperature_colours
 from simdtex.report.folder import earlier_files
 from simdtex.report.sheet import FRAME_SIDE, Picture, animation, contact_sheet, enlarged, fitted, reduction
 from simdtex.run import Progress
@@ -82,7 +82,7 @@ class StageWriter:
         picture = to_display(values, self._limits)
         write(self.folder / f"{name}.png", picture if picture.ndim == 2 else picture[..., :4])
         for kind, values in progress.maps().items():
-            write(self.folder / f"{kind}-{name}.png", heat(values))
+            write(self.folder / f"{kind}-{name}.png", temperature_colours(values))
 
     def _start(self, name: str) -> None:
         """Make the folder, and remove the files of an earlier run."""

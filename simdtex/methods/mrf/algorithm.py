@@ -101,9 +101,10 @@ class Run(Lattices):
 
 def opened(level: Level, field: Field) -> State:
     """Return the state of a level before its first sweep."""
-    count, heat = active.survey(level.machine, level.grid, field.temperature)
+    count, total = active.survey(level.machine, level.grid, field.temperature)
     penalty = use_penalty(counted(level, field, level.grid), level.fair_use, level.rate, None)
-    return State(*field, penalty, level.schedule.init(level.setting), level.number, active=count, heat=heat)
+    memory = level.schedule.init(level.setting)
+    return State(*field, penalty, memory, level.number, active=count, temperature_sum=total)
 
 
 def sweep(level: Level, state: State, watch: Watch = ignore) -> tuple[State, list[schedules.Info]]:
@@ -125,16 +126,16 @@ def sweep(level: Level, state: State, watch: Watch = ignore) -> tuple[State, lis
     """
     free = not state.active
     field, memory, chosen = swept(level, state, free, watch)
-    count, heat = active.survey(level.machine, level.grid, field.temperature)
-    penalty = use_penalty(counted(level, field, level.grid), level.fair_use, level.rate, state.price)
+    count, total = active.survey(level.machine, level.grid, field.temperature)
+    penalty = use_penalty(counted(level, field, level.grid), level.fair_use, level.rate, state.penalty)
     cooling, freed = state.cooling + (not free), state.free + free
-    return State(*field, penalty, memory, level.number, cooling, freed, count, heat), chosen
+    return State(*field, penalty, memory, level.number, cooling, freed, count, total), chosen
 
 
 def swept(level: Level, state: State, free: bool, watch: Watch = ignore) -> tuple[Field, Any, list[schedules.Info]]:
     """Run the steps of a sweep; return the sites after it, the schedule's state, and what the schedule decided."""
     field, memory = exchanged(level, state.field), state.schedule
-    relaxation = rule(level, state.price)
+    relaxation = rule(level, state.penalty)
     chosen: list[schedules.Info] = []
     while not (chosen and chosen[-1].last):
         memory, now = level.schedule.step(level.setting, memory, Active(level, field.temperature, free))  # 6.2.1
@@ -154,7 +155,7 @@ def counted(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
     return found
 
 
-def rule(level: Level, price: NDArray[np.float32]) -> Relaxation:
+def rule(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
     """Return how a site of the level relaxes: what happens to all sites of a step in parallel."""
     return Relaxation(
         grid=level.grid,
@@ -163,7 +164,7 @@ def rule(level: Level, price: NDArray[np.float32]) -> Relaxation:
         discount=level.discount,
         novelty=level.novelty,
         confidences=level.confidences,
-        price=level.machine.put(np.pad(price, (0, -price.size % BLOCK))),
+        penalty=level.machine.put(np.pad(penalty, (0, -penalty.size % BLOCK))),
         choice=level.choice,  # 6.2.2.2 a draw from it, or its mode
         xi=level.xi,  # 6.2.2.3 the temperature, equation (13)
         seed=level.setting.seed,

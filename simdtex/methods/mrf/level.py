@@ -31,7 +31,7 @@ WHOLE = 256
 """Candidates of a coarsest level whose neighbourhoods see much of the sample's layout; of more they see less."""
 
 STRICT = 2.0
-"""lambda of the price of a category that is used more than it is to be."""
+"""lambda of the penalty of a category that is used more than it is to be."""
 
 TOGETHER = 2**16
 """Sites that one kernel relaxes between two looks at the clock."""
@@ -81,7 +81,7 @@ class State(NamedTuple):
         The source map: pixel index in the sample, its margin included.
     temperature : (H, W) uint16 array
         t in 1/1024.
-    price : (n,) float32 array
+    penalty : (n,) float32 array
         Penalty of each candidate of the level during the next sweep (`simdtex.ops.use`), on the host.
     schedule : tuple of arrays and numbers
         The schedule's own state.
@@ -89,7 +89,7 @@ class State(NamedTuple):
         The present level, 0 the finest.
     cooling, free : int
         Sweeps of the level done: while it cooled, and free ones.
-    active, heat : int
+    active, temperature_sum : int
         Active sites of the level, and the sum of their temperatures in 1/1024.
 
     Notes
@@ -100,13 +100,13 @@ class State(NamedTuple):
     values: Array
     source: Array
     temperature: Array
-    price: NDArray[np.float32]
+    penalty: NDArray[np.float32]
     schedule: Any
     level: int
     cooling: int = 0
     free: int = 0
     active: int = 0
-    heat: int = 0
+    temperature_sum: int = 0
 
     @property
     def field(self) -> Field:

@@ -268,14 +268,14 @@ class Options:
     shares: tuple[float, ...] | None = data(
         None,
         Numbers(),
-        "Use each of several samples this much, kept by the price on use",
+        "Use each of several samples this much, kept by the penalty on use",
         none="every pixel of all samples counts alike",
         shown=("synth", "fill", "simulate"),
     )
     proportions: tuple[float, ...] | None = data(
         None,
         Numbers(),
-        "Make this much of the output of each category, in ascending order, kept by a price",
+        "Make this much of the output of each category, in ascending order, kept by a penalty",
         none="as follows from the sample and the known pixels",
         shown=("simulate",),
     )

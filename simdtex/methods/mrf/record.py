@@ -63,7 +63,7 @@ class Record:
         if not self.reports or level.number != self.reports[-1]["level"]:
             self._begin(level)
         free, sites = not state.active, level.grid.rows * level.grid.cols
-        left = state.heat / (1024 * sites)
+        left = state.temperature_sum / (1024 * sites)
         self._done = part.sites + (0 if self._ended else self._done)
         report = self.reports[-1]
         for what, number in {"sweeps": self._ended, "steps": part.steps, "relaxations": part.sites}.items():
@@ -172,7 +172,7 @@ class Record:
 
 def output(run: Lattices, state: State, source: NDArray[np.int32], record: Record) -> Output:
     """Return the source map, temperatures, stages and statistics of a run that has ended."""
-    place, heat = run.sample.place(source), run.grid(0).view(run.machine.get(state.temperature))
+    place, t = run.sample.place(source), run.grid(0).view(run.machine.get(state.temperature))
     launches = run.machine.launches - record.launches
     statistics = {
         "options": vars(run.options) | {"levels": run.levels, "schedule": run.plan.schedule.name},
@@ -186,7 +186,7 @@ def output(run: Lattices, state: State, source: NDArray[np.int32], record: Recor
     given = run.plan.given
     if given and given.place is not None:
         place = np.where(given.whole[..., None], given.place, place)
-    return Output(place, heat / 1024, record.stages, statistics)
+    return Output(place, t / 1024, record.stages, statistics)
 
 
 def picture(run: Lattices, grid: Grid, field: Field) -> NDArray[Any]:

@@ -46,13 +46,12 @@ class Framed(NamedTuple):
 class Tally(NamedTuple):
     """Counts of a tile's sites, which add up over tiles.
 
-    ``counts`` (n,) how often each candidate is used; ``active`` sites; ``heat`` the sum of their temperatures in
-    1/1024.
+    ``counts`` (n,) how often each candidate is used; ``active`` sites; ``temperature_sum`` in 1/1024.
     """
 
     counts: NDArray[np.int32]
     active: int
-    heat: int
+    temperature_sum: int
 
 
 def framed(lattice: Grid, tile: Tile, halo: int) -> Framed:
@@ -97,7 +96,7 @@ def whole(run: Run, number: int, above: Field | None) -> Field:
 
 
 def relaxed(
-    run: Run, number: int, tile: Tile, frame: Framed, field: Field, price: NDArray[np.float32], done: int, free: bool
+    run: Run, number: int, tile: Tile, frame: Framed, field: Field, penalty: NDArray[np.float32], done: int, free: bool
 ) -> tuple[Field, Tally]:
     """Return a tile after a sweep.
 
@@ -111,7 +110,7 @@ def relaxed(
         Its window, with a halo as deep as the sweep reaches.
     field : Field
         The sites of the window before the sweep.
-    price : (n,) float32 array
+    penalty : (n,) float32 array
         Of the candidates, during the sweep.
     done : int
         Sweeps of the level before it.
@@ -122,7 +121,7 @@ def relaxed(
     if frame.window.rows < run.grid(number).rows:  # else rows wrap around, and none is far away
         level = replace(level, schedule=Trimmed(level.schedule, frame.rows.start, frame.rows.stop))
     memory = level.schedule.init(level.setting)._replace(sweep=done)  # all that its state carries over
-    state = State(*Field(*map(machine.put, field)), price, memory, number)
+    state = State(*Field(*map(machine.put, field)), penalty, memory, number)
     found, *_ = swept(level, state, free)
     inside = Field(*map(frame.cut, _off(machine, found)))
     inner = run.grid(number).window(*tile)
