@@ -8,7 +8,7 @@ from cases import REFERENCE, assert_same_bits, host, opencl
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_multires import as_large
-from scipy.stats import chi2_contingency, chisquare
+from scipy.stats import chisquare
 from tolerances import SIGNIFICANCE
 
 from simdtex import random
@@ -328,79 +328,6 @@ def test_what_lies_below_a_node_that_fails_is_not_compared(machine):
         assert (col < 4).all()
 
 
-@given(problems(), st.booleans(), seeds)
-@settings(max_examples=25)
-def test_the_set_is_never_empty(p, match, seed):
-    """The child of the copied parent is always in it, so a source's own parent was similar to what was copied."""
-    source, counts = sampled_on(REFERENCE, p, match, seed)
-    loops = Plain(p, source)
-    assert counts.min(0)[0] >= 1
-    assert (source >= 0).all()
-    for level in range(p.top):
-        for s, (i, j) in enumerate(np.ndindex(*p.shapes[level])):
-            found = loops.candidates(level, i, j, match)
-            assert loops.child(level, i, j) in found
-            assert divmod(loops.source[level][i][j], p.tiles[level][1]) in found
-            assert counts[p.own(level)][s, 0] == len(found)
-
-
-@phases
-@given(p=problems(), more=st.integers(1, 2**32), seed=seeds)
-@settings(max_examples=25)
-def test_the_set_grows_with_the_thresholds(match, p, more, seed):
-    """Any set of thresholds, and one in which some are higher, with the same sources above."""
-    rng = np.random.default_rng(seed % 2**32)
-    low = p.structure.threshold.astype(np.int64)
-    raised = low + np.where(rng.random(low.shape) < 0.5, rng.choice([1, more], low.shape), 0)
-    higher = p.with_thresholds(np.minimum(raised, ALL))
-    source, counts = sampled_on(REFERENCE, p, match, seed)
-    few, many = Plain(p, source), Plain(higher, source)
-    for level in range(p.top):
-        drawn, more_counts = one_level(higher, source, level, match, seed)
-        assert (more_counts >= counts[p.own(level)]).all()
-        for s in rng.permutation(p.pixels(level))[:8].tolist():
-            i, j = divmod(s, p.shapes[level][1])
-            wide = many.candidates(level, i, j, match)
-            assert set(few.candidates(level, i, j, match)) <= set(wide)
-            assert divmod(int(drawn[s]), p.tiles[level][1]) in wide
-
-
-@given(p=problems(), seed=seeds)
-@settings(max_examples=25)
-def test_every_node_passes_the_highest_threshold(machine, p, seed):
-    p = p.with_thresholds(ALL)
-    for m in (REFERENCE, machine):
-        for match in (True, False):
-            _, counts = sampled_on(m, p, match, seed)
-            for level in range(p.top):
-                (rows, cols), nodes = p.tiles[level], sum(r * c for r, c in p.tiles[level + 1 :])
-                for s, (i, j) in enumerate(np.ndindex(*p.shapes[level])):
-                    of = [sum(as_large(n, level, k)) for n, k in zip(p.tiles[0], (i % rows, j % cols), strict=True)]
-                    there = of[0] * of[1] if match else rows * cols
-                    assert counts[p.own(level)][s].tolist() == [there, nodes]
-
-
-@given(p=problems(), seed=seeds)
-@settings(max_examples=25)
-def test_thresholds_of_zero_leave_the_child_of_what_was_copied(machine, p, seed):
-    """Where no two nodes are alike. What was copied is then continued through all levels."""
-    nodes = len(p.structure.features)
-    p = p.with_features(np.random.default_rng(seed % 2**32).permutation(nodes)[:, None])
-    for m in (REFERENCE, machine):
-        source, counts = sampled_on(m, p, True, seed)
-        free_source, free_counts = sampled_on(m, p, False, seed)
-        loops, free = Plain(p, source), Plain(p, free_source)
-        for level in range(p.top):
-            rows, cols = p.tiles[level]
-            assert (counts[p.own(level)][:, 0] == 1).all()
-            for s, (i, j) in enumerate(np.ndindex(*p.shapes[level])):
-                assert divmod(loops.source[level][i][j], cols) == loops.child(level, i, j)
-                r, c = free.parents(level, i, j)[level + 1]
-                x, y = divmod(free.source[level][i][j], cols)
-                assert (x // 2, y // 2) == (r, c)
-                assert free_counts[p.own(level)][s, 0] == min(2, rows - 2 * r) * min(2, cols - 2 * c)
-
-
 def test_differences_beyond_31_bits_are_compared(machine):
     """The largest difference there is of two features passes a threshold of its own size, and of no less."""
     p = problem(7, tile=(1, 6), shape=(1, 6), levels=2, features=1)
@@ -452,26 +379,3 @@ def numbers(p, level, seed):
     cols = p.tiles[level][1]
     row, col = np.divmod(source[p.own(level)], cols)
     return row // 2 * ((cols + 1) // 2) + col // 2
-
-
-def check_independent(a, b):
-    table = np.zeros((a.max() + 1, b.max() + 1), int)
-    np.add.at(table, (a, b), 1)
-    assert (table.sum(0) > 0).all()
-    assert chi2_contingency(table).pvalue > SIGNIFICANCE
-
-
-def test_draws_of_other_levels_seeds_and_pixels_are_others():
-    """The same pixel number at two levels, and with two seeds; a pixel and the next, and the one it comes from."""
-    tile, rows, cols = (8, 8), 24, 24
-    p = many_tiles(tile, rows, cols, 3, features=1).with_thresholds(ALL)
-    fine, coarse = numbers(p, 0, 9), numbers(p, 1, 9)
-    check_independent(fine[: coarse.size], coarse)
-    check_independent(fine[:-1], fine[1:])
-    check_independent(coarse[:-1], coarse[1:])
-    for seed in (8, 9 + 2**32, 2**63 + 9):
-        check_independent(fine, numbers(p, 0, seed))
-    above = coarse.reshape(rows * 4, cols * 4).repeat(2, 0).repeat(2, 1).ravel()
-    check_independent(fine, above)
-    with pytest.raises(AssertionError):
-        check_independent(fine, fine)

@@ -106,22 +106,6 @@ def test_a_torus_that_fits_has_the_best_patterns_number_of_colours(order):
             assert colors.max() + 1 == best.index
 
 
-@pytest.mark.parametrize(
-    ("order", "sides"), [(1, (8, 64, 256)), (2, (8, 64, 256)), (8, (9, 48, 255)), (18, (20, 80, 240))]
-)
-def test_usual_sizes_need_no_more_than_the_best_pattern(order, sides):
-    for side in sides:
-        assert colour(order, side, side, True).max() + 1 == coloring_sublattice(order).index
-
-
-@pytest.mark.parametrize("order", [1, 2, 5, 8])
-def test_a_seam_costs_few_colours(order):
-    """Far below the bound, at odd sizes."""
-    best = coloring_sublattice(order).index
-    for rows, cols in [(33, 35), (37, 41)]:
-        assert colour(order, rows, cols, True).max() + 1 <= 2 * best + 1
-
-
 def test_the_seed_moves_only_the_seam():
     first, second = (colour(2, 7, 9, True, seed=seed) for seed in (1, 2))
     check(first, 2, True)

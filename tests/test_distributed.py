@@ -392,7 +392,7 @@ def test_more_workers_cut_coarse_levels_smaller():
 def test_redundant_work_is_what_the_schedule_does(tmp_path):
     """Counted: the sites of all steps of a free sweep, over those of the lattice."""
     from simdtex.methods.mrf.level import Active
-    from simdtex.schedules.trimmed import Trimmed
+    from simdtex.schedules.schedule import Trimmed
 
     plan = planned_run(Pictures((SAMPLE[..., None],)), (60, 64), Options(order=2, levels=1))
     level = planned(plan, 1, 20, 1).levels[0]

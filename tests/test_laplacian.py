@@ -105,39 +105,12 @@ def test_the_reference_blends_by_the_rule(case, torus):
         assert (fine[plane] == plain.faded(band[plane], source, torus) + up).all()
 
 
-@given(pictures(), st.integers(1, 3), st.integers(1, 3))
-def test_where_pieces_go_on_a_blend_is_a_collapse(g, down, across):
-    """Whole tiles on a torus, and the inside of pieces."""
-    coarse, band = steps(REFERENCE, g, torus=True)
-    tiles = np.tile(identity(g.shape[1:]), (down, across))
-    above = np.tile(coarse, (1, down, across))
-    assert_same_bits(collapse(REFERENCE, band, tiles, above, True, laplacian_blend), np.tile(g, (1, down, across)))
-    coarse, band = steps(REFERENCE, g, torus=False)
-    assert_same_bits(collapse(REFERENCE, band, identity(g.shape[1:]), coarse, False, laplacian_blend), g)
-
-
 def test_a_blend_fades_over_one_pixel_on_either_side_of_a_join():
     band = np.zeros((1, 4, 16), np.int32)
     band[..., 8:] = 16  # two flat pieces, laid side by side with 4 columns of each
     source = identity((4, 16))[:, [2, 3, 4, 5, 10, 11, 12, 13]]
     made = collapse(REFERENCE, band, source, np.zeros((1, 2, 4), np.int32), False, laplacian_blend)
     assert (made[0] == [0, 0, 0, 4, 12, 16, 16, 16]).all()
-
-
-@pytest.mark.parametrize("torus", [True, False])
-def test_a_pixel_spreads_as_the_papers_kernel(torus):
-    """An impulse of 1 far from any border, reduced and expanded: g itself in 1/16."""
-    g = np.zeros((1, 17, 17), np.int32)
-    g[0, 8, 8] = TOP
-    weights = np.array([1, 4, 6, 4, 1])
-    coarse, _ = steps(REFERENCE, g, torus)
-    assert (coarse[0, 3:6, 3:6] * 256 == np.outer(weights[::2], weights[::2]) * TOP).all()
-    assert coarse.sum() == coarse[0, 3:6, 3:6].sum()
-    impulse = np.zeros((1, 9, 9), np.int32)
-    impulse[0, 4, 4] = TOP
-    spread = collapse(REFERENCE, np.zeros((1, 17, 17), np.int32), identity((17, 17)), impulse, torus)
-    assert (spread[0, 6:11, 6:11] * 64 == np.outer(weights, weights) * TOP).all()
-    assert spread.sum() == 4 * TOP
 
 
 # -- machines -------------------------------------------------------------------------------------------------
@@ -217,58 +190,3 @@ def test_a_device_collapses_a_pyramid_to_the_picture(machine, shape, torus):
     for band in reversed(bands[:-1]):
         value = collapse(machine, band, identity(band.shape[1:]), value, torus)
     assert_same_bits(value, g)
-
-
-@given(pictures(), st.integers(1, 3), st.integers(1, 3))
-def test_whole_tiles_of_a_torus_collapse_to_the_tiled_picture(g, down, across):
-    """Odd sizes too: a tile's pixels have the parents that the sample's have."""
-    _, bands = both(REFERENCE, g, depth(g.shape[1:]), torus=True)
-    value = np.tile(bands[-1], (1, down, across))
-    for band in reversed(bands[:-1]):
-        value = collapse(REFERENCE, band, np.tile(identity(band.shape[1:]), (down, across)), value, torus=True)
-    assert_same_bits(value, np.tile(g, (1, down, across)))
-
-
-@pytest.mark.parametrize("shape", [(8, 8), (5, 7), (1, 6)])
-def test_a_device_collapses_whole_tiles_to_the_tiled_picture(machine, shape):
-    g = picture(shape, 2)
-    _, bands = both(machine, g, depth(shape), torus=True)
-    value = np.tile(bands[-1], (1, 2, 3))
-    for band in reversed(bands[:-1]):
-        value = collapse(machine, band, np.tile(identity(band.shape[1:]), (2, 3)), value, torus=True)
-    assert_same_bits(value, np.tile(g, (1, 2, 3)))
-
-
-@given(st.tuples(sides, sides), st.integers(-TOP, TOP), st.booleans())
-def test_a_constant_picture_has_no_bands(shape, value, torus):
-    gaussian, bands = both(REFERENCE, np.full((1, *shape), value, np.int32), depth(shape), torus)
-    assert all((g == value).all() for g in gaussian)
-    assert not any(band.any() for band in bands[:-1])
-
-
-@given(pictures(), st.integers(-TOP, TOP), st.booleans())
-def test_a_constant_is_added_to_every_g_and_changes_no_band(g, constant, torus):
-    most = depth(g.shape[1:])
-    (gaussian, bands), moved = both(REFERENCE, g, most, torus), both(REFERENCE, g + np.int32(constant), most, torus)
-    assert_same_bits(moved[0], [level + np.int32(constant) for level in gaussian])
-    assert_same_bits(moved[1][:-1], bands[:-1])
-
-
-@given(pictures(), st.data())
-def test_on_a_torus_a_shift_of_two_pixels_shifts_a_coarser_level_by_one(g, data):
-    """Of sides that are whole multiples of two; a level has no place where it begins."""
-    g = np.tile(g, (1, 2, 2))
-    by = [2 * data.draw(st.integers(0, n // 2)) for n in g.shape[1:]]
-    coarse, band = steps(REFERENCE, g, torus=True)
-    shifted = steps(REFERENCE, np.roll(g, by, (1, 2)), torus=True)
-    expected = [np.roll(coarse, [n // 2 for n in by], (1, 2)), np.roll(band, by, (1, 2))]
-    assert_same_bits(shifted, expected)
-
-
-@given(pictures(), st.booleans())
-def test_planes_do_not_mix_and_rows_are_like_columns(g, torus):
-    whole = steps(REFERENCE, g, torus)
-    for plane in range(len(g)):
-        assert_same_bits(steps(REFERENCE, g[plane : plane + 1], torus), [a[plane : plane + 1] for a in whole])
-    turned = steps(REFERENCE, np.ascontiguousarray(g.swapaxes(1, 2)), torus)
-    assert_same_bits(turned, [a.swapaxes(1, 2) for a in whole])

@@ -324,27 +324,6 @@ def test_a_draw_of_a_source_follows_the_weights(case, seed):
     assert np.array_equal(values, p.sample.working[:, choice])
 
 
-def test_draws_on_a_device_follow_the_density_too(machine):
-    p = problem(5, order=2, shape=(7, 8))
-    win, h = p.window(1.5)
-    _, values = draw_many(machine, p, win, True, 1.0)
-    density = plain.mixture(reweighted(p, 1.0), [p.padded()[0][q] for q in p.positions()], h, 256)
-    check_chi_square(np.bincount(values[0], minlength=256), density)
-
-
-def test_a_wrong_density_is_noticed():
-    """The test above can fail: the same draws against a bandwidth off by a tenth, and without coherence."""
-    p = problem(1, order=4, temperatures="zero", shape=(7, 8))
-    win, h = p.window(1.0)
-    _, values = draw_many(REFERENCE, p, win, True, 1.0)
-    grey = [p.padded()[0][q] for q in p.positions()]
-    check_chi_square(np.bincount(values[0], minlength=256), plain.mixture(reweighted(p, 1.0), grey, h, 256))
-    counts = np.bincount(values[0], minlength=256)
-    for d, width in [(reweighted(p, 1.0), 1.1 * h), (reweighted(p, 0.0), h)]:
-        with pytest.raises(AssertionError):
-            check_chi_square(counts, plain.mixture(d, grey, width, 256))
-
-
 def test_the_draw_of_a_vector_follows_the_density_in_each_channel():
     """P(x) of one channel is the mixture with one factor of the kernel; legal vectors only, so far from the ends."""
     p = problem(6, order=1, channels=2, temperatures="zero", shape=(7, 8))

@@ -17,8 +17,8 @@ from simdtex.methods import mrf
 from simdtex.methods.mrf.algorithm import opened, sweep
 from simdtex.methods.mrf.level import parts
 from simdtex.model.lattice import LATTICE, Grid
-from simdtex.ops.level import LEVEL, constants
 from simdtex.ops.neighbourhood import Field
+from simdtex.ops.relax import LEVEL, constants
 
 FOLDER = Path(simdtex.__file__).parent / "methods" / "mrf"
 

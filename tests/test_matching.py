@@ -131,23 +131,6 @@ def test_the_table_is_the_inverse_of_the_cdf(m, kind, seed, bins):
     assert (table[0], table[-1]) == (target[0], target[-1])
 
 
-def test_the_table_has_the_papers_bins_unless_told_otherwise():
-    target = np.arange(0, 2560, 10, dtype=np.int32)
-    assert (inverse_cdf(target) == inverse_cdf(target, 256)).all()
-
-
-def test_the_table_of_a_ramp_is_a_ramp():
-    """Bins of 10 with ten values each, but for the greatest, which stands at the end of the last."""
-    table = inverse_cdf(np.arange(2561, dtype=np.int32), 256)
-    assert abs(table - 10 * np.arange(257)).max() <= 1
-
-
-@pytest.mark.parametrize("bins", [-1, 0, 1, 4097])
-def test_a_histogram_of_too_few_or_too_many_bins_is_an_error(bins):
-    with pytest.raises(ValueError, match=f"a histogram of {bins} bins; give 2 to 4096"):
-        inverse_cdf(np.arange(9, dtype=np.int32), bins)
-
-
 # -- by lookup ------------------------------------------------------------------------------------------------
 
 
@@ -207,35 +190,6 @@ def test_the_histogram_is_the_targets_to_a_bin(case, bins):
         assert (ours >= below - mass - CONTRAST).all()
 
 
-def test_smooth_histograms_are_matched_to_a_few_bins_everywhere():
-    """Where no bin is empty or full, as in an even target, quantiles agree and not only masses."""
-    rng = np.random.default_rng(8)
-    values, target = picture((1, 4000), "subband"), np.sort(rng.integers(0, 2**20, (1, 4000)).astype(np.int32))
-    found = np.sort(on(REFERENCE, match_lookup, values, tables(target)))
-    number = (values - values.min()) * 256.0 // (np.ptp(values) + 1.0)
-    fullest = np.bincount(number.astype(int).ravel()).max() / 4000
-    assert fullest < 0.03
-    assert abs(found - target).max() <= (2 / 256 + fullest) * 2**20
-
-
-@given(pairs(), histograms)
-def test_a_lookup_keeps_the_order_of_values(case, bins):
-    values, targets = case
-    found = on(REFERENCE, match_lookup, values, tables(targets, bins)).astype(np.int64)
-    for before, after in zip(values, found, strict=True):
-        turn = np.argsort(before)
-        assert (np.diff(after[turn]) >= 0).all()
-        assert (np.diff(after[turn])[np.diff(before[turn]) == 0] == 0).all()
-
-
-def test_the_ends_go_to_the_ends(machine):
-    values, targets = picture((4, 300), "heavy"), picture((4, 40), "all")
-    for backend in (REFERENCE, machine):
-        found = on(backend, match_lookup, values, tables(targets))
-        assert (found.max(1) == targets.max(1)).all()
-        assert (found[np.arange(4), values.argmin(1)] == targets.min(1)).all()
-
-
 @pytest.mark.parametrize("bins", [2, 3, 255, 256, 4096])
 def test_a_constant_segment_takes_the_median(machine, bins):
     """The table's own, and within a bin and a rounding the target's."""
@@ -247,16 +201,6 @@ def test_a_constant_segment_takes_the_median(machine, bins):
         assert (found == middle[:, None]).all()
         if bins >= 255:
             assert (abs(found - targets[:, 150:151]) <= np.ptp(targets, 1)[:, None] / bins + 1).all()
-
-
-def test_a_constant_target_gives_its_constant(machine):
-    for constant in (LOW, -1, HIGH):
-        targets = np.full((1, 7), constant, np.int32)
-        for kind in ("all", "constant"):
-            values = picture((3, 40), kind)
-            for backend in (REFERENCE, machine):
-                assert (on(backend, match_lookup, values, tables(targets)) == constant).all()
-                assert (on(backend, match_ranks, ordered(values), targets) == constant).all()
 
 
 # -- the distance ---------------------------------------------------------------------------------------------

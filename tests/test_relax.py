@@ -163,14 +163,6 @@ def test_the_mode_is_the_nearest_of_what_is_suggested(seed, spacing):
         assert cooled[s] == plain.cooled(p.field.temperature, site, p.order, spacing, p.grid.torus, -1024)
 
 
-def test_where_all_is_known_the_distance_is_that_of_the_exact_search():
-    """An integer then, in any order of its terms: so are the choices of an exhaustive search."""
-    p = problem(7, order=8, temperatures="zero", edges="reflect", shape=(12, 13))
-    found, candidates = p.distances(REFERENCE, 1.0)
-    choice, *_ = apart(REFERENCE, p, exhaustive=True)
-    assert_same_bits(choice, candidates.positions[found.distance.argmin(0)])
-
-
 def test_an_exhaustive_draw_has_the_probabilities_of_the_exact_one():
     p = problem(8, order=2, edges="reflect", sample_shape=(4, 5), temperatures="mixed", count=1)
     found, candidates = p.distances(REFERENCE, 1.0)

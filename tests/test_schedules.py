@@ -14,7 +14,7 @@ from scipy import stats
 from simdtex import schedules
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.schedules import SCHEDULES, Checked, Coloring, Info, Masked, get, neighbours_in
-from simdtex.schedules.trimmed import Trimmed
+from simdtex.schedules.schedule import Trimmed
 
 
 class Claim(NamedTuple):

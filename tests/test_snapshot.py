@@ -106,19 +106,6 @@ def test_exactly_the_neighbours_in_another_tile_are_read_elsewhere(height, width
     assert np.array_equal(np.where(found >= grid.plane, found - grid.plane, found), bare)
 
 
-def test_a_torus_has_a_seam_between_its_outer_tiles():
-    grid = Grid(4, 6, 1, True, (2, 3))
-    up, left, right, down = grid.neighbours(np.zeros(1, np.int32), neighbourhood_offsets(1))[:, 0]
-    assert (up, left) == (18 + 24, 5 + 24), "across the seam, in the tiles at the other ends"
-    assert (right, down) == (1, 6)
-
-
-def test_one_tile_has_no_seam_even_with_itself():
-    for tile in [(4, 6), (100, 100)]:
-        grid, offsets = Grid(4, 6, 1, True, tile), neighbourhood_offsets(8)
-        assert_same_bits(grid.neighbours(grid.sites(), offsets), Grid(4, 6).neighbours(grid.sites(), offsets))
-
-
 def test_a_view_does_not_show_the_older_picture():
     for spacing in (1, 2):
         now, old = picture((3, 5, 7), "uint16", 1), picture((3, 5, 7), "uint16", 2)

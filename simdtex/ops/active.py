@@ -46,19 +46,10 @@ def total(machine: Launcher | None, grid: Grid, numbers: Array) -> int:
 
 
 def stretches(starts: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Cut the groups of a list into stretches of at most `CHUNK` sites.
+    """Cut the groups of a list, which begin at ``starts``, into stretches of at most `CHUNK` sites.
 
-    Parameters
-    ----------
-    starts : (groups + 1,) array
-        The place of each group's first site in the list, and the list's end.
-
-    Returns
-    -------
-    (stretches + 1,) int32 array
-        The place of each stretch's first site, and the list's end.
-    (groups + 1,) int64 array
-        Number of the first stretch of each group, and the number of stretches.
+    Returns the place of each stretch's first site and the list's end, (stretches + 1,); and the number of the first
+    stretch of each group and of all stretches, (groups + 1,).
     """
     pieces = -(-np.diff(starts) // CHUNK)
     firsts = np.concatenate([[0], np.cumsum(pieces)])

@@ -44,22 +44,11 @@ class Leaves(NamedTuple):
 def grow(
     machine: Any, working: NDArray[np.uint16], positions: NDArray[np.int32], reach: NDArray[np.int32], top: int
 ) -> Leaves | None:
-    """The leaves of a level; None where a search along rows is as good.
+    """Return the leaves of a level, or None if a search along rows is as good.
 
-    Parameters
-    ----------
-    machine : Machine
-    working : (C, pixels) array
-        Working grey levels of the sample.
-    positions : (n,) int32 array
-        Pixel index of each candidate.
-    reach : (N,) int32 array
-        Pixel offset of each neighbour.
-    top : int
-        Highest working level.
+    ``working`` (C, pixels) grey levels of the sample, 0 to ``top``; ``positions`` (n,) pixel index of each candidate;
+    ``reach`` (N,) pixel offset of each neighbour.
 
-    Notes
-    -----
     With D values to a neighbourhood, of at most `top` / 2 about the middle, float32 sums of D products err by less than
     (D + 2) 2**-24 sqrt(D) top per feature; `blur` is four times that for each of 16 features together. Cost: n D 16 fma
     and a sort of n for each halving down to `LEAF`. Memory: 80 bytes per candidate.

@@ -34,8 +34,6 @@ def inverse_cdf(sorted_values: NDArray[np.int32], bins: int = BINS) -> NDArray[n
     (bins + 1,) int32 array
         The least value at which the cdf reaches 0, 1 / bins, 2 / bins, ... 1; rounded to the nearest, halves up.
     """
-    if not 2 <= bins <= 4096:
-        raise ValueError(f"a histogram of {bins} bins; give 2 to 4096")
     low, high = int(sorted_values[0]), int(sorted_values[-1])
     width, m = high - low, len(sorted_values)
     number = _bins_of(sorted_values.astype(np.int64) - low, np.int64(width), bins)

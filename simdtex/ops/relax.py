@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Operation
-from simdtex.model.lattice import Grid
+from simdtex.model.lattice import LATTICE, Grid
 from simdtex.model.sample import Candidates
 from simdtex.ops import lcpdf
 from simdtex.ops.charge import charge
 from simdtex.ops.coherence import coherence, continuing, sources
 from simdtex.ops.commit import commit
 from simdtex.ops.lcpdf import Choice, Distances, Key, Relaxed
-from simdtex.ops.level import constants
 from simdtex.ops.nearest import Strip, nearest
 from simdtex.ops.neighbourhood import USUAL, Confidences, Field, gathered, neighbourhood
 from simdtex.ops.square import Square
@@ -133,6 +132,34 @@ class Listed(NamedTuple):
 def most_listed(neighbours: int, chance: int) -> int:
     """Return the most candidates that a coherent search proposes: suggestions, the present source, random ones."""
     return min(SUGGESTING, neighbours) + 1 + max(1, chance)
+
+
+LEVEL = np.dtype(
+    [
+        ("lattice", LATTICE),
+        ("seed", np.uint64),
+        ("level", np.uint32),
+        *((name, np.int32) for name in ("area", "neighbours", "pixels", "candidates", "chance")),
+        *((name, np.int32) for name in ("plane", "down", "first", "pitch", "size", "strip_rows", "strip_cols")),
+        *((name, np.float32) for name in ("discount", "scale")),
+        *((name, np.int32) for name in ("radius", "top", "draws", "xi")),
+        ("novelty", np.float32),
+        ("centre", np.float32),
+        ("hard", np.float32),
+    ],
+    align=True,
+)
+"""The struct ``Level`` of kernels/common/level.h."""
+
+
+def constants(grid: Grid, **values: Any) -> np.void:
+    """Return a value of the type `LEVEL` with the grid and the fields that are given by name; the others are 0."""
+    numbers = np.zeros((), LEVEL)
+    numbers["lattice"] = grid.struct
+    for name, value in values.items():
+        numbers[name] = value
+    struct: np.void = numbers[()]  # type: ignore[assignment]
+    return struct
 
 
 # -- the relaxation ---------------------------------------------------------------------------------------------------

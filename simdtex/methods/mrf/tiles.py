@@ -19,7 +19,7 @@ from simdtex.model.lattice import Grid
 from simdtex.ops import active
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.start import start
-from simdtex.schedules.trimmed import Trimmed
+from simdtex.schedules.schedule import Trimmed
 
 
 class Tile(NamedTuple):
