@@ -2,8 +2,8 @@
 """The table of options: what a field of a method's `Options` declares, and the checks of values.
 
 An option is declared once, by `option`, as a field of the frozen dataclass ``Options`` of its method. From there come
-its check, its place in the docstring, in ``simdtex/methods/typed_options.py``, on the command line, on the live page and in the
-reference pages.
+its check, its place in the docstring, its type in ``simdtex/methods/typed_options.py``, and its places on the command
+line, on the live page and in the reference pages.
 """
 
 from __future__ import annotations

@@ -9,11 +9,10 @@ from typing import Any
 
 import click
 
-from simdtex.cli.command import OUTPUTS
 from simdtex.cli.inputs import channels, check_source_map, read_also, read_material, write_arranged
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import given, option
-from simdtex.cli.places import FOLDER, READ, WRITE, WRITE_PAIR
+from simdtex.cli.options import ALSO, SOURCE_MAP, given, option, report_option
+from simdtex.cli.places import READ, WRITE
 
 SIDES = ("top", "bottom", "left", "right")
 
@@ -49,28 +48,9 @@ SIDES = ("top", "bottom", "left", "right")
     type=int,
     help="Make this many pixels anew along each edge, with --seamless.  [an eighth of the shorter side, 8 to 64]",
 )
-@option(
-    "--also",
-    group=OUTPUTS,
-    multiple=True,
-    type=WRITE_PAIR,
-    metavar="MAP=OUT",
-    help="Extend another map of the material (normal, height) in the same arrangement; may be repeated.",
-)
-@option(
-    "--source-map",
-    group=OUTPUTS,
-    type=WRITE,
-    metavar="FILE",
-    help="Write from where in the picture each pixel is: .npz, .npy or .png.",
-)
-@option(
-    "--report",
-    group=OUTPUTS,
-    type=FOLDER,
-    metavar="DIR",
-    help="Write a page of the run: pictures, and how evenly it uses the picture.",
-)
+@ALSO
+@SOURCE_MAP
+@report_option("pictures, and how evenly it uses the picture")
 def extend(
     picture: Path,
     output: Path,

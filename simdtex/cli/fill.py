@@ -11,11 +11,10 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.command import OUTPUTS
 from simdtex.cli.inputs import channels, check_source_map, read_also, read_material, write_arranged
 from simdtex.cli.job import Task, job
-from simdtex.cli.options import given, option
-from simdtex.cli.places import READ, WRITE, WRITE_PAIR
+from simdtex.cli.options import ALSO, SOURCE_MAP, given
+from simdtex.cli.places import READ, WRITE
 
 
 @job(
@@ -48,21 +47,8 @@ from simdtex.cli.places import READ, WRITE, WRITE_PAIR
     type=int,
     help="Fill a hole from what is this near, in pixels.  [128, or twice its longer side]",
 )
-@option(
-    "--also",
-    group=OUTPUTS,
-    multiple=True,
-    type=WRITE_PAIR,
-    metavar="MAP=OUT",
-    help="Fill another map of the material (normal, height) in the same arrangement; may be repeated.",
-)
-@option(
-    "--source-map",
-    group=OUTPUTS,
-    type=WRITE,
-    metavar="FILE",
-    help="Write from where in the picture each pixel is: .npz, .npy or .png.",
-)
+@ALSO
+@SOURCE_MAP
 def fill(
     picture: Path,
     output: Path,

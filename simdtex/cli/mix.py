@@ -11,7 +11,7 @@ import click
 
 from simdtex.cli.inputs import channels, last_iteration, output_shape
 from simdtex.cli.job import Task, job
-from simdtex.cli.options import given, numbers
+from simdtex.cli.options import given, numbers, size_option
 from simdtex.cli.places import READ, WRITE
 
 CHOSEN = ("palette", "pattern", "low", "high")
@@ -26,11 +26,7 @@ CHOSEN = ("palette", "pattern", "low", "high")
 )
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
 @click.option("-o", "--output", required=True, type=WRITE, help="Write this picture.")
-@click.option(
-    "--size",
-    metavar="WIDTHxHEIGHT",
-    help="Make an output of this size, in pixels.  [twice the first sample]",
-)
+@size_option("twice the first sample")
 @click.option("--palette", metavar="SAMPLE", help="Take the colours of this sample.  [those of the pattern]")
 @click.option("--pattern", metavar="SAMPLE", help="Take the pattern of this sample.  [the average of all]")
 @click.option("--average", metavar="W,W,...", help="Take the average of the patterns, a weight for each sample.")

@@ -11,12 +11,12 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from simdtex.cli.command import DEVICE_GROUP, FIRST, JOB, OUTPUTS, RUNS
-from simdtex.cli.places import FOLDER, WRITE
+from simdtex.cli.command import DATA, DEVICE_GROUP, FIRST, JOB, OUTPUTS, RUNS
+from simdtex.cli.places import FOLDER, READ, READ_PAIR, WRITE, WRITE_PAIR
 from simdtex.options import PRESET, Choice, Number, Numbers, Other, Switch, Whole, is_flag, table
 from simdtex.options import Option as Declared
 
-Command = Callable[..., None]
+Command = Callable[..., Any]
 
 METHODS = {
     "synth": ("mrf", "multires", "pyramid"),
@@ -171,6 +171,58 @@ CHECKPOINT = option(
     group=RUNS,
     help="Keep the state of the run in this file; `simdtex resume FILE` continues it.",
 )
+
+
+SAMPLE_MASK = option(
+    "--sample-mask",
+    group=DATA,
+    multiple=True,
+    type=READ,
+    metavar="FILE",
+    help="mrf: take pixels only where this picture of the sample's size is white; once for each sample.",
+)
+KNOWN = option(
+    "--known",
+    group=DATA,
+    type=READ,
+    metavar="FILE",
+    help="mrf: keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), or a picture that is "
+    "transparent or NaN where nothing is known.",
+)
+GUIDE = option(
+    "--guide",
+    group=DATA,
+    type=READ_PAIR,
+    metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
+    help="mrf: take each pixel from places whose sample guide equals the output guide there: two pictures of labels or "
+    "numbers. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples.",
+)
+SOURCE_MAP = option(
+    "--source-map",
+    group=OUTPUTS,
+    type=WRITE,
+    metavar="FILE",
+    help="Write where in the sample each pixel is from: .npz, .npy or .png.",
+)
+ALSO = option(
+    "--also",
+    group=OUTPUTS,
+    multiple=True,
+    type=WRITE_PAIR,
+    metavar="MAP=OUT",
+    help="Carry the arrangement over to another map of the material (normal, height); may be repeated. Give "
+    "MAP0,MAP1=OUT for several samples.",
+)
+
+
+def report_option(what: str) -> Callable[[Command], Command]:
+    """Return ``--report``, which writes a page with this on it."""
+    return option("--report", type=FOLDER, metavar="DIR", group=OUTPUTS, help=f"Write a page of the run: {what}.")
+
+
+def size_option(default: str, of: str = "an output") -> Callable[[Command], Command]:
+    """Return ``--size``, with its default in words."""
+    return option("--size", metavar="WIDTHxHEIGHT", help=f"Make {of} of this size, in pixels.  [{default}]")
 
 
 def stages_option(what: str) -> Callable[[Command], Command]:

@@ -12,7 +12,7 @@ import numpy as np
 from simdtex.cli.command import command
 from simdtex.cli.inputs import candidates_per_level, output_shape
 from simdtex.cli.job import progress_bar
-from simdtex.cli.options import DEVICE, given, job_options, numbers
+from simdtex.cli.options import DEVICE, given, job_options, numbers, size_option
 from simdtex.cli.places import READ, WRITE
 
 
@@ -37,7 +37,7 @@ from simdtex.cli.places import READ, WRITE
     metavar="A,B,...",
     help="Make a row of pictures for each of these.",
 )
-@click.option("--size", metavar="WIDTHxHEIGHT", help="Make pictures of this size, in pixels.  [twice the sample]")
+@size_option("twice the sample", "pictures")
 @job_options("sheet")
 @click.option("--seed", type=int, help="Make every picture from this seed.  [a fresh one, printed]")
 @DEVICE

@@ -11,12 +11,12 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.command import DATA, DEVICE_GROUP, OUTPUTS
+from simdtex.cli.command import DEVICE_GROUP
 from simdtex.cli.guides import read_guides
 from simdtex.cli.inputs import output_shape, read_known, read_masks, read_material
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import given, option
-from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
+from simdtex.cli.options import GUIDE, KNOWN, SAMPLE_MASK, given, option, report_option, size_option
+from simdtex.cli.places import EITHER, READ
 
 
 @job(
@@ -36,47 +36,17 @@ from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR
 )
 @click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
 @click.option("--first", default=0, show_default=True, type=int, help="Begin with the realisation of this number.")
-@click.option(
-    "--size",
-    metavar="WIDTHxHEIGHT",
-    help="Make realisations of this size, in pixels.  [that of --known, else of TRAINING_IMAGE]",
-)
-@option(
-    "--known",
-    group=DATA,
-    type=READ,
-    metavar="FILE",
-    help="Honour these hard data in every realisation: a table x,y,value (.csv), or a picture that is NaN or "
-    "transparent where nothing is known.",
-)
-@option(
-    "--sample-mask",
-    group=DATA,
-    multiple=True,
-    type=READ,
-    metavar="FILE",
-    help="Use the training image only where this picture is white; once for each of several.",
-)
-@option(
-    "--guide",
-    group=DATA,
-    type=READ_PAIR,
-    metavar="A[,B...]=OUT",
-    help="Follow secondary data: of each training image, and of the realisations.",
-)
+@size_option("that of --known, else of TRAINING_IMAGE", "realisations")
+@KNOWN
+@SAMPLE_MASK
+@GUIDE
 @option(
     "--jobs",
     group=DEVICE_GROUP,
     type=int,
     help="Make this many realisations at a time.  [one for each core, at most 4; on a GPU 1]",
 )
-@option(
-    "--report",
-    group=OUTPUTS,
-    type=FOLDER,
-    metavar="DIR",
-    help="Write a page: realisations, shares, entropy, variograms, connectivity, variety.",
-)
+@report_option("realisations, shares, entropy, variograms, connectivity, variety")
 def simulate(
     training_image: tuple[Path, ...],
     output: Path,

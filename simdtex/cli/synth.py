@@ -9,7 +9,6 @@ from typing import Any
 
 import click
 
-from simdtex.cli.command import DATA, OUTPUTS
 from simdtex.cli.guides import read_guides
 from simdtex.cli.inputs import (
     candidates_per_level,
@@ -24,8 +23,19 @@ from simdtex.cli.inputs import (
     write_arranged,
 )
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import METHODS, given, option
-from simdtex.cli.places import EITHER, FOLDER, READ, READ_PAIR, WRITE, WRITE_PAIR
+from simdtex.cli.options import (
+    ALSO,
+    GUIDE,
+    KNOWN,
+    METHODS,
+    SAMPLE_MASK,
+    SOURCE_MAP,
+    given,
+    option,
+    report_option,
+    size_option,
+)
+from simdtex.cli.places import EITHER, READ
 from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 
 
@@ -41,12 +51,7 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 )
 @click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
 @click.option("-o", "--output", required=True, type=EITHER, help="Write this picture; with --tiles a .zarr store.")
-@click.option(
-    "--size",
-    metavar="WIDTHxHEIGHT",
-    help="Make an output of this size, in pixels.  [that of the picture of --known, of the output's guide, "
-    "else twice the first sample]",
-)
+@size_option("that of --known or of the output guide, else twice the first sample")
 @option(
     "--method",
     default="mrf",
@@ -54,53 +59,12 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
     words=METHODS["synth"],
     help="Use Paget and Longstaff's method (mrf), De Bonet's (multires), or Heeger and Bergen's (pyramid).",
 )
-@option(
-    "--sample-mask",
-    group=DATA,
-    multiple=True,
-    type=READ,
-    metavar="FILE",
-    help="mrf: take pixels only where this picture of the sample's size is white; once for each sample.",
-)
-@option(
-    "--known",
-    group=DATA,
-    type=READ,
-    metavar="FILE",
-    help="mrf: keep what is known of the output: a table of x, y and values (.csv, .tsv, .txt, .dat), or a picture "
-    "that is transparent or NaN where it is not known.",
-)
-@option(
-    "--guide",
-    group=DATA,
-    type=READ_PAIR,
-    metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
-    help="mrf: take each place of the output from where the first of these two pictures, of labels or numbers, has "
-    "what the second has there. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples.",
-)
-@option(
-    "--source-map",
-    group=OUTPUTS,
-    type=WRITE,
-    metavar="FILE",
-    help="Write from where in the sample each pixel is: .npz, .npy or .png.",
-)
-@option(
-    "--also",
-    group=OUTPUTS,
-    multiple=True,
-    type=WRITE_PAIR,
-    metavar="MAP=OUT",
-    help="Carry the arrangement over to another map of the material (normal, height); may be repeated. Give "
-    "MAP0,MAP1=OUT for several samples.",
-)
-@option(
-    "--report",
-    group=OUTPUTS,
-    type=FOLDER,
-    metavar="DIR",
-    help="Write a page of the run: pictures, and how evenly it uses the sample.",
-)
+@SAMPLE_MASK
+@KNOWN
+@GUIDE
+@SOURCE_MAP
+@ALSO
+@report_option("pictures, and how evenly it uses the sample")
 @tiles_options
 def synth(
     samples: tuple[Path, ...],
