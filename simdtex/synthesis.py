@@ -315,7 +315,7 @@ def suggest_alpha(
         raise TypeError(f"suggest_alpha finds alpha; leave {name} out")
     chosen = resolve(Options, "synth", options)
     machine = open_machine(device)
-    return alpha.suggest_alpha(machine, analyse(machine, pixels, **chosen.analysis), chosen)
+    return alpha.suggest_alpha(machine, analyse(machine, pixels, chosen), chosen)
 
 
 def lcpdf(
@@ -373,6 +373,7 @@ def lcpdf(
     Cost: S x sample pixels x neighbours x 2 fma, and 12 S x greys bytes for a piece of the sites.
     """
     from simdtex.methods.mrf.density import lcpdf_at
+    from simdtex.ops.neighbourhood import Field
 
     whole("greys", greys, 2)
     if greys > 4096:
@@ -390,9 +391,10 @@ def lcpdf(
     grey = Sample.of_levels(y, greys)
     mrf.check_fit(y.shape, int(offsets.max()), order)
 
-    machine = open_machine(device)
-    grid, t = Grid(x.shape[0], x.shape[1], 1, boundary == "torus"), _check_temperature(temperature, x.shape)
-    return lcpdf_at(machine, x, grey, where, t, offsets, grid, bandwidth, estimator)
+    machine, grid = open_machine(device), Grid(x.shape[0], x.shape[1], 1, boundary == "torus")
+    planes = x[None].astype(np.uint16), np.zeros(x.shape, np.int32), _check_temperature(temperature, x.shape)
+    field = Field(*map(machine.put, planes))
+    return lcpdf_at(machine, field, grey, where, offsets, grid, bandwidth, estimator)
 
 
 def _check_block(shape: Any) -> tuple[int, int, int]:

@@ -267,3 +267,17 @@ def sweeps(run, state=None, watch=ignore):
         state, info = run.step(state, watch)
         if info.sweep:
             yield run.level(info.level), state, info
+
+
+def analyse(machine, pixels, **options):
+    """The analysis of a sample by options of ``multires``."""
+    from simdtex.methods.multires import Options, analysis
+
+    return analysis.analyse(machine, pixels, Options(**options))
+
+
+def ising(machine, size, temperatures, schedule, seed=1, callback=None, **settings):
+    """Chains of the Ising model."""
+    from simdtex.experiments.ising import Experiment, ising
+
+    return ising(machine, Experiment(size, temperatures, **settings), schedule, seed=seed, callback=callback)

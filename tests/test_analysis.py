@@ -6,11 +6,11 @@ from fractions import Fraction
 import numpy as np
 import plain_multires as plain
 import pytest
-from cases import REFERENCE, assert_same_bits, host, opencl, texture
+from cases import REFERENCE, analyse, assert_same_bits, host, opencl, texture
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from simdtex.methods.multires.analysis import analyse, pyramid
+from simdtex.methods.multires.analysis import pyramid
 from simdtex.model.stretched import TOP, Stretched
 from simdtex.ops.filters import bank
 

@@ -349,7 +349,6 @@ import simdtex.ops.relax as rule
 from simdtex.ops import leaves
 from simdtex.machine.devices import find
 from simdtex.machine.opencl import OpenCL
-from simdtex.experiments.ising import ising
 
 info = find("oclgrind")
 colour, grey = texture((6, 5), 3), texture((7, 6))

@@ -4,14 +4,14 @@ import functools
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, opencl
+from cases import REFERENCE, assert_same_bits, ising, opencl
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
 from simdtex import random
 from simdtex.experiments.estimates import estimate, findings
-from simdtex.experiments.ising import Chains, ising
+from simdtex.experiments.ising import Chains
 from simdtex.experiments.onsager import CRITICAL
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.ising import heat_bath_chances, ising_commit, ising_relax, ising_sequence

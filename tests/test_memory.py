@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import psutil
 import pytest
+from cases import ising
 
 import simdtex
-from simdtex.experiments.ising import ising
 from simdtex.machine import memory
 from simdtex.machine.reference import Reference
 

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, opencl, texture
+from cases import REFERENCE, analyse, assert_same_bits, opencl, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_multires import as_large
@@ -14,7 +14,6 @@ from tolerances import SIGNIFICANCE
 
 import simdtex
 from simdtex.methods import multires
-from simdtex.methods.multires.analysis import analyse
 from simdtex.methods.multires.levels import differences, thresholds
 from simdtex.ops.candidates import Sampled, Structure, candidates
 

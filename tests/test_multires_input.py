@@ -7,7 +7,7 @@ from dataclasses import fields
 import numpy as np
 import plain_multires as plain
 import pytest
-from cases import REFERENCE, assert_same_bits, opencl, texture
+from cases import REFERENCE, analyse, assert_same_bits, opencl, texture
 
 import simdtex
 from simdtex.driver import drive
@@ -15,7 +15,6 @@ from simdtex.machine import memory
 from simdtex.methods import multires
 from simdtex.methods.multires.algorithm import Plan
 from simdtex.methods.multires.alpha import strain, suggest_alpha
-from simdtex.methods.multires.analysis import analyse
 
 INF = math.inf
 
@@ -370,7 +369,7 @@ def test_where_nothing_meets_nothing_strains():
 def test_a_strain_is_what_neighbours_differ_by_from_what_the_other_goes_on_with(boundary):
     sample, torus = texture((24, 20), 2), boundary == "torus"
     options = multires.Options(boundary=boundary, alpha=1.0, edges="keep")
-    analysis = analyse(REFERENCE, sample, **options.analysis)
+    analysis = analyse(REFERENCE, sample, boundary=boundary, edges="keep")
     _, output = drive(Plan(sample, (24, 20), options, analysis), REFERENCE, 0)
     levels = []
     for level, source in ((stage.level, stage.source) for stage in output.stages if stage.level < 2):

@@ -7,13 +7,13 @@ from math import inf, nan
 import click
 import numpy as np
 import pytest
+from cases import ising
 from click.testing import CliRunner
 
 import simdtex
 from simdtex.cli.ending import report_errors
 from simdtex.experiments import onsager
 from simdtex.experiments.comparison import compare
-from simdtex.experiments.ising import ising
 from simdtex.machine.reference import Reference
 from simdtex.methods import mrf, multires, pyramid
 from simdtex.methods.pyramid import solid

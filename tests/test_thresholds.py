@@ -1,16 +1,14 @@
 """Thresholds of unusual size and type, and the alpha that is looked for."""
 
 from fractions import Fraction
-from inspect import signature
 from math import inf
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, texture
+from cases import REFERENCE, analyse, assert_same_bits, texture
 
 import simdtex
 from simdtex.methods.multires import Options
-from simdtex.methods.multires.analysis import analyse
 from simdtex.methods.multires.levels import differences, thresholds
 
 
@@ -48,11 +46,6 @@ def test_infinite_thresholds_let_every_difference_pass():
     table[2] = 0
     largest = differences(found, table)
     assert (largest[2] == 0).all() and (np.delete(largest, 2, 0) == 2**32 - 1).all()
-
-
-def test_an_analysis_has_the_defaults_of_the_method():
-    given = {name: p.default for name, p in signature(analyse).parameters.items() if p.default is not p.empty}
-    assert given == Options().analysis
 
 
 def test_a_sample_beyond_32_bits_is_refused_before_any_work():

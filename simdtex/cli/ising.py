@@ -63,7 +63,7 @@ def ising(
     """Relax Ising spins by each schedule and compare with the exact energy and magnetisation."""
     from simdtex import schedules as known
     from simdtex.experiments.estimates import findings
-    from simdtex.experiments.ising import check, ising
+    from simdtex.experiments.ising import Experiment, ising
     from simdtex.io import image
     from simdtex.machine import open_machine
     from simdtex.options import whole
@@ -80,7 +80,8 @@ def ising(
     whole("--seeds", options["seeds"], 2)  # there is no error bar over one
     whole("--sweeps", options["sweeps"], 2)
     as_seed(seed)
-    check(shape, temperatures, **options)
+    experiment = Experiment(shape, temperatures, **options)
+    once = Experiment(shape, [min(temperatures)], 1, PICTURE_SWEEPS, 0, start="random")
     machine = open_machine(device)
 
     began = time.perf_counter()
@@ -92,11 +93,9 @@ def ising(
             def told(share: float, place: int = place, job: str = job) -> None:
                 show((place + share) / len(chosen), "", job)
 
-            runs.append(ising(machine, shape, temperatures, schedule, seed=seed, callback=told, **options))
+            runs.append(ising(machine, experiment, schedule, seed=seed, callback=told))
             if output:
-                lowest = [min(temperatures)]
-                once: dict[str, Any] = {"seeds": 1, "sweeps": PICTURE_SWEEPS, "burn_in": 0, "start": "random"}
-                pictures.append(ising(machine, shape, lowest, schedule, seed=seed, **once))
+                pictures.append(ising(machine, once, schedule, seed=seed))
     found = findings(runs)
     if not quiet:
         for table in report.tables(found):

@@ -23,8 +23,6 @@ from simdtex.ops.ising import heat_bath_chances, ising_commit, ising_relax, isin
 from simdtex.ops.snapshot import snapshot
 from simdtex.options import one_of, real, whole
 
-STARTS = ("up", "random")
-
 AT_ONCE = 2**22
 """Relaxations in one launch at most, so that none is long."""
 
@@ -33,6 +31,57 @@ HOST, MEASURED = 24, 40
 
 QUEUE = 2**16
 """Steps in one launch of `ising_sequence` at most: one work-item does them all."""
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What is simulated and measured, whatever the schedule.
+
+    Attributes
+    ----------
+    size : (int, int)
+        Rows and columns, 2 or more.
+    temperatures : sequence of float
+        Above 0, in units of J / k_B. All run side by side; none changes another's result.
+    seeds : int
+        R, independent chains at each temperature; they share the schedule's choices.
+    sweeps, burn_in : int
+        Sweeps that are measured, 1 or more, and sweeps before them.
+    boundary : {"torus", "open"}
+    start : {"up", "random"}
+        All spins up, which below T_c is close to equilibrium, or each by the toss of a coin, which may freeze into
+        stripes there.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A value is out of range; the sentence names the remedy.
+    """
+
+    size: tuple[int, int]
+    temperatures: Sequence[float]
+    seeds: int = 16
+    sweeps: int = 1000
+    burn_in: int = 500
+    boundary: str = "torus"
+    start: str = "up"
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        for side in self.size:
+            whole("a side of the lattice", side, 2)
+        if not len(self.temperatures):
+            raise ValueError("there is no temperature; give one at least, say 2.0")
+        for temperature in self.temperatures:
+            real("temperature", temperature, 0, above=True)
+        whole("seeds", self.seeds, 1)
+        whole("sweeps", self.sweeps, 1)
+        whole("burn_in", self.burn_in, 0)
+        one_of("boundary", self.boundary, ("torus", "open"))
+        one_of("start", self.start, ("up", "random"))
+        spins = prod(self.size) * self.seeds * len(self.temperatures)
+        if 2 * spins >= 2**31:
+            raise ValueError(f"{spins} spins are too many; give a smaller size or fewer seeds, below 2**30 in all")
 
 
 @dataclass(frozen=True)
@@ -85,16 +134,10 @@ class Chains:
 
 def ising(
     machine: Machine,
-    size: tuple[int, int],
-    temperatures: Sequence[float],
+    experiment: Experiment,
     schedule: str | schedules.Schedule,
     *,
-    seeds: int = 16,
-    sweeps: int = 1000,
-    burn_in: int = 500,
     seed: int = 1,
-    boundary: str = "torus",
-    start: str = "up",
     callback: Callable[[float], Any] | None = None,
 ) -> Chains:
     """Relax Ising spins by a schedule, and measure after every sweep.
@@ -102,32 +145,12 @@ def ising(
     Parameters
     ----------
     machine : Machine
-    size : (int, int)
-        Rows and columns, 2 or more.
-    temperatures : sequence of float
-        Above 0, in units of J / k_B. All run side by side; none changes another's result.
+    experiment : Experiment
     schedule : str or simdtex.schedules.Schedule
-    seeds : int
-        R, independent chains at each temperature; they share the schedule's choices.
-    sweeps, burn_in : int
-        Sweeps that are measured, 1 or more, and sweeps before them.
     seed : int
         0 to 2**64 - 1; keys every random number.
-    boundary : {"torus", "open"}
-    start : {"up", "random"}
-        All spins up, which below T_c is close to equilibrium, or each by the toss of a coin, which may freeze into
-        stripes there.
     callback : callable, optional
         Called with the share of the work that is done after every sweep.
-
-    Returns
-    -------
-    Chains
-
-    Raises
-    ------
-    ValueError, TypeError
-        A value is out of range; the sentence names the remedy.
 
     Notes
     -----
@@ -139,17 +162,18 @@ def ising(
     site that follow one another cost one launch together. Memory: up to 3 bytes per spin on the device, some 20 on the
     host, and 32 there per chain and sweep.
     """
-    check(size, temperatures, seeds, sweeps, burn_in, boundary, start)
+    size, temperatures, seeds = experiment.size, experiment.temperatures, experiment.seeds
+    sweeps, burn_in = experiment.sweeps, experiment.burn_in
     chains = seeds * len(temperatures)
     memory.require(machine, 3 * prod(size) * chains, HOST * prod(size) * chains + MEASURED * sweeps * chains)
     began, launches = time.perf_counter(), machine.launches
     schedule = schedules.get(schedule)
-    grid, offsets = Grid(*size, torus=boundary == "torus"), neighbourhood_offsets(1)
+    grid, offsets = Grid(*size, torus=experiment.boundary == "torus"), neighbourhood_offsets(1)
     count = len(temperatures)
     chances = heat_bath_chances(temperatures, len(offsets))
     setting = schedules.Setting(machine, grid, offsets, 1, seed, 0)
     run = _Run(setting, machine.put(offsets), machine.put(chances), schedule)
-    spins = machine.put(np.tile(_first(size, seeds, seed, start), (count, 1, 1)))
+    spins = machine.put(np.tile(_first(experiment, seed), (count, 1, 1)))
     state = schedule.init(setting)
 
     measured = np.empty((sweeps, 4, count * seeds))
@@ -168,7 +192,7 @@ def ising(
         schedule=schedule.name,
         independent=schedule.independent(grid, offsets),
         temperatures=np.array(temperatures, np.float64),
-        boundary=boundary,
+        boundary=experiment.boundary,
         energy=energy,
         lagged=lagged,
         even=even,
@@ -242,11 +266,12 @@ class _Run:
         self.machine.sync(100 * sites * int(spins.shape[0]))  # a draw is about as much work as 100 fma
 
 
-def _first(size: tuple[int, int], seeds: int, seed: int, start: str) -> NDArray[np.uint8]:
-    """(seeds, H, W) spins before the first sweep."""
-    if start == "up":
+def _first(experiment: Experiment, seed: int) -> NDArray[np.uint8]:
+    """Return the spins before the first sweep, (seeds, H, W)."""
+    size, seeds = experiment.size, experiment.seeds
+    if experiment.start == "up":
         return np.ones((seeds, *size), np.uint8)
-    bits = random.draw4(seed, 0, 0, np.arange(size[0] * size[1]), random.START, np.arange(seeds)[:, None])[0]
+    bits = random.draw4(seed, 0, 0, np.arange(prod(size)), random.START, np.arange(seeds)[:, None])[0]
     return (bits >> np.uint32(31)).astype(np.uint8).reshape(seeds, *size)
 
 
@@ -262,38 +287,6 @@ def _measure(before: NDArray[np.uint8], now: NDArray[np.uint8], grid: Grid) -> N
 
 
 def _field(spins: NDArray[np.int8], torus: bool) -> NDArray[np.int8]:
-    """The sum of each site's neighbours."""
-    if torus:
-        return np.asarray(sum(np.roll(spins, by, axis) for axis in (1, 2) for by in (1, -1)), np.int8)
-    field = np.zeros_like(spins)
-    field[:, 1:] += spins[:, :-1]
-    field[:, :-1] += spins[:, 1:]
-    field[:, :, 1:] += spins[:, :, :-1]
-    field[:, :, :-1] += spins[:, :, 1:]
-    return field
-
-
-def check(
-    size: tuple[int, int],
-    temperatures: Sequence[float],
-    seeds: int,
-    sweeps: int,
-    burn_in: int,
-    boundary: str = "torus",
-    start: str = "up",
-) -> None:
-    """Raise ValueError or TypeError where `ising` would, but for the schedule, in one sentence."""
-    for side in size:
-        whole("a side of the lattice", side, 2)
-    if not len(temperatures):
-        raise ValueError("there is no temperature; give one at least, say 2.0")
-    for temperature in temperatures:
-        real("temperature", temperature, 0, above=True)
-    whole("seeds", seeds, 1)
-    whole("sweeps", sweeps, 1)
-    whole("burn_in", burn_in, 0)
-    one_of("boundary", boundary, ("torus", "open"))
-    one_of("start", start, STARTS)
-    spins = size[0] * size[1] * seeds * len(temperatures)
-    if 2 * spins >= 2**31:
-        raise ValueError(f"{spins} spins in all are too many; give a smaller size or fewer seeds, below 2**30 in all")
+    """Return the sum of each site's neighbours."""
+    around = np.pad(spins, ((0, 0), (1, 1), (1, 1)), mode="wrap" if torus else "constant")
+    return around[:, :-2, 1:-1] + around[:, 2:, 1:-1] + around[:, 1:-1, :-2] + around[:, 1:-1, 2:]

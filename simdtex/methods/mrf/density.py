@@ -19,10 +19,9 @@ AT_ONCE = 4096
 
 def lcpdf_at(
     machine: Machine,
-    image: NDArray[np.int64],
+    field: Field,
     sample: Sample,
     sites: NDArray[np.int32],
-    temperature: NDArray[np.uint16],
     offsets: NDArray[np.int32],
     grid: Grid,
     bandwidth: float,
@@ -33,14 +32,12 @@ def lcpdf_at(
     Parameters
     ----------
     machine : Machine
-    image : (rows, cols) array
-        Working grey levels.
+    field : Field
+        The image in working grey levels, and its temperatures; nothing is read of its sources.
     sample : Sample
         Of one channel.
     sites : (S,) int32 array
         Pixel indices.
-    temperature : (rows, cols) uint16 array
-        In 1/1024.
     offsets : (N, 2) int32 array
     grid : Grid
     bandwidth : float
@@ -59,8 +56,6 @@ def lcpdf_at(
         No neighbourhood of the sample matches that of a site.
     """
     greys = sample.top + 1
-    values, source = image[None].astype(np.uint16), np.zeros(image.shape, np.int32)
-    field = Field(*(machine.put(array) for array in (values, source, temperature)))
     candidates = sample.candidates(machine, sample.places(offsets, 1))
     h = bandwidth * lcpdf.optimal_bandwidth(sample.variance, candidates.size, len(offsets) + 1)
     window = lcpdf.window(h, sample.top)

@@ -65,7 +65,7 @@ class Plan:
         channels, size = self.sample.shape[-1], self.sample.dtype.itemsize
         within_32_bits(self.shape, max(VALUES, channels))  # before any work
         memory.require_host(_on_host(self.shape, channels, size))
-        analysis = self.analysis or analyse(machine, self.sample, **self.options.analysis)
+        analysis = self.analysis or analyse(machine, self.sample, self.options)
         return Run(machine, analysis, self.shape, self.options, seed)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
 from simdtex.methods.multires.mend import mend
+from simdtex.methods.multires.options import Options
 from simdtex.model.stretched import Stretched
 from simdtex.ops.filters import bank, filters
 from simdtex.ops.laplacian import half, laplacian_band, laplacian_reduce
@@ -80,26 +81,15 @@ def pyramid(machine: Machine, picture: Array, levels: int, torus: bool) -> tuple
     return gaussian, [*bands, gaussian[-1]]
 
 
-def analyse(
-    machine: Machine,
-    pixels: NDArray[Any],
-    *,
-    orientations: int = 4,
-    sigma: float = 0.7,
-    filter_size: int = 3,
-    features: str = "luminance",
-    levels: int | None = None,
-    boundary: str = "torus",
-    edges: str = "mend",
-) -> Analysis:
-    """The first phase of the paper: bands and features of the sample at every level.
+def analyse(machine: Machine, pixels: NDArray[Any], options: Options) -> Analysis:
+    """Return the bands and features of a sample at every level: the first phase of the paper.
 
     Parameters
     ----------
     machine : Machine
     pixels : (rows, cols, channels) array
-    orientations, sigma, filter_size, features, levels, boundary, edges
-        See `simdtex.methods.multires.Options`.
+    options : Options
+        ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``boundary`` and ``edges`` matter.
 
     Returns
     -------
@@ -117,19 +107,20 @@ def analyse(
     pixel and feature. `simdtex.methods.multires.mend.mend` says what mending takes.
     """
     rows, cols, channels = pixels.shape
-    seen = 1 if features == "luminance" else channels  # planes that features are made of
-    width = seen * (1 + 2 * orientations)
+    seen = 1 if options.features == "luminance" else channels  # planes that features are made of
+    width = seen * (1 + 2 * options.orientations)
     if rows * cols * max(width, channels) >= 2**31:
         raise ValueError(
             f"a sample of {rows} rows x {cols} columns with {width} features is beyond 2**31 values; give a smaller one"
         )
-    sample, torus = Stretched(pixels), boundary == "torus"
-    place = mend(sample.planes) if edges == "mend" else np.arange(rows * cols).reshape(rows, cols)
-    if edges == "mend":
+    sample, torus = Stretched(pixels), options.boundary == "torus"
+    place = mend(sample.planes) if options.edges == "mend" else np.arange(rows * cols).reshape(rows, cols)
+    if options.edges == "mend":
         sample = Stretched(pixels.reshape(-1, channels)[place])
-    shapes = _level_shapes((rows, cols), levels)
-    fits = [min(shape) >= filter_size for shape in shapes]
-    taps = bank(orientations, sigma, filter_size if any(fits[1:]) else 3)  # of no level, they are left out
+    shapes = _level_shapes((rows, cols), options.levels)
+    fits = [min(shape) >= options.filter_size for shape in shapes]
+    size = options.filter_size if any(fits[1:]) else 3  # of no level, filters are left out
+    taps = bank(options.orientations, options.sigma, size)
     memory.require(machine, rows * cols * (16 * (channels + (seen < channels)) + 3 * width))
 
     gaussian, bands = pyramid(machine, machine.put(sample.planes), len(shapes), torus)
@@ -147,7 +138,7 @@ def analyse(
         _log.warning(
             "no level above the finest of a sample of %d rows x %d columns is as large as the filters, %d x %d: "
             "candidates are compared by their bands alone",
-            *(*shapes[0], filter_size, filter_size),
+            *(*shapes[0], options.filter_size, options.filter_size),
         )
     return Analysis(sample, shapes, bands, machine.put(np.concatenate(measured)), np.array(energy), torus, place)
 

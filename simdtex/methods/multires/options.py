@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 from math import inf
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -143,9 +142,3 @@ class Options:
         check(self)
         if self.filter_size % 2 == 0:
             raise ValueError(f"filter_size is {self.filter_size}; give an odd number, 3 or 5")
-
-    @property
-    def analysis(self) -> dict[str, Any]:
-        """Those that bear on the analysis."""
-        names = ("orientations", "sigma", "filter_size", "features", "levels", "boundary", "edges")
-        return {name: vars(self)[name] for name in names}
