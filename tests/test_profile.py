@@ -98,7 +98,7 @@ def test_a_launch_states_its_work(any_device):
     machine = OpenCL(any_device, profile=True)
     values = noise(machine, 4, 100, 1, 0)
     (only,) = machine.profile()["kernels"]
-    assert (only["name"], only["calls"], only["bytes"], only["fma"]) == ("noise", 1, values.nbytes, None)
+    assert (only["name"], only["calls"], only["bytes"], only["fma"]) == ("noise", 1, None, None)
     assert 0 < only["min"] == only["median"] == only["max"] == only["seconds"]
     assert touching(values, fma=3) == (3, 1600)
 

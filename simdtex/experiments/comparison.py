@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex import schedules as known
 from simdtex.driver import check_shape
 from simdtex.experiments.quality import COPIED_PATCH, Quality, measure
+from simdtex.experiments.quality.pictures import as_planes
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, open_machine
 from simdtex.methods.mrf import Options
@@ -415,7 +416,7 @@ def compare(
         raise TypeError("schedule is no option here; give schedules, a sequence of them")
     settled = resolve(Options, "schedules", options)
     pixels = check_sample(sample, channel_axis)
-    size = _check_sides(pixels.shape[:2], shape)
+    size = _check_sides(as_planes(pixels).shape[:2], shape)
     machine, found, settings = open_machine(device, profile=True), {name: list[Any]() for name in names}, vars(settled)
     call = _Call(np.asarray(sample), pixels, channel_axis, machine, settings)
     turns = [(seed, schedule) for seed in keys for schedule in chosen]  # a slow hour then slows all schedules alike

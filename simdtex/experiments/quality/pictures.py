@@ -13,10 +13,16 @@ from simdtex.io.image import check_sample
 Array = NDArray[Any]
 Planes = NDArray[np.float32]
 
+LARGEST = 1e100
+"""Of values that figures are computed of: sums of their squares stay finite."""
+
 
 def as_planes(array: ArrayLike) -> Array:
-    """A picture as (rows, cols, channels), checked."""
-    return check_sample(array, None if np.ndim(array) == 2 else -1)
+    """Return a picture as (rows, cols, channels), checked."""
+    planes = check_sample(array, None if np.ndim(array) == 2 else -1)
+    if np.abs(planes, dtype=np.float64).max() > LARGEST:
+        raise ValueError(f"a picture has values beyond {LARGEST:g}: give them in a larger unit")
+    return planes
 
 
 def as_pair(sample: ArrayLike, output: ArrayLike, side: int, *, keep_type: bool = False) -> tuple[Array, Array]:
