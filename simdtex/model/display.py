@@ -44,11 +44,11 @@ def as_html(made: NDArray[Any] | None, source: NDArray[np.int32] | None, statist
     if source is not None and source.shape[-1] == 2:
         sample = [int(last) + 1 for last in source.reshape(-1, 2).max(axis=0)]
         figures.append(_figure(source_colours(_thinned(source), (sample[0], sample[1])), "where from in the sample"))
-    told = [f"{statistics['seconds']:.2f} s"] if "seconds" in statistics else []
-    told += [f"on {statistics['device']}"] if "device" in statistics else []
-    told += [f"seed {statistics['seed']}"] if "seed" in statistics else []
+    facts = [f"{statistics['seconds']:.2f} s"] if "seconds" in statistics else []
+    facts += [f"on {statistics['device']}"] if "device" in statistics else []
+    facts += [f"seed {statistics['seed']}"] if "seed" in statistics else []
     row = f'<div style="display:flex;flex-wrap:wrap;gap:1em">{"".join(figures)}</div>'
-    return f"<div>{row}<p>{escape(', '.join(told))}</p></div>"
+    return f"<div>{row}<p>{escape(', '.join(facts))}</p></div>"
 
 
 def _thinned(array: NDArray[Any]) -> NDArray[Any]:

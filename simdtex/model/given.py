@@ -66,13 +66,13 @@ class Given:
 
 
 class Stand(NamedTuple):
-    """Who stands for whom at a level: ``site`` and ``datum``, (n,) pixel indices of the output."""
+    """Sites that stand for off-grid data at a level: ``site`` and ``datum``, (n,) pixel indices of the output."""
 
     site: NDArray[np.int64]
     datum: NDArray[np.int64]
 
 
-NOBODY = Stand(np.zeros(0, np.int64), np.zeros(0, np.int64))
+NO_STAND_IN = Stand(np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 
 def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
@@ -91,7 +91,7 @@ def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
     """
     step, (height, width) = grid.spacing, known.shape
     if step == 1:
-        return NOBODY
+        return NO_STAND_IN
     own = np.zeros((grid.rows, grid.cols), bool)
     own[:] = known[::step, ::step]
     row, col = np.nonzero(known)

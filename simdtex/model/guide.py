@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What tells an output where to be what: pictures beside the sample and the output that are matched and never made.
+"""Guides: pictures that accompany the sample and the output, are matched, and are never made.
 
-A guide's channels stand in equation (12) beside those of the pixels, with two differences: they are known everywhere,
-whatever the temperature, and the site itself counts, as much as `centre` says. So a candidate is near where its guide,
-there and around it, is that of the site: texture by numbers (Hertzmann et al. 2001), or a secondary variable.
+A guide's channels stand in equation (12) with those of the pixels, with two differences: they are known everywhere,
+whatever the temperature, and the site itself counts, with the weight `centre`. So a candidate is near if its guide,
+there and around it, equals that of the site: texture by numbers (Hertzmann et al. 2001), or a secondary variable.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from simdtex.model.pictures import unknown_in
 from simdtex.model.scale import Scale, stretch
 
 UNKNOWN = 2**16 - 1
-"""The working level of what nobody knows: it counts for nothing (kernels/common/level.h)."""
+"""The working level of an unknown value, which counts for nothing (kernels/common/confidence.h)."""
 
 
 GuidePair = tuple[tuple[NDArray[Any], ...], NDArray[Any]]

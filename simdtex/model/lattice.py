@@ -219,7 +219,7 @@ class Grid:
     def neighbours(self, sites: NDArray[np.int32], offsets: NDArray[np.int32]) -> NDArray[np.int32]:
         """Pixel index of each neighbour, (N, S); -1 outside an open lattice or a window, and for the site itself.
 
-        Where there are tiles, `plane` is added to that of a neighbour in another tile.
+        If there are tiles, `plane` is added to that of a neighbour in another tile.
         """
         row = sites // self.width // self.spacing
         col = sites % self.width // self.spacing

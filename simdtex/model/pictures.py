@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a sample is made of: one picture or several, what of them is known, what may be used, and what kind it is."""
+"""The pictures of a sample: which pixels are known, which may be used, and which variables are categories."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Pictures:
     pixels : tuple of (rows, cols, C) arrays
         Of any sizes; NaN where a pixel is unknown.
     unknown : tuple of (rows, cols) bool arrays, optional
-        What is unknown beside NaN: nothing is taken from there, and it is nobody's neighbour.
+        Unknown pixels in addition to NaN: nothing is taken from there, and they are no neighbours.
     usable : tuple of (rows, cols) bool arrays, optional
         Where pixels may be taken from; all of them are neighbours. None: everywhere.
     categorical : tuple of C bools, optional
@@ -42,7 +42,7 @@ class Pictures:
     known: tuple[Mask, ...] | None = field(init=False)
 
     def __post_init__(self) -> None:
-        """Complete what is unknown by the nearest known pixel, so that a neighbourhood can be looked at."""
+        """Complete unknown pixels by the nearest known one, so that a neighbourhood can be looked at."""
         gaps = [unknown_in(picture) for picture in self.pixels]
         if self.unknown:
             gaps = [gap | more for gap, more in zip(gaps, self.unknown, strict=True)]

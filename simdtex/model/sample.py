@@ -117,7 +117,7 @@ class Sample:
     guides : (G, H, W) uint16 array
         Working levels of the output's guides.
     guided : list of (G, rows, cols) uint16 arrays
-        Those of each picture's; empty where there is no guide.
+        Those of each picture's; empty without guides.
     boxes : list of (int, int, int)
         Of each picture its first row, its rows and its columns.
 
@@ -330,7 +330,7 @@ class Sample:
     def place(self, source: NDArray[np.int32]) -> NDArray[np.int32]:
         """(row, column) in the user's sample of pixel indices, on a last axis; -1 where a pixel has no source.
 
-        Where there are several pictures, the number of the picture is the third.
+        Of several pictures, the number of the picture is the third.
         """
         place = np.stack(np.divmod(source, np.int32(self.cols)), -1) - np.int32(self.margin)
         if len(self.boxes) > 1:

@@ -3,7 +3,7 @@
 
 With it the arrangement of one synthesis carries over to any other map of the same material, and
 it shows what was copied from where. It is an integer array (rows, cols, 2) of (row, column), or
-(rows, cols, 3) of (row, column, sample) where there are several samples, counted from 0. A pixel
+(rows, cols, 3) of (row, column, sample) of several samples, counted from 0. A pixel
 that was given and not taken from any sample has no source: its row and column are -1.
 """
 
@@ -143,7 +143,7 @@ def _check_size(name: str, values: NDArray[Any], places: SourceMap, shape: tuple
 
 
 def _filling(fill: ArrayLike, none: NDArray[np.bool_], carried: NDArray[Any]) -> NDArray[Any]:
-    """What to take where there is no source, in the map's type."""
+    """Return the values of pixels without a source, in the map's type."""
     given: Any = np.ma.asarray(fill)
     if given.dtype.kind not in "buifc":
         raise TypeError(f"fill holds {given.dtype} values: give numbers of the other map's type")

@@ -133,7 +133,7 @@ def effective_use(
         Side of a piece, pixels: each side of the sample is cut into as many parts as come nearest
         to this length, which differ by one pixel at most.
     sample : int, optional
-        The sample whose use is told, from 0, by the pixels taken from it alone; needed where the source map is of
+        The sample whose use is measured, from 0, by the pixels taken from it alone; needed where the source map is of
         several.
 
     Returns

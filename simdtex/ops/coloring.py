@@ -44,7 +44,7 @@ class Plan(NamedTuple):
 
 
 def coloring(grid: Grid, order: int, seed: int = 0) -> NDArray[np.int32]:
-    """Colour a level's lattice, or a window of one.
+    """Return the colours of a level's lattice, or of a window of one.
 
     The best lattice colouring of the plane where the size of the lattice takes it without a seam. Else either a
     lattice colouring with more colours that fits, or the best one with its clashes along the seam coloured
@@ -77,7 +77,7 @@ def coloring(grid: Grid, order: int, seed: int = 0) -> NDArray[np.int32]:
 
 
 def colors_of(grid: Grid, order: int, seed: int) -> Plan:
-    """How the whole lattice of a grid is coloured."""
+    """Return the plan of the whole lattice of a grid."""
     return _plan(grid.within.rows, grid.within.cols, grid.torus, order, seed)
 
 
@@ -87,20 +87,20 @@ def _plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Plan:
     assert best is not None  # a square pattern always exists in the plane
     neighbours = len(neighbourhood_offsets(order))
     seamless = coloring_sublattice(order, rows, cols, limit=max(best.index, neighbours + 1)) if torus else best
-    nobody, own = np.zeros(0, np.int64), None
+    none, own = np.zeros(0, np.int64), None
     vast = rows + cols > VAST and seamless is not None
     if seamless != best and not vast:
         seam = _clashing(rows, cols, order, best)
         own = _greedy(rows, cols, order, best, seam, seed, max(best.index, seamless.index - 1) if seamless else inf)
     if own is None:
         assert seamless is not None  # else greedy colours have no limit
-        best, seam, own = seamless, nobody, nobody.astype(np.int32)
+        best, seam, own = seamless, none, none.astype(np.int32)
     used = _used(rows, cols, order, best, seam, own)
     return Plan(best, seam, own, (np.cumsum(used) - 1).astype(np.int32), int(used.sum()))
 
 
 def _cosets(pattern: Sublattice, row: NDArray[np.int64], col: NDArray[np.int64]) -> NDArray[np.int32]:
-    """The colour of a site is its coset of the sublattice spanned by (a, 0) and (b, c) (row, column).
+    """Return the colour of sites, their coset of the sublattice spanned by (a, 0) and (b, c) (row, column).
 
     Two sites of one coset differ by a sublattice vector, none of which is as short as a neighbour's offset.
     """
@@ -111,7 +111,7 @@ def _cosets(pattern: Sublattice, row: NDArray[np.int64], col: NDArray[np.int64])
 
 
 def _along(rows: int, cols: int, radius: int) -> NDArray[np.int64]:
-    """The sites that may see another across the seam and come after it, in ascending order."""
+    """Return the sites with neighbours before them across the seam, in ascending order."""
     row, col = np.arange(rows), np.arange(cols)
     low = row >= rows - radius
     side = (col < radius) | (col >= cols - radius)
@@ -126,7 +126,7 @@ def _along(rows: int, cols: int, radius: int) -> NDArray[np.int64]:
 
 
 def _clashing(rows: int, cols: int, order: int, pattern: Sublattice) -> NDArray[np.int64]:
-    """The later of any two sites that are neighbours across the seam and of one coset."""
+    """Return the later of any two sites that are neighbours across the seam and of one coset."""
     offsets = neighbourhood_offsets(order).astype(np.int64)
     site = _along(rows, cols, int(offsets.max()))
     clash = [np.zeros(0, bool)]
@@ -142,7 +142,7 @@ def _clashing(rows: int, cols: int, order: int, pattern: Sublattice) -> NDArray[
 
 
 def _pieces(sites: NDArray[np.int64], neighbours: int) -> list[NDArray[np.int64]]:
-    """Sites in pieces of which all neighbours are looked at together."""
+    """Return sites in pieces, small enough to look at all their neighbours together."""
     return np.array_split(sites, 1 + sites.size * neighbours // TOGETHER)
 
 
@@ -156,7 +156,7 @@ def _greedy(
     """
     offsets, n = neighbourhood_offsets(order).astype(np.int64), bare.size
     taken = np.zeros((n, max(pattern.index, len(offsets) + 1) + 1), bool)
-    beside = np.empty((len(offsets), n), np.int64)
+    near = np.empty((len(offsets), n), np.int64)
     first = 0
     for here in _pieces(bare, len(offsets)):
         row, col = np.divmod(here, cols)
@@ -164,22 +164,22 @@ def _greedy(
         r = k * cols + m
         at = np.minimum(np.searchsorted(bare, r), n - 1)
         other = bare[at] == r
-        beside[:, first : first + here.size] = np.where(other & (r != here), at, -1)
+        near[:, first : first + here.size] = np.where(other & (r != here), at, -1)
         fixed = np.nonzero(~other)
         taken[first + fixed[1], _cosets(pattern, k[fixed], m[fixed])] = True
         first += here.size
     priority = random.draw4(seed, 0, 0, bare, random.COLOR)[0].astype(np.int64)
     rank = np.empty(n, np.int64)
     rank[np.lexsort((bare, priority))] = np.arange(n)
-    rank = np.append(rank, -1)  # of nobody, whom -1 stands for
+    rank = np.append(rank, -1)  # for -1, no neighbour
     colors, left = np.full(n, UNCOLORED, np.int32), np.arange(n)
     while left.size:
-        now = left[(rank[beside[:, left]] < rank[left]).all(0)]
+        now = left[(rank[near[:, left]] < rank[left]).all(0)]
         colors[now] = taken[now].argmin(1)
         if (colors[now] >= most).any():
             return None
-        near = beside[:, now]
-        taken[near[near >= 0], np.broadcast_to(colors[now], near.shape)[near >= 0]] = True
+        those = near[:, now]
+        taken[those[those >= 0], np.broadcast_to(colors[now], those.shape)[those >= 0]] = True
         rank[now] = -1
         left = left[colors[left] == UNCOLORED]
     return colors
@@ -188,7 +188,7 @@ def _greedy(
 def _used(
     rows: int, cols: int, order: int, pattern: Sublattice, seam: NDArray[np.int64], own: NDArray[np.int32]
 ) -> NDArray[np.bool_]:
-    """Which colours there are."""
+    """Return which colours are used."""
     used = np.zeros(1 + max(pattern.index - 1, int(own.max(initial=0))), bool)
     used[own] = True
     radius = int(neighbourhood_offsets(order).max())

@@ -13,7 +13,7 @@ COUNTERS = 3 * 2**11
 """Of a segment: for 11 bits in each of three passes."""
 
 SHORT, LONG = 2**15, 2**22
-"""Values of a segment that one work-item sorts where there are few of them, and where there are many."""
+"""Values of a segment that one work-item sorts, if segments are few and if they are many."""
 
 
 def alone(machine: Launcher, segments: int, n: int) -> bool:

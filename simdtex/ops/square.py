@@ -36,9 +36,9 @@ class Square(NamedTuple):
         u: NDArray[np.float32],
         offsets: NDArray[np.int32],
     ) -> NDArray[np.float32]:
-        """Equation (12) for each candidate, (slots, S), infinity where there is none; summed as a device does.
+        """Return equation (12) for each candidate, (slots, S), infinity for none; summed as a device does.
 
-        ``numbers`` (slots, S), -1 where there is none; ``x`` (N, C, S) grey levels of the neighbours and ``u`` (N, C or
+        ``numbers`` (slots, S), -1 for none; ``x`` (N, C, S) grey levels of the neighbours and ``u`` (N, C or
         1, S), how certain each is; one more of both where the site itself is among ``offsets``.
         """
         radius = int(offsets.max())

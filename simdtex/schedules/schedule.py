@@ -112,7 +112,7 @@ class Info(NamedTuple):
 
     @property
     def ranges(self) -> NDArray[np.int64]:
-        """``steps``, also where there is one."""
+        """``steps``, also of a single step."""
         return np.array([[0, self.sites.size]], np.int64) if self.steps is None else self.steps
 
     def apart(self, machine: Machine) -> Iterator[Info]:

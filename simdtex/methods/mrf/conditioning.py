@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Machine
-from simdtex.model.given import NOBODY, Planes, Stand, stand_ins
+from simdtex.model.given import NO_STAND_IN, Planes, Stand, stand_ins
 from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import Grid
 from simdtex.ops.neighbourhood import UNTOUCHED, Confidences, Field
@@ -138,7 +138,7 @@ class Conditioning(Conditions):
             source.flat[site], kind.flat[site] = -1, STANDING
         gaps = bool((self.guides == UNKNOWN).any())
         for plane, guide in zip(values[matched:], self.guides, strict=True):
-            stand: Stand = stand_ins(guide != UNKNOWN, grid) if gaps else NOBODY
+            stand: Stand = stand_ins(guide != UNKNOWN, grid) if gaps else NO_STAND_IN
             plane[:] = guide
             plane.flat[stand.site] = guide.flat[stand.datum]
         return Held(*(np.ascontiguousarray(grid.view(plane)) for plane in (values, source, kind)))
