@@ -344,8 +344,9 @@ TINY = """
 import sys
 import numpy as np
 import simdtex
-from cases import REFERENCE, assert_same_bits, texture
+from cases import REFERENCE, assert_same_bits, ising, texture
 import simdtex.ops.relax as rule
+from simdtex.methods.mrf import level
 from simdtex.ops import leaves
 from simdtex.machine.devices import find
 from simdtex.machine.opencl import OpenCL
@@ -354,7 +355,7 @@ info = find("oclgrind")
 colour, grey = texture((6, 5), 3), texture((7, 6))
 few = (np.indices((5, 6)).sum(0) // 2 % 3).astype(np.uint8)
 leaves.LEAST = 1  # few as the candidates are
-rule.KEPT = 40  # of finer levels, they are weighed by several kernels
+rule.KEPT = level.KEPT = 40  # of finer levels, they are weighed by several kernels
 runs = [
     (grey, None, {"order": 1, "levels": 2}),
     (texture((8, 9)), None, {"order": 5, "levels": 2, "search": "exact", "novelty": 0}),
