@@ -85,12 +85,12 @@ def test_who_has_something_to_say(machine, how, torus):
         assert_same_bits(finished(m, p, 1.0).reshape(expected.shape), expected)
 
 
-def finished(m, p, sd, first=0, count=None):
+def finished(m, p, sd, rows=None):
     """What is from nowhere is given."""
     _, field, _ = p.on(m)
     given = m.put((p.field.source < 0).astype(np.uint8))
     where = (p.grid, p.sample.planes(m), p.sample)
-    return finish(m, field, given, *where, sd, first, count or p.grid.plane)
+    return finish(m, field, given, *where, sd, rows or range(p.grid.rows))
 
 
 @pytest.mark.parametrize("sd", [0.5, 1.5, 2.0])
@@ -107,7 +107,7 @@ def test_a_change_is_the_weighted_mean(machine, sd, how):
 @settings(max_examples=10)
 def test_a_device_has_the_references_bits_on_any_rows(machine, p, rows, torus):
     p = problem(p, shape=(8, 7), torus=torus, channels=2)
-    assert_same_bits(*(finished(m, p, 1.5, 7 * rows, 14) for m in (REFERENCE, machine)))
+    assert_same_bits(*(finished(m, p, 1.5, range(rows, rows + 2)) for m in (REFERENCE, machine)))
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int8, np.float32, np.float64])
@@ -119,7 +119,7 @@ def test_where_the_arrangement_is_coherent_nothing_changes(machine, dtype):
     for m in (REFERENCE, machine):
         values, t = sample.working[:, source], np.zeros((9, 10), np.uint16)
         field, given = Field(*(m.put(plane) for plane in (values, source, t))), m.put(np.zeros((9, 10), np.uint8))
-        by = finish(m, field, given, grid, sample.planes(m), sample, 1.5, 0, 90)
+        by = finish(m, field, given, grid, sample.planes(m), sample, 1.5, range(9))
         assert not by.any()
         assert_same_bits(sample.moved(source, by.reshape(2, 9, 10)), pixels[4:13, 4:14])
 

@@ -25,7 +25,7 @@ def run(machine, p, strength=1.0, dear=0.1):
     sites, field, offsets = p.on(machine)
     terms = (np.float32(1 / (1 + strength)), machine.put(p.penalty(dear)))
     candidates, strip = p.candidates(machine), p.strip(machine)
-    return host(machine, nearest(machine, sites, field, offsets, p.grid, candidates, strip, *terms))
+    return host(machine, nearest(machine, sites, field, offsets, p.grid, candidates, strip, terms))
 
 
 @given(problems(max_order=5), strengths, penalties)
@@ -53,7 +53,7 @@ def test_places_that_may_not_be_taken_cost_infinity(machine, masked):
     for m in (REFERENCE, machine):
         sites, field, offsets = p.on(m)
         terms = (np.float32(0.5), m.put(p.penalty(0.1, every=True)))
-        outcome = nearest(m, sites, field, offsets, p.grid, p.candidates(m, every=True), p.strip(m), *terms)
+        outcome = nearest(m, sites, field, offsets, p.grid, p.candidates(m, every=True), p.strip(m), terms)
         found[m.name] = host(m, outcome)
     first, second = found.values()
     assert_same_bits(first, second)

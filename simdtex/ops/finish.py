@@ -40,16 +40,16 @@ def finish(
     planes: Array,
     sample: Sample,
     sd: float,
-    first: int,
-    count: int,
+    rows: range,
 ) -> NDArray[np.int16]:
     """Return the difference of pixels from their sources, (channels, count), on the host.
 
-    Of the sites from ``first`` on, in working levels of 8-bit samples and in 1/8 of a working level of others. The
-    ``field``, ``given`` (H, W) uint8, 1 if a value is given, and ``planes``, the sample's, are of the machine. Cost: N
-    channels gathers a site.
+    Of the sites of some ``rows`` of the grid, in working levels of 8-bit samples and in 1/8 of a working level of
+    others. The ``field``, ``given`` (H, W) uint8, 1 if a value is given, and ``planes``, the sample's, are of the
+    machine. Cost: N channels gathers a site.
     """
     offsets, weights = around(sd)
+    first, count = rows.start * grid.cols, len(rows) * grid.cols
     if machine is None:
         return _finished(field, given, grid, sample, offsets, weights, grid.sites()[first : first + count])
     out, i = machine.empty((sample.shown, count), np.int16), np.int32

@@ -95,10 +95,13 @@ def nearest(
     grid: Grid,
     candidates: Candidates,
     strip: Strip,
-    discount: np.float32,
-    penalty: Array,
+    terms: tuple[np.float32, Array],
 ) -> Relaxed:
-    """Return the nearest candidate of each site, its distance discounted by coherence plus its penalty."""
+    """Return the nearest candidate of each site by its distance, discounted for coherence, plus its penalty.
+
+    ``terms`` the discount, and the penalties of the candidates.
+    """
+    discount, penalty = terms
     if machine is None:
         around = neighbourhood.neighbourhood.reference(sites, field, offsets, grid)
         distances = lcpdf.distance.reference(around, candidates)
@@ -111,7 +114,7 @@ def nearest(
     defines = {"V": machine.vector, "C": channels, "STEP": machine.step, "CHECK": CHECK}
     f, i, leaves = np.float32, np.int32, strip.leaves()
     near = machine.empty((count, neighbours * (1 + channels)), f)
-    terms = machine.empty((count, neighbours * (2 + channels)), i)
+    listed = machine.empty((count, neighbours * (2 + channels)), i)
     least, certain = machine.empty((count,), f), machine.empty((count,), f)
     used, where = machine.empty((count,), i), machine.empty((count,), i)
     features = machine.empty((count, FEATURES), f)
@@ -123,7 +126,7 @@ def nearest(
         *(candidates.index_of, plane),
         *(candidates.pixels, candidates.positions, candidates.reach, strip.reach),
         *(machine.constant(_spread(strip.offsets)), discount, penalty, axes, f(leaves.middle if leaves else 0)),
-        *(near, terms, used, features, least, where, certain),
+        *(near, listed, used, features, least, where, certain),
     )
     split = machine.split(count, -(-strip.cols // (machine.vector * machine.step)) * strip.rows)
     row = split if leaves else 0  # the leaves' results come first
@@ -142,7 +145,7 @@ def nearest(
     machine.launch(
         machine.kernel("nearest", "nearest_scan", **defines),
         (count * split,),
-        *(i(count), i(neighbours), terms, used, near, least, where),
+        *(i(count), i(neighbours), listed, used, near, least, where),
         *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach, penalty),
         *(slack(neighbours * channels), i(split), i(leaves is None), wanted, i(row), found, at, work),
     )

@@ -265,7 +265,7 @@ def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxatio
     candidates = proposal.candidates
     if not (choice.draws or relaxation.confidences.own):
         terms = (relaxation.discount, relaxation.penalty)
-        relaxed = nearest(machine, sites, field, offsets, grid, candidates, proposal.strip, *terms)
+        relaxed = nearest(machine, sites, field, offsets, grid, candidates, proposal.strip, terms)
     else:
         near = neighbourhood(machine, sites, field, offsets, grid, relaxation.confidences)
         distances = lcpdf.distance(machine, near, candidates)

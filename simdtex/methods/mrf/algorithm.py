@@ -233,7 +233,9 @@ def finished(
     given = run.machine.put((np.zeros((grid.height, grid.width), bool) if known is None else known).view(np.uint8))
     for top in range(0, len(seen), rows):
         here = seen[top : top + rows]
-        by = finish(run.machine, field, given, grid, run.planes, sample, sd, (first + top) * grid.cols, here.size)
+        by = finish(
+            run.machine, field, given, grid, run.planes, sample, sd, range(first + top, first + top + len(here))
+        )
         picture[top : top + rows] = sample.moved(here, by.reshape(-1, *here.shape))
     return picture
 
