@@ -33,7 +33,7 @@ def philox(counter: list[NDArray[np.uint32]], key: tuple[int, int]) -> list[NDAr
     list of four (n,) uint32 arrays
         128 random bits per counter.
     """
-    c0, c1, c2, c3 = (np.asarray(c, np.uint64) for c in counter)
+    c0, c1, c2, c3 = np.asarray(counter, np.uint64)
     k0, k1 = key
     for _ in range(10):
         first, second = c0 * np.uint64(0xD2511F53), c2 * np.uint64(0xCD9E8D57)
@@ -44,7 +44,7 @@ def philox(counter: list[NDArray[np.uint32]], key: tuple[int, int]) -> list[NDAr
             first & _LOW,
         )
         k0, k1 = (k0 + 0x9E3779B9) & 0xFFFFFFFF, (k1 + 0xBB67AE85) & 0xFFFFFFFF
-    return [c.astype(np.uint32) for c in (c0, c1, c2, c3)]
+    return list(np.array([c0, c1, c2, c3]).astype(np.uint32))
 
 
 def draw4(seed: int, level: int, turn: Any, site: Any, purpose: int, attempt: Any = 0) -> list[NDArray[np.uint32]]:

@@ -44,13 +44,9 @@ class Operation(Generic[P, R]):
 
     def __call__(self, machine: Machine, *args: P.args, **kwargs: P.kwargs) -> R:
         """Run the operation on a machine."""
-        result: R = machine.run(self, *args, **kwargs)
-        return result
+        with machine.running() as launcher:
+            return self._function(launcher, *args, **kwargs)
 
     def reference(self, *args: P.args, **kwargs: P.kwargs) -> R:
         """Compute in NumPy."""
         return self._function(None, *args, **kwargs)
-
-    def launch(self, machine: Launcher, *args: P.args, **kwargs: P.kwargs) -> R:
-        """Launch kernels; `simdtex.machine.opencl.OpenCL.run` calls this."""
-        return self._function(machine, *args, **kwargs)

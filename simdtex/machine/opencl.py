@@ -146,10 +146,11 @@ class OpenCL:
         self._programs: dict[tuple[tuple[str, ...], str], Any] = {}
         self._kernels: dict[tuple[tuple[str, ...], str, str], Any] = {}
 
-    def run(self, operation: Any, *args: Any, **kwargs: Any) -> Any:
-        """Launch the operation's kernels, while no other thread launches any."""
+    @contextmanager
+    def running(self) -> Iterator[OpenCL]:
+        """Let an operation launch its kernels, while no other thread launches any."""
         with self._plain_errors(), self._lock:
-            return operation.launch(self, *args, **kwargs)
+            yield self
 
     def put(self, array: Any) -> Any:
         """Copy to the device; a small array is copied in the queue's order, without waiting."""
