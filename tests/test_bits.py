@@ -358,7 +358,7 @@ leaves.LEAST = 1  # few as the candidates are
 rule.KEPT = level.KEPT = 40  # of finer levels, they are weighed by several kernels
 runs = [
     (grey, None, {"order": 1, "levels": 2}),
-    (texture((8, 9)), None, {"order": 5, "levels": 2, "search": "exact", "novelty": 0}),
+    (texture((8, 9)), None, {"order": 5, "levels": 2, "search": "exact"}),
     (grey, None, {"order": 2, "levels": 1, "relaxation": "gibbs", "pixel": "density", "boundary": "open"}),
     (colour, -1, {"order": 1, "levels": 2, "edges": "reflect", "pixel": "density", "relaxation": "gibbs"}),
     (grey, None, {"order": 1, "levels": 1, "schedule": "luby"}),
@@ -372,7 +372,7 @@ machines = [OpenCL(info, work_group=3, vector=4, split=3), OpenCL(info, work_gro
 machines = [OpenCL(info), *machines]
 for number, (sample, axis, options) in enumerate(runs):
     for machine in machines[: 3 if number < 2 else 1]:
-        options |= {"rng": 1, "channel_axis": axis} | ({} if "method" in options else {"free_sweeps": 1})
+        options |= {"rng": 1, "channel_axis": axis} | ({} if "method" in options else {"free_sweeps": 1, "novelty": 0})
         ours = simdtex.synthesize(sample, (5, 7), device=machine, **options)
         assert_same_bits(ours, simdtex.synthesize(sample, (5, 7), device=REFERENCE, **options))
 for options in ({"temperature": np.full((5, 6), 0.5)}, {"estimator": "histogram"}):
