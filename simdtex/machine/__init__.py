@@ -27,7 +27,7 @@ def open_machine(device: str | Machine | None = None, *, profile: bool = False) 
     TypeError
         `device` is none of these.
     """
-    if callable(getattr(device, "run", None)):
+    if callable(getattr(device, "running", None)):
         return device  # type: ignore[return-value]
     from simdtex.machine.devices import find
 
