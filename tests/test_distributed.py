@@ -23,7 +23,6 @@ from simdtex.model.lattice import Grid
 from simdtex.model.pictures import Pictures
 from simdtex.ops.coloring import colors_of
 from simdtex.ops.neighbourhood import Field
-from simdtex.run import Tiling
 
 zarr = pytest.importorskip("zarr")
 
@@ -31,21 +30,14 @@ SAMPLE = texture((22, 25), seed=2)
 COLOUR = np.stack([texture((22, 25), seed=k) for k in (1, 2, 3)], -1)
 
 
-def both(tmp_path, sample, shape, tiles, device=REFERENCE, **options):
-    """The output in tiles and its source map; and those of one that is made at once."""
+def assert_same(tmp_path, sample, shape, tiles, device=REFERENCE, **options):
+    """Assert that the output in tiles and its source map are those of one that is made at once."""
     path = tmp_path / "out.zarr"
-    options = {"xi": -8.0} | options  # few sweeps
-    ours = distributed.synthesize(
-        sample, shape, path, tiles=tiles, rng=11, device=device, source_map=True, **options
-    ).compute()
-    theirs, output = simdtex.synthesize(sample, shape, rng=11, device=device, full_output=True, **options)
-    return (ours, zarr.open_group(path)["source"][...]), (theirs, output.source)
-
-
-def assert_same(tmp_path, *given, **options):
-    ours, theirs = both(tmp_path, *given, **options)
-    for mine, whole in zip(ours, theirs, strict=True):
-        assert_same_bits(mine, whole)
+    options = {"xi": -8.0, "rng": 11, "device": device} | options  # few sweeps
+    ours = distributed.synthesize(sample, shape, path, tiles=tiles, source_map=True, **options)
+    theirs, output = simdtex.synthesize(sample, shape, full_output=True, **options)
+    assert_same_bits(ours.compute(), theirs)
+    assert_same_bits(zarr.open_group(path)["source"][...], output.source)
     forget()
 
 
@@ -138,22 +130,13 @@ def test_guides(tmp_path, gaps):
     assert_same(tmp_path, SAMPLE, shape, 14, order=1, guide=(SAMPLE.astype(np.float32) / 255, guide))
 
 
-def test_labels_with_known_sites(tmp_path):
-    shape = (27, 30)
-    labels = (SAMPLE > 128).astype(np.uint8), (np.indices(shape).sum(0) // 20 % 2).astype(np.uint8)
-    assert_same(tmp_path, SAMPLE, shape, 14, order=1, guide=labels, known=known_values(shape, 0.05, 6))
-
-
 def test_several_samples_with_masks_and_gaps(tmp_path):
     first, second = SAMPLE.astype(np.float32), texture((19, 30), seed=8).astype(np.float32)
     first[3:6, 4:9] = np.nan
     masks = [np.ones(one.shape, bool) for one in (first, second)]
     masks[1][:, :7] = False
-    given = {"mask": masks, "shares": (2.0, 1.0)}
-    ours, theirs = both(tmp_path, [first, second], (28, 31), 15, order=1, **given)
-    for mine, whole in zip(ours, theirs, strict=True):
-        assert_same_bits(mine, whole)
-    assert ours[1].shape == (28, 31, 3)
+    assert_same(tmp_path, [first, second], (28, 31), 15, order=1, mask=masks, shares=(2.0, 1.0))
+    assert zarr.open_group(tmp_path / "out.zarr")["source"].shape == (28, 31, 3)
 
 
 def test_categories(tmp_path):
@@ -209,8 +192,13 @@ def go_on(store, execute):
     drive(Tiles(store, execute), REFERENCE, 0)
 
 
-def test_tiles_come_in_any_order(tmp_path):
-    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, xi=-8.0, device=REFERENCE)
+@pytest.fixture(scope="module")
+def whole():
+    """The picture of the store that `created` makes."""
+    return simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, xi=-8.0, device=REFERENCE)
+
+
+def test_tiles_come_in_any_order(tmp_path, whole):
     for seed in range(2):
         store, where = created(tmp_path, f"{seed}.zarr")
         go_on(store, shuffled(store, seed))
@@ -218,8 +206,7 @@ def test_tiles_come_in_any_order(tmp_path):
         assert "work" not in Store(where).root
 
 
-def test_a_run_that_is_stopped_after_any_tile_goes_on_to_the_same_bytes(tmp_path):
-    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, xi=-8.0, device=REFERENCE)
+def test_a_run_that_is_stopped_after_any_tile_goes_on_to_the_same_bytes(tmp_path, whole):
     store, where = created(tmp_path)
     stops = 0
     while True:
@@ -232,7 +219,7 @@ def test_a_run_that_is_stopped_after_any_tile_goes_on_to_the_same_bytes(tmp_path
     assert_same_bits(store.root["image"][...], whole)
 
 
-def test_a_tile_that_is_done_twice_changes_nothing(tmp_path):
+def test_a_tile_that_is_done_twice_changes_nothing(tmp_path, whole):
     store, where = created(tmp_path)
 
     def twice(turn, tiles):
@@ -247,14 +234,12 @@ def test_a_tile_that_is_done_twice_changes_nothing(tmp_path):
             yield number
 
     go_on(store, twice)
-    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, xi=-8.0, device=REFERENCE)
     assert_same_bits(store.root["image"][...], whole)
 
 
 @pytest.mark.parametrize("moment", ["penalty", "attribute", "removal", "tally", "planes"])
-def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeypatch, moment):
+def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeypatch, moment, whole):
     """Turns are changed in one piece: stopped before or after each of the writes around that, a run goes on."""
-    whole = simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, xi=-8.0, device=REFERENCE)
     store, where = created(tmp_path)
     calls = {"left": 0}
 
@@ -333,11 +318,13 @@ def test_one_process_at_a_time_leads(tmp_path):
     distributed.resume(path, device=REFERENCE)  # nobody is kept off for longer
 
 
-def test_progress_tells_every_tile(tmp_path):
+@pytest.mark.parametrize(("most", "side"), [(1024, (30, 31)), (8, (8, 8))])
+def test_progress_tells_every_tile(tmp_path, monkeypatch, most, side):
+    """The picture of a large level is every n-th site."""
+    monkeypatch.setattr("simdtex.distributed.tiling.SHOWN", most)
     seen = []
 
     def callback(progress):
-        assert isinstance(progress, Tiling)
         seen.append((progress.fraction, progress.doing, progress.image()))
 
     options = {"order": 1, "xi": -8.0, "rng": 1, "device": REFERENCE}
@@ -347,17 +334,7 @@ def test_progress_tells_every_tile(tmp_path):
     assert fractions[-1] == 1.0
     assert seen[-1][1] == "writing the picture, tile 4 of 4"
     assert any("sweep 2, tile 3 of 4" in doing for _, doing, _ in seen)
-    assert seen[-1][2].shape[:2] == (30, 31)
-
-
-def test_a_picture_of_a_large_level_is_every_nth_site(tmp_path, monkeypatch):
-    monkeypatch.setattr("simdtex.distributed.tiling.SHOWN", 8)
-    shapes = set()
-    distributed.synthesize(
-        SAMPLE, (30, 31), tmp_path / "o.zarr", tiles=16, order=1, xi=-8.0, rng=1, device=REFERENCE,
-        callback=lambda progress: shapes.add(progress.image().shape[:2]),
-    )  # fmt: skip
-    assert (8, 8) in shapes
+    assert seen[-1][2].shape[:2] == side
 
 
 # -- the plan --------------------------------------------------------------------------------------------------
@@ -467,14 +444,6 @@ def test_bad_input_is_said_before_anything_is_made(tmp_path, options, words):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_what_is_there_is_kept(tmp_path):
-    (tmp_path / "out.zarr").mkdir()
-    with pytest.raises(ValueError, match="is there already; remove it"):
-        distributed.synthesize(SAMPLE, (20, 20), tmp_path / "out.zarr")
-    with pytest.raises(ValueError, match=r"the folder .*no does not exist; make it first"):
-        distributed.synthesize(SAMPLE, (20, 20), tmp_path / "no" / "out.zarr")
-
-
 def test_only_stores_of_ones_own_are_gone_on_with(tmp_path, monkeypatch):
     for make in (lambda path: None, lambda path: path.mkdir(), lambda path: path.write_text("no")):
         make(tmp_path / "a.zarr")
@@ -485,17 +454,13 @@ def test_only_stores_of_ones_own_are_gone_on_with(tmp_path, monkeypatch):
     zarr.open_group(tmp_path / "b.zarr", mode="w")
     with pytest.raises(ValueError, match="is no output in tiles"):
         distributed.resume(tmp_path / "b.zarr")
-    with monkeypatch.context() as patch:
-        patch.setattr(store_module, "version", lambda name: "v")
-        store, where = created(tmp_path)
-    with pytest.raises(
-        ValueError, match=r"was begun by simdtex v and this is .*; go on with that version, or begin anew"
-    ):
-        distributed.resume(where)
-    monkeypatch.setattr(store_module, "FORMAT", 3)
-    with pytest.raises(ValueError, match="go on with that version"):
-        distributed.resume(where)
-    assert store.turn.number == 1
+    for name, other in (("version", lambda name: "v"), ("FORMAT", 0), ("KIND", "other")):
+        with monkeypatch.context() as patch:
+            patch.setattr(store_module, name, other)
+            store, where = created(tmp_path, f"{name}.zarr")
+        with pytest.raises(ValueError, match=r"was begun by simdtex .* and this is .*; go on with that version, or"):
+            distributed.resume(where)
+        assert store.turn.number == 1
 
 
 def test_a_schedule_of_ones_own_is_not_known_to_workers(tmp_path):

@@ -134,6 +134,12 @@ def test_alpha_is_dropped_only_where_opaque(tmp_path, dtype, colours, suffix):
     np.testing.assert_array_equal(image.read(tmp_path / f"b{suffix}").pixels, pixels)
 
 
+def test_an_extra_channel_that_is_no_alpha_is_kept(tmp_path):
+    pixels = np.full((6, 5, 5), 255, np.uint8)
+    image.write(tmp_path / "a.tif", pixels)
+    np.testing.assert_array_equal(image.read(tmp_path / "a.tif").pixels, pixels)
+
+
 def test_transparent_colour_becomes_alpha(tmp_path):
     grey = PIL.Image.fromarray(np.array([[0, 7], [7, 9]], np.uint8))
     grey.save(tmp_path / "a.png", transparency=7)

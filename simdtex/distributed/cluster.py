@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Who does the tiles: this process, or the workers of a Dask cluster."""
+"""Where tiles are done: in this process, or by the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from distributed import Client
 
 AHEAD = 3
-"""Tiles to a worker that the scheduler knows of: the next one is there when one is done, and no more."""
+"""Tiles for each worker that the scheduler knows of: one is always ready, and the scheduler's memory is bounded."""
 
 
 def here(store: Store, device: str | Machine | None) -> Execute:
-    """Tiles are done by this process, one after another."""
+    """Return what does tiles in this process, one after another."""
     name = store.name
 
     def execute(turn: Turn, tiles: Sequence[int]) -> Iterator[int]:
@@ -36,7 +36,7 @@ def here(store: Store, device: str | Machine | None) -> Execute:
 
 
 def across(client: Client, store: Store, device: str | None) -> Execute:
-    """Tiles are done by the workers of a cluster; one that is lost with its worker is done by another."""
+    """Return what has the workers of a cluster do tiles; a tile that is lost with its worker is done by another."""
     distributed: Any = import_module("distributed")
     what = store.where, store.name, device
 
@@ -109,6 +109,3 @@ def _libraries() -> Any:
     except ImportError:
         raise ValueError("distributed is not installed; pip install 'simdtex[distributed]'") from None
     return Client, LocalCluster
-
-
-__all__ = ["across", "connected", "here"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A plan as plain arrays and JSON, so that a worker, or a later process, lays out the same run."""
+"""A plan as a tree of plain arrays and numbers, from which a worker or a later process lays out the same run."""
 
 from __future__ import annotations
 
@@ -35,31 +35,19 @@ class Ready:
         return Planes(self.samples, np.zeros((self.channels, 1, 1), np.uint16))
 
 
-def described(plan: Plan) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-    """Return what `restored` needs: JSON, and arrays by name. Conditioning data of the output are not part of it."""
+def described(plan: Plan) -> dict[str, Any]:
+    """Return what `restored` needs, for `simdtex.checkpoint.pack`; conditioning data of the output are not in it."""
     pictures = plan.sample.pictures
-    text = {
-        **{"shape": list(plan.shape), "levels": plan.levels, "pictures": len(pictures.pixels)},
-        **{"options": asdict(plan.options), "layout": plan.sample.layout},
-    }
-    parts = {"pixels": pictures.pixels, "unknown": pictures.unknown, "usable": pictures.usable}
-    arrays = {f"{name}{k}": one for name, those in parts.items() for k, one in enumerate(those or ())}
-    return text, arrays | {f"guide{k}": one for k, one in enumerate(plan.sample.guided)}
+    arrays = {"pixels": pictures.pixels, "unknown": pictures.unknown, "usable": pictures.usable}
+    sample = {"layout": plan.sample.layout, "guides": list(plan.sample.guided)}
+    return {"shape": plan.shape, "levels": plan.levels, "options": asdict(plan.options), **arrays, **sample}
 
 
-def restored(text: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Plan:
+def restored(tree: dict[str, Any]) -> Plan:
     """Return the plan that was described, without conditioning data of the output."""
-    chosen: dict[str, Any] = {
-        name: tuple(one) if isinstance(one, list) else one for name, one in text["options"].items()
-    }
-    options = Options(**chosen)
-
-    def those(name: str) -> tuple[NDArray[Any], ...] | None:
-        return tuple(arrays[f"{name}{k}"] for k in range(text["pictures"])) if f"{name}0" in arrays else None
-
-    pixels, guided = those("pixels"), those("guide")
-    assert pixels is not None
-    pictures = options.of(Pictures(pixels, those("unknown"), those("usable")))
-    sample = Sample(pictures, **text["layout"], guides=[Ready(list(guided))] if guided else [])
-    shape, offsets = (text["shape"][0], text["shape"][1]), neighbourhood_offsets(options.order)
-    return Plan(sample, shape, offsets, options, schedules.get(options.schedule), text["levels"])
+    options = Options(**tree["options"])
+    pictures = options.of(Pictures(tree["pixels"], tree["unknown"], tree["usable"]))
+    guides = [Ready(tree["guides"])] if tree["guides"] else []
+    sample = Sample(pictures, **tree["layout"], guides=guides)
+    schedule, offsets = schedules.get(options.schedule), neighbourhood_offsets(options.order)
+    return Plan(sample, tree["shape"], offsets, options, schedule, tree["levels"])

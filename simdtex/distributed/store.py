@@ -4,15 +4,14 @@
     image, source    the output, written tile by tile at the end
     work/            removed at the end
         input/       the plan's arrays (`simdtex.distributed.description`)
-        given/       values and which are known, of the output; held0, held1, ... what is given of each level
-        level0/a, b  values, source, temperature: before a sweep and after it, turn about
-        penalty7       of each candidate during turn 7
-        tally7       a row for each tile that has had its turn 7: 1, active, sum of temperatures, use of
-                     each candidate
+        given/       values of the output and which are known; held0, held1, ... the conditioning data of each level
+        level0/0, 1  values, source, temperature: before a sweep and after it, in turn
+        penalty7     of each candidate during turn 7
+        tally7       a row for each tile that has finished turn 7: 1, active, sum of temperatures, use of each candidate
 
-A turn is one thing done to every tile: a level begun, a sweep, the picture. Whatever is written in a turn goes where
-nobody reads, so a turn that was broken off is done again, or only its tiles that are missing. The attribute ``turn`` of
-``work`` is changed when a turn is complete, in one piece.
+A turn is one thing done to every tile: begin a level, a sweep, write the picture. Nothing that is written in a turn is
+read in it, so an interrupted turn is completed by its missing tiles. The attribute ``turn`` of ``work`` changes when a
+turn is complete, in one write.
 """
 
 from __future__ import annotations
@@ -20,13 +19,15 @@ from __future__ import annotations
 import secrets
 from collections.abc import Iterator
 from dataclasses import asdict
-from importlib import import_module
 from importlib.metadata import version
 from typing import Any, NamedTuple, cast
 
 import numpy as np
+import zarr
+import zarr.codecs
 from numpy.typing import NDArray
 
+from simdtex.checkpoint import pack, unpack
 from simdtex.distributed.description import described, restored
 from simdtex.distributed.layout import Layout, LevelLayout, laid
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Held
@@ -35,13 +36,13 @@ from simdtex.methods.mrf.tiles import Tally, Tile
 from simdtex.model.lattice import Grid
 from simdtex.ops.neighbourhood import Confidences, Field
 
-FORMAT = 2
-"""Of the store; another one is not gone on with."""
+FORMAT = 3
+"""Format of the store; another one is refused."""
 
 KIND = "simdtex tiles"
 
 TOGETHER = 2**22
-"""Numbers that are read of tallies at once."""
+"""Numbers of tallies that are read at a time."""
 
 PLANES = ("values", "source", "temperature")
 
@@ -50,8 +51,8 @@ class Turn(NamedTuple):
     """What is to be done to every tile.
 
     ``number`` from 1; ``phase`` ``"begin"``, ``"whole"`` (a level of one tile), ``"sweep"``, ``"show"`` or ``"done"``;
-    ``level``; ``read``, ``write`` 0 or 1, the state before and the one after; ``cooling``, ``free`` sweeps of the level
-    done; ``active`` sites of the level now, and their ``temperature_sum``.
+    ``level``; ``read``, ``write`` 0 or 1, the state before and after; the level's ``cooling`` and ``free`` sweeps so
+    far; its ``active`` sites now, and their ``temperature_sum``.
     """
 
     number: int
@@ -66,10 +67,10 @@ class Turn(NamedTuple):
 
 
 class Work(NamedTuple):
-    """What a store makes: the ``plan``, without conditioning data; the ``seed``; the tiles' ``layout``.
+    """The ``plan`` of a store, without conditioning data, its ``seed``, and the ``layout`` of its tiles.
 
-    ``confidences`` which channels are guides; ``held``, ``given`` whether there are conditioning data or
-    guides, and whether there are data.
+    ``confidences``: which channels are guides; ``held``: whether there are conditioning data or guides; ``given``:
+    whether there are data.
     """
 
     plan: Plan
@@ -81,39 +82,24 @@ class Work(NamedTuple):
 
 
 class Store:
-    """A store, opened by its path or address.
-
-    Parameters
-    ----------
-    where : str
-        As Zarr takes it: a folder, or an address of a file system that all workers reach.
-    """
+    """A store: ``where`` is a folder, or an address of a file system that all workers reach."""
 
     def __init__(self, where: str) -> None:
         self.where = where
-        self.root: Any = _zarr().open_group(where, mode="r+")
+        self.root: Any = zarr.open_group(where, mode="r+")
         self._arrays: dict[str, Any] = {}
 
     @staticmethod
     def create(where: str, plan: Plan, seed: int, layout: Layout, *, channels: bool, source: bool) -> Store:
         """Make a store, ready for its first turn.
 
-        Parameters
-        ----------
-        where : str
-        plan : Plan
-        seed : int
-        layout : Layout
-        channels : bool
-            Whether the image has a channel axis.
-        source : bool
-            Whether the source map is written too.
+        ``channels``: whether the image has a channel axis; ``source``: whether the source map is written too.
         """
-        root, own = _zarr().open_group(where, mode="w"), version("simdtex")
+        root, own = zarr.open_group(where, mode="w"), version("simdtex")
         work = root.create_group("work")
-        text, arrays = described(plan)
-        for name, array in arrays.items():
-            work.create_array(f"input/{name}", data=np.ascontiguousarray(array))
+        tree, arrays = pack(described(plan))
+        for number, array in enumerate(arrays):
+            work.create_array(f"input/{number}", data=np.ascontiguousarray(array))
         options, given = plan.options, plan.given
         conditions = Conditioning(plan.levels, plan.sample.guides, plan.planes, len(plan.offsets), options.data_weight)
         store, held = Store(where), False
@@ -132,7 +118,7 @@ class Store:
             store._pixels("source", finest, (2 + (len(sample.boxes) > 1),), np.dtype(np.int32))
         work.attrs["kind"] = KIND
         work.attrs["about"] = {
-            **{"format": FORMAT, "version": own, "name": secrets.token_hex(8), "run": text, "seed": seed},
+            **{"format": FORMAT, "version": own, "name": secrets.token_hex(8), "run": tree, "seed": seed},
             **{"sides": [one.side for one in layout.levels], "workers": layout.workers},
             **{"confidences": [float(one) for one in conditions.confidences], "held": held, "given": given is not None},
         }
@@ -142,20 +128,19 @@ class Store:
 
     @property
     def about(self) -> dict[str, Any]:
-        """What is kept in JSON."""
+        """The description of the run, as JSON holds it."""
         return cast(dict[str, Any], self.root["work"].attrs["about"])
 
     @property
     def name(self) -> str:
-        """What it was called when it was made: no other has this name."""
+        """The store's own name: no other has it."""
         return str(self.about.get("name")) if "work" in self.root else ""
 
     def work(self) -> Work:
-        """What it is about."""
-        about = self.about
-        inputs = self.root["work/input"]
-        arrays = {name: inputs[name][...] for name in inputs.array_keys()}
-        plan, seed = restored(about["run"], arrays), about["seed"]
+        """Return the plan and all that belongs to it."""
+        about, inputs = self.about, self.root["work/input"]
+        arrays = [inputs[str(number)][...] for number in range(len(inputs))]
+        plan, seed = restored(unpack(about["run"], arrays)), about["seed"]
         guides, own, centre, hard = about["confidences"]
         confidences = Confidences(int(guides), bool(own), np.float32(centre), np.float32(hard))
         layout = laid(plan, seed, about["sides"], about["workers"])
@@ -165,12 +150,14 @@ class Store:
 
     @property
     def turn(self) -> Turn:
-        """What is to be done now, as the store has it."""
-        work = _zarr().open_group(self.where, path="work", mode="r") if "work" in self.root else None
-        return Turn(*work.attrs["turn"]) if work is not None else Turn(0, "done", 0)
+        """The present turn, as the store has it."""
+        if "work" not in self.root:
+            return Turn(0, "done", 0)
+        work: Any = zarr.open_group(self.where, path="work", mode="r")
+        return Turn(*work.attrs["turn"])
 
-    def save(self, turn: Turn, penalty: NDArray[np.float32] | None = None) -> None:
-        """Go on to a turn: from now on this is what is to be done."""
+    def save(self, turn: Turn, penalty: NDArray[np.float32] | None = None) -> Turn:
+        """Go on to a turn, and return it."""
         work = self.root["work"]
         if penalty is not None:
             work.create_array(f"penalty{turn.number}", data=penalty, overwrite=True)
@@ -178,9 +165,10 @@ class Store:
         for name in (f"penalty{turn.number - 1}", f"tally{turn.number - 1}"):
             if name in work:
                 del work[name]
+        return turn
 
     def prepare(self, turn: Turn, level: LevelLayout, channels: int, candidates: int) -> bool:
-        """Make the arrays that a turn writes to, where they are not there; true where the turn is new."""
+        """Make the arrays that a turn writes to, if they are missing; return whether the turn is new."""
         work = self.root["work"]
         if turn.phase != "show" and f"level{level.number}/{turn.write}/temperature" not in work:
             for name, kind in zip(PLANES, ("uint16", "int32", "uint16"), strict=True):
@@ -199,35 +187,35 @@ class Store:
             del work[f"level{level}"]
 
     def finish(self) -> None:
-        """Remove what is of use no more."""
+        """Remove the working state."""
         if "work" in self.root:
             del self.root["work"]
 
     def penalty(self, turn: Turn) -> NDArray[np.float32]:
-        """What each candidate costs during a turn."""
+        """Return the penalty of each candidate during a turn."""
         return np.asarray(self.root[f"work/penalty{turn.number}"][...])
 
-    def told(self, turn: Turn, number: int, tally: Tally) -> None:
-        """Note that a tile has had its turn."""
+    def note(self, turn: Turn, number: int, tally: Tally) -> None:
+        """Note that a tile has finished a turn."""
         row = np.concatenate([np.array([1, tally.active, tally.temperature_sum], np.int64), tally.counts])
         self._at(f"tally{turn.number}")[number] = row
 
     def tally(self, turn: Turn, number: int) -> Tally | None:
-        """What was noted of a tile, if it has had its turn."""
+        """Return what was noted of a tile, None before it has finished the turn."""
         there, active, temperature_sum, *_ = row = self._at(f"tally{turn.number}")[number]
         return Tally(row[3:], int(active), int(temperature_sum)) if there else None
 
     def done(self, turn: Turn, count: int) -> NDArray[np.bool_]:
-        """Which of so many tiles have had their turn."""
+        """Return which of the tiles have finished a turn."""
         return np.concatenate([rows[:, 0] > 0 for rows in self._rows(turn, count)])
 
     def total(self, turn: Turn, count: int) -> Tally:
-        """The sum of what was noted of all tiles."""
+        """Return the sum of what was noted of all tiles."""
         _, active, temperature_sum, *counts = sum(rows.sum(0) for rows in self._rows(turn, count))
         return Tally(np.array(counts, np.int64), int(active), int(temperature_sum))
 
     def _rows(self, turn: Turn, count: int) -> Iterator[NDArray[np.int64]]:
-        """What was noted, many tiles at once: one by one they take longer."""
+        """Yield what was noted, many tiles at a time: one by one they take longer."""
         tally = self._at(f"tally{turn.number}")
         some = max(1, TOGETHER // tally.shape[1])
         for first in range(0, count, some):
@@ -236,7 +224,7 @@ class Store:
     # -- arrays over sites ----------------------------------------------------------------------------------------
 
     def read(self, level: LevelLayout, which: int, window: Tile) -> Field:
-        """The state of a level's sites in a window, which may go on across the seam."""
+        """Return the state of a level's sites in a window, which may cross the seam."""
         here = f"level{level.number}/{which}"
         return Field(*(cut(self._at(f"{here}/{name}"), level, window) for name in PLANES))
 
@@ -247,12 +235,12 @@ class Store:
             self._at(f"{here}/{name}")[..., *spans(tile)] = plane
 
     def held(self, level: LevelLayout, window: Tile) -> Held:
-        """What is given of a level's sites in a window."""
+        """Return the conditioning data of a level's sites in a window."""
         here = f"given/held{level.number}"
         return Held(*(cut(self._at(f"{here}/{name}"), level, window) for name in Held._fields))
 
     def given(self, tile: Tile) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-        """Values that are given of the output's pixels in a tile, and which of them are."""
+        """Return the known values of the output in a tile, and where they are known."""
         values, known = (self._at(f"given/{name}")[spans(tile)] for name in ("values", "known"))
         return values, known
 
@@ -264,9 +252,9 @@ class Store:
             self.root["source"][spans(tile)] = place
 
     def _at(self, name: str) -> Any:
-        """An array of ``work``, opened once."""
+        """Return an array of ``work``, opened once."""
         if name not in self._arrays:
-            if len(self._arrays) >= 64:  # those of turns that are over
+            if len(self._arrays) >= 64:  # of turns that are complete
                 self._arrays.clear()
             self._arrays[name] = self.root[f"work/{name}"]
         return self._arrays[name]
@@ -282,7 +270,7 @@ class Store:
     def _array(
         self, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: np.dtype[Any], axes: tuple[str, ...]
     ) -> Any:
-        fast = _zarr().codecs.BloscCodec(cname="lz4", clevel=1, shuffle="shuffle")
+        fast = zarr.codecs.BloscCodec(cname="lz4", clevel=1, shuffle="shuffle")
         chunks = tuple(max(1, min(pair)) for pair in zip(chunks, shape, strict=True))
         return self.root.create_array(
             name, shape=shape, chunks=chunks, dtype=dtype, compressors=fast, dimension_names=axes, overwrite=True
@@ -304,28 +292,23 @@ class Stored(Conditions):
         return self._store.held(self._work.layout.levels[number], window)
 
 
-def _zarr() -> Any:
-    import_module("zarr.codecs")
-    return import_module("zarr")
-
-
 def first_turn(layout: Layout) -> Turn:
-    """The coarsest level begins."""
+    """Return the turn that begins the coarsest level."""
     return Turn(1, phase_of(layout.levels[-1]), len(layout.levels) - 1)
 
 
 def phase_of(level: LevelLayout) -> str:
-    """How a level begins: one that is a single tile goes through all its sweeps at once."""
+    """Return the phase that begins a level: a level of one tile does all its sweeps in one turn."""
     return "whole" if level.count == 1 else "begin"
 
 
 def spans(tile: Tile) -> tuple[slice, slice]:
-    """Rows and columns of a tile."""
+    """Return the rows and columns of a tile."""
     return slice(tile.top, tile.top + tile.rows), slice(tile.left, tile.left + tile.cols)
 
 
 def cut(array: Any, level: LevelLayout, window: Tile) -> NDArray[Any]:
-    """A window of a stored array (..., rows, cols), in one piece."""
+    """Return a window of a stored array (..., rows, cols), which may cross the seam."""
 
     def parts(first: int, size: int, whole: int) -> Iterator[tuple[slice, slice]]:
         at = 0
@@ -340,6 +323,3 @@ def cut(array: Any, level: LevelLayout, window: Tile) -> NDArray[Any]:
         for cols, right in parts(window.left, window.cols, level.cols):
             found[..., down, right] = array[..., rows, cols]
     return found
-
-
-__all__ = ["FORMAT", "KIND", "Store", "Stored", "Turn", "Work", "first_turn", "phase_of"]

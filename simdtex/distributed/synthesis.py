@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 TILES = 2048
-"""Sites to the side of a tile, where nobody says."""
+"""Sites to the side of a tile by default."""
 
 PathLike = str | os.PathLike[str]
 
@@ -62,39 +62,39 @@ def synthesize(
     Parameters
     ----------
     sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array; or a list of such
-        As in `simdtex.synthesize`, like all that is not said here.
+        As in `simdtex.synthesize`.
     shape : (int, int)
         Rows and columns of the output.
     store : path
-        Folder of the Zarr store to make, or an address of a file system that every worker reaches. It holds all that is
-        needed to go on where a run ended early: see `resume`.
+        Folder of the Zarr store to make, or an address of a file system that every worker reaches. `resume` goes on
+        from it if the run is stopped.
     tiles : int
-        Sites to the side of a tile. It decides how much memory a worker needs, never what is made.
+        Sites to the side of a tile, which determine the memory of a worker and not the result.
     client : distributed.Client, optional
-        Whose cluster's workers do the tiles; each opens its own device.
+        The workers of its cluster do the tiles; each opens its own device.
     workers : int, optional
-        Start so many worker processes on this machine, which share its cores out. Without `client` and `workers` this
-        process does one tile after another.
+        Start so many worker processes on this machine, which divide its cores among them. Without `client` and
+        `workers` this process does one tile after another.
     source_map : bool
         Also write ``source``, for every output pixel the (row, column[, picture]) of the sample pixel it is from.
     mask, known, known_source, guide, rng
-        As in `simdtex.synthesize`. What is given of the output is held by this process once, and copied into the store.
+        As in `simdtex.synthesize`. This process copies known values and guides into the store.
     device : str, optional
         As in `simdtex.synthesize`, on every worker.
     callback : callable, optional
         Called with a `simdtex.run.Tiling` after every tile.
     **options
-        Of the method, see `simdtex.methods.mrf.Options`; schedules that relax a window as they do the whole.
+        Of the method, see `simdtex.methods.mrf.Options`; only schedules that relax a window as they do the whole.
 
     Returns
     -------
     dask.array.Array, (rows, cols[, channels])
-        The array ``image`` of the store, read when it is asked for; the channels are where `channel_axis` says.
+        The array ``image`` of the store, read on demand; `channel_axis` is the axis of its channels.
 
     Raises
     ------
     ValueError, TypeError
-        What is wrong and what would be right, in one sentence.
+        An argument is wrong; the sentence says how.
     DeviceError
         Workers end one after another over the same tile.
 
@@ -126,7 +126,7 @@ def resume(
     device: str | Machine | None = None,
     callback: Callback | None = None,
 ) -> Any:
-    """Go on with an output that was begun: to the bytes of a run that never ended early.
+    """Resume an output that was stopped; the bytes are those of a run that was never stopped.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def resume(
 
 
 def finished(store: PathLike) -> bool:
-    """Whether nothing is left to do of an output; raises ValueError where it is none, as `resume` does."""
+    """Return whether an output is complete; raise ValueError if the store holds none, as `resume` does."""
     return bool(_opened(_address(store)).turn.phase == "done")
 
 
@@ -180,14 +180,14 @@ def plan(
     channel_axis: int | None = None,
     **options: Any,
 ) -> Layout:
-    """How an output would be cut into tiles, and what that would need.
+    """Return the layout of an output in tiles, and the memory and disk that it needs.
 
     Parameters
     ----------
     sample, shape, tiles, channel_axis, **options
         As of `synthesize`; ``mask``, ``known`` and the like may be among the options.
     workers : int
-        For whom it is laid out.
+        The number that the layout is for.
 
     Returns
     -------
@@ -207,7 +207,7 @@ def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any]) -> Pla
 
 
 def _workers(client: Client | None, workers: int | None) -> int:
-    """How many there are."""
+    """Return the number of workers."""
     if workers is not None:
         whole("workers", workers, 1, 4 * (os.cpu_count() or 1))
         if client is not None:
@@ -225,7 +225,7 @@ def _address(store: PathLike) -> str:
 
 @contextmanager
 def _made(where: str) -> Iterator[str]:
-    """Where to make a store, so that it is there whole or not at all."""
+    """Yield where to make a store, so that it exists completely or not at all."""
     _libraries()
     if "://" in where:
         yield where
@@ -240,7 +240,7 @@ def _made(where: str) -> Iterator[str]:
 
 
 def _opened(where: str) -> Any:
-    """A store, or one clear sentence."""
+    """Open a store; raise ValueError unless this version can go on with it."""
     _libraries()
     from simdtex.distributed.store import FORMAT, KIND, Store
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a worker does: one tile's turn. It finds all that it needs in the store, and notes there what it has done."""
+"""The task of a worker: one turn of one tile, read from the store and written to it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from simdtex.ops.neighbourhood import Field
 
 @dataclass(frozen=True)
 class Context:
-    """What a process keeps between two tiles."""
+    """What a process keeps from one tile to the next."""
 
     store: Store
     work: Work
@@ -29,14 +29,14 @@ class Context:
 
 _contexts: dict[tuple[str, str, Any], Context] = {}
 _one = Lock()
-"""A process has one device, and two tiles at once would share it."""
+"""A process has one device, which two tiles would share."""
 
 
 def context(where: str, name: str, device: str | Machine | None) -> Context:
-    """The context of a store, laid out on a device once."""
+    """Return the context of a store, laid out on a device once."""
     key = (where, name, device)
     if key not in _contexts:
-        _contexts.clear()  # one at a time, so that memory has its bound
+        _contexts.clear()  # one at a time, which bounds the memory
         store, machine = Store(where), open_machine(device)
         work = store.work()
         run = Run(work.plan, machine, work.seed, Stored(store, work))
@@ -45,29 +45,20 @@ def context(where: str, name: str, device: str | Machine | None) -> Context:
 
 
 def forget() -> None:
-    """Let go of what is kept."""
+    """Drop what is kept."""
     _contexts.clear()
 
 
 def do(where: str, name: str, device: str | Machine | None, turn: Turn, number: int) -> int:
-    """A tile's turn, unless it has been done; returns the tile's number.
+    """Do a turn of one tile, unless it is done; return the tile's number.
 
-    Parameters
-    ----------
-    where, name : str
-        The store, and the name that it was given when it was made: another may lie there later.
-    device : str or Machine, optional
-        As of `simdtex.open_machine`.
-    turn : Turn
-    number : int
-        Of the tile, row by row.
+    ``where`` and ``name`` are the store's path and own name, since another store may be there later.
     """
     with _one:
         here = context(where, name, device)
         if here.store.tally(turn, number) is None:
-            here.store.told(
-                turn, number, PHASES[turn.phase](here, turn, here.work.layout.levels[turn.level].tile(number))
-            )
+            tile = here.work.layout.levels[turn.level].tile(number)
+            here.store.note(turn, number, PHASES[turn.phase](here, turn, tile))
     return number
 
 
@@ -117,5 +108,3 @@ def _above(here: Context, turn: Turn, tile: Tile) -> Field | None:
 
 
 PHASES = {"begin": _begin, "whole": _whole, "sweep": _sweep, "show": _show}
-
-__all__ = ["Context", "context", "do", "forget"]

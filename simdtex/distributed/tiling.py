@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Algorithm 1 over a store, as the driver runs it: a step is one turn, done to every tile by any process."""
+"""Algorithm 1 over a store, for the driver: a step is one turn, done to every tile by any process."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from simdtex.ops.use import use_penalty
 from simdtex.run import Callback, Output, Tiling
 
 Execute = Callable[[Turn, Sequence[int]], Iterator[int]]
-"""Has tiles of a turn done, in any order; yields the number of each tile that is done."""
+"""Does a turn to tiles, in any order, and yields the number of each tile that is done."""
 
 SHOWN = 1024
-"""The most sites to the side of the picture that a callback sees."""
+"""Sites to the side of the picture that a callback sees, at most."""
 
 
 @dataclass(frozen=True)
 class Tiles:
-    """The plan of an output in tiles: its store, and who does the tiles."""
+    """The plan of an output in tiles: its store, and what does the tiles."""
 
     store: Store
     execute: Execute
 
     def on(self, machine: Machine, seed: int) -> Run:
-        """Lay out what the leading process needs: the sample, and one number for each of its candidates."""
+        """Lay out what the leading process needs: the sample, and a count for each of its candidates."""
         return Run(self, machine)
 
 
 class Run:
-    """All turns that are left of an output; the state is the turn, which the store keeps."""
+    """The turns of an output; the state is the present turn, which the store keeps."""
 
     def __init__(self, tiles: Tiles, machine: Machine) -> None:
         self.store, self.execute, self.work = tiles.store, tiles.execute, tiles.store.work()
@@ -52,7 +52,7 @@ class Run:
         return self.store.turn
 
     def step(self, turn: Turn, watch: Callable[..., None]) -> tuple[Turn, None]:
-        """Do a turn to all tiles that have not had it, and return the next turn."""
+        """Do a turn to all tiles that have not finished it, and return the next turn."""
         level = self.work.layout.levels[turn.level]
         new = self.store.prepare(turn, level, self.work.layout.channels, self._candidates(turn))
         left = list(range(level.count)) if new else np.flatnonzero(~self.store.done(turn, level.count)).tolist()
@@ -65,12 +65,12 @@ class Run:
         return turn.phase == "done"
 
     def result(self, turn: Turn, observer: Any) -> tuple[NDArray[Any], Output]:
-        """Remove what is no longer needed from the store; the picture stays there."""
+        """Remove the working state from the store, which holds the picture."""
         self.store.finish()
         return np.zeros((0, 0, 0)), Output(None)
 
     def save(self, turn: Turn) -> Turn:
-        """Return the turn: the store keeps all else."""
+        """Return the turn: the store holds everything else."""
         return turn
 
     load = save
@@ -80,19 +80,17 @@ class Run:
         return Watch(self, callback)
 
     def _candidates(self, turn: Turn) -> int:
-        """Return how many candidates a tile counts the use of."""
+        """Return the number of candidates whose use a tile counts."""
         if turn.phase in ("whole", "show"):
             return 0
         places = self.lattices.places(turn.level)
         return int((places.everywhere if self.lattices.exhaustive(turn.level) else places.positions).size)
 
     def _complete(self, turn: Turn) -> Turn:
-        """Return the next turn, now that all tiles have had this one; the store goes on to it."""
+        """Return the turn after a complete one, and have the store go on to it."""
         store, lattices, levels = self.store, self.lattices, self.work.layout.levels
         if turn.phase == "show":
-            after = turn._replace(number=turn.number + 1, phase="done")
-            store.save(after)
-            return after
+            return store.save(turn._replace(number=turn.number + 1, phase="done"))
         counts, active, temperature_sum = store.total(turn, levels[turn.level].count)
         cooling = turn.cooling + (turn.phase == "sweep" and turn.active > 0)
         free = turn.free + (turn.phase == "sweep" and turn.active == 0)
@@ -103,25 +101,16 @@ class Run:
             after = Turn(number, "sweep", turn.level, read, 1 - read, cooling, free, active, temperature_sum)
             store.save(after, use_penalty(counts, lattices.fair_use(turn.level), rate, before))
         elif turn.level:
-            after = Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1, read)
-            store.save(after)
+            after = store.save(Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1, read))
         else:
-            after = Turn(number, "show", 0, read, read)
-            store.save(after)
+            after = store.save(Turn(number, "show", 0, read, read))
         if turn.phase in ("begin", "whole"):
             store.forget(turn.level + 1)
         return after
 
 
 class Watch:
-    """Reports how far an output is.
-
-    Parameters
-    ----------
-    run : Run
-    callback : callable, optional
-        Called with a `simdtex.run.Tiling` after every tile.
-    """
+    """Calls the callback with a `simdtex.run.Tiling` after every tile."""
 
     def __init__(self, run: Run, callback: Callback | None) -> None:
         self._run, self._callback = run, callback
@@ -129,7 +118,7 @@ class Watch:
         self._fraction = 0.0
 
     def part(self, turn: Turn, done: int) -> None:
-        """Report that so many tiles have had their turn."""
+        """Report that so many tiles have finished a turn."""
         if self._callback is None:
             return
         level = self._run.work.layout.levels[turn.level]
@@ -148,13 +137,13 @@ class Watch:
         )
 
     def step(self, turn: Turn, info: None) -> None:
-        """See nothing: tiles are reported one by one."""
+        """Do nothing: tiles are reported one by one."""
 
     def save(self) -> None:
-        """Return nothing: the store keeps the state."""
+        """Return nothing: the store holds the state."""
 
     def load(self, saved: None) -> None:
-        """Go on from nothing."""
+        """Do nothing: the store holds the state."""
 
     def _share(self, turn: Turn, level: LevelLayout, part: float) -> float:
         """Return the share of the expected work that is done; the last hundredth is for writing the picture."""
@@ -167,9 +156,7 @@ class Watch:
         if turn.phase == "sweep" and not turn.active:
             over += cooling + free * min(1.0, (turn.free + part) / max(1, self._run.lattices.options.free_sweeps))
         elif turn.phase == "sweep":
-            first = (
-                1.0 if turn.level == self._run.lattices.levels - 1 else 0.75
-            )  # mean temperature where the level began
+            first = 1.0 if turn.level == self._run.lattices.levels - 1 else 0.75  # mean temperature at the beginning
             left = turn.temperature_sum / (1024 * level.rows * level.cols * first)
             over += cooling * min(1.0, 1 - sqrt(left) + 0.1 * part)
         elif turn.phase == "whole":
@@ -179,19 +166,10 @@ class Watch:
     def _picture(self, turn: Turn, level: LevelLayout) -> NDArray[Any]:
         """Return every n-th site of the state before the turn, at most about `SHOWN` to the side."""
         step, state = -(-max(level.rows, level.cols) // SHOWN), self._run.store.root["work"]
-        where = (
-            f"level{turn.level}/{turn.read}"
-            if turn.phase in ("sweep", "show")
-            else f"level{turn.level + 1}/{turn.read}"
-        )
+        sample, above = self._run.lattices.sample, turn.phase in ("begin", "whole")
+        where = f"level{turn.level + above}/{turn.read}"
         if f"{where}/{PLANES[-1]}" not in state:
-            return np.zeros((1, 1, self._run.lattices.sample.shown), self._run.lattices.sample.pixels.dtype)
+            return np.zeros((1, 1, sample.shown), sample.pixels.dtype)
         values, source = (state[f"{where}/{name}"] for name in PLANES[:2])
-        rows = [
-            self._run.lattices.sample.picture(values[:, i, ::step][:, None], source[i, ::step][None])
-            for i in range(0, source.shape[0], step)
-        ]
-        return np.concatenate(rows)
-
-
-__all__ = ["Execute", "Tiles"]
+        rows = range(0, source.shape[0], step)
+        return np.concatenate([sample.picture(values[:, i, ::step][:, None], source[i, ::step][None]) for i in rows])

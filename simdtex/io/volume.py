@@ -124,24 +124,3 @@ def _encode(path: Path, suffix: str, values: Array) -> None:
         digits = max(3, len(str(len(values) - 1)))
         for number, picture in enumerate(values):
             image.encode(path / f"slice-{number:0{digits}}.png", ".png", picture)
-
-
-def read(path: PathLike) -> Array:
-    """Read a solid texture that `write` has written, (depth, rows, cols) or with channels."""
-    target, suffix = Path(path), Path(path).suffix.lower()
-    try:
-        if suffix == ".npz":
-            with np.load(target) as arrays:
-                return np.asarray(arrays["volume"])
-        if suffix == ".npy":
-            return np.asarray(np.load(target))
-        if suffix == ".nrrd":
-            return np.asarray(nrrd.read(str(target), index_order="C")[0])
-        import tifffile
-
-        if suffix:
-            with tifffile.TiffFile(target) as file:
-                return np.stack([page.asarray() for page in file.pages])
-        return np.stack([image.read(slice_).pixels for slice_ in sorted(target.iterdir())])
-    except Exception as error:  # every library has its own exceptions
-        raise ValueError(f"{target} cannot be read as a volume ({' '.join(str(error).split())[:100]})") from None
