@@ -7,7 +7,7 @@ import nrrd
 import numpy as np
 import PIL.Image
 import pytest
-from volumes import loaded
+from volumes import loaded, noise
 
 from simdtex.io import volume
 
@@ -20,17 +20,6 @@ HOLDS = {
     "": (["uint8", "uint16", ">u2"], [None, 1, 2, 3, 4]),
 }
 ROUND_TRIPS = [(s, dtype, c) for s, (types, channels) in HOLDS.items() for dtype in types for c in channels]
-
-
-def noise(shape, dtype="uint8", seed=0):
-    rng = np.random.default_rng(seed)
-    kind = np.dtype(dtype).newbyteorder("=")
-    if kind.kind == "b":
-        return rng.random(shape) < 0.5
-    if kind.kind == "f":
-        return rng.normal(size=shape).astype(dtype)
-    limits = np.iinfo(kind)
-    return rng.integers(limits.min, limits.max, shape, kind, endpoint=True).astype(dtype)
 
 
 @pytest.mark.parametrize(("suffix", "dtype", "channels"), ROUND_TRIPS)

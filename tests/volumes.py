@@ -1,4 +1,4 @@
-"""Volumes read back by the libraries of their formats."""
+"""Random pictures and volumes, and volumes read back by the libraries of their formats."""
 
 from pathlib import Path
 
@@ -6,6 +6,18 @@ import imagecodecs
 import nrrd
 import numpy as np
 import tifffile
+
+
+def noise(shape, dtype="uint8", seed=0):
+    """Random values over the whole range of a type."""
+    rng = np.random.default_rng(seed)
+    kind = np.dtype(dtype).newbyteorder("=")
+    if kind.kind == "b":
+        return rng.random(shape) < 0.5
+    if kind.kind == "f":
+        return rng.normal(size=shape).astype(dtype)
+    limits = np.iinfo(kind)
+    return rng.integers(limits.min, limits.max, shape, kind, endpoint=True).astype(dtype)
 
 
 def loaded(path):

@@ -78,25 +78,18 @@ class Job:
 
     Attributes
     ----------
-    sample : array
-        What the output is made from.
-    maps : dict
-        Further maps of the sample, by name.
+    sample, maps
+        The sample of the output and its further maps.
     shape : (rows, cols)
         Of the output.
     options : dict
         Of the method, those that differ from their defaults.
     files : dict
-        The pictures that the lines read, by file name.
-    output : str
-        The file that the lines write.
-    carried : dict
-        The files that they write of the further maps, by the map's name.
+        The pictures that the command line and the Python lines read, by file name.
+    output, carried : str, dict
+        The files that they write: the picture, and the further maps by name.
 
-    Raises
-    ------
-    ValueError, TypeError
-        The message is wrong; the sentence says how.
+    Raises ValueError or TypeError if the message is wrong; the sentence says how.
     """
 
     def __init__(self, message: Message, picture: Picture, maps: Maps, result: Callable[[Any], Any]) -> None:
@@ -208,17 +201,8 @@ class Job:
 def paint(strokes: Any, shape: tuple[int, ...]) -> NDArray[np.uint8]:
     """Return the labels that strokes of a round brush leave, (rows, cols), 0 where there are none.
 
-    Parameters
-    ----------
-    strokes : list of dict
-        Each has a ``label``, 0 to erase, a ``width`` in pixels, and ``points``, a list of [x, y] in pixels. A later
-        stroke covers an earlier one.
-    shape : (rows, cols, ...)
-
-    Raises
-    ------
-    ValueError, TypeError
-        `strokes` is something else.
+    Each stroke is a dict with a ``label``, 0 to erase, a ``width`` in pixels, and ``points``, a list of [x, y] in
+    pixels; a later stroke covers an earlier one. Raises ValueError or TypeError if `strokes` is something else.
     """
     if not isinstance(strokes, list):
         raise TypeError("strokes must be a list; paint again")
@@ -269,8 +253,7 @@ def _part(given: Any, shape: tuple[int, ...]) -> tuple[slice, slice]:
         raise TypeError("a part of the picture is four numbers: left, top, width and height")
     rows, cols = shape[:2]
     for name, value, most in zip(("left", "top", "width", "height"), given, (cols, rows, cols, rows), strict=True):
-        least = min(MIN_REGION, most) if name in ("width", "height") else 0
-        whole(f"the {name} of the part", value, least, most)
+        whole(f"the {name} of the part", value, min(MIN_REGION, most) if name in ("width", "height") else 0, most)
     left, top, width, height = given
     if left + width > cols or top + height > rows:
         raise ValueError(f"the part reaches beyond the picture of {cols}x{rows}; choose one within it")

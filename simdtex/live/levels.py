@@ -16,15 +16,9 @@ MAX_BYTES = 2**27
 
 
 class Levels:
-    """The states of a run of ``mrf`` at the end of each level.
+    """The states of a run of ``mrf`` at the end of each level; ``key`` is the job without its options, None keeps none.
 
-    Parameters
-    ----------
-    key : object
-        The job without its options; None keeps no state.
-    options : simdtex.methods.mrf.Options
-    before : Levels, optional
-        Those of an earlier run; if its key is the same, the run starts after the last level that is the same.
+    If an earlier run, ``before``, has the same key, this run starts after the last level that is the same.
     """
 
     def __init__(self, key: Any, options: mrf.Options, before: Levels | None = None) -> None:

@@ -53,19 +53,7 @@ FIGURES = {
 
 
 class Result:
-    """A result.
-
-    Parameters
-    ----------
-    number : int
-        From 1.
-    job : Job
-        What it was made by.
-    image : array
-    output : simdtex.run.Output
-    seconds : float
-        The duration of the run, with the frames.
-    """
+    """A result: its ``number``, from 1, its job, what the job returned, and the duration of the run with its frames."""
 
     def __init__(self, number: int, job: Job, image: NDArray[Any], output: Output, seconds: float) -> None:
         self.number, self.job, self.image, self.seconds = number, job, image, seconds
@@ -84,7 +72,7 @@ class Result:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of its arrays."""
+        """Bytes of all arrays."""
         arrays = [self.image, self.source, self.temperature, *self.maps.values()]
         return sum(one.nbytes for one in arrays if one is not None)
 
@@ -94,7 +82,7 @@ class Result:
         return frames.thumbnail(self.layers["picture"](), THUMBNAIL)
 
     def describe(self) -> dict[str, Any]:
-        """Return what the page is told of it."""
+        """Return the message to the page."""
         return {
             **{"result": self.number, "width": self.job.shape[1], "height": self.job.shape[0]},
             **{"seconds": self.seconds, "device": self.device, "settings": self.job.message},

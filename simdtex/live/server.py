@@ -50,7 +50,7 @@ HEADERS = {
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-"""Of every answer: the page loads nothing from elsewhere, is in nobody's frame, and tells nobody its address."""
+"""Headers of every answer: the page loads nothing from elsewhere, cannot be framed, and its address is not sent on."""
 
 REFUSED = "This address lacks the right token. Open the address that `simdtex live` has printed."
 
@@ -58,7 +58,7 @@ MAX_PAGES = 8
 """Pages that are open at a time, at most."""
 
 KEPT = 600.0
-"""Seconds that a session is kept for a page that has lost the connection, at least, unless others need its place."""
+"""Seconds that a session is kept for a page that has lost the connection, unless others need its place."""
 
 ENDING = 2.0
 """Seconds that the end of the server waits for a session's run, or for a request that does not come."""
@@ -111,25 +111,11 @@ class Pages:
 def serve(
     picture: Picture | None, device: str | None, address: str, port: int, ready: Callable[[str, Machine], None]
 ) -> None:
-    """Serve the live page until Ctrl-C.
+    """Serve the live page until Ctrl-C; every new page begins with ``picture``.
 
-    Parameters
-    ----------
-    picture : Picture, optional
-        What every new page begins with.
-    device : str, optional
-        As of `simdtex.open_machine`.
-    address : str
-        What to listen to; with any other than 127.0.0.1, other computers may reach the page.
-    port : int
-        0 takes a free one.
-    ready : callable
-        Called with the page's address and the machine, once the page can be opened.
-
-    Raises
-    ------
-    ValueError
-        The address cannot be listened to, or the token is too short.
+    With any ``address`` but 127.0.0.1, other computers may reach the page; ``port`` 0 takes a free one. ``ready`` is
+    called with the page's address and the machine, once the page can be opened. Raises ValueError if the address cannot
+    be listened to, or if the token is too short.
     """
     token = os.environ.get(TOKEN) or secrets.token_urlsafe(24)
     if not re.fullmatch(r"[\w-]{16,}", token, re.ASCII):
@@ -145,12 +131,9 @@ def serve(
 
 @contextmanager
 def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
-    """Serve pages in threads until the block ends; the value of the context is the port. Every path has the token.
+    """Serve pages in threads until the block ends, and yield the port; every path begins with the token.
 
-    Raises
-    ------
-    ValueError
-        The address cannot be listened to.
+    Raises ValueError if the address cannot be listened to.
     """
     try:
         family = socket.AF_INET6 if ":" in address else socket.AF_INET

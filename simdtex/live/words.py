@@ -23,20 +23,16 @@ TABLES: dict[str, tuple[Any, str]] = {
     "fill": (mrf.Options, "fill"),
     "extend": (mrf.Options, "extend"),
 }
-"""The sets of controls: of each method, and of the jobs that only ``mrf`` does; the options, and the command."""
+"""The options and the command of each set of controls: of the methods, and of the jobs that only ``mrf`` does."""
 
 
 def controls(name: str) -> list[dict[str, Any]]:
-    """Return the controls of one of `TABLES`.
+    """Return the controls of one of `TABLES`: each option of the command that is a word, a switch, or has a slider.
 
-    Returns
-    -------
-    list of dict
-        One for each option that the command shows and that is a word, a switch, or a number with a slider: ``name``,
-        ``group``, ``label``, ``hint``, ``kind`` (``"words"``, ``"whole"``, ``"number"`` or ``"switch"``) and
-        ``default``, None if the method decides. Of words ``valid``, pairs of a value and its label. Of numbers
-        ``least``, None if there is none; ``span``, the least, the largest and the step of the slider; ``empty``, the
-        text of an empty field, and ``blank``, its value.
+    A control has ``name``, ``group``, ``label``, ``hint``, ``kind`` (``"words"``, ``"whole"``, ``"number"`` or
+    ``"switch"``) and ``default``, None if the method decides. Words have ``valid``, pairs of a value and its label.
+    Numbers have ``least``, None if there is none; ``span``, the least, the largest and the step of the slider;
+    ``empty``, the text of an empty field, and ``blank``, its value.
     """
     options, job = TABLES[name]
     made = [_control(name, one, one.default_of(job)) for name, one in table(options).items() if job in one.shown]
