@@ -74,22 +74,24 @@ def connected(workers: int | str | None) -> Iterator[Client | None]:
     if workers is None:
         yield None
         return
-    Client, LocalCluster = _libraries()
+    try:
+        distributed: Any = import_module("distributed")
+        from simdtex.distributed.cores import Cores
+    except ImportError:
+        raise ValueError("distributed is not installed; pip install 'simdtex[distributed]'") from None
     if isinstance(workers, str):
         try:
-            client = Client(workers, timeout=10)
+            client = distributed.Client(workers, timeout=10)
         except (OSError, ValueError) as error:
             raise ValueError(f"no scheduler answers at {workers}; start one with: dask scheduler") from error
         with client:
             yield client
         return
-    from simdtex.distributed.cores import Cores
-
     whole("workers", workers, 1, 4 * (os.cpu_count() or 1))
     each = max(1, (os.cpu_count() or 1) // workers)
     limits = {name: str(each) for name in ("POCL_MAX_PTHREAD_COUNT", "POCL_CPU_MAX_CU_COUNT")}
     with (
-        LocalCluster(
+        distributed.LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
             dashboard_address=None,
@@ -98,14 +100,6 @@ def connected(workers: int | str | None) -> Iterator[Client | None]:
             plugins=(Cores(each),),
             silence_logs=50,
         ) as cluster,
-        Client(cluster) as client,
+        distributed.Client(cluster) as client,
     ):
         yield client
-
-
-def _libraries() -> Any:
-    try:
-        from distributed import Client, LocalCluster
-    except ImportError:
-        raise ValueError("distributed is not installed; pip install 'simdtex[distributed]'") from None
-    return Client, LocalCluster

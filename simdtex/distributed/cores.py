@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Workers of one machine that share its cores out among themselves."""
+"""The cores of each worker on one machine."""
 
 from __future__ import annotations
 
@@ -11,13 +11,7 @@ from distributed import Worker, WorkerPlugin
 
 
 class Cores(WorkerPlugin):
-    """Gives each worker of a local cluster cores of its own, before it opens a device.
-
-    Parameters
-    ----------
-    each : int
-        Cores to a worker.
-    """
+    """Gives each worker of a local cluster ``each`` cores of its own, before it opens a device."""
 
     name = "simdtex-cores"
 
@@ -25,11 +19,11 @@ class Cores(WorkerPlugin):
         self.each = each
 
     def setup(self, worker: Worker) -> None:
-        """Called by the worker: its threads, and those of its device, inherit what is set here."""
+        """Set the cores of the worker, which its threads and those of its device inherit."""
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that has the workers
         if not hasattr(os, "sched_setaffinity"):
-            return  # no such thing on this system: workers compete for cores
+            return  # workers compete for cores on this system
         free = sorted(os.sched_getaffinity(0))
         first = int(worker.name) * self.each % len(free)
         os.sched_setaffinity(0, {free[(first + k) % len(free)] for k in range(min(self.each, len(free)))})
