@@ -136,7 +136,6 @@ CHANGES = [
     ({}, 0),
     ({"search": "exact", "finish": 0}, COARSEST),
     ({"coherence": 1.0}, None),
-    pytest.param({"overview": 64}, None, marks=pytest.mark.slow),
     pytest.param({"edges": "whole"}, None, marks=pytest.mark.slow),
     pytest.param({"levels": 1}, None, marks=pytest.mark.slow),
 ]
