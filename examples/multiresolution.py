@@ -18,7 +18,7 @@ from skimage import data
 
 import simdtex
 from simdtex.io.image import write
-from simdtex.model.colours import heat, source_colours
+from simdtex.model.colours import source_colours, temperature_colours
 from simdtex.model.source_map import apply_source_map
 from simdtex.report.sheet import contact_sheet, enlarged
 
@@ -44,7 +44,7 @@ contact_sheet(pictures, folder / "sheet.png", columns=3)
 # The last of them is shown level by level; brightness is the logarithm of the number of candidates.
 most = np.log(max(2, max(stage.candidates.max() for stage in output.stages)))
 maps = [
-    (f"level {stage.level}", enlarged(heat(np.log(stage.candidates) / most), shape, 2**stage.level))
+    (f"level {stage.level}", enlarged(temperature_colours(np.log(stage.candidates) / most), shape, 2**stage.level))
     for stage in output.stages
 ]
 contact_sheet(maps, folder / "candidates.png", columns=4)

@@ -179,13 +179,13 @@ def test_a_part_options_a_seed_and_an_earlier_result(page, wall):
     page.script("page.setPart([8, 4, 50, 60])")
     page.result(2)
     assert page.labelled("Left").get_attribute("value") == "8"
-    page.put("Keep pieces together", 1.5)
+    page.put("Coherence", 1.5)
     page.result(3)
     page.button("New seed").click()
     page.result(4)
     assert "--coherence 1.5" in " ".join(page.command)
     page.all(".strip button")[0].click()
-    until(lambda: page.labelled("Keep pieces together").get_attribute("value") == "0.5")
+    until(lambda: page.labelled("Coherence").get_attribute("value") == "0.5")
     assert page.labelled("Seed").get_attribute("value") == "1"
     assert page.all(".strip button")[0].get_attribute("aria-current") == "true"
     assert page.results == 4, "it selects a result and makes none"
@@ -358,7 +358,7 @@ def test_a_killed_server_is_told_and_a_new_one_found(chromium, wall):
         page = Page(chromium, address)
         port = address.split(":")[2].split("/")[0]
         page.script("page.auto.checked = false")
-        page.put("Reach", 4)
+        page.put("Order", 4)
         drop(page.driver, wall)
         until(lambda: page.script("return page.running"))
         process.kill()
