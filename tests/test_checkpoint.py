@@ -224,14 +224,21 @@ def test_finished_realisations_are_kept(file):
 
     def callback(progress):
         made.append(progress.realisation)
-        if progress.finished == 2:
+        if len(made) == 2:
             raise Stop
 
     with pytest.raises(Stop):  # those that wait are written at the end
         run(simulated, callback=callback, checkpoint=Checkpoint(file, every=1e6))
-    found, _ = run(simulated, callback=callback, checkpoint=file)
-    assert made == [0, 1, 2]
-    assert_same_bits(found, whole)
+    tree = read(file)[1]
+    assert tree["numbers"] == made and len(made) >= 2
+    assert_same_bits(tree["pictures"][..., 0], whole[made])
+    for numbers in ([0, 1], [2, 0]):  # several machines end in any order
+        edited(file, {"numbers": numbers, "pictures": whole[numbers][..., None]})
+        kept, made[:] = file.read_bytes(), []
+        found, _ = run(simulated, callback=callback, checkpoint=file)
+        assert made == [number for number in range(3) if number not in numbers]
+        assert_same_bits(found, whole)
+        file.write_bytes(kept)
 
 
 # -- what is refused ------------------------------------------------------------------------------------------
@@ -253,10 +260,10 @@ def refused(file, words, job=QUICK, **how):
     assert "\n" not in str(caught.value)
 
 
-def edited(file, **changes):
-    """Change the description in a checkpoint, checksum included."""
+def edited(file, state=None, **changes):
+    """Change the description in a checkpoint, or its state, checksum included."""
     about, tree = read(file)
-    text, arrays = pack(tree)
+    text, arrays = pack(tree if state is None else state)
     about |= {"tree": text} | changes
     named = {str(k): array for k, array in enumerate(arrays)}
     named["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
