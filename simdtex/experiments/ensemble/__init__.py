@@ -10,12 +10,10 @@ from __future__ import annotations
 
 from simdtex.experiments.ensemble.arrays import categories_of
 from simdtex.experiments.ensemble.channels import channels
-from simdtex.experiments.ensemble.connections import Connectivity, connectivity
 from simdtex.experiments.ensemble.distance import Anodi, anodi
 from simdtex.experiments.ensemble.ends import dead_end_places, dead_ends
-from simdtex.experiments.ensemble.maps import deviation, entropy, mean, share_maps, shares
+from simdtex.experiments.ensemble.figures import Connectivity, connectivity, entropy, share_maps, shares, variogram
 from simdtex.experiments.ensemble.summary import Summary, summary
-from simdtex.experiments.ensemble.variograms import variogram
 
 __all__ = [
     "Anodi",
@@ -27,9 +25,7 @@ __all__ = [
     "connectivity",
     "dead_end_places",
     "dead_ends",
-    "deviation",
     "entropy",
-    "mean",
     "share_maps",
     "shares",
     "summary",

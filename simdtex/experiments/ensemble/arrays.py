@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is measured: ensembles, single images, and the categories that they hold."""
+"""Checks of ensembles and images, and the categories that they hold."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ MOST_CATEGORIES = 16  # integers of more values are taken for continuous ones
 
 
 def as_image(array: ArrayLike, name: str = "image") -> Array:
-    """An image (rows, cols), checked."""
-    unmasked(f"the {name}", array)
-    return _checked(np.asarray(array), name, 2, "(rows, cols)")
+    """Return an image (rows, cols), checked."""
+    return _checked(array, name, 2, "(rows, cols)")
 
 
 def as_ensemble(array: ArrayLike) -> Array:
-    """An ensemble (realisations, rows, cols), checked."""
-    unmasked("the ensemble", array)
-    return _checked(np.asarray(array), "ensemble", 3, "(realisations, rows, cols)")
+    """Return an ensemble (realisations, rows, cols), checked."""
+    return _checked(array, "ensemble", 3, "(realisations, rows, cols)")
 
 
-def _checked(array: Array, name: str, axes: int, shape: str) -> Array:
+def _checked(given: ArrayLike, name: str, axes: int, shape: str) -> Array:
+    unmasked(f"the {name}", given)
+    array = np.asarray(given)
     if array.ndim != axes or array.size == 0:
         raise ValueError(f"the {name} has the shape {array.shape}: give {shape}, none of them 0")
     if array.dtype.kind not in "biuf":
@@ -38,41 +38,35 @@ def _checked(array: Array, name: str, axes: int, shape: str) -> Array:
     return array
 
 
-def as_categories(categories: ArrayLike) -> Array:
-    """Categories (K,), checked, in the order in which they are given."""
+def as_index(array: Array, categories: ArrayLike, name: str) -> tuple[NDArray[np.intp], int]:
+    """Return every value's place in a list of categories, checked, and their number."""
     values = np.asarray(categories)
     if values.ndim != 1 or values.size == 0:
         raise ValueError("there are no categories: give a list of the values that stand for them, as [0, 1]")
     if len(np.unique(values)) < len(values):
         raise ValueError("a category is named twice: name each once")
-    return values
-
-
-def as_index(array: Array, categories: Array, name: str) -> NDArray[np.intp]:
-    """Every value's place in the list of categories; raises where a value is none of them."""
-    order = np.argsort(categories)
-    place = np.minimum(np.searchsorted(categories, array, sorter=order), len(categories) - 1)
-    found: NDArray[np.intp] = order[place]
-    other = categories[found] != array
+    order = np.argsort(values)
+    found = order[np.minimum(np.searchsorted(values, array, sorter=order), len(values) - 1)]
+    other = values[found] != array
     if other.any():
         raise ValueError(f"the {name} holds {array[other][0]}, which is no category: name it among the categories")
-    return found
+    return found, len(values)
 
 
 def categories_of(training: ArrayLike, categories: Sequence[int] | None = None) -> Array:
-    """Find out which categories a training image has.
+    """Return the categories that a training image has.
 
     Parameters
     ----------
     training : array_like, (rows, cols)
     categories : sequence of int, optional
         The values that stand for categories; an empty one says that the values are continuous. By default the values
-        of the training image where they are integers, or true and false, and at most 16.
+        of the training image if they are integers, or true and false, and at most 16.
 
     Returns
     -------
     ndarray, (K,)
-        The categories, in the given order or in ascending order; empty where the values are continuous.
+        The categories, in the given order or in ascending order; empty if the values are continuous.
 
     Raises
     ------
@@ -80,13 +74,10 @@ def categories_of(training: ArrayLike, categories: Sequence[int] | None = None) 
         The training image is not (rows, cols), or holds a value that is none of the categories.
     """
     image = as_image(training, "training image")
-    if categories is not None:
-        if len(categories) == 0:
-            return np.empty(0, np.intp)
-        named = as_categories(categories)
-        as_index(image, named, "training image")
-        return named
-    if image.dtype.kind == "f":
-        return np.empty(0, np.intp)
+    if categories is not None and len(categories):
+        as_index(image, categories, "training image")
+        return np.asarray(categories)
     values: Array = np.unique(image)
-    return values if len(values) <= MOST_CATEGORIES else np.empty(0, np.intp)
+    if categories is not None or image.dtype.kind == "f" or len(values) > MOST_CATEGORIES:
+        return np.empty(0, np.intp)
+    return values

@@ -1,49 +1,58 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A training image made by code: sinuous channels that meet, part and now and then end."""
+"""A training image made by code: sinuous channels that meet, part and now and then end.
+
+All arithmetic is in whole numbers, so that no platform's library decides on a pixel.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from itertools import count
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from simdtex.experiments.ensemble.courses import (
-    FINE,
-    PIXEL,
-    STEEPEST,
-    Draws,
-    Path,
-    is_far,
-    is_inside,
-    swing_of,
-    values_at,
-    walk,
-)
-from simdtex.random import as_seed
+from simdtex.random import as_seed, philox
 
 Pixels = NDArray[np.uint8]
+Path = NDArray[np.int64]
+"""(n, 3): row and column in fixed point, and heading."""
 
 LEAST = 32  # pixels of a side
+SHARE = 0.3  # of the channels
+WIDTH = 8  # of the channels, pixels
 OUTSIDE = 30  # channels begin so far to the left of the picture, pixels
 TRIES = 8  # courses of which the one with most room is taken
 FAR = 40  # more room than this is no better, pixels
 CLEAR = 7  # ground around a dead end, pixels
-LEAVING = 26  # steps that a branch takes to leave what it comes from
+LEAVING = 26  # steps that a branch takes to leave its channel
 MEETING = 5  # steps into the channel that a branch meets
 APART = 22  # of joints from one another, pixels
-MAIN = 4  # eighths of the share, in channels across the whole picture
-AREA = 62500  # pixels, for
-ENDS = (9, 13)  # so many dead ends, from and to
+ENDS = (9, 13)  # dead ends in AREA pixels, from and to
+AREA = 62500
 PATIENCE = 60  # tries for one dead end, and for all branches
 
+PIXEL = 256  # fixed point: parts of a pixel
+TURN = 4096  # parts of a full turn; a heading of 0 is to the right
+SINE = np.rint(PIXEL * np.sin(np.arange(TURN) * (2 * np.pi / TURN))).astype(np.int64).tolist()
 
-def channels(shape: tuple[int, int], rng: Any = None, *, share: float = 0.3, width: int = 8) -> Pixels:
+# Headings h are a damped swing pushed at random, h(i) = AFTER h(i-1) - BEFORE h(i-2) + push (Ferguson, "Disturbed
+# periodic model for river meanders", 1976), for meanders of about 75 pixels, in parts of 65536.
+AFTER, BEFORE = 127926, 62849
+FINE = 256  # parts of a heading's unit
+PUSH = 19  # pushes are less than this, units of a heading; headings deviate by about 38 degrees
+STEEPEST = 850  # no heading is further from the right, 75 degrees
+SETTLE = 120  # steps that a swing takes to forget its start
+POOL = 1024  # random numbers drawn at once
+
+
+def channels(shape: tuple[int, int], rng: Any = None) -> Pixels:
     """Make a training image of sinuous channels that run from left to right.
 
-    Channels meander, cross, part and meet again, and a few end inside: mostly 6 to 10 dead ends in 250 x 250 pixels.
+    Channels are about 8 pixels wide and cover about 0.3 of the image, less exactly in small ones. They meander, cross,
+    part and meet again, and a few end inside: mostly 6 to 10 dead ends in 250 x 250 pixels.
 
     Parameters
     ----------
@@ -51,10 +60,6 @@ def channels(shape: tuple[int, int], rng: Any = None, *, share: float = 0.3, wid
         Pixels, at least 32 each.
     rng : None, int or numpy.random.Generator
         The seed: the same integer gives the same bytes on every platform.
-    share : float
-        Of the channels, about, 0.1 to 0.5; smaller images deviate more.
-    width : int
-        Of the channels, pixels, 3 to 16; single channels are one wider or narrower.
 
     Returns
     -------
@@ -64,7 +69,7 @@ def channels(shape: tuple[int, int], rng: Any = None, *, share: float = 0.3, wid
     Raises
     ------
     ValueError
-        The shape, the share or the width is out of range.
+        A side is too short.
 
     Notes
     -----
@@ -73,124 +78,159 @@ def channels(shape: tuple[int, int], rng: Any = None, *, share: float = 0.3, wid
     rows, cols = shape
     if min(rows, cols) < LEAST:
         raise ValueError(f"the shape is {rows} x {cols} pixels: give at least {LEAST} x {LEAST}")
-    if not (0.1 <= share <= 0.5 and 3 <= width <= 16):
-        raise ValueError(
-            f"share {share} or width {width} is out of range: give a share of 0.1 to 0.5, a width of 3 to 16"
-        )
-    scene = _Scene(np.zeros((rows, cols), np.uint8), Draws(as_seed(rng)), width)
-    wanted = int(share * rows * cols)
-    while scene.pixels.sum() < wanted * MAIN // 8:
-        _add_main(scene)
-    least, more = (round(number * rows * cols / AREA) for number in ENDS)
-    ends = least + scene.draws.below(more - least + 1)
+    scene = _Scene((rows, cols), as_seed(rng))
+    wanted = int(SHARE * rows * cols)
+    while scene.pixels.sum() < wanted // 2:
+        scene.add_main()
+    least, most = (round(number * rows * cols / AREA) for number in ENDS)
+    ends = least + scene.below(most - least + 1)
     for _ in range(PATIENCE * ends):
         if len(scene.tips) == ends or scene.pixels.sum() >= wanted:
             break
-        _add_end(scene)
+        scene.add_end()
     tries = 0
     while scene.pixels.sum() < wanted:
-        # where no branch has room any more, channels across the picture fill it
-        (_add_branch if tries < PATIENCE else _add_main)(scene)
+        if tries < PATIENCE:
+            scene.add_branch()
+        else:  # no branch has room any more
+            scene.add_main()
         tries += 1
     return scene.pixels
 
 
-@dataclass
 class _Scene:
-    """What is drawn so far: the pixels, courses, free ends and joints of the channels, and the room between them."""
+    """The image so far: pixels, courses, free ends and joints of the channels, and the distance from any channel."""
 
-    pixels: Pixels
-    draws: Draws
-    width: int
-    paths: list[Path] = field(default_factory=list)
-    tips: list[Path] = field(default_factory=list)
-    joints: list[Path] = field(default_factory=list)
-    room: NDArray[np.int64] = field(init=False)
+    def __init__(self, shape: tuple[int, int], seed: int) -> None:
+        self.pixels = np.zeros(shape, np.uint8)
+        self.room = np.full(shape, FAR)
+        self.paths: list[Path] = []
+        self.tips: list[Path] = []
+        self.joints: list[Path] = []
+        self.words = _words(seed)
 
-    def __post_init__(self) -> None:
-        self.room = np.full(self.pixels.shape, FAR)
+    def below(self, limit: int) -> int:
+        """Draw a number from 0 to limit - 1."""
+        return next(self.words) * limit >> 32
 
+    def turned(self, last: int, now: int) -> int:
+        """Return the heading after two others, at random."""
+        push = self.below(2 * PUSH - 1) - (PUSH - 1)
+        heading = (AFTER * now - BEFORE * last >> 16) + push * FINE
+        return max(-STEEPEST * FINE, min(STEEPEST * FINE, heading))
 
-def _add_main(scene: _Scene) -> None:
-    """A channel across the whole picture, where there is room."""
-    rows, cols = scene.pixels.shape
-    found = []
-    for _ in range(TRIES):
-        start = (scene.draws.below(rows + rows // 5) - rows // 10, -OUTSIDE)
-        found.append(walk(scene.draws, start, swing_of(scene.draws), 2 * cols + 2 * OUTSIDE, 1))
-    clear = [path for path in found if is_far(path, scene.tips, CLEAR + scene.width)]
-    _draw(scene, max(clear or found, key=lambda path: _room(scene, path)))
+    def walk(self, start: tuple[int, int], swing: tuple[int, int], steps: int, towards: int) -> Path:
+        """Draw a course of so many steps of a pixel, to the right (1) or to the left (-1)."""
+        (last, now), (row, col) = swing, (place * PIXEL for place in start)
+        path = []
+        for _ in range(steps):
+            heading = now // FINE
+            path.append((row, col, heading * towards))
+            row += SINE[heading % TURN]
+            col += SINE[(heading + TURN // 4) % TURN] * towards
+            last, now = now, self.turned(last, now)
+        return np.array(path, dtype=np.int64)
 
+    def add_main(self) -> None:
+        """Add a channel across the whole picture, where it has most room."""
+        rows, cols = self.pixels.shape
+        found = []
+        for _ in range(TRIES):
+            start = (self.below(rows + rows // 5) - rows // 10, -OUTSIDE)
+            last = now = 0
+            for _ in range(SETTLE):
+                last, now = now, self.turned(last, now)
+            found.append(self.walk(start, (last, now), 2 * cols + 2 * OUTSIDE, 1))
+        clear = [path for path in found if _is_far(path, self.tips, CLEAR + WIDTH)]
+        self.draw(max(clear or found, key=self.mean_room))
 
-def _add_branch(scene: _Scene) -> None:
-    """A channel that leaves another and goes on until it meets one, or out of the picture, but past no free end."""
-    ways = []
-    for _ in range(TRIES):
-        path = _leaving(scene, 1, 2 * scene.pixels.shape[1])
+    def add_branch(self) -> None:
+        """Add a channel that leaves another and goes on until it meets one, or out of the picture."""
+        ways = []
+        for _ in range(TRIES):
+            path = self.leaving(1, 2 * self.pixels.shape[1])
+            if path is None:
+                continue
+            met = np.flatnonzero(_values_at(self.pixels, path)[LEAVING:])
+            way = path if len(met) == 0 else path[: LEAVING + int(met[0]) + MEETING]
+            if _is_far(way, self.tips, CLEAR + WIDTH) and _is_far(way[-1:], self.joints, APART):
+                ways.append(way)
+        if ways:
+            way = max(ways, key=lambda way: self.mean_room(way[LEAVING // 2 :]))
+            self.draw(way)
+            self.joints += [way[0, :2], way[-1, :2]]
+
+    def add_end(self) -> None:
+        """Add a channel that leaves another and ends inside, or begins inside and meets another, if there is room."""
+        path = self.leaving(1 if self.below(2) else -1, LEAVING + 10 + self.below(60))
         if path is None:
-            continue
-        met = np.flatnonzero(values_at(scene.pixels, path)[LEAVING:])
-        way = path if len(met) == 0 else path[: LEAVING + int(met[0]) + MEETING]
-        if is_far(way, scene.tips, CLEAR + scene.width) and is_far(way[-1:], scene.joints, APART):
-            ways.append(way)
-    if ways:
-        way = max(ways, key=lambda way: _room(scene, way[LEAVING // 2 :]))
-        _draw(scene, way)
-        scene.joints += [way[0, :2], way[-1, :2]]
+            return
+        tip, shape = path[-1, :2] // PIXEL, np.array(self.pixels.shape)
+        if not _inside(path, self.pixels).all() or (tip < 2 * CLEAR).any() or (tip >= shape - 2 * CLEAR).any():
+            return
+        room = _values_at(self.room, path)[LEAVING:] - WIDTH // 2
+        if (room <= CLEAR // 2).any() or room[-1] <= CLEAR:
+            return
+        self.draw(path)
+        self.tips.append(path[-1, :2])
+        self.joints.append(path[0, :2])
+
+    def leaving(self, towards: int, steps: int) -> Path | None:
+        """Draw a course that leaves some channel at an angle; None if it would do so near a joint or an end."""
+        path = self.paths[self.below(len(self.paths))]
+        start = path[(at := self.below(len(path))) : at + 1]
+        if not (_inside(start, self.pixels).all() and _is_far(start, self.joints + self.tips, APART)):
+            return None
+        row, col, heading = (int(part) for part in start[0])
+        turn = (340 + self.below(300)) * (1 if self.below(2) else -1)
+        swing = max(-STEEPEST, min(STEEPEST, heading * towards + turn)) * FINE
+        return self.walk((row // PIXEL, col // PIXEL), (swing, swing), steps, towards)
+
+    def mean_room(self, path: Path) -> float:
+        """Return the mean distance of a course from other channels, where it is inside, pixels."""
+        inside = int(_inside(path, self.pixels).sum())
+        return int(_values_at(self.room, path).sum()) / max(FAR, inside)  # a course that soon leaves has little
+
+    def draw(self, path: Path) -> None:
+        """Draw a course in place, as discs of one width."""
+        width = WIDTH - 1 + self.below(3)
+        reach = width // 2 + 1
+        offsets = np.arange(-reach, reach + 1)
+        centres = path[:, np.newaxis, np.newaxis, :2]
+        rows, cols = np.broadcast_arrays(
+            centres[..., 0] // PIXEL + offsets[:, np.newaxis], centres[..., 1] // PIXEL + offsets
+        )
+        # from the middles of pixels, in parts of a half pixel
+        apart = (rows * PIXEL + PIXEL // 2 - centres[..., 0]) ** 2 + (cols * PIXEL + PIXEL // 2 - centres[..., 1]) ** 2
+        height, across = self.pixels.shape
+        drawn = (4 * apart <= (width * PIXEL) ** 2) & (rows >= 0) & (rows < height) & (cols >= 0) & (cols < across)
+        self.pixels[rows[drawn], cols[drawn]] = 1
+        self.paths.append(path)
+        self.room = np.minimum(ndimage.distance_transform_edt(self.pixels == 0).astype(np.int64), FAR)
 
 
-def _add_end(scene: _Scene) -> None:
-    """A channel that leaves another and ends inside, or begins inside and meets another, if there is room."""
-    draws, shape = scene.draws, np.array(scene.pixels.shape)
-    path = _leaving(scene, 1 if draws.below(2) else -1, LEAVING + 10 + draws.below(60))
-    if path is None:
-        return
-    inside = path[:, :2] // PIXEL
-    tip = inside[-1]
-    if (inside < 0).any() or (inside >= shape).any() or (tip < 2 * CLEAR).any() or (tip >= shape - 2 * CLEAR).any():
-        return
-    room = values_at(scene.room, path)[LEAVING:] - scene.width // 2
-    if (room <= CLEAR // 2).any() or room[-1] <= CLEAR:
-        return
-    _draw(scene, path)
-    scene.tips.append(path[-1, :2])
-    scene.joints.append(path[0, :2])
+def _words(seed: int) -> Iterator[int]:
+    """Yield random numbers of 32 bits, by Philox."""
+    counter = np.zeros((4, POOL), np.uint32)
+    counter[0] = np.arange(POOL)
+    for turn in count():
+        counter[1] = turn
+        yield from np.stack(philox(list(counter), (seed & 0xFFFFFFFF, seed >> 32)), axis=-1).ravel().tolist()
 
 
-def _leaving(scene: _Scene, towards: int, steps: int) -> Path | None:
-    """A course that leaves some channel at an angle, to the right (1) or to the left (-1)."""
-    draws = scene.draws
-    path = scene.paths[draws.below(len(scene.paths))]
-    start = path[(at := draws.below(len(path))) : at + 1]
-    row, col, heading = (int(part) for part in start[0])
-    rows, cols = scene.pixels.shape
-    inside = 0 <= row // PIXEL < rows and 0 <= col // PIXEL < cols
-    if not (inside and is_far(start, scene.joints, APART) and is_far(start, scene.tips, APART)):
-        return None
-    turn = (340 + draws.below(300)) * (1 if draws.below(2) else -1)
-    swing = max(-STEEPEST, min(STEEPEST, heading * towards + turn)) * FINE
-    return walk(draws, (row // PIXEL, col // PIXEL), (swing, swing), steps, towards)
+def _inside(path: Path, picture: NDArray[Any]) -> NDArray[np.bool_]:
+    """Return which places of a course are inside of a picture."""
+    places = path[:, :2] // PIXEL
+    return np.asarray(((places >= 0) & (places < np.array(picture.shape))).all(axis=1))
 
 
-def _room(scene: _Scene, path: Path) -> float:
-    """Mean distance of a course from other channels, where it is inside, pixels; more than `FAR` is so much."""
-    inside = int(is_inside(path, scene.pixels.shape).sum())
-    return int(values_at(scene.room, path).sum()) / max(FAR, inside)  # one that soon leaves has little
+def _values_at(picture: NDArray[Any], path: Path) -> NDArray[Any]:
+    """Return the picture's values along a course, 0 outside."""
+    inside = _inside(path, picture)
+    row, col = np.where(inside[:, np.newaxis], path[:, :2] // PIXEL, 0).T
+    return np.asarray(picture[row, col] * inside)
 
 
-def _draw(scene: _Scene, path: Path) -> None:
-    """Draw a course in place, as discs of one width."""
-    width = scene.width - 1 + scene.draws.below(3)
-    reach = width // 2 + 1
-    offsets = np.arange(-reach, reach + 1)
-    centres = path[:, np.newaxis, np.newaxis, :2]
-    rows = centres[..., 0] // PIXEL + offsets[:, np.newaxis]
-    cols = centres[..., 1] // PIXEL + offsets
-    # from the middles of pixels, in parts of a half pixel
-    apart = (rows * PIXEL + PIXEL // 2 - centres[..., 0]) ** 2 + (cols * PIXEL + PIXEL // 2 - centres[..., 1]) ** 2
-    rows, cols = np.broadcast_arrays(rows, cols)
-    height, across = scene.pixels.shape
-    drawn = (4 * apart <= (width * PIXEL) ** 2) & (rows >= 0) & (rows < height) & (cols >= 0) & (cols < across)
-    scene.pixels[rows[drawn], cols[drawn]] = 1
-    scene.paths.append(path)
-    scene.room = np.minimum(ndimage.distance_transform_edt(scene.pixels == 0).astype(np.int64), FAR)
+def _is_far(path: Path, places: Iterable[Path], apart: int) -> bool:
+    """Return whether a course keeps so many pixels away from all of some places."""
+    return all(int(((path[:, :2] - place) ** 2).sum(axis=1).min()) > (apart * PIXEL) ** 2 for place in places)

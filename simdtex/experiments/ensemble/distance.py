@@ -14,6 +14,8 @@ from simdtex.experiments.ensemble.arrays import Array, as_ensemble, as_image, as
 
 Floats = NDArray[np.float64]
 
+LEVELS = 3  # at most
+CLASSES = 3  # that continuous values are cut into, by quantiles
 BLOCK = 1 << 21  # numbers compared at once
 MOST_COUNTS = 1 << 26  # different patterns x images, 0.5 GB
 
@@ -24,8 +26,8 @@ class Anodi(NamedTuple):
     Attributes
     ----------
     variety : float
-        Mean distance between two realisations: the larger, the more an ensemble says of what is not known. NaN for a
-        single realisation.
+        Mean distance between two realisations: the larger, the more the ensemble leaves open. NaN for a single
+        realisation.
     likeness : float
         Mean distance between a realisation and the training image: the smaller, the better its patterns are kept.
     ratio : float
@@ -44,35 +46,22 @@ class Anodi(NamedTuple):
     distances: Floats
 
 
-def anodi(
-    ensemble: ArrayLike,
-    training: ArrayLike,
-    *,
-    categories: Sequence[int] | None = None,
-    classes: int = 3,
-    side: int | None = None,
-    levels: int = 3,
-) -> Anodi:
+def anodi(ensemble: ArrayLike, training: ArrayLike, *, categories: Sequence[int] | None = None) -> Anodi:
     r"""Measure the variety of an ensemble against its likeness to the training image.
 
-    The distance of two images is the mean over levels :math:`g = 0, 1, \dots` with weights :math:`2^{-g}` of the
-    Jensen-Shannon distance (to base 2) between their histograms of patterns. A pattern of level g is a square of
-    `side` x `side` pixels that are :math:`2^g` pixels apart, and all of them in the image are counted: the patterns of
-    the images that keep every :math:`2^g`-th pixel, from every first pixel.
+    The distance of two images is the mean over three levels :math:`g = 0, 1, 2` with weights :math:`2^{-g}` of the
+    Jensen-Shannon distance (to base 2) between their histograms of patterns. A pattern of level g is a square of pixels
+    that are :math:`2^g` pixels apart, 4 x 4 of two categories, 3 x 3 of three categories or of continuous values, 2 x 2
+    of more categories. All of them in the image are counted: the patterns of the images that keep every
+    :math:`2^g`-th pixel, from every first pixel. A level at which an image has no pattern is left out.
 
     Parameters
     ----------
     ensemble : array_like, (realisations, rows, cols)
     training : array_like, (rows, cols)
     categories : sequence of int, optional
-        As in `categories_of`; those of the training image by default.
-    classes : int
-        Continuous values are cut into so many classes, by quantiles of the training image. A value that is frequent
-        enough to be such a quantile is a class of its own.
-    side : int, optional
-        Pixels of a pattern each way; by default 4 for two categories or classes, 3 for three, and 2 for more.
-    levels : int
-        At most so many; one at which an image has no pattern is left out.
+        As in `categories_of`; those of the training image by default. Continuous values are cut into three classes, by
+        quantiles of the training image. A value that is frequent enough to be such a quantile is a class of its own.
 
     Returns
     -------
@@ -81,8 +70,8 @@ def anodi(
     Raises
     ------
     ValueError
-        The arrays have another number of axes or are too small, a value is no category, an option is out of range, or
-        there are so many different patterns that their counts do not fit into 0.5 GB.
+        The arrays have another number of axes or are too small, a value is no category, or there are so many different
+        patterns that their counts do not fit into 0.5 GB.
 
     Notes
     -----
@@ -97,52 +86,36 @@ def anodi(
     channels, and up to half a minute for noise, which has every pattern.
     """
     array, image = as_ensemble(ensemble), as_image(training, "training image")
-    index, own, count = _classified(array, image, categories, classes)
-    width = side or _side(count if categories_of(image, categories).size else classes)
-    if width < 1 or count**width**2 >= 1 << 62 or levels < 1:
-        raise ValueError(f"side {side} or levels {levels} is out of range: give 1 or more, and a side of 4 or less")
-    least = min(*array.shape[1:], *image.shape)
-    if least < width:
-        raise ValueError(f"there are no patterns of {width} x {width} pixels: give larger images or a smaller side")
-    spreads = [1 << level for level in range(levels) if least > (width - 1) << level]
-    tables = [_distances([*index, own], count, width, spread) for spread in spreads]
-    weights = np.array([1.0 / spread for spread in spreads])
-    distances = np.average(tables, axis=0, weights=weights)
-    by_level = np.array([_summary(table) for table in tables])
-    variety, likeness = _summary(distances)
-    ratio = variety / likeness if likeness > 0 else float("nan")
-    return Anodi(variety, likeness, ratio, by_level, distances)
-
-
-def _classified(
-    array: Array, image: Array, categories: Sequence[int] | None, classes: int
-) -> tuple[NDArray[np.intp], NDArray[np.intp], int]:
-    """Both as numbers 0 to K - 1, and K."""
     values = categories_of(image, categories)
     if len(values):
-        return as_index(array, values, "ensemble"), as_index(image, values, "training image"), len(values)
-    if classes < 2:
-        raise ValueError(f"classes is {classes}: give 2 or more")
-    bounds = np.unique(np.quantile(image, np.arange(1, classes) / classes))
+        index, count = as_index(array, values, "ensemble")
+        own, _ = as_index(image, values, "training image")
+    else:
+        bounds = np.unique(np.quantile(image, np.arange(1, CLASSES) / CLASSES))
+        index, own, count = _cut(array, bounds), _cut(image, bounds), 2 * len(bounds) + 1
+    side = {1: 4, 2: 4, 3: 3}.get(len(values) or CLASSES, 2)
+    least = min(*array.shape[1:], *image.shape)
+    if least < side:
+        raise ValueError(f"there are no patterns of {side} x {side} pixels: give larger images")
+    spreads = [1 << level for level in range(LEVELS) if least > (side - 1) << level]
+    tables = [_distances([*index, own], count, side, spread) for spread in spreads]
+    distances = np.average(tables, axis=0, weights=1 / np.array(spreads))
+    variety, likeness = _means(distances)
+    ratio = variety / likeness if likeness > 0 else float("nan")
+    return Anodi(variety, likeness, ratio, np.array([_means(table) for table in tables]), distances)
 
-    def cut(values: Array) -> NDArray[np.intp]:
-        # a value that is a bound is a class of its own, or one that is frequent would be one with its neighbours
-        return np.searchsorted(bounds, values, side="left") + np.searchsorted(bounds, values, side="right")
 
-    return cut(array), cut(image), 2 * len(bounds) + 1
-
-
-def _side(count: int) -> int:
-    """Of patterns of so many categories or classes, where none is given."""
-    return 4 if count <= 2 else 3 if count == 3 else 2
+def _cut(values: Array, bounds: Array) -> NDArray[np.intp]:
+    """Return the classes of values; a value that is a bound is a class of its own."""
+    return np.searchsorted(bounds, values, side="left") + np.searchsorted(bounds, values, side="right")
 
 
 def _distances(images: list[NDArray[np.intp]], count: int, side: int, spread: int) -> Floats:
-    """Jensen-Shannon distances between the histograms of all pairs of images."""
+    """Return the Jensen-Shannon distances between the histograms of all pairs of images."""
     coded = [_patterns(image, count, side, spread) for image in images]
     present = np.unique(np.concatenate([np.unique(codes) for codes in coded]))
     if len(present) * len(coded) > MOST_COUNTS:
-        raise ValueError(f"there are {len(present)} different patterns: give a smaller side or fewer classes")
+        raise ValueError(f"there are {len(present)} different patterns: give smaller or fewer images")
     rows = [np.bincount(np.searchsorted(present, codes), minlength=len(present)) / len(codes) for codes in coded]
     histograms = np.stack(rows)
     found = np.zeros((len(rows), len(rows)))
@@ -156,7 +129,7 @@ def _distances(images: list[NDArray[np.intp]], count: int, side: int, spread: in
 
 
 def _patterns(image: NDArray[np.intp], count: int, side: int, spread: int) -> NDArray[np.int64]:
-    """Every pattern of an image as one number."""
+    """Return every pattern of an image as one number."""
     rows, cols = (length - (side - 1) * spread for length in image.shape)
     codes = np.zeros((rows, cols), np.int64)
     for down in range(0, side * spread, spread):
@@ -165,8 +138,8 @@ def _patterns(image: NDArray[np.intp], count: int, side: int, spread: int) -> ND
     return codes.ravel()
 
 
-def _summary(distances: Floats) -> tuple[float, float]:
-    """Mean distance between realisations, and of them from the training image."""
+def _means(distances: Floats) -> tuple[float, float]:
+    """Return the mean distance between realisations, and of them from the training image."""
     number = len(distances) - 1
     pairs = distances[np.triu_indices(number, 1)] if number > 1 else np.array([np.nan])
     return float(pairs.mean()), float(distances[-1, :-1].mean())

@@ -1,20 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""All figures of an ensemble at once, beside those of its training image."""
+"""All figures of an ensemble at once, with those of its training image."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.experiments.ensemble.arrays import Array, as_ensemble, as_image, categories_of
-from simdtex.experiments.ensemble.connections import connectivity
 from simdtex.experiments.ensemble.distance import Anodi, anodi
 from simdtex.experiments.ensemble.ends import MARGIN, dead_ends
-from simdtex.experiments.ensemble.maps import deviation, entropy, mean, share_maps, shares
-from simdtex.experiments.ensemble.variograms import variogram
+from simdtex.experiments.ensemble.figures import connectivity, entropy, share_maps, variogram
 
 Floats = NDArray[np.float64]
 
@@ -42,11 +41,11 @@ class Summary:
     maps : ndarray of float64, (K, rows, cols)
         `share_maps`; of continuous values one map, the mean.
     open : ndarray of float64, (rows, cols)
-        `entropy`, bits; of continuous values `deviation`, in their unit.
+        `entropy`, bits; of continuous values their standard deviation (divisor n - 1), in their unit.
     variograms : ndarray of float64, (2, K, n + 1, L)
         Along axis 0 (down) and 1 (to the right), of each category's indicator; of continuous values K is 1.
     connectivity : ndarray of float64, (2, K, n + 1, L)
-        Connectivity functions along both axes.
+        Connectivity functions along both axes, see `connectivity`.
     components, largest, dead_ends : ndarray of float64, (K, n + 1)
         See `connectivity` and `dead_ends`; NaN for images too small for it.
     anodi : Anodi
@@ -109,67 +108,52 @@ def summary(
     """
     array, image = as_ensemble(ensemble), as_image(training, "training image")
     known = categories_of(image, categories)
-    points = as_data(data, array.shape[1:])
+    points = _checked_data(data, array.shape[1:])
     shortest = min(*array.shape[1:], *image.shape)
     if shortest < LEAST:
         raise ValueError(f"an image has a side of {shortest} pixels: give at least {LEAST} x {LEAST}")
     if max(float(np.abs(one).max()) for one in (array, image)) > LARGEST:
         raise ValueError(f"an image has values beyond {LARGEST:g}: give them in a larger unit")
     lag = min(shortest // 2, MOST_LAG) if max_lag is None else max_lag
-    images = [*array, image]
-    own = image[np.newaxis]
-    distances = anodi(array, image, categories=[] if len(known) == 0 else known.tolist())
+    images, number = [*array, image], len(array)
     at_data = array[:, points[:, 1].astype(np.intp), points[:, 0].astype(np.intp)]
-    if len(known) == 0:
-        none = np.empty((0, len(images)))
-        return Summary(
-            known,
-            np.arange(lag + 1),
-            none,
-            mean(array)[np.newaxis],
-            deviation(array),
-            np.array([[[variogram(one, axis, lag) for one in images]] for axis in (0, 1)]),
-            np.empty((2, 0, len(images), lag + 1)),
-            none,
-            none,
-            none,
-            distances,
-            points,
-            np.sqrt(((at_data - points[:, 2]) ** 2).mean(axis=1)) if len(points) else np.zeros(len(array)),
-        )
-    maps = share_maps(array, known)
+    if len(known):
+        maps = share_maps(array, known)
+        left_open = entropy(maps)
+        fields = [[one == k for one in images] for k in (known[-1:] if len(known) == 2 else known)]
+        misses = (at_data != points[:, 2]).sum(axis=1).astype(np.float64)
+    else:
+        maps = array.mean(axis=0, dtype=np.float64)[np.newaxis]
+        left_open = array.std(axis=0, ddof=int(number > 1), dtype=np.float64)
+        fields = [images]
+        misses = np.sqrt(((at_data - points[:, 2]) ** 2).mean(axis=1)) if len(points) else np.zeros(number)
+    variograms = np.array([[[variogram(one, axis, lag) for one in row] for row in fields] for axis in (0, 1)])
     found = [[[connectivity(one, k, lag, axis) for one in images] for k in known] for axis in (0, 1)]
 
-    def each(figure: Callable[[Array, int], float]) -> Floats:
-        return np.array([[figure(one, k) for one in images] for k in known])
+    functions = np.array([one.function for along in found for row in along for one in row])
 
-    small = shortest <= 2 * MARGIN
+    def table(figure: Callable[[int, int], float]) -> Floats:
+        return np.array([[figure(k, n) for n in range(number + 1)] for k in range(len(known))]).reshape(-1, number + 1)
+
     return Summary(
-        known,
-        np.arange(lag + 1),
-        np.concatenate([shares(array, known), shares(own, known)]).T,
-        maps,
-        entropy(maps),
-        _indicators(images, known, lag),
-        np.array([[[one.function for one in row] for row in axis] for axis in found]),
-        np.array([[one.components for one in row] for row in found[0]]),
-        np.array([[one.largest for one in row] for row in found[0]]),
-        each(lambda one, k: float("nan") if small else dead_ends(one, k)),
-        distances,
-        points,
-        (at_data != points[:, 2]).sum(axis=1).astype(np.float64),
+        categories=known,
+        lags=np.arange(lag + 1),
+        shares=table(lambda k, n: (images[n] == known[k]).mean()),
+        maps=maps,
+        open=left_open,
+        variograms=np.repeat(variograms, 2, axis=1) if len(known) == 2 else variograms,  # of two they are the same
+        connectivity=functions.reshape(2, len(known), number + 1, lag + 1),
+        components=table(lambda k, n: found[0][k][n].components),
+        largest=table(lambda k, n: found[0][k][n].largest),
+        dead_ends=table(lambda k, n: nan if shortest <= 2 * MARGIN else dead_ends(images[n], known[k])),
+        anodi=anodi(array, image, categories=known.tolist()),
+        data=points,
+        misses=misses,
     )
 
 
-def _indicators(images: list[Array], categories: Array, lag: int) -> Floats:
-    """Variograms of indicators; of two categories they are the same."""
-    asked = categories[-1:] if len(categories) == 2 else categories
-    found = np.array([[[variogram(one == k, axis, lag) for one in images] for k in asked] for axis in (0, 1)])
-    return np.repeat(found, 2, axis=1) if len(categories) == 2 else found
-
-
-def as_data(data: ArrayLike | None, shape: tuple[int, ...]) -> Floats:
-    """Hard data (m, 3), checked: x, y and value, inside of a shape."""
+def _checked_data(data: ArrayLike | None, shape: tuple[int, ...]) -> Floats:
+    """Return hard data (m, 3), checked: x, y and value, inside of a shape."""
     points = np.empty((0, 3)) if data is None else np.asarray(data, dtype=np.float64)
     if points.size == 0:
         return np.empty((0, 3))

@@ -1,23 +1,30 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures from the nearest patches: whether either picture stands in the other, and in pieces how large."""
+"""Figures of patches: whether either picture stands in the other, in pieces how large, and what comes back."""
 
 from __future__ import annotations
 
 from math import gcd
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import ArrayLike, NDArray
 
-from simdtex.experiments.quality.nearest import Indices, count, nearest
-from simdtex.experiments.quality.pictures import Planes, as_pair, halved, in_deviations
+from simdtex.experiments.quality.patches import Array, Indices, Planes, as_pair, count, halved, in_deviations, nearest
 
 PATCH = 7  # side of the patches, pixels
 SCALES = 3  # full size, 1/2 and 1/4
-QUERIES = 4096  # patches looked up per scale where no stride is given
+QUERIES = 4096  # patches looked up per scale, at most
+COPIED_PATCH = 9  # side of the patches, pixels
+REPEATED_PATCH = 32  # side of the patches, pixels of the full size
+APART = 16  # least displacement of a repeat in one direction, pixels of the full size
+ALIKE = 0.35  # standard deviations of the sample at half its size
+GRID = 8  # from patch to patch, pixels of the full size
+PATCHES = 1024  # of that grid looked up, at most
 
 
-def plausibility(sample: ArrayLike, output: ArrayLike, *, stride: int | None = None) -> float:
-    """Mean distance from a 7 x 7 patch of the output to the nearest patch of the sample.
+def plausibility(sample: ArrayLike, output: ArrayLike) -> float:
+    """Return the mean distance from a 7 x 7 patch of the output to the nearest patch of the sample.
 
     The distance is the root of the mean squared difference over the 49 x channels values, in
     sample standard deviations; the mean is over patches, then over three scales (full size, 1/2
@@ -27,9 +34,6 @@ def plausibility(sample: ArrayLike, output: ArrayLike, *, stride: int | None = N
     ----------
     sample, output : array_like, (rows, cols) or (rows, cols, channels)
         At least 7 x 7 pixels each, with the same number of channels.
-    stride : int, optional
-        Every `stride`-th patch in raster order is looked up, 1 for all. By default as many as
-        leave about 4096 at each scale, spread evenly.
 
     Returns
     -------
@@ -38,24 +42,23 @@ def plausibility(sample: ArrayLike, output: ArrayLike, *, stride: int | None = N
 
     Notes
     -----
-    The nearest patch is exact, by comparing with all. Cost: queries x candidates x 98 x channels
-    operations in single precision; memory under 200 MB beside the pictures, for any size.
+    About 4096 patches are looked up at each scale, spread evenly. The nearest one is exact, by comparing with all.
+    Cost: queries x candidates x 98 x channels operations in single precision; memory under 200 MB beyond the pictures,
+    for any size.
     """
-    return _mean_nearest(sample, output, of_output=True, stride=stride)
+    return _mean_nearest(sample, output, of_output=True)
 
 
-def coverage(sample: ArrayLike, output: ArrayLike, *, stride: int | None = None) -> float:
-    """Mean distance from a 7 x 7 patch of the sample to the nearest patch of the output.
+def coverage(sample: ArrayLike, output: ArrayLike) -> float:
+    """Return the mean distance from a 7 x 7 patch of the sample to the nearest patch of the output.
 
     `plausibility` the other way round: it grows with every part of the sample that the output
     lacks. Parameters, units and cost are those of `plausibility`.
     """
-    return _mean_nearest(sample, output, of_output=False, stride=stride)
+    return _mean_nearest(sample, output, of_output=False)
 
 
-def _mean_nearest(sample: ArrayLike, output: ArrayLike, *, of_output: bool, stride: int | None) -> float:
-    if stride is not None and stride < 1:
-        raise ValueError(f"stride is {stride}: give 1 or more")
+def _mean_nearest(sample: ArrayLike, output: ArrayLike, *, of_output: bool) -> float:
     first, second = as_pair(sample, output, PATCH)
     pair = in_deviations(first, first, second)
     means = []
@@ -63,23 +66,23 @@ def _mean_nearest(sample: ArrayLike, output: ArrayLike, *, of_output: bool, stri
         if min(side for planes in pair for side in planes.shape[:2]) < PATCH:
             break
         candidates, queries = pair if of_output else pair[::-1]
-        means.append(float(nearest(queries, _every(queries, stride), candidates, PATCH).distance.mean()))
+        means.append(float(nearest(queries, _every(queries), candidates, PATCH).distance.mean()))
         pair = [halved(planes) for planes in pair]
     return float(np.mean(means))
 
 
-def _every(planes: Planes, stride: int | None) -> Indices:
+def _every(planes: Planes) -> Indices:
+    """Return the patches of a picture that are looked up."""
     total = count(planes, PATCH)
-    if stride is None:
-        stride = -(-total // QUERIES)
-        # no common divisor with a row of patches, or the queries would stand in columns
-        while gcd(stride, planes.shape[1] - PATCH + 1) > 1:
-            stride += 1
+    stride = -(-total // QUERIES)
+    # no common divisor with a row of patches, or the queries would stand in columns
+    while gcd(stride, planes.shape[1] - PATCH + 1) > 1:
+        stride += 1
     return np.arange(0, total, stride)
 
 
 def innovation(sample: ArrayLike, output: ArrayLike) -> float:
-    r"""Share of neighbour pixels of the output that do not continue one another in the sample.
+    r"""Return the share of neighbour pixels of the output that do not continue one another in the sample.
 
     With :math:`s(x)` the position of the sample's patch that is nearest to the 7 x 7 patch at
     :math:`x` of the output, and :math:`e` one pixel down or to the right, this is
@@ -120,3 +123,96 @@ def innovation(sample: ArrayLike, output: ArrayLike) -> float:
     across = (np.diff(places, axis=2) == (0, 1)).all(axis=-1)
     down = (np.diff(places, axis=1) == (1, 0)).all(axis=-1)
     return float(1.0 - (across.mean() + down.mean()) / 2)
+
+
+def copying(sample: ArrayLike, output: ArrayLike) -> float:
+    """Return the share of the 9 x 9 patches of the output that stand verbatim in the sample.
+
+    Parameters
+    ----------
+    sample, output : array_like, (rows, cols) or (rows, cols, channels)
+        At least 9 x 9 pixels each, with the same number of channels.
+
+    Returns
+    -------
+    float
+        0 to 1. Flat parts count as copied: the same flat patch does stand in the sample.
+
+    Notes
+    -----
+    Patches are compared by hashes of 64 bits: of n different patches of the output and m of the sample, n m / 2**64
+    are taken for equal.
+    """
+    first, second = as_pair(sample, output, COPIED_PATCH)
+    numbers = np.unique(np.concatenate([first.ravel(), second.ravel()]), return_inverse=True)[1]
+    known = numbers[: first.size].reshape(first.shape)
+    made = numbers[first.size :].reshape(second.shape)
+    return float(np.isin(_hashes(made), _hashes(known)).mean())
+
+
+def _hashes(numbers: Array) -> NDArray[np.uint64]:
+    """Return a hash of each patch: the sum of its numbers, each times an odd random weight, modulo 2**64."""
+    weights = np.random.default_rng(0).integers(1, 2**64, (COPIED_PATCH, COPIED_PATCH, numbers.shape[2]), np.uint64) | 1
+    patches = sliding_window_view(numbers.astype(np.uint64), (COPIED_PATCH, COPIED_PATCH), (0, 1))
+    found: NDArray[np.uint64] = np.einsum("rckij,ijk->rc", patches, weights)
+    return found
+
+
+class Repeats(NamedTuple):
+    """How much of the output, and of the sample, stands in it again, see `repeats`."""
+
+    share: float
+    own: float
+
+
+def repeats(sample: ArrayLike, output: ArrayLike) -> Repeats:
+    r"""Return the share of the 32 x 32 patches of the output that stand elsewhere in the output once more.
+
+    The output is reduced to half its size by means of 2 x 2 blocks, where patches :math:`a_x`
+    have 16 x 16 pixels. A patch is repeated if
+
+    .. math::
+
+       \min_y \frac{1}{\sigma} \sqrt{\frac{1}{256 c} \sum_i (a_{x,i} - a_{y,i})^2} < 0.35
+
+    over all places :math:`y` of the half size that are at least half a patch from :math:`x` in
+    rows or in columns. Here :math:`\sigma` is the standard deviation of the sample at half its
+    size, so fine grain, which is lost there, makes nothing alike. The picture is not continued
+    around its border: a repeat across it is not seen.
+
+    Parameters
+    ----------
+    sample, output : array_like, (rows, cols) or (rows, cols, channels)
+        At least 48 x 48 pixels each, with the same number of channels.
+
+    Returns
+    -------
+    share : float
+        Of the output's patches, 0 to 1.
+    own : float
+        The same of the sample's own patches in the sample: about 0 for most materials, and large
+        for a regular one such as bricks, where repeats are right. A small sample has fewer places
+        where a patch could stand again, so `own` is rather too low than too high.
+
+    Notes
+    -----
+    Every 8th patch both ways is looked up, fewer if there are more than 1024, by comparing with all. Cost: about 16 G
+    operations in single precision for 256 x 256 pixels in colour, growing as their number squared up to 1024 patches
+    and in proportion to it beyond.
+    """
+    first, second = as_pair(sample, output, REPEATED_PATCH + APART)
+    small, large = (halved(planes) for planes in in_deviations(first, first, second))
+    own, made = (_share(planes) for planes in in_deviations(small, small, large))
+    return Repeats(share=made, own=own)
+
+
+def _share(planes: Planes) -> float:
+    """Return the share of a picture's patches, at half its size, that stand in it again."""
+    side = REPEATED_PATCH // 2
+    rows, cols = (length - side + 1 for length in planes.shape[:2])
+    spacing = GRID // 2
+    while -(-rows // spacing) * -(-cols // spacing) > PATCHES:
+        spacing += 1
+    asked = np.add.outer(np.arange(0, rows, spacing) * cols, np.arange(0, cols, spacing)).ravel()
+    found = nearest(planes, asked, planes, side, apart=APART // 2)
+    return float((found.distance < ALIKE).mean())

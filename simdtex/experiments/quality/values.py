@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import median_filter
 from scipy.stats import wasserstein_distance
 
-from simdtex.experiments.quality.pictures import Array, as_pair, as_planes, deviation, spread
+from simdtex.experiments.quality.patches import Array, as_pair, as_planes, deviation, spread
 
 ODD = 0.005  # share of the sample's pixels that count as odd
 BLOCK = 16  # side of the blocks of the coarse scale, pixels
@@ -25,7 +25,7 @@ class Tones(NamedTuple):
 
 
 def histogram_distance(sample: ArrayLike, output: ArrayLike) -> float:
-    """Earth mover's distance between the marginal histograms, mean over channels.
+    """Return the earth mover's distance between the marginal histograms, mean over channels.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def histogram_distance(sample: ArrayLike, output: ArrayLike) -> float:
 
 
 def seam(output: ArrayLike) -> float:
-    """How much the seam shows when the output is laid side by side with itself.
+    """Return how much the seam shows when the output is laid side by side with itself.
 
     The mean absolute difference between the last and the first row over that between neighbour
     rows inside, the same for columns, and the mean of the two.
@@ -75,7 +75,7 @@ def _seam_along(planes: Array, axis: int) -> float:
 
 
 def salt(sample: ArrayLike, output: ArrayLike) -> float:
-    r"""How many odd pixels the output has, as a multiple of the sample's.
+    r"""Return how many odd pixels the output has, as a multiple of the sample's.
 
     A pixel's deviation is its distance from the median of the 3 x 3 pixels around it, the largest
     over the channels. With :math:`t` the 99.5 % point of the sample's deviations, this is
@@ -102,7 +102,7 @@ def salt(sample: ArrayLike, output: ArrayLike) -> float:
     Beyond the border the last row or column goes on. Cost: about 0.05 s for 256 x 256 pixels in
     colour.
     """
-    first, second = as_pair(sample, output, 3, keep_type=True)
+    first, second = as_pair(sample, output, 3)
     had, has = _off_median(first), _off_median(second)
     threshold = np.quantile(had, 1 - ODD, method="inverted_cdf")
     weight = (ODD - (had > threshold).mean()) / (had == threshold).mean()
@@ -115,7 +115,7 @@ def _off_median(planes: Array) -> NDArray[np.float64]:
 
 
 def tones(sample: ArrayLike, output: ArrayLike) -> Tones:
-    r"""How the output's brightness and contrast differ from the sample's.
+    r"""Return how the output's brightness and contrast differ from the sample's.
 
     With :math:`\sigma` the standard deviation, root of the mean variance of the channels,
     :math:`\mu` the mean of a channel, and :math:`\bar a` the means of the 16 x 16 blocks of a
@@ -142,7 +142,7 @@ def tones(sample: ArrayLike, output: ArrayLike) -> Tones:
         The third; 0 is best. Below 0 the large light and dark parts of the sample are missing,
         above 0 there are more or stronger ones.
     """
-    first, second = as_pair(sample, output, 2 * BLOCK)
+    first, second = (planes.astype(np.float64) for planes in as_pair(sample, output, 2 * BLOCK))
     scale = deviation(first)
     shift = np.sqrt(((second.mean(axis=(0, 1)) - first.mean(axis=(0, 1))) ** 2).mean()) / scale
     return Tones(
