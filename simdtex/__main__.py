@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``python -m simdtex`` is the command ``simdtex``: both begin here, so that Ctrl-C ends also their imports quietly."""
+"""``python -m simdtex`` and the command ``simdtex`` begin here, so that Ctrl-C during imports ends in one line."""
 
 
 def main() -> None:
@@ -9,7 +9,7 @@ def main() -> None:
 
     def leave(*_: object) -> None:
         os.write(2, b"simdtex: stopped\n")
-        os._exit(130)  # an exception could be caught, or told with its traceback, by whatever is being imported
+        os._exit(130)  # a module that is being imported could catch an exception, or print its traceback
 
     try:
         import signal

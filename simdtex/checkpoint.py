@@ -305,7 +305,7 @@ LEAVES = (str, int, float, bool, type(None))
 
 
 def pack(tree: Any) -> tuple[Any, list[NDArray[Any]]]:
-    """A tree of plain things as what JSON holds exactly, and the arrays that it refers to by number.
+    """Return a tree in the form of JSON, and the arrays that it refers to by number.
 
     Raises
     ------
@@ -333,11 +333,11 @@ def pack(tree: Any) -> tuple[Any, list[NDArray[Any]]]:
     return packed(tree), arrays
 
 
-def unpack(told: Any, arrays: Sequence[NDArray[Any]]) -> Any:
-    """What `pack` was given; tuples with names come back without them (see `like`)."""
-    if not isinstance(told, dict):
-        return told
-    ((kind, node),) = told.items()
+def unpack(packed: Any, arrays: Sequence[NDArray[Any]]) -> Any:
+    """Return what `pack` was given; tuples with names come back without them (see `like`)."""
+    if not isinstance(packed, dict):
+        return packed
+    ((kind, node),) = packed.items()
     if kind == "array":
         return arrays[node]
     if kind == "scalar":
@@ -349,7 +349,7 @@ def unpack(told: Any, arrays: Sequence[NDArray[Any]]) -> Any:
 
 
 def like(template: Any, node: Any) -> Any:
-    """A tree whose tuples have the types of those of another tree of the same form."""
+    """Return a tree whose tuples have the types of those of another tree of the same form."""
     if not (isinstance(node, tuple) and isinstance(template, tuple) and len(node) == len(template)):
         return node
     inside = [like(one, value) for one, value in zip(template, node, strict=True)]
@@ -358,7 +358,7 @@ def like(template: Any, node: Any) -> Any:
 
 
 def digest(*arrays: NDArray[Any]) -> str:
-    """SHA-256 over types, shapes and bytes in C order."""
+    """Return the SHA-256 over types, shapes and bytes in C order."""
     found = hashlib.sha256()
     for array in arrays:
         found.update(f"{array.dtype.str}{array.shape}".encode())
@@ -367,7 +367,7 @@ def digest(*arrays: NDArray[Any]) -> str:
 
 
 def identity(thing: Any) -> Any:
-    """What tells an input from another, for JSON: numbers and texts themselves, arrays by their digest."""
+    """Return an input for comparison in JSON: numbers and texts themselves, arrays by their digest."""
     if isinstance(thing, np.ndarray):
         return f"sha256:{digest(thing)}"
     if thing is None or isinstance(thing, (bool, str)):

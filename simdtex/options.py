@@ -218,7 +218,7 @@ PRESET = Option(
     "Begin with the defaults of the method (default), or with the rules of its paper (paper)",
     group="Job",
 )
-"""The option ``preset``, which every method has beside its table."""
+"""The option ``preset``, which every method has in addition to its table."""
 
 
 def option(default: Any, kind: Kind, help: str, **more: Any) -> Any:
@@ -293,7 +293,7 @@ def documented(options: type[T]) -> type[T]:
 
 
 def described(one: Option) -> str:
-    """Return all that a declaration says of an option beside its type and default, in sentences."""
+    """Return a declaration in sentences, but for the type and default."""
     text = [f"{one.help}.", one.more, f"None: {one.none}." if one.none else ""]
     text.append(f"In the paper: {one.symbol}." if one.symbol else "")
     if one.jobs:
@@ -348,7 +348,7 @@ def real(
 
 
 def unmasked(name: str, value: Any) -> None:
-    """Raise where a masked array hides values, which would be taken as if they were there."""
+    """Raise if a masked array hides values, which NumPy would not heed."""
     if np.ma.is_masked(value):
         count = int(np.count_nonzero(np.ma.getmaskarray(value)))
         raise ValueError(
@@ -357,7 +357,7 @@ def unmasked(name: str, value: Any) -> None:
 
 
 def real_array(name: str, value: Any) -> NDArray[Any]:
-    """The value as an array of finite real numbers; raises where it is none."""
+    """Return the value as an array of finite real numbers; raise if it is none."""
     unmasked(name, value)
     try:
         array = np.asarray(value)
@@ -371,7 +371,7 @@ def real_array(name: str, value: Any) -> NDArray[Any]:
 
 
 def shown(value: Any) -> str:
-    """A value in one line, cut where it is long."""
+    """Return a value in one line, cut if it is long."""
     try:
         text = " ".join(repr(value).split())
     except ValueError:  # an integer of thousands of digits
@@ -380,7 +380,7 @@ def shown(value: Any) -> str:
 
 
 def number(value: Any) -> str:
-    """A number, or what kind of number it is where it has too many digits."""
+    """Return a number as text, or its kind if it has too many digits."""
     try:
         text = str(value)
     except ValueError:

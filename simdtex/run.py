@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a run tells while it goes on, and what it leaves: progress, stages and statistics."""
+"""Progress of a run for callbacks, and the rest of its output: stages, source map and statistics."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, kw_only=True)
 class Progress:
-    """Where a run stands; what a callback is called with several times a second.
+    """The progress of a run; a callback receives it several times a second.
 
     Attributes
     ----------
@@ -23,14 +23,14 @@ class Progress:
     fraction : float
         Share of the expected work that is done, 0 to 1; an estimate.
     image : callable
-        ``image()`` reads back a picture, (rows, cols[, channels]) in the sample's type: that of the level, or, where
-        the level has none before its end, of the one before.
+        ``image()`` reads back a picture, (rows, cols[, channels]) in the sample's type: that of the level, or of the
+        level before if this one has none before its end.
     doing : str
-        The level and what is being done in it, in words.
+        The present work, in words.
     stage : str or None
         The name of the picture that is complete now: the end of a sweep, of a level that has none, or of an iteration.
     caption : str
-        What the picture is called on a sheet, where the last one of each name is shown.
+        The name of the picture on a sheet, which shows the last picture of each name.
     """
 
     level: int
@@ -51,17 +51,17 @@ class Progress:
         return f"level {self.level}"
 
     def picture(self) -> NDArray[Any]:
-        """What is shown of it as a stage: the image."""
+        """Return the picture of the stage: the image."""
         return self.image()
 
     def maps(self) -> dict[str, NDArray[np.float64]]:
-        """What the stage has beside its picture: arrays (rows, cols), 0 to 1, by name."""
+        """Return further pictures of the stage: arrays (rows, cols), 0 to 1, by name."""
         return {}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Relaxing(Progress):
-    """The progress of the method ``mrf``, told after every piece of a step.
+    """The progress of the method ``mrf``, after every part of a step.
 
     Attributes
     ----------
@@ -99,13 +99,13 @@ class Relaxing(Progress):
         return f"level{self.level}-sweep{self.sweep:02d}" if self.end_of_sweep else None
 
     def maps(self) -> dict[str, NDArray[np.float64]]:
-        """The temperatures."""
+        """Return the temperatures."""
         return {"temperature": self.temperature()}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sampling(Progress):
-    """The progress of the method ``multires``, told after every piece of a level.
+    """The progress of the method ``multires``, after every part of a level.
 
     Attributes
     ----------
@@ -124,14 +124,14 @@ class Sampling(Progress):
         return f"level{self.level}" if self.end_of_level else None
 
     def maps(self) -> dict[str, NDArray[np.float64]]:
-        """The candidates, on a logarithmic scale from 1 to the most that a pixel of the level has."""
+        """Return the candidates, on a logarithmic scale from 1 to the most that a pixel of the level has."""
         counts = self.candidates()
         return {"candidates": np.log(counts) / np.log(max(2, counts.max()))}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Iterating(Progress):
-    """The progress of the method ``pyramid``, told after every channel's turn; of a solid, after every part of it.
+    """The progress of the method ``pyramid``, after every channel's turn; of a solid, after every part of it.
 
     All is at level 0. The picture has the channels that have had their turn as of this iteration, the others as of the
     one before; of a solid it is the block, (depth, rows, cols[, channels]).
@@ -164,14 +164,14 @@ class Iterating(Progress):
         return f"iteration {self.iteration}"
 
     def picture(self) -> NDArray[Any]:
-        """The image; of a block the middle x-y slice."""
+        """Return the image; of a block the middle x-y slice."""
         image = self.image()
         return image[len(image) // 2] if self.solid else image
 
 
 @dataclass(frozen=True, kw_only=True)
 class Simulating(Progress):
-    """The progress of `simdtex.simulate`, told after every realisation.
+    """The progress of `simdtex.simulate`, after every realisation.
 
     All is at level 0; the picture is the realisation.
 
@@ -202,7 +202,7 @@ class Simulating(Progress):
 
 @dataclass(frozen=True, kw_only=True)
 class Tiling(Progress):
-    """The progress of `simdtex.distributed.synthesize`, told after every tile.
+    """The progress of `simdtex.distributed.synthesize`, after every tile.
 
     The image is every n-th site of the level as it was before the turn, about 1000 to the side: reading it takes long.
 
@@ -257,7 +257,7 @@ class Stage:
 
 @dataclass(frozen=True, repr=False)
 class Output:
-    """What ``full_output=True`` returns beside the image.
+    """What ``full_output=True`` returns with the image.
 
     Attributes
     ----------
@@ -279,8 +279,7 @@ class Output:
         ``most_used``, the piece of the sample of which most is taken: ``times_fair_share``, its first pixel
         (``row``, ``col``) and its size (``rows``, ``cols``), pixels.
     made : (rows, cols, channels) or (depth, rows, cols, channels) array or None
-        What was made, channels last whatever axes the sample has: a notebook that displays an Output shows it, with its
-        arrangement.
+        The result, channels last whatever axes the sample has; notebooks show it.
 
     Notes
     -----
@@ -312,7 +311,7 @@ class Output:
     made: NDArray[Any] | None = None
 
     def __repr__(self) -> str:
-        """What it has, in a line: its arrays and figures fill pages."""
+        """Return a line on the contents; arrays and figures would fill pages."""
         rows_cols = "x".join(map(str, self.made.shape[:-1])) if self.made is not None else ""
         has = [name for name in ("source", "temperature") if getattr(self, name) is not None]
         has += [f"{len(self.stages)} stages"] if self.stages else []
@@ -321,14 +320,14 @@ class Output:
         return f"Output({', '.join([rows_cols] * bool(rows_cols) + has)})"
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the picture and its arrangement."""
+        """Return what a notebook shows: the picture and its arrangement."""
         from simdtex.model.display import as_html
 
         return as_html(self.made, self.source, self.statistics)
 
 
 def paced(count: int, least: int, first: int = 0) -> Iterator[tuple[int, int]]:
-    """Ranges (first, end) that make up first..count, of a size that takes the loop's body about a tenth of a second.
+    """Yield ranges (first, end) of first..count, for each of which the loop's body takes about a tenth of a second.
 
     `least` is the size of the first, and of the smallest.
     """

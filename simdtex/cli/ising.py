@@ -90,10 +90,10 @@ def ising(
         for place, schedule in enumerate(chosen):
             job = f"schedule {place + 1} of {len(chosen)}: {schedule.name}"
 
-            def told(share: float, place: int = place, job: str = job) -> None:
+            def show_share(share: float, place: int = place, job: str = job) -> None:
                 show((place + share) / len(chosen), "", job)
 
-            runs.append(ising(machine, experiment, schedule, seed=seed, callback=told))
+            runs.append(ising(machine, experiment, schedule, seed=seed, callback=show_share))
             if output:
                 pictures.append(ising(machine, once, schedule, seed=seed))
     found = findings(runs)

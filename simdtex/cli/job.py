@@ -40,7 +40,7 @@ class Task(NamedTuple):
     limits : (float, float)
         Black and white in the pictures of stages.
     more : callable, optional
-        ``more(statistics)`` prints what there is to say beside the summary.
+        ``more(statistics)`` prints further lines after the summary.
     """
 
     make: Callable[..., Any]

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Jobs with constraints: what users give beside a sample, filling and extending pictures, and simulation."""
+"""Jobs with conditioning data: checked input arrays, filling and extending pictures, and simulation."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is missing of a picture, made from the rest of it: `fill`, and `extend`."""
+"""Fill the holes of a picture from the rest of it, and extend it: `fill`, and `extend`."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ FEW = 16
 
 
 class Window(NamedTuple):
-    """A part of a picture that is worked on: its rows and columns, and in how many levels."""
+    """A part of a picture that is a lattice of its own: its rows and columns, and its number of levels."""
 
     rows: slice
     cols: slice
@@ -316,7 +316,7 @@ def extend(
 
 
 class Made(NamedTuple):
-    """What came of a window: where its sample begins in the picture, and values, temperatures and sources of its hole.
+    """The result of a window: where its sample begins in the picture, and values, temperatures and sources of its hole.
 
     ``statistics`` are those of its run.
     """
@@ -337,9 +337,9 @@ class Whole(NamedTuple):
 
 
 class Around(NamedTuple):
-    """What a window is filled from.
+    """The sample of a window.
 
-    ``corner`` is where this begins in the picture, ``place`` where the window's pixels are in it; None where it is a
+    ``corner`` is its first pixel in the picture; ``place`` says where in it the window's pixels are, None if it is a
     texture of its own.
     """
 
@@ -377,7 +377,7 @@ class Filling:
         return {"options": self.options, "image": known, "mask": self.hole, "sample": sample, "reach": self.reach}
 
     def run(self, machine: Machine, seed: int, callback: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
-        """Fill one window after the other; the state is what came of the finished windows, and the present run's."""
+        """Fill one window after the other; the state is the results of finished ones, and the present run's state."""
         shape, options = self.hole.shape, self.options
         several = self.sample is not None and len(self.sample.pixels) > 1
         whole = Whole(self.pixels.copy(), np.zeros(shape), np.full((*shape, 3 if several else 2), -1, np.int32))
@@ -432,7 +432,7 @@ class Filling:
 
 
 def _around(job: Filling, window: Window) -> Around:
-    """The sample of a window: its surroundings, or that of the job."""
+    """Return the sample of a window: its surroundings, or that of the job."""
     if job.sample is not None:
         return Around(job.sample, (0, 0), None)
     hole, (rows, cols) = job.hole[window.rows, window.cols], job.hole.shape
@@ -447,7 +447,7 @@ def _around(job: Filling, window: Window) -> Around:
 
 
 def _moved(source: NDArray[np.int32], corner: tuple[int, int]) -> NDArray[np.int32]:
-    """Sources (..., 2 or 3) that count from a corner, in pixels of the whole; what is from nowhere stays so."""
+    """Return sources (..., 2 or 3) that count from a corner in pixels of the whole; -1 stays -1."""
     moved = source.copy()
     moved[..., :2] += np.where(source[..., :1] < 0, 0, np.array(corner, np.int32))
     return moved
@@ -462,9 +462,9 @@ def _pasting(
     number: int,
     count: int,
 ) -> Callback:
-    """A callback that sees the whole picture with what is made of the hole at a place, and the work on all windows.
+    """Return a callback that sees the whole picture, with the present hole pasted in, and the share of all windows.
 
-    ``corner`` where the sources of the hole count from.
+    The sources of the hole count from ``corner``.
     """
 
     def seen(progress: Any) -> Any:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Realisations of a random field that is told by a training image: `simulate`."""
+"""Realisations of a random field with the statistics of a training image: `simulate`."""
 
 from __future__ import annotations
 
@@ -218,16 +218,16 @@ def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) ->
     text = json.dumps(
         vars(options), default=lambda value: value.tolist() if isinstance(value, np.generic) else str(value)
     )
-    told: dict[str, Any] = {"seed": seed, "version": version("simdtex"), "device": device, "options": text}
+    found: dict[str, Any] = {"seed": seed, "version": version("simdtex"), "device": device, "options": text}
     pictures = inputs.pictures  # whose pixels are completed where they are unknown
-    told["training_image"] = digest(*pictures.pixels, *(pictures.known or ()))
+    found["training_image"] = digest(*pictures.pixels, *(pictures.known or ()))
     if inputs.given:
-        told["hard_data"] = digest(np.where(inputs.given.known, inputs.given.values, 0), inputs.given.known)
+        found["hard_data"] = digest(np.where(inputs.given.known, inputs.given.values, 0), inputs.given.known)
     if inputs.guide:
-        told["guide"] = digest(*inputs.guide[0], inputs.guide[1])
+        found["guide"] = digest(*inputs.guide[0], inputs.guide[1])
     if pictures.usable:
-        told["mask"] = digest(*pictures.usable)
-    return told
+        found["mask"] = digest(*pictures.usable)
+    return found
 
 
 def _xarray() -> Any:

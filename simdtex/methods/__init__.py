@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The methods: programs over whole-array steps, readable beside the papers."""
+"""The methods: programs over whole-array steps, to be read with the papers."""

@@ -302,7 +302,7 @@ class Level:
     number : int
         l of Algorithm 1, 0 the finest.
     setting : simdtex.schedules.Setting
-        What its schedule is told.
+        The input of its schedule.
     grid : Grid
         The lattice, or a window of it with its origin in the whole.
     offsets : (N, 2) int32 array of the machine

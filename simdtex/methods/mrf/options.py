@@ -313,7 +313,7 @@ class Options:
             raise ValueError(f"finish={self.finish:g} takes means, and of categories there are none; leave it out")
 
     def of(self, pictures: Pictures) -> Pictures:
-        """The pictures of a sample with what these options say of their kind."""
+        """Return the pictures of a sample with their kinds, weights and shares by these options."""
         variables, count = pictures.pixels[0].shape[-1], len(pictures.pixels)
         kinds = (self.categorical,) * variables if isinstance(self.categorical, bool) else None
         if isinstance(self.categorical, tuple):
@@ -329,9 +329,9 @@ class Options:
         return replace(pictures, categorical=kinds, weights=self.weights, shares=self.shares)
 
     def resolved(self, pictures: Pictures) -> Options:
-        """The same as it is executed: what ``search="auto"`` and ``finish=None`` mean for a sample.
+        """Return the options as they are executed: what ``search="auto"`` and ``finish=None`` mean for a sample.
 
-        The grey levels of a density are nobody's, so nothing says how far from an edge they are: no structure channel.
+        Grey levels of a density have no source, so their distance from an edge is unknown: no structure channel.
         """
         usual = "coherent" if self.relaxation == "icm" else "exact"
         search = usual if self.search == "auto" else self.search
@@ -344,13 +344,13 @@ class Options:
 
 
 def begins(before: Options, now: Options, levels: int) -> int:
-    """The first level at which a run with other options differs from one before, of so many levels, all else the same.
+    """Return the first level at which a run with other options differs from an earlier one with the same input.
 
     Returns
     -------
     int
-        ``levels - 1``, the coarsest, where all of it may differ; the level after that where the search does; -1 where
-        nothing but the finish may.
+        ``levels - 1``, the coarsest, if all levels may differ; the next finer one if only the search does; -1 if only the
+        finish does.
     """
     old, new = vars(before), vars(now)
     different = {name for name in old if old[name] != new[name]}
@@ -362,7 +362,7 @@ def begins(before: Options, now: Options, levels: int) -> int:
 
 
 def few(pictures: Sequence[NDArray[Any]]) -> bool:
-    """Whether a sample, pictures (rows, cols, C), has at most `CATEGORIES` different pixels: a map of them."""
+    """Return whether a sample, pictures (rows, cols, C), has at most `CATEGORIES` different pixels: a map of them."""
     seen = np.zeros((0, pictures[0].shape[-1]), pictures[0].dtype)
     for picture in pictures:
         flat = picture.reshape(-1, picture.shape[-1])
