@@ -349,8 +349,8 @@ def begins(before: Options, now: Options, levels: int) -> int:
     Returns
     -------
     int
-        ``levels - 1``, the coarsest, if all levels may differ; the next finer one if only the search does; -1 if only the
-        finish does.
+        ``levels - 1``, the coarsest, if all levels may differ; the next finer one if only the search does; -1 if only
+        the finish does.
     """
     old, new = vars(before), vars(now)
     different = {name for name in old if old[name] != new[name]}
