@@ -68,7 +68,7 @@ def test_a_report_is_complete(tmp_path):
     assert results["settings"]["rows"] == 4 and results["settings"]["columns"] == 6
     assert results["settings"]["temperatures"] == [2.0, 2.3, 2.6]
     assert [one["schedule"] for one in results["findings"]] == ["coloring", "synchronous", "random-scan"] * 3
-    assert set(results["findings"][0]["energy"]) == {"mean", "error", "between", "within", "tau", "effective"}
+    assert set(results["findings"][0]["energy"]) == {"mean", "error", "between", "within", "tau"}
     assert results["runs"]["random-scan"]["steps"] == 16 * 24
 
 
@@ -133,7 +133,7 @@ def test_a_schedule_or_a_temperature_given_twice_counts_once():
 
 @pytest.mark.parametrize("width", [160, 80])
 def test_a_narrow_terminal_gets_the_columns_in_parts(width, capsys):
-    mean = Estimate(-1.74, 0.01, 0.01, 0.01, 5.0, 100.0)
+    mean = Estimate(-1.74, 0.01, 0.01, 0.01, 5.0)
     one = Finding("random-subset:0.25", False, 2.0, *[mean] * 3, -1.745, -1.745, 0.911, True, 0.5, 55, 0.01, 0.04)
     (table,) = tables([replace(one, differs="magnetisation")])
     print_table(table, width)

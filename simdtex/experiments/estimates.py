@@ -1,23 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Means of Markov chains with error bars that know of autocorrelation, and whether they agree with an exact value."""
+"""Means of Markov chains, with error bars for correlated sweeps, against exact values."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, sqrt
-from typing import Any
 
 import numpy as np
+from emcee.autocorr import integrated_time
 from numpy.typing import NDArray
+from scipy import stats
 
 from simdtex.experiments import onsager as exact
+from simdtex.experiments.ising import Chains
 
 FAIR = 10
 """Correlation lengths that a side must have for |m| of a finite lattice to stand for that of the infinite one."""
 
 LEVEL = 0.001
-"""Chance that a table of nothing but right results has a single one in it that is said to differ."""
+"""Chance that a table of right results has one that is said to differ."""
 
 
 @dataclass(frozen=True)
@@ -30,14 +32,12 @@ class Estimate:
     error : float
         One standard error: the larger of `between` and `within`.
     between : float
-        From the means of the chains alone: standard deviation / sqrt(R). Chains are independent, so autocorrelation is
-        in it whatever it is; itself uncertain by 1 / sqrt(2 (R - 1)) of its value.
+        From the means of the chains alone: standard deviation / sqrt(R). Chains are independent, so it includes any
+        autocorrelation; its own relative error is 1 / sqrt(2 (R - 1)).
     within : float
         From all sweeps: standard deviation * sqrt(tau / (R n)).
     tau : float
         Integrated autocorrelation time in sweeps, 1 + 2 times the sum of the autocorrelations; at least 1.
-    effective : float
-        R n / tau: so many independent samples would be worth as much.
     """
 
     mean: float
@@ -45,18 +45,17 @@ class Estimate:
     between: float
     within: float
     tau: float
-    effective: float
 
 
 def estimate(series: NDArray[np.float64], least: float = 0.0) -> Estimate:
-    """The mean of chains.
+    """Return the mean of chains with its error bar.
 
     Parameters
     ----------
     series : (R, n) array
         R independent chains of n sweeps each.
     least : float
-        The error is not said to be smaller than this: a series in which nothing happens to change has no spread.
+        The least error: a series in which nothing happens to change has no spread.
 
     Returns
     -------
@@ -65,22 +64,19 @@ def estimate(series: NDArray[np.float64], least: float = 0.0) -> Estimate:
     Notes
     -----
     The autocorrelation time is that of `emcee.autocorr.integrated_time` (Sokal's window), the autocorrelation function
-    averaged over chains. Chains shorter than some 50 of it make it too small; `between` does not mind.
+    averaged over chains. It is too small for chains shorter than some 50 of it; `between` is not affected.
     """
-    from emcee.autocorr import integrated_time
-
     chains, length = series.shape
     moving = series[np.ptp(series, 1) > 0]
     tau = max(1.0, float(integrated_time(moving.T, tol=0)[0])) if len(moving) and length > 1 else 1.0
     between = float(series.mean(1).std(ddof=1)) / sqrt(chains) if chains > 1 else 0.0
     within = float(series.std()) * sqrt(tau / series.size)
-    error = max(between, within, least)
-    return Estimate(float(series.mean()), error, between, within, tau, series.size / tau)
+    return Estimate(float(series.mean()), max(between, within, least), between, within, tau)
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What a schedule made of the Ising model at one temperature.
+    """The result of a schedule at one temperature.
 
     Attributes
     ----------
@@ -98,14 +94,14 @@ class Finding:
         Whether ``|m|`` of this lattice stands for that of the infinite one: T < T_c, and sides of `FAIR` correlation
         lengths at least.
     energy_sigmas, magnetisation_sigmas : float
-        Deviations in error bars; the second is 0 where it is not `fair`.
+        Deviations in error bars; the second is 0 if it is not `fair`.
     staggered : float
         Mean of ``|m_even - m_odd| / 2``.
     neighbours : float
-        Correlation of neighbouring spins beyond what their sublattices' magnetisations make of it,
-        <s_r s_s> - <m_even m_odd>; 0 where the sublattices know nothing of one another.
+        Correlation of neighbouring spins beyond that of their sublattices' magnetisations, <s_r s_s> - <m_even m_odd>;
+        0 if the sublattices are independent.
     differs : str
-        Empty where all agrees, else ``"energy"`` or ``"magnetisation"``, whichever is worse.
+        Empty if all agrees, else ``"energy"`` or ``"magnetisation"``, whichever is worse.
     """
 
     schedule: str
@@ -126,14 +122,14 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """In words."""
+        """Whether it agrees, in words."""
         if not self.differs:
             return "agrees"
         sigmas = self.energy_sigmas if self.differs == "energy" else self.magnetisation_sigmas
         return f"differs by {abs(sigmas):.0f} sigma" + (" in |m|" if self.differs == "magnetisation" else "")
 
 
-def findings(runs: Sequence[Any]) -> list[Finding]:
+def findings(runs: Sequence[Chains]) -> list[Finding]:
     """Compare runs with what is known exactly.
 
     Parameters
@@ -148,15 +144,21 @@ def findings(runs: Sequence[Any]) -> list[Finding]:
 
     Notes
     -----
-    A deviation counts where Student's t with R - 1 degrees of freedom gives it a probability below `LEVEL` divided by
-    the number of comparisons (Bonferroni).
+    A deviation counts if Student's t with R - 1 degrees of freedom gives it a probability below `LEVEL` divided by the
+    number of comparisons (Bonferroni).
     """
     found = [_finding(run, t) for t in range(len(runs[0].temperatures)) for run in runs]
-    least = threshold(runs[0].energy.shape[1], len(found) + sum(one.fair for one in found))
-    return [_judged(one, least) for one in found]
+    comparisons, chains = len(found) + sum(one.fair for one in found), runs[0].energy.shape[1]
+    least = float(stats.t.isf(LEVEL / comparisons / 2, chains - 1)) if chains > 1 else inf
+    judged = []
+    for one in found:
+        sigmas = {"energy": abs(one.energy_sigmas), "magnetisation": abs(one.magnetisation_sigmas)}
+        worst = max(sigmas, key=lambda name: sigmas[name])
+        judged.append(replace(one, differs=worst if sigmas[worst] > least else ""))
+    return judged
 
 
-def _finding(run: Any, t: int) -> Finding:
+def _finding(run: Chains, t: int) -> Finding:
     rows, cols = run.spins.shape[-2:]
     temperature = float(run.temperatures[t])
     sites, samples = rows * cols, run.energy[t].size
@@ -180,16 +182,3 @@ def _finding(run: Any, t: int) -> Finding:
         staggered=float(np.abs(run.even[t] - run.odd[t]).mean() / 2),
         neighbours=float(-energy.mean / 2 - (run.even[t] * run.odd[t]).mean()),
     )
-
-
-def _judged(found: Finding, least: float) -> Finding:
-    sigmas = {"energy": abs(found.energy_sigmas), "magnetisation": abs(found.magnetisation_sigmas)}
-    worst = max(sigmas, key=lambda name: sigmas[name])
-    return replace(found, differs=worst if sigmas[worst] > least else "")
-
-
-def threshold(seeds: int, tests: int) -> float:
-    """Deviations of so many error bars count, for means of `seeds` chains and so many comparisons."""
-    from scipy import stats
-
-    return float(stats.t.isf(LEVEL / tests / 2, seeds - 1)) if seeds > 1 else inf

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The Ising model by heat-bath relaxation under any schedule: what a schedule samples, against what is known exactly.
+"""The Ising model on a torus by heat-bath relaxation under any schedule.
 
-The conditional distributions are as simple as can be, so whatever is wrong with a result is the schedule's doing.
+The conditional distributions are as simple as can be, so whatever is wrong with a result is due to the schedule.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from simdtex import random, schedules
 from simdtex.machine import Machine, memory
-from simdtex.machine.interface import Array
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.ops.ising import heat_bath_chances, ising_commit, ising_relax, ising_sequence
 from simdtex.ops.snapshot import snapshot
@@ -47,7 +46,6 @@ class Experiment:
         R, independent chains at each temperature; they share the schedule's choices.
     sweeps, burn_in : int
         Sweeps that are measured, 1 or more, and sweeps before them.
-    boundary : {"torus", "open"}
     start : {"up", "random"}
         All spins up, which below T_c is close to equilibrium, or each by the toss of a coin, which may freeze into
         stripes there.
@@ -63,7 +61,6 @@ class Experiment:
     seeds: int = 16
     sweeps: int = 1000
     burn_in: int = 500
-    boundary: str = "torus"
     start: str = "up"
 
     def __post_init__(self) -> None:
@@ -77,7 +74,6 @@ class Experiment:
         whole("seeds", self.seeds, 1)
         whole("sweeps", self.sweeps, 1)
         whole("burn_in", self.burn_in, 0)
-        one_of("boundary", self.boundary, ("torus", "open"))
         one_of("start", self.start, ("up", "random"))
         spins = prod(self.size) * self.seeds * len(self.temperatures)
         if 2 * spins >= 2**31:
@@ -95,7 +91,6 @@ class Chains:
         Whether the schedule keeps equation (14) on this lattice.
     temperatures : (T,) float64 array
         In units of J / k_B.
-    boundary : str
     energy : (T, R, n) float64 array
         Energy per spin after each sweep, in units of J.
     lagged : (T, R, n) float64 array
@@ -112,7 +107,6 @@ class Chains:
     schedule: str
     independent: bool
     temperatures: NDArray[np.float64]
-    boundary: str
     energy: NDArray[np.float64]
     lagged: NDArray[np.float64]
     even: NDArray[np.float64]
@@ -162,42 +156,32 @@ def ising(
     site that follow one another cost one launch together. Memory: up to 3 bytes per spin on the device, some 20 on the
     host, and 32 there per chain and sweep.
     """
-    size, temperatures, seeds = experiment.size, experiment.temperatures, experiment.seeds
-    sweeps, burn_in = experiment.sweeps, experiment.burn_in
-    chains = seeds * len(temperatures)
+    size, sweeps, burn_in = experiment.size, experiment.sweeps, experiment.burn_in
+    chains = experiment.seeds * len(experiment.temperatures)
     memory.require(machine, 3 * prod(size) * chains, HOST * prod(size) * chains + MEASURED * sweeps * chains)
     began, launches = time.perf_counter(), machine.launches
-    schedule = schedules.get(schedule)
-    grid, offsets = Grid(*size, torus=experiment.boundary == "torus"), neighbourhood_offsets(1)
-    count = len(temperatures)
-    chances = heat_bath_chances(temperatures, len(offsets))
-    setting = schedules.Setting(machine, grid, offsets, 1, seed, 0)
-    run = _Run(setting, machine.put(offsets), machine.put(chances), schedule)
-    spins = machine.put(np.tile(_first(experiment, seed), (count, 1, 1)))
-    state = schedule.init(setting)
-
-    measured = np.empty((sweeps, 4, count * seeds))
-    now = machine.get(spins)[:, : grid.height]
+    run = _Run(machine, experiment, schedules.get(schedule), seed)
+    measured = np.empty((sweeps, 4, chains))
+    now = run.look()
     for sweep in range(burn_in + sweeps):
-        spins, state = run.sweep(spins, state)
+        run.sweep()
         k = sweep - burn_in
         if k >= -1:
-            before, now = now, machine.get(spins)[:, : grid.height]
+            before, now = now, run.look()
         if k >= 0:
-            measured[k] = _measure(before, now, grid)
+            measured[k] = _measure(before, now)
         if callback:
             callback((sweep + 1) / (burn_in + sweeps))
-    energy, lagged, even, odd = np.moveaxis(measured.reshape(sweeps, 4, count, seeds), 0, -1)
+    energy, lagged, even, odd = np.moveaxis(measured.reshape(sweeps, 4, -1, experiment.seeds), 0, -1)
     return Chains(
-        schedule=schedule.name,
-        independent=schedule.independent(grid, offsets),
-        temperatures=np.array(temperatures, np.float64),
-        boundary=experiment.boundary,
+        schedule=run.schedule.name,
+        independent=run.schedule.independent(run.grid, run.setting.offsets),
+        temperatures=np.array(experiment.temperatures, np.float64),
         energy=energy,
         lagged=lagged,
         even=even,
         odd=odd,
-        spins=now.reshape(count, seeds, *size),
+        spins=now.reshape(-1, experiment.seeds, *size),
         steps=run.steps,
         relaxations=run.relaxations,
         launches=machine.launches - launches,
@@ -205,65 +189,70 @@ def ising(
     )
 
 
-@dataclass
 class _Run:
-    """What stays the same throughout a run, and what it has done so far."""
+    """The spins of all chains on the machine, and the state of the schedule."""
 
-    setting: schedules.Setting
-    offsets: Array
-    chances: Array
-    schedule: schedules.Schedule
-    steps: int = 0
-    relaxations: int = 0
-
-    def __post_init__(self) -> None:
-        self.machine, self.grid, self.seed = self.setting.machine, self.setting.grid, self.setting.seed
+    def __init__(self, machine: Machine, experiment: Experiment, schedule: schedules.Schedule, seed: int) -> None:
+        self.machine, self.schedule, self.seed = machine, schedule, seed
+        self.grid, offsets = Grid(*experiment.size, torus=True), neighbourhood_offsets(1)
+        self.setting = schedules.Setting(machine, self.grid, offsets, 1, seed, 0)
         self.everywhere = schedules.Masked(self.grid)
+        self.offsets = machine.put(offsets)
+        self.chances = machine.put(heat_bath_chances(experiment.temperatures, len(offsets)))
+        self.spins = machine.put(np.tile(_first(experiment, seed), (len(experiment.temperatures), 1, 1)))
+        self.chains = int(self.spins.shape[0])
+        self.state = schedule.init(self.setting)
+        self.single: list[tuple[int, int]] = []  # steps of one site each, put off until another step needs them
+        self.steps = self.relaxations = 0
 
-    def sweep(self, spins: Array, state: Any) -> tuple[Array, Any]:
-        """A sweep of the schedule."""
-        queue: list[tuple[int, int]] = []
+    def look(self) -> NDArray[np.uint8]:
+        """Return the spins, (chains, H, W)."""
+        spins: NDArray[np.uint8] = self.machine.get(self.spins)[:, : self.grid.height]
+        return spins
+
+    def sweep(self) -> None:
+        """Relax by the schedule until it says that a sweep has ended."""
         if self.schedule.tile:  # what tiles see of one another until the sweep ends
-            spins = snapshot(self.machine, spins, self.grid.height)
-        while True:
-            state, chosen = self.schedule.step(self.setting, state, self.everywhere)
+            self.spins = snapshot(self.machine, self.spins, self.grid.height)
+        last = False
+        while not last:
+            self.state, chosen = self.schedule.step(self.setting, self.state, self.everywhere)
             for info in chosen.apart(self.machine):
                 self.steps += 1
                 self.relaxations += info.sites.size
                 if info.sites.size == 1 and not self.schedule.tile:
-                    queue.append((int(info.sites[0]), info.turn))
+                    self.single.append((int(info.sites[0]), info.turn))
                 elif info.sites.size:
-                    spins = self._step(self._flush(spins, queue), info)
-            if chosen.last:
-                return self._flush(spins, queue), state
+                    self._relax_single()
+                    self._relax(info)
+            last = chosen.last
+        self._relax_single()
 
-    def _step(self, spins: Array, info: schedules.Info) -> Array:
+    def _relax(self, info: schedules.Info) -> None:
         """Relax the sites of a step, every old value read before the first new one is written."""
-        machine, grid = self.machine, replace(self.grid, tile=self.schedule.tile)
-        most = max(1, AT_ONCE // spins.shape[0])
+        grid, most = replace(self.grid, tile=self.schedule.tile), max(1, AT_ONCE // self.chains)
         relaxed = []
         for k in range(0, info.sites.size, most):
-            sites = machine.put(info.sites[k : k + most])
-            drawn = ising_relax(machine, spins, sites, self.offsets, grid, self.chances, self.seed, info.turn)
+            sites = self.machine.put(info.sites[k : k + most])
+            drawn = ising_relax(self.machine, self.spins, sites, self.offsets, grid, self.chances, self.seed, info.turn)
             relaxed.append((sites, drawn))
-            self._sync(sites.size, spins)
+            self._sync(sites.size)
         for sites, drawn in relaxed:
-            spins = ising_commit(machine, spins, sites, drawn)
-        return spins
+            self.spins = ising_commit(self.machine, self.spins, sites, drawn)
 
-    def _flush(self, spins: Array, queue: list[tuple[int, int]]) -> Array:
-        """Do the steps of one site each that have been put off; the queue is empty then."""
-        most = min(QUEUE, max(1, 4 * AT_ONCE // spins.shape[0]))
-        for k in range(0, len(queue), most):
-            part = np.array(queue[k : k + most], np.uint32).view(np.int32)
-            put = self.machine.put(part)
-            spins = ising_sequence(self.machine, spins, put, self.offsets, self.grid, self.chances, self.seed)
-            self._sync(len(part), spins)
-        queue.clear()
-        return spins
+    def _relax_single(self) -> None:
+        """Do the steps that have been put off."""
+        most = min(QUEUE, max(1, 4 * AT_ONCE // self.chains))
+        for k in range(0, len(self.single), most):
+            part = self.machine.put(np.array(self.single[k : k + most], np.uint32).view(np.int32))
+            self.spins = ising_sequence(
+                self.machine, self.spins, part, self.offsets, self.grid, self.chances, self.seed
+            )
+            self._sync(len(self.single[k : k + most]))
+        self.single.clear()
 
-    def _sync(self, sites: int, spins: Array) -> None:
-        self.machine.sync(100 * sites * int(spins.shape[0]))  # a draw is about as much work as 100 fma
+    def _sync(self, sites: int) -> None:
+        self.machine.sync(100 * sites * self.chains)  # a draw is about as much work as 100 fma
 
 
 def _first(experiment: Experiment, seed: int) -> NDArray[np.uint8]:
@@ -275,18 +264,10 @@ def _first(experiment: Experiment, seed: int) -> NDArray[np.uint8]:
     return (bits >> np.uint32(31)).astype(np.uint8).reshape(seeds, *size)
 
 
-def _measure(before: NDArray[np.uint8], now: NDArray[np.uint8], grid: Grid) -> NDArray[np.float64]:
-    """(4, chains): energy, energy across the sweep, and the mean spins of the even and the odd sublattice."""
+def _measure(before: NDArray[np.uint8], now: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Return (4, chains): energy, energy across the sweep, and the mean spins of the even and the odd sublattice."""
     old, new = (2 * spins.astype(np.int8) - 1 for spins in (before, now))
-    sites = grid.rows * grid.cols
-    parity = np.indices((grid.rows, grid.cols)).sum(0) % 2
-    total = new.sum((1, 2), dtype=np.int64)
-    odd = new[:, parity == 1].sum(1, dtype=np.int64)
-    energies = [-(new * _field(spins, grid.torus)).sum((1, 2), dtype=np.int64) / (2 * sites) for spins in (new, old)]
-    return np.stack([*energies, (total - odd) / ((sites + 1) // 2), odd / (sites // 2)])
-
-
-def _field(spins: NDArray[np.int8], torus: bool) -> NDArray[np.int8]:
-    """Return the sum of each site's neighbours."""
-    around = np.pad(spins, ((0, 0), (1, 1), (1, 1)), mode="wrap" if torus else "constant")
-    return around[:, :-2, 1:-1] + around[:, 2:, 1:-1] + around[:, 1:-1, :-2] + around[:, 1:-1, 2:]
+    parity = np.indices(new.shape[1:]).sum(0) % 2
+    fields = [sum(np.roll(spins, by, axis) for axis in (1, 2) for by in (1, -1)) for spins in (new, old)]
+    energies = [-(new * field).mean((1, 2), dtype=np.float64) / 2 for field in fields]
+    return np.stack([*energies, *(new[:, parity == odd].mean(1, dtype=np.float64) for odd in (0, 1))])
