@@ -104,7 +104,7 @@ def test_a_device_gives_what_the_reference_gives(found, any_device):
     for one, other in zip(found.entries, on_device.entries, strict=True):
         for a, b in zip(one.runs, other.runs, strict=True):
             assert np.array_equal(a.image, b.image) and a.sweeps == b.sweeps
-    assert all(run.device_seconds > 0 for entry in on_device.entries for run in entry.runs)
+    assert all(run.figures["device_seconds"] > 0 for entry in on_device.entries for run in entry.runs)
 
 
 def test_runs_are_what_the_statistics_say(found):
@@ -114,19 +114,19 @@ def test_runs_are_what_the_statistics_say(found):
             finest = run.levels[-1]
             assert len(run.finest) == finest["sweeps"] and run.finest[-1].steps == finest["steps"]
             cooling = [sweep for sweep in run.finest if sweep.phase == "relax"]
-            assert run.figure("steps") == cooling[-1].steps == finest["equilibrium"]["steps"]
-            assert run.figure("sweeps") == len(cooling)
+            assert run.figures["steps"] == cooling[-1].steps == finest["equilibrium"]["steps"]
+            assert run.figures["sweeps"] == len(cooling)
             assert cooling[0].before == 0.75 and cooling[-1].left == 0
-            assert run.image.shape == (12, 14) and run.seconds > 0
-            assert 0 < run.figure("utilisation") <= 1
+            assert run.image.shape == (12, 14) and run.figures["seconds"] > 0
+            assert 0 < run.figures["utilisation"] <= 1
     synchronous = found.entries[1].runs[0]
-    assert synchronous.figure("steps") == synchronous.figure("sweeps")
+    assert synchronous.figures["steps"] == synchronous.figures["sweeps"]
 
 
 def test_figures_over_seeds(found):
     for entry in found.entries:
         spread = entry.figure("plausibility")
-        values = [run.quality.plausibility for run in entry.runs]
+        values = [run.figures["plausibility"] for run in entry.runs]
         assert spread == Spread(pytest.approx(np.mean(values)), pytest.approx(np.std(values, ddof=1)), tuple(values))
     one = Entry("one", (True,), found.entries[0].runs[:1])
     assert one.figure("copying").deviation is None

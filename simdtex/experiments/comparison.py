@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Parallel schedules compared: the same job under each, what it took, how it changed its picture, and the result."""
+"""Parallel schedules compared: the same job under each, its steps and times, how the picture moved, and the result."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from math import isfinite, isqrt
 from statistics import mean, stdev
 from typing import Any
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex import schedules as known
 from simdtex.driver import check_shape
-from simdtex.experiments.quality import COPIED_PATCH, Quality, measure
+from simdtex.experiments.quality import COPIED_PATCH, measure
 from simdtex.experiments.quality.patches import as_planes
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, open_machine
@@ -29,13 +29,21 @@ from simdtex.synthesis import synthesize
 
 __all__ = ["FIGURES", "Comparison", "Entry", "Recorder", "Run", "Spread", "Sweep", "compare"]
 
-MEASURED = "plausibility", "coverage", "copying", "histogram_distance", "seam"
-"""The figures of merit of each run, out of `simdtex.experiments.quality.FIGURES`."""
+FIGURES = (
+    *("steps", "sweeps", "relaxations_per_site", "all_steps", "all_sweeps", "all_relaxations_per_site"),
+    *("seconds", "device_seconds", "utilisation", "model_seconds", "passes"),
+    *("changed_cooling", "oscillation_cooling", "changed_free", "oscillation_free"),
+    *("plausibility", "coverage", "histogram_distance", "copying", "seam"),
+)
+"""The names of a run's figures; `compare` says what each is."""
+
+MEASURED = FIGURES[-5:]
+"""Those of `simdtex.experiments.quality`."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """What a sweep of a level did.
+    """A sweep of a level.
 
     Attributes
     ----------
@@ -138,17 +146,18 @@ class Noted(Watched):
 
     def look(self, setting: Setting, info: Info) -> None:
         """Keep a step."""
-        if self.claims[-1] and len(info.sites) > 1:  # a site alone meets nobody
+        if self.claims[-1] and len(info.sites) > 1:
             self.levels[-1][3].append(info.sites)
 
     def met(self) -> tuple[int, int, int] | None:
         """Return a level and two neighbours that relaxed together against a claim of equation (14), or None."""
-        for level, grid, offsets, steps in self.levels:
-            for sites in steps:
-                pair = neighbours_in(grid, offsets, sites)
-                if pair:
-                    return level, *pair
-        return None
+        pairs = (
+            (level, *pair)
+            for level, grid, offsets, steps in self.levels
+            for sites in steps
+            if (pair := neighbours_in(grid, offsets, sites))
+        )
+        return next(pairs, None)
 
 
 @dataclass(frozen=True)
@@ -161,16 +170,12 @@ class Run:
     seed : int
     image : array
         The output, with the sample's type and axes.
-    quality : simdtex.experiments.quality.Quality
-        Of the output against the sample: plausibility, coverage, copying, histogram distance and seam.
+    figures : dict
+        The `FIGURES` by name; None for each that the run has none of.
     sweeps : tuple of Sweep
         All levels, the coarsest first.
     levels : list of dict
         As in `simdtex.run.Output.statistics`.
-    seconds : float
-        Wall time, without what watching it took.
-    device_seconds : float or None
-        Time that the device spent in kernels, where it says so.
     accounting : dict
         What the run would take on the processor array, as in `simdtex.run.Output.statistics`.
     met : tuple or None
@@ -181,11 +186,9 @@ class Run:
     schedule: str
     seed: int
     image: NDArray[Any]
-    quality: Quality
+    figures: dict[str, float | None]
     sweeps: tuple[Sweep, ...]
     levels: list[dict[str, Any]]
-    seconds: float
-    device_seconds: float | None
     accounting: dict[str, Any]
     met: tuple[int, int, int] | None
 
@@ -194,39 +197,29 @@ class Run:
         """The sweeps of the finest level."""
         return tuple(sweep for sweep in self.sweeps if sweep.level == 0)
 
-    def figure(self, name: str) -> float | None:
-        """Return one of `FIGURES`; None if the run has none of it."""
-        return _figures(self)[name]
 
-
-FIGURES = (
-    *("steps", "sweeps", "relaxations_per_site", "all_steps", "all_sweeps", "all_relaxations_per_site"),
-    *("seconds", "device_seconds", "utilisation", "model_seconds", "passes"),
-    *("changed_cooling", "oscillation_cooling", "changed_free", "oscillation_free"),
-    *("plausibility", "coverage", "histogram_distance", "copying", "seam"),
-)
-"""The names of a run's figures; `compare` says what each is."""
-
-
-def _figures(run: Run) -> dict[str, float | None]:
-    """Return the figures of a run by name; None if the run has none of it."""
-    finest = next(level for level in run.levels if level["level"] == 0)
-    found: dict[str, Any] = {"seconds": run.seconds, "device_seconds": run.device_seconds}
-    for what in ("steps", "sweeps", "relaxations"):
-        sites = finest["rows"] * finest["cols"] if what == "relaxations" else 1
-        name = f"{what}_per_site" if what == "relaxations" else what
-        found[name] = finest["equilibrium"][what] / sites
-        found[f"all_{name}"] = sum(level["equilibrium"][what] for level in run.levels) / sites
-    found |= {name: run.accounting[name] for name in ("utilisation", "model_seconds", "passes")}
-    free = [sweep for sweep in run.finest if sweep.phase == "free"]
+def _figures(statistics: dict[str, Any], sweeps: Sequence[Sweep]) -> dict[str, float | None]:
+    """Return the figures of a run but those of its output and its wall time."""
+    levels = statistics["levels"]
+    finest = next(level for level in levels if level["level"] == 0)
+    found: dict[str, float | None] = {"device_seconds": statistics["device_seconds"]}
+    for what, name, per in (
+        ("steps", "steps", 1),
+        ("sweeps", "sweeps", 1),
+        ("relaxations", "relaxations_per_site", finest["rows"] * finest["cols"]),
+    ):
+        found[name] = finest["equilibrium"][what] / per
+        found[f"all_{name}"] = sum(level["equilibrium"][what] for level in levels) / per
+    found |= {name: float(statistics["accounting"][name]) for name in ("utilisation", "model_seconds", "passes")}
+    at_finest = [sweep for sweep in sweeps if sweep.level == 0]
+    free = [sweep for sweep in at_finest if sweep.phase == "free"]
     for name, what, least in (("changed", "changed", 1), ("oscillation", "returned", 2)):
-        cooling = [getattr(sweep, what) for sweep in run.finest if sweep.phase == "relax"]
+        cooling = [getattr(sweep, what) for sweep in at_finest if sweep.phase == "relax"]
         cooling = [value for value in cooling if value is not None]
         found[f"{name}_cooling"] = mean(cooling) if cooling else None
         # of a change and its return, both are to be free
         found[f"{name}_free"] = getattr(free[-1], what) if len(free) >= least else None
-    found |= {name: getattr(run.quality, name) for name in MEASURED}
-    return {name: None if found[name] is None else float(found[name]) for name in FIGURES}
+    return found
 
 
 @dataclass(frozen=True)
@@ -266,19 +259,16 @@ class Entry:
         return any(run.met for run in self.runs)
 
     def figure(self, name: str) -> Spread | None:
-        """One of `FIGURES` over the seeds; None where a run has none of it, or one that is not finite."""
-        found = [run.figure(name) for run in self.runs]
-        values = tuple(value for value in found if value is not None)
-        if len(values) < len(found):
-            return None
-        if not all(map(isfinite, values)):  # of samples near the largest number: they have no mean
+        """Return one of `FIGURES` over the seeds; None if a run has none of it, or one that is not finite."""
+        values = tuple(value for run in self.runs if (value := run.figures[name]) is not None)
+        if len(values) < len(self.runs) or not all(map(isfinite, values)):  # not finite near the largest number
             return None
         return Spread(mean(values), stdev(values) if len(values) > 1 else None, values)
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What `compare` found.
+    """Several schedules and their runs, as `compare` returns them.
 
     Attributes
     ----------
@@ -303,39 +293,29 @@ class Comparison:
     entries: tuple[Entry, ...] = field(repr=False)
 
     def results(self) -> dict[str, Any]:
-        """Everything but the pictures, as JSON knows it; the same for the same seeds but for ``seconds``."""
+        """Return everything but the pictures, for JSON; the same for the same seeds but for times."""
         return {
             "sample_shape": list(self.sample.shape),
             "shape": list(self.shape),
             "seeds": list(self.seeds),
             "device": self.device,
             "options": self.options,
-            "schedules": [_entry_results(entry) for entry in self.entries],
+            "schedules": [
+                {
+                    "name": entry.name,
+                    "keeps_equation_14": entry.independent,
+                    "claims_by_level": list(entry.claims),
+                    "caught": entry.caught,
+                    "figures": {name: (found := entry.figure(name)) and asdict(found) for name in FIGURES},
+                    "runs": [
+                        {one.name: getattr(run, one.name) for one in fields(run) if one.name not in ("image", "sweeps")}
+                        | {"sweeps": [asdict(sweep) for sweep in run.sweeps]}
+                        for run in entry.runs
+                    ],
+                }
+                for entry in self.entries
+            ],
         }
-
-
-def _entry_results(entry: Entry) -> dict[str, Any]:
-    found = {name: entry.figure(name) for name in FIGURES}
-    runs = [
-        {
-            "seed": run.seed,
-            "seconds": run.seconds,
-            "device_seconds": run.device_seconds,
-            "quality": {name: getattr(run.quality, name) for name in MEASURED},
-            "accounting": run.accounting,
-            "levels": run.levels,
-            "sweeps": [asdict(sweep) for sweep in run.sweeps],
-        }
-        for run in entry.runs
-    ]
-    return {
-        "name": entry.name,
-        "keeps_equation_14": entry.independent,
-        "claims_by_level": list(entry.claims),
-        "caught": entry.caught,
-        "figures": {name: None if spread is None else asdict(spread) for name, spread in found.items()},
-        "runs": runs,
-    }
 
 
 def compare(
@@ -407,30 +387,30 @@ def compare(
     >>> [(entry.name, entry.independent) for entry in found.entries]
     [('coloring', True), ('synchronous', False)]
     """
-    chosen = [known.get(schedule) for schedule in schedules]
-    names = [schedule.name for schedule in chosen]
+    chosen = {schedule.name: schedule for schedule in map(known.get, schedules)}
     keys = [as_seed(seed) for seed in seeds]
-    _check_distinct("schedule", names)
+    _check_distinct("schedule", [known.get(schedule).name for schedule in schedules])
     _check_distinct("seed", keys)
     if "schedule" in options:
         raise TypeError("schedule is no option here; give schedules, a sequence of them")
-    settled = resolve(Options, "schedules", options)
+    settings = vars(resolve(Options, "schedules", options))
     pixels = check_sample(sample, channel_axis)
     size = _check_sides(as_planes(pixels).shape[:2], shape)
-    machine, found, settings = open_machine(device, profile=True), {name: list[Any]() for name in names}, vars(settled)
+    machine = open_machine(device, profile=True)
     call = _Call(np.asarray(sample), pixels, channel_axis, machine, settings)
-    turns = [(seed, schedule) for seed in keys for schedule in chosen]  # a slow hour then slows all schedules alike
-    for number, (seed, schedule) in enumerate(turns):
+    found: dict[str, list[tuple[Run, tuple[bool, ...]]]] = {name: [] for name in chosen}
+    turns = [(seed, name) for seed in keys for name in chosen]  # a slow hour then slows all schedules alike
+    for number, (seed, name) in enumerate(turns):
 
-        def tell(progress: Relaxing, number: int = number, seed: int = seed, name: str = schedule.name) -> None:
+        def tell(progress: Relaxing, number: int = number, seed: int = seed, name: str = name) -> None:
             if callback:
                 job = f"run {number + 1} of {len(turns)}: {name}, seed {seed}"
                 callback((number + progress.fraction) / len(turns), job, progress)
 
-        if not found[schedule.name]:
-            call.build_kernels(schedule, size)
-        run, claims, settings = call.run(schedule, seed, size, tell)
-        found[schedule.name].append((run, claims))
+        if not found[name]:
+            call.build_kernels(chosen[name], size)
+        run, claims, settings = call.run(chosen[name], seed, size, tell)
+        found[name].append((run, claims))
     entries = [Entry(name, done[0][1], tuple(run for run, _ in done)) for name, done in found.items()]
     settings = {name: value for name, value in settings.items() if name != "schedule"}
     return Comparison(call.sample, size, channel_axis, tuple(keys), machine.name, settings, tuple(entries))
@@ -453,18 +433,11 @@ class _Call:
         noted, recorder = Noted(schedule), Recorder(self.channel_axis, tell, self.machine.sync)
         image, said = self._synthesize(noted, seed, size, callback=recorder)
         made = image[..., None] if self.channel_axis is None else np.moveaxis(image, self.channel_axis, -1)
-        run = Run(
-            schedule.name,
-            seed,
-            image,
-            measure(self.pixels, made, figures=MEASURED),
-            tuple(recorder.sweeps),
-            said["levels"],
-            said["seconds"] - recorder.seconds,
-            said["device_seconds"],
-            said["accounting"],
-            noted.met(),
-        )
+        quality = measure(self.pixels, made, figures=MEASURED)
+        figures = _figures(said, recorder.sweeps) | {name: getattr(quality, name) for name in MEASURED}
+        figures["seconds"] = said["seconds"] - recorder.seconds
+        levels, accounting = said["levels"], said["accounting"]
+        run = Run(schedule.name, seed, image, figures, tuple(recorder.sweeps), levels, accounting, noted.met())
         return run, tuple(noted.claims), said["options"]
 
     def build_kernels(self, schedule: Schedule, size: tuple[int, int]) -> None:
