@@ -18,7 +18,7 @@ from statistics import median
 import numpy as np
 
 import simdtex
-from simdtex.experiments.ensemble import channels, share_maps, summary
+from simdtex.experiments.ensemble import channels, summary
 from simdtex.io.image import write
 
 
@@ -98,7 +98,7 @@ def main():
         )
         if options.pictures:
             options.pictures.mkdir(parents=True, exist_ok=True)
-            share = share_maps(made, [0, 1])[1]
+            share = (made == 1).mean(0)
             shown = [np.rint(255 * one).astype(np.uint8) for one in (image, *made[:2], share)]
             gap = np.full((side, 6), 128, np.uint8)
             parts = [part for one in shown for part in (one, gap)][:-1]

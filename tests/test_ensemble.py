@@ -10,14 +10,14 @@ from scipy.special import kl_div
 
 from simdtex.experiments import ensemble
 from simdtex.experiments.ensemble import distance
-from simdtex.experiments.ensemble.ends import MARGIN
+from simdtex.experiments.ensemble.summary import MARGIN, _variogram
 
 
 def noise(seed, shape=(6, 40, 50), values=2):
     return np.random.default_rng(seed).integers(0, values, shape).astype(np.uint8)
 
 
-# ---------------------------------------------------------------- categories, shares and maps
+# ---------------------------------------------------------------- categories
 
 
 def test_categories_are_those_of_the_training_image_unless_they_are_named():
@@ -31,42 +31,24 @@ def test_categories_are_those_of_the_training_image_unless_they_are_named():
     assert ensemble.categories_of(image > 2).tolist() == [False, True]
 
 
-def test_shares_are_counted_in_the_order_of_the_categories():
-    array = np.array([[[5, 5, 2, 9]], [[9, 9, 9, 9]]])
-    np.testing.assert_array_equal(ensemble.shares(array, [9, 5, 2]), [[0.25, 0.5, 0.25], [1, 0, 0]])
-
-
-def test_share_maps_and_entropy_at_each_pixel():
-    array = np.array([[[0, 0, 0]], [[0, 1, 0]], [[0, 0, 1]], [[0, 1, 0]]])
-    maps = ensemble.share_maps(array, [0, 1])
-    np.testing.assert_array_equal(maps, [[[1, 0.5, 0.75]], [[0, 0.5, 0.25]]])
-    expected = -(0.75 * np.log2(0.75) + 0.25 * np.log2(0.25))
-    np.testing.assert_allclose(ensemble.entropy(maps), [[0, 1, expected]])
-
-
-def test_entropy_of_four_equal_categories_is_two_bits():
-    array = np.arange(4).reshape(4, 1, 1) * np.ones((1, 2, 3), int)
-    np.testing.assert_allclose(ensemble.entropy(ensemble.share_maps(array, range(4))), np.full((2, 3), 2.0))
-
-
 # ---------------------------------------------------------------- variograms
 
 
 def test_variogram_of_a_checkerboard():
     board = np.indices((20, 31)).sum(axis=0) % 2
     for axis in (0, 1):
-        np.testing.assert_allclose(ensemble.variogram(board == 1, axis, 6), [0, 0.5, 0, 0.5, 0, 0.5, 0])
+        np.testing.assert_allclose(_variogram(board == 1, axis, 6), [0, 0.5, 0, 0.5, 0, 0.5, 0])
 
 
 def test_variogram_of_a_slope_is_along_its_axis():
     slope = np.tile(3.0 * np.arange(30), (12, 1))
-    np.testing.assert_allclose(ensemble.variogram(slope, 1, 5), 4.5 * np.arange(6) ** 2)
-    np.testing.assert_allclose(ensemble.variogram(slope, 0, 5), np.zeros(6))
+    np.testing.assert_allclose(_variogram(slope, 1, 5), 4.5 * np.arange(6) ** 2)
+    np.testing.assert_allclose(_variogram(slope, 0, 5), np.zeros(6))
 
 
 def test_variogram_of_noise_is_its_variance():
     field = np.random.default_rng(1).normal(0, 2, (200, 200))
-    np.testing.assert_allclose(ensemble.variogram(field, 0, 10)[1:], 4.0, rtol=0.05)
+    np.testing.assert_allclose(_variogram(field, 0, 10)[1:], 4.0, rtol=0.05)
 
 
 def test_without_gstools_one_sentence_says_so(monkeypatch):
@@ -79,7 +61,7 @@ def test_without_gstools_one_sentence_says_so(monkeypatch):
 
     monkeypatch.setattr(builtins, "__import__", missing)
     with pytest.raises(ValueError, match=r"gstools is not installed; pip install 'simdtex\[simulate\]'"):
-        ensemble.variogram(np.zeros((5, 5)), 0, 2)
+        _variogram(np.zeros((5, 5)), 0, 2)
 
 
 # ---------------------------------------------------------------- connectivity
@@ -89,30 +71,30 @@ def test_connectivity_of_two_bars():
     image = np.zeros((30, 40), int)
     image[5:8] = 4
     image[15:18] = 4
-    along = ensemble.connectivity(image, 4, 30, 1)
-    np.testing.assert_array_equal(along.function, np.ones(31))
-    assert along.components == pytest.approx(2 * 1e4 / 1200) and along.largest == 0.5
-    down = ensemble.connectivity(image, 4, 14, 0).function
+    found = ensemble.connectivity(image, 4, 14)
+    assert found.components == pytest.approx(2 * 1e4 / 1200) and found.largest == 0.5
+    down, along = found.function
+    np.testing.assert_array_equal(along, np.ones(15))
     np.testing.assert_array_equal(down[:3], 1)
     assert np.isnan(down[3:8]).all()  # no pair so far apart
     np.testing.assert_array_equal(down[8:13], 0)
 
 
 def test_connectivity_of_a_broken_bar():
-    image = np.zeros((9, 20), int)
+    image = np.zeros((20, 20), int)
     image[4, :8] = image[4, 10:] = 1
-    found = ensemble.connectivity(image, 1, 9, 1)
+    found = ensemble.connectivity(image, 1, 9)
     # at a distance of 3 there are 5 + 7 pairs within the pieces, and 7 - 8, 6 - 9 ... across: columns 7 to 10
-    assert found.function[3] == pytest.approx(12 / 13)
-    assert found.function[1] == 1 and found.largest == pytest.approx(10 / 18)
+    assert found.function[1, 3] == pytest.approx(12 / 13)
+    assert found.function[1, 1] == 1 and found.largest == pytest.approx(10 / 18)
 
 
 def test_pixels_are_connected_by_their_sides():
-    assert ensemble.connectivity(np.eye(6, dtype=int), 1, 2, 0).components == pytest.approx(6e4 / 36)
+    assert ensemble.connectivity(np.eye(6, dtype=int), 1, 2).components == pytest.approx(6e4 / 36)
 
 
 def test_connectivity_of_a_missing_category():
-    found = ensemble.connectivity(np.zeros((5, 5), int), 1, 3, 0)
+    found = ensemble.connectivity(np.zeros((5, 5), int), 1, 3)
     assert np.isnan(found.function).all() and found.components == 0 and np.isnan(found.largest)
 
 
@@ -164,15 +146,16 @@ DRAWN = {
 @pytest.mark.parametrize("turned", [0, 1, 2])
 def test_dead_ends_of_drawn_figures(name, turned):
     image, expected = DRAWN[name]
-    assert len(ensemble.dead_end_places(np.rot90(image, turned), 1)) == expected
+    assert len(ensemble.dead_ends(np.rot90(image, turned), 1)) == expected
 
 
 def test_a_flat_end_counts_once_where_it_is():
     image = np.zeros((80, 100), np.uint8)
     image[36:44, :70] = 1
-    (place,) = ensemble.dead_end_places(image, 1)
+    (place,) = ensemble.dead_ends(image, 1)
     assert abs(place[0] - 40) <= 1 and 63 <= place[1] < 70
-    assert ensemble.dead_ends(image, 1) == pytest.approx(1e4 / ((80 - 2 * MARGIN) * (100 - 2 * MARGIN)))
+    found = ensemble.summary(image[np.newaxis], image).dead_ends[1]
+    assert found == pytest.approx(1e4 / ((80 - 2 * MARGIN) * (100 - 2 * MARGIN)))
 
 
 @pytest.mark.parametrize("name", ["across", "inside", "Y that leaves", "Y with one end", "Y with three ends", "free"])
@@ -183,8 +166,8 @@ def test_rough_banks_holes_and_specks_hardly_make_dead_ends(name):
     for _ in range(20):
         noisy = image.copy()
         noisy[bank] = rng.integers(0, 2, np.count_nonzero(bank))
-        rough.append(len(ensemble.dead_end_places(noisy, 1)))
-        specks.append(len(ensemble.dead_end_places(image ^ (rng.random(image.shape) < 0.01), 1)))
+        rough.append(len(ensemble.dead_ends(noisy, 1)))
+        specks.append(len(ensemble.dead_ends(image ^ (rng.random(image.shape) < 0.01), 1)))
     for found in (rough, specks):
         assert np.mean(found) == pytest.approx(expected, abs=0.1)
 
@@ -193,7 +176,7 @@ def test_a_line_that_bends_is_one_arm():
     stairs = np.zeros((60, 60), np.uint8)
     for step in range(10, 50):
         stairs[step, step - 1 : step + 2] = 1  # three pixels at each step: corners that look like junctions
-    assert len(ensemble.dead_end_places(stairs, 1)) == 2
+    assert len(ensemble.dead_ends(stairs, 1)) == 2
 
 
 # ---------------------------------------------------------------- distances
@@ -273,19 +256,23 @@ def test_summary_puts_everything_together():
     np.testing.assert_allclose(found.shares[:, -1], [1 - training.mean(), training.mean()])
     np.testing.assert_allclose(found.shares[1, :-1], images.mean(axis=(1, 2)))
     assert found.variograms.shape == found.connectivity.shape == (2, 2, 5, 25)
-    np.testing.assert_array_equal(found.variograms[1, 0, 2], ensemble.variogram(images[2] == 0, 1, 24))
-    np.testing.assert_array_equal(found.variograms[0, 1, -1], ensemble.variogram(training == 1, 0, 24))
-    np.testing.assert_array_equal(found.connectivity[0, 1, 3], ensemble.connectivity(images[3], 1, 24, 0).function)
-    assert found.components[0, 1] == ensemble.connectivity(images[1], 0, 1, 0).components
-    assert found.dead_ends[1, -1] == ensemble.dead_ends(training, 1)
+    np.testing.assert_array_equal(found.variograms[1, 0, 2], _variogram(images[2] == 0, 1, 24))
+    np.testing.assert_array_equal(found.variograms[0, 1, -1], _variogram(training == 1, 0, 24))
+    np.testing.assert_array_equal(found.connectivity[:, 1, 3], ensemble.connectivity(images[3], 1, 24).function)
+    assert found.components[0, 1] == ensemble.connectivity(images[1], 0, 1).components
+    assert found.dead_ends[1, -1] == 1e4 * len(ensemble.dead_ends(training, 1)) / 48**2
+    np.testing.assert_array_equal(found.maps[1], images.mean(0))
+    p = found.maps.clip(1e-300)
+    np.testing.assert_allclose(found.open, -(p * np.log2(p)).sum(0), atol=1e-12)
     misses = [sum(int(one[y, x] != value) for x, y, value in data) for one in images]
     assert found.misses.tolist() == misses and misses[0] == 0
 
 
 def test_summary_of_continuous_values():
     images = np.random.default_rng(2).normal(size=(3, 12, 14))
-    found = ensemble.summary(images, images[0], data=[(1, 2, 0.5)], max_lag=4)
-    assert found.variograms.shape == (2, 1, 4, 5) and found.shares.shape == (0, 4)
+    found = ensemble.summary(images, images[0], data=[(1, 2, 0.5)])
+    assert found.variograms.shape == (2, 1, 4, 7) and found.shares.shape == (0, 4)
+    assert found.connectivity.shape == (2, 0, 4, 7)
     np.testing.assert_allclose(found.misses, np.abs(images[:, 2, 1] - 0.5))
     np.testing.assert_allclose(found.maps[0], images.mean(0))
     np.testing.assert_allclose(found.open, images.std(0, ddof=1))
@@ -305,8 +292,8 @@ def test_channels_are_like_channels():
         image = ensemble.channels((250, 250), seed)
         assert image.dtype == np.uint8 and set(np.unique(image)) == {0, 1}
         found.append(image.mean())
-        ends.append(len(ensemble.dead_end_places(image, 1)))
-        right, down = (ensemble.variogram(image == 1, axis, 20)[8] for axis in (1, 0))
+        ends.append(len(ensemble.dead_ends(image, 1)))
+        right, down = (_variogram(image == 1, axis, 20)[8] for axis in (1, 0))
         assert right < 0.7 * down  # they run to the right
     assert all(0.28 <= share <= 0.335 for share in found)
     assert all(3 <= number <= 14 for number in ends) and sum(ends) >= 15
@@ -334,14 +321,12 @@ IMAGE, FEW = np.zeros((20, 20), int), np.zeros((2, 20, 20), int)
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: ensemble.shares(IMAGE, [0]), r"the ensemble has the shape \(20, 20\)"),
-        (lambda: ensemble.shares(FEW, [1]), "holds 0, which is no category"),
-        (lambda: ensemble.shares(FEW, []), "there are no categories"),
-        (lambda: ensemble.shares(FEW, [0, 0]), "named twice"),
+        (lambda: ensemble.summary(IMAGE, IMAGE), r"the ensemble has the shape \(20, 20\)"),
+        (lambda: ensemble.summary(FEW, IMAGE, categories=[1]), "holds 0, which is no category"),
+        (lambda: ensemble.categories_of(IMAGE, [[0]]), "there are no categories"),
+        (lambda: ensemble.categories_of(IMAGE, [0, 0]), "named twice"),
+        (lambda: ensemble.connectivity(IMAGE, 1, 20), "max_lag is 20: give 1 to 19"),
         (lambda: ensemble.summary(np.full((1, 2, 2), np.nan), IMAGE), "not finite"),
-        (lambda: ensemble.entropy(np.ones((2, 3, 3))), "do not add up to 1"),
-        (lambda: ensemble.variogram(IMAGE, 2, 3), "axis is 2"),
-        (lambda: ensemble.variogram(IMAGE, 0, 20), "max_lag is 20: give 1 to 19"),
         (lambda: ensemble.dead_ends(IMAGE[:16], 0), "a side of 16 pixels: give more than 16"),
         (lambda: ensemble.dead_ends(FEW, 0), "the image has the shape"),
         (lambda: ensemble.anodi(FEW, IMAGE + 1), "the ensemble holds 0, which is no category"),
@@ -360,4 +345,4 @@ def test_bad_input_is_refused_in_a_sentence(call, words):
 
 def test_other_types_are_refused():
     with pytest.raises(TypeError, match="holds complex128"):
-        ensemble.shares(np.ones((1, 2, 2), complex), [0, 1])
+        ensemble.summary(np.ones((1, 2, 2), complex), IMAGE)

@@ -16,8 +16,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure as Plot
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.experiments.ensemble import Summary, dead_end_places, summary
-from simdtex.experiments.ensemble.ends import MARGIN
+from simdtex.experiments.ensemble import Summary, dead_ends, summary
+from simdtex.experiments.ensemble.connectivity import MARGIN
 from simdtex.io.image import to_display
 from simdtex.report.page import Figure, Part, Section, check_folder, write_report
 from simdtex.report.plots import FAINT, INK, legend, new_figure, tidy
@@ -309,7 +309,7 @@ def _ends(images: Array, own: Array, found: Summary) -> Figure:
     shown, factor = _labelled(images, own, found, min(MARKED, len(images)))
     pictures = []
     for label, image, picture in shown:
-        places = dead_end_places(image, category)
+        places = dead_ends(image, category)
         pictures.append((f"{label}: {len(places)}", _ringed(magnified(picture, factor), places, factor)))
     return Figure(
         "dead-ends.png",

@@ -10,9 +10,8 @@ from __future__ import annotations
 
 from simdtex.experiments.ensemble.arrays import categories_of
 from simdtex.experiments.ensemble.channels import channels
+from simdtex.experiments.ensemble.connectivity import Connectivity, connectivity, dead_ends
 from simdtex.experiments.ensemble.distance import Anodi, anodi
-from simdtex.experiments.ensemble.ends import dead_end_places, dead_ends
-from simdtex.experiments.ensemble.figures import Connectivity, connectivity, entropy, share_maps, shares, variogram
 from simdtex.experiments.ensemble.summary import Summary, summary
 
 __all__ = [
@@ -23,11 +22,6 @@ __all__ = [
     "categories_of",
     "channels",
     "connectivity",
-    "dead_end_places",
     "dead_ends",
-    "entropy",
-    "share_maps",
-    "shares",
     "summary",
-    "variogram",
 ]

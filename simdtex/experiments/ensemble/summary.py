@@ -9,11 +9,11 @@ from math import nan
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import entropy
 
 from simdtex.experiments.ensemble.arrays import Array, as_ensemble, as_image, categories_of
+from simdtex.experiments.ensemble.connectivity import MARGIN, connectivity, dead_ends
 from simdtex.experiments.ensemble.distance import Anodi, anodi
-from simdtex.experiments.ensemble.ends import MARGIN, dead_ends
-from simdtex.experiments.ensemble.figures import connectivity, entropy, share_maps, variogram
 
 Floats = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ LEAST = 4
 LARGEST = 1e100
 """Of numbers that figures are computed of: sums of their squares, and axes of plots, stay finite."""
 
-MOST_LAG = 100  # pixels, where none is given
+MOST_LAG = 100  # of variograms and connectivity functions, pixels; half of the shortest side is less in small images
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,16 +38,21 @@ class Summary:
     lags : ndarray of int, (L,)
         Pixels.
     shares : ndarray of float64, (K, n + 1)
+        Share of the pixels.
     maps : ndarray of float64, (K, rows, cols)
-        `share_maps`; of continuous values one map, the mean.
+        Share of the realisations in which a pixel has each category; of continuous values one map, the mean.
     open : ndarray of float64, (rows, cols)
-        `entropy`, bits; of continuous values their standard deviation (divisor n - 1), in their unit.
+        Entropy of each pixel's shares of categories in bits, 0 where all realisations agree, at most log2 n; of
+        continuous values their standard deviation (divisor n - 1), in their unit.
     variograms : ndarray of float64, (2, K, n + 1, L)
-        Along axis 0 (down) and 1 (to the right), of each category's indicator; of continuous values K is 1.
+        Along axis 0 (down) and 1 (to the right), of each category's indicator or, with K = 1, of continuous values:
+        half the mean squared difference of two pixels at a lag, Matheron's estimator, in squared units.
     connectivity : ndarray of float64, (2, K, n + 1, L)
         Connectivity functions along both axes, see `connectivity`.
-    components, largest, dead_ends : ndarray of float64, (K, n + 1)
-        See `connectivity` and `dead_ends`; NaN for images too small for it.
+    components, largest : ndarray of float64, (K, n + 1)
+        See `connectivity`.
+    dead_ends : ndarray of float64, (K, n + 1)
+        Number in 10,000 of the pixels where they count, see `dead_ends`; NaN for images too small for it.
     anodi : Anodi
     data : ndarray of float64, (m, 3)
         Hard data: x, y, value.
@@ -76,7 +81,6 @@ def summary(
     *,
     data: ArrayLike | None = None,
     categories: Sequence[int] | None = None,
-    max_lag: int | None = None,
 ) -> Summary:
     """Compute all figures of an ensemble.
 
@@ -89,8 +93,6 @@ def summary(
         Hard data: x (column), y (row), both in pixels of a realisation, and the value there.
     categories : sequence of int, optional
         As in `categories_of`: the training image's own by default, none for continuous values.
-    max_lag : int, optional
-        Of variograms and connectivity functions, pixels; by default half of the shortest side, but at most 100.
 
     Returns
     -------
@@ -114,12 +116,12 @@ def summary(
         raise ValueError(f"an image has a side of {shortest} pixels: give at least {LEAST} x {LEAST}")
     if max(float(np.abs(one).max()) for one in (array, image)) > LARGEST:
         raise ValueError(f"an image has values beyond {LARGEST:g}: give them in a larger unit")
-    lag = min(shortest // 2, MOST_LAG) if max_lag is None else max_lag
+    lag = min(shortest // 2, MOST_LAG)
     images, number = [*array, image], len(array)
     at_data = array[:, points[:, 1].astype(np.intp), points[:, 0].astype(np.intp)]
     if len(known):
-        maps = share_maps(array, known)
-        left_open = entropy(maps)
+        maps = np.stack([(array == k).mean(axis=0) for k in known])
+        left_open = np.asarray(entropy(maps, base=2, axis=0))
         fields = [[one == k for one in images] for k in (known[-1:] if len(known) == 2 else known)]
         misses = (at_data != points[:, 2]).sum(axis=1).astype(np.float64)
     else:
@@ -127,10 +129,9 @@ def summary(
         left_open = array.std(axis=0, ddof=int(number > 1), dtype=np.float64)
         fields = [images]
         misses = np.sqrt(((at_data - points[:, 2]) ** 2).mean(axis=1)) if len(points) else np.zeros(number)
-    variograms = np.array([[[variogram(one, axis, lag) for one in row] for row in fields] for axis in (0, 1)])
-    found = [[[connectivity(one, k, lag, axis) for one in images] for k in known] for axis in (0, 1)]
-
-    functions = np.array([one.function for along in found for row in along for one in row])
+    variograms = np.array([[[_variogram(one, axis, lag) for one in row] for row in fields] for axis in (0, 1)])
+    found = [[connectivity(one, k, lag) for one in images] for k in known]
+    functions = np.array([one.function for row in found for one in row]).reshape(len(known), number + 1, 2, lag + 1)
 
     def table(figure: Callable[[int, int], float]) -> Floats:
         return np.array([[figure(k, n) for n in range(number + 1)] for k in range(len(known))]).reshape(-1, number + 1)
@@ -142,14 +143,29 @@ def summary(
         maps=maps,
         open=left_open,
         variograms=np.repeat(variograms, 2, axis=1) if len(known) == 2 else variograms,  # of two they are the same
-        connectivity=functions.reshape(2, len(known), number + 1, lag + 1),
-        components=table(lambda k, n: found[0][k][n].components),
-        largest=table(lambda k, n: found[0][k][n].largest),
-        dead_ends=table(lambda k, n: nan if shortest <= 2 * MARGIN else dead_ends(images[n], known[k])),
+        connectivity=np.moveaxis(functions, 2, 0),
+        components=table(lambda k, n: found[k][n].components),
+        largest=table(lambda k, n: found[k][n].largest),
+        dead_ends=table(lambda k, n: _ends_per_area(images[n], known[k])),
         anodi=anodi(array, image, categories=known.tolist()),
         data=points,
         misses=misses,
     )
+
+
+def _variogram(field: Array, axis: int, max_lag: int) -> Floats:
+    """Return the experimental variogram along an axis, for lags of 0 to `max_lag`."""
+    try:
+        from gstools import vario_estimate_axis  # late: it takes a second and is an extra
+    except ImportError:
+        raise ValueError("gstools is not installed; pip install 'simdtex[simulate]'") from None
+    return np.asarray(vario_estimate_axis(field.astype(np.float64), axis)[: max_lag + 1], dtype=np.float64)
+
+
+def _ends_per_area(image: Array, category: int) -> float:
+    """Return the dead ends in 10,000 of the pixels where they count; NaN for a small image."""
+    rows, cols = (side - 2 * MARGIN for side in image.shape)
+    return 1e4 * len(dead_ends(image, category)) / (rows * cols) if min(rows, cols) > 0 else nan
 
 
 def _checked_data(data: ArrayLike | None, shape: tuple[int, ...]) -> Floats:

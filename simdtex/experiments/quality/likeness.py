@@ -26,9 +26,9 @@ PATCHES = 1024  # of that grid looked up, at most
 def plausibility(sample: ArrayLike, output: ArrayLike) -> float:
     """Return the mean distance from a 7 x 7 patch of the output to the nearest patch of the sample.
 
-    The distance is the root of the mean squared difference over the 49 x channels values, in
-    sample standard deviations; the mean is over patches, then over three scales (full size, 1/2
-    and 1/4 by means of 2 x 2 blocks). A scale at which a picture has no 7 x 7 patch is left out.
+    The distance is the root of the mean squared difference over the 49 x channels values, in sample standard
+    deviations; the mean is over patches, then over three scales (full size, 1/2 and 1/4 by means of 2 x 2 blocks). A
+    scale at which a picture has no 7 x 7 patch is left out.
 
     Parameters
     ----------
@@ -52,8 +52,8 @@ def plausibility(sample: ArrayLike, output: ArrayLike) -> float:
 def coverage(sample: ArrayLike, output: ArrayLike) -> float:
     """Return the mean distance from a 7 x 7 patch of the sample to the nearest patch of the output.
 
-    `plausibility` the other way round: it grows with every part of the sample that the output
-    lacks. Parameters, units and cost are those of `plausibility`.
+    `plausibility` the other way round: it grows with every part of the sample that the output lacks. Parameters, units
+    and cost are those of `plausibility`.
     """
     return _mean_nearest(sample, output, of_output=False)
 
@@ -84,15 +84,15 @@ def _every(planes: Planes) -> Indices:
 def innovation(sample: ArrayLike, output: ArrayLike) -> float:
     r"""Return the share of neighbour pixels of the output that do not continue one another in the sample.
 
-    With :math:`s(x)` the position of the sample's patch that is nearest to the 7 x 7 patch at
-    :math:`x` of the output, and :math:`e` one pixel down or to the right, this is
+    With :math:`s(x)` the position of the sample's patch that is nearest to the 7 x 7 patch at :math:`x` of the output,
+    and :math:`e` one pixel down or to the right, this is
 
     .. math::
 
        1 - \operatorname{mean}_{x, e} [ s(x + e) = s(x) + e ] ,
 
-    the mean over both directions. It is the innovation capacity of R. Webster, "Innovative
-    non-parametric texture synthesis via patch permutations", 2018.
+    the mean over both directions. It is the innovation capacity of R. Webster, "Innovative non-parametric texture
+    synthesis via patch permutations", 2018.
 
     Parameters
     ----------
@@ -102,15 +102,14 @@ def innovation(sample: ArrayLike, output: ArrayLike) -> float:
     Returns
     -------
     float
-        0 to 1: 0 where the output is one piece of the sample, 1 where it continues nothing of it.
-        Patches across the joints of pieces have sources of their own. Where patches of the sample
-        are equal to the last bit the first stands for all, so flat parts count as innovation.
+        0 to 1: 0 where the output is one piece of the sample, 1 where it continues nothing of it. Patches across the
+        joints of pieces have sources of their own. Where patches of the sample are equal to the last bit the first
+        stands for all, so flat parts count as innovation.
 
     Notes
     -----
-    Taken from the pictures alone, over pairs of neighbour rows of patches, as many as have about
-    4096 patches and evenly spread. The nearest patch is exact; cost and memory are those of one
-    scale of `plausibility`.
+    Taken from the pictures alone, over pairs of neighbour rows of patches, as many as have about 4096 patches and
+    evenly spread. The nearest patch is exact; cost and memory are those of one scale of `plausibility`.
     """
     first, second = as_pair(sample, output, PATCH + 1)
     candidates, queries = in_deviations(first, first, second)
@@ -140,8 +139,8 @@ def copying(sample: ArrayLike, output: ArrayLike) -> float:
 
     Notes
     -----
-    Patches are compared by hashes of 64 bits: of n different patches of the output and m of the sample, n m / 2**64
-    are taken for equal.
+    Patches are compared by hashes of 64 bits: of n different patches of the output and m of the sample, n m / 2**64 are
+    taken for equal.
     """
     first, second = as_pair(sample, output, COPIED_PATCH)
     numbers = np.unique(np.concatenate([first.ravel(), second.ravel()]), return_inverse=True)[1]
@@ -168,17 +167,16 @@ class Repeats(NamedTuple):
 def repeats(sample: ArrayLike, output: ArrayLike) -> Repeats:
     r"""Return the share of the 32 x 32 patches of the output that stand elsewhere in the output once more.
 
-    The output is reduced to half its size by means of 2 x 2 blocks, where patches :math:`a_x`
-    have 16 x 16 pixels. A patch is repeated if
+    The output is reduced to half its size by means of 2 x 2 blocks, where patches :math:`a_x` have 16 x 16 pixels. A
+    patch is repeated if
 
     .. math::
 
        \min_y \frac{1}{\sigma} \sqrt{\frac{1}{256 c} \sum_i (a_{x,i} - a_{y,i})^2} < 0.35
 
-    over all places :math:`y` of the half size that are at least half a patch from :math:`x` in
-    rows or in columns. Here :math:`\sigma` is the standard deviation of the sample at half its
-    size, so fine grain, which is lost there, makes nothing alike. The picture is not continued
-    around its border: a repeat across it is not seen.
+    over all places :math:`y` of the half size that are at least half a patch from :math:`x` in rows or in columns. Here
+    :math:`\sigma` is the standard deviation of the sample at half its size, so fine grain, which is lost there, makes
+    nothing alike. The picture is not continued around its border: a repeat across it is not seen.
 
     Parameters
     ----------
@@ -190,9 +188,9 @@ def repeats(sample: ArrayLike, output: ArrayLike) -> Repeats:
     share : float
         Of the output's patches, 0 to 1.
     own : float
-        The same of the sample's own patches in the sample: about 0 for most materials, and large
-        for a regular one such as bricks, where repeats are right. A small sample has fewer places
-        where a patch could stand again, so `own` is rather too low than too high.
+        The same of the sample's own patches in the sample: about 0 for most materials, and large for a regular one such
+        as bricks, where repeats are right. A small sample has fewer places where a patch could stand again, so `own` is
+        rather too low than too high.
 
     Notes
     -----

@@ -46,8 +46,8 @@ def histogram_distance(sample: ArrayLike, output: ArrayLike) -> float:
 def seam(output: ArrayLike) -> float:
     """Return how much the seam shows when the output is laid side by side with itself.
 
-    The mean absolute difference between the last and the first row over that between neighbour
-    rows inside, the same for columns, and the mean of the two.
+    The mean absolute difference between the last and the first row over that between neighbour rows inside, the same
+    for columns, and the mean of the two.
 
     Parameters
     ----------
@@ -57,8 +57,8 @@ def seam(output: ArrayLike) -> float:
     Returns
     -------
     float
-        About 1 for a picture that tiles (and for a constant one), larger where the seam is an
-        edge; infinite where it is the only edge.
+        About 1 for a picture that tiles (and for a constant one), larger where the seam is an edge; infinite where it
+        is the only edge.
     """
     planes = as_planes(output).astype(np.float64)
     if min(planes.shape[:2]) < 2:
@@ -77,8 +77,8 @@ def _seam_along(planes: Array, axis: int) -> float:
 def salt(sample: ArrayLike, output: ArrayLike) -> float:
     r"""Return how many odd pixels the output has, as a multiple of the sample's.
 
-    A pixel's deviation is its distance from the median of the 3 x 3 pixels around it, the largest
-    over the channels. With :math:`t` the 99.5 % point of the sample's deviations, this is
+    A pixel's deviation is its distance from the median of the 3 x 3 pixels around it, the largest over the channels.
+    With :math:`t` the 99.5 % point of the sample's deviations, this is
 
     .. math::
 
@@ -94,13 +94,12 @@ def salt(sample: ArrayLike, output: ArrayLike) -> float:
     Returns
     -------
     float
-        0 to 200; 1 is as much as the sample has. Above 1 single pixels stand out, below 1 the
-        output is smoother than the sample, or its odd pixels have a place where none stand out.
+        0 to 200; 1 is as much as the sample has. Above 1 single pixels stand out, below 1 the output is smoother than
+        the sample, or its odd pixels have a place where none stand out.
 
     Notes
     -----
-    Beyond the border the last row or column goes on. Cost: about 0.05 s for 256 x 256 pixels in
-    colour.
+    Beyond the border the last row or column goes on. Cost: about 0.05 s for 256 x 256 pixels in colour.
     """
     first, second = as_pair(sample, output, 3)
     had, has = _off_median(first), _off_median(second)
@@ -117,9 +116,9 @@ def _off_median(planes: Array) -> NDArray[np.float64]:
 def tones(sample: ArrayLike, output: ArrayLike) -> Tones:
     r"""Return how the output's brightness and contrast differ from the sample's.
 
-    With :math:`\sigma` the standard deviation, root of the mean variance of the channels,
-    :math:`\mu` the mean of a channel, and :math:`\bar a` the means of the 16 x 16 blocks of a
-    picture a (whole ones, counted from its first pixel):
+    With :math:`\sigma` the standard deviation, root of the mean variance of the channels, :math:`\mu` the mean of a
+    channel, and :math:`\bar a` the means of the 16 x 16 blocks of a picture a (whole ones, counted from its first
+    pixel):
 
     .. math::
 
@@ -139,8 +138,8 @@ def tones(sample: ArrayLike, output: ArrayLike) -> Tones:
     shift : float
         The second, by the root of the mean square over the channels; 0 is best.
     coarse_contrast : float
-        The third; 0 is best. Below 0 the large light and dark parts of the sample are missing,
-        above 0 there are more or stronger ones.
+        The third; 0 is best. Below 0 the large light and dark parts of the sample are missing, above 0 there are more
+        or stronger ones.
     """
     first, second = (planes.astype(np.float64) for planes in as_pair(sample, output, 2 * BLOCK))
     scale = deviation(first)
