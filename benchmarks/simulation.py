@@ -5,9 +5,9 @@ python benchmarks/simulation.py [--side 250] [-n 50] [--data 0 50 500] [--jobs N
 
     [--device TEXT] [--pictures DIR]
 
-The training image is `simdtex.experiments.ensemble.channels`; the data are read off another image of the same maker, at
-random places. Times are of the whole call after one that is not counted; the ratio of a run with data to one without is
-of single realisations in turn, in one process, the median of nine.
+The training image is one of ``channels.py``; the data are read off another one, at random places. Times are of the
+whole call after one that is not counted; the ratio of a run with data to one without is of single realisations in turn,
+in one process, the median of nine.
 """
 
 import argparse
@@ -16,9 +16,10 @@ from pathlib import Path
 from statistics import median
 
 import numpy as np
+from channels import channels
 
 import simdtex
-from simdtex.experiments.ensemble import channels, summary
+from simdtex.experiments.ensemble import summary
 from simdtex.io.image import write
 
 

@@ -67,6 +67,7 @@ def small(code):
         .replace("--size 64", "--size 8")
     )
     code = code.replace("data.camera()", "data.camera()[:64, :64]")
+    code = re.sub(r"((ensemble\.)?channels\(\))", r"(image[:40, :40] for image in \1)", code)
     return (
         code.replace("(256, 256)", "(40, 40)")
         .replace("(192, 192)", "(40, 40)")

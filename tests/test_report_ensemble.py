@@ -23,8 +23,9 @@ OF_CATEGORIES = {"connectivity.png", "dead-ends.png"}
 
 
 def test_a_report_of_categories(tmp_path):
-    images = np.stack([ensemble.channels((48, 60), seed) for seed in range(3)])
-    training = ensemble.channels((64, 56), 7)
+    training, hidden = ensemble.channels()
+    images = np.stack([hidden[i : i + 48, :60] for i in (0, 60, 120)])
+    training = training[:64, :56]
     data = [(10, 20, images[0, 20, 10]), (59, 47, images[0, 47, 59])]
     write_ensemble(tmp_path / "r", training, images, data=data, command="simdtex simulate <ti>")
     assert {path.name for path in (tmp_path / "r").iterdir()} == ALWAYS | OF_CATEGORIES

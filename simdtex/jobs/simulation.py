@@ -104,8 +104,8 @@ def simulate(
     --------
     >>> from simdtex.experiments.ensemble import channels
     >>> import simdtex
-    >>> image = channels((64, 64), 1)
-    >>> found = simdtex.simulate(image, 2, shape=(32, 40), categorical=True, order=8, rng=1)
+    >>> training, _ = channels()
+    >>> found = simdtex.simulate(training[:64, :64], 2, shape=(32, 40), categorical=True, order=8, rng=1)
     >>> dict(found.sizes)
     {'realisation': 2, 'y': 32, 'x': 40}
     """

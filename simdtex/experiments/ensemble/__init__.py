@@ -8,11 +8,16 @@ right, lags are pixels. No figure is enough alone: see the page on ensembles.
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
 from simdtex.experiments.ensemble.arrays import categories_of
-from simdtex.experiments.ensemble.channels import channels
 from simdtex.experiments.ensemble.connectivity import Connectivity, connectivity, dead_ends
 from simdtex.experiments.ensemble.distance import Anodi, anodi
 from simdtex.experiments.ensemble.summary import Summary, summary
+from simdtex.io.image import read
 
 __all__ = [
     "Anodi",
@@ -25,3 +30,18 @@ __all__ = [
     "dead_ends",
     "summary",
 ]
+
+
+def channels() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return a training image of sinuous channels, and another map of the same kind to read hard data off.
+
+    Channels are about 8 pixels wide and cover 0.3 of each. They meander from left to right, cross, part and meet again,
+    and a few end inside. ``benchmarks/channels.py`` draws them, and more of any size.
+
+    Returns
+    -------
+    training, hidden : ndarray of uint8, (256, 256)
+        1 in channels, 0 elsewhere.
+    """
+    both = read(Path(__file__).with_name("channels.png")).pixels
+    return both[:, :256], both[:, 256:]

@@ -1,20 +1,28 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A training image made by code: sinuous channels that meet, part and now and then end.
+"""Makes training images of sinuous channels that meet, part and now and then end.
 
-All arithmetic is in whole numbers, so that no platform's library decides on a pixel.
+    python benchmarks/channels.py [--shape 256 256] [--seed 1 7] [--out simdtex/experiments/ensemble/channels.png]
+
+Writes an image for each seed, side by side. All arithmetic is in whole numbers, so that no platform's library decides
+on a pixel.
 """
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterable, Iterator
 from itertools import count
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from simdtex.io.image import write
 from simdtex.random import as_seed, philox
+
+HERE = Path(__file__).resolve().parent
 
 Pixels = NDArray[np.uint8]
 Path = NDArray[np.int64]
@@ -234,3 +242,18 @@ def _values_at(picture: NDArray[Any], path: Path) -> NDArray[Any]:
 def _is_far(path: Path, places: Iterable[Path], apart: int) -> bool:
     """Return whether a course keeps so many pixels away from all of some places."""
     return all(int(((path[:, :2] - place) ** 2).sum(axis=1).min()) > (apart * PIXEL) ** 2 for place in places)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--shape", type=int, nargs=2, default=(256, 256))
+    parser.add_argument("--seed", type=int, nargs="+", default=(1, 7))
+    parser.add_argument(
+        "--out", type=Path, default=HERE.parent / "simdtex" / "experiments" / "ensemble" / "channels.png"
+    )
+    options = parser.parse_args()
+    write(options.out, np.hstack([channels(tuple(options.shape), seed) for seed in options.seed]))
+
+
+if __name__ == "__main__":
+    main()
