@@ -18,7 +18,6 @@ import PIL.Image
 from skimage import data
 
 import simdtex
-from simdtex.live import session
 from simdtex.live.job import Picture
 from simdtex.machine import open_machine
 
@@ -47,7 +46,6 @@ def watched(page, size, seed):
 
 
 def cost(machine, sizes, runs):
-    session.IDLE = 1e6  # no figures of quality meanwhile
     page = Fake(Picture("sample.png", SAMPLE, -1), machine=machine)
     for size in sizes:
         page.ask("frame", kind="view", left=0, top=0, width=size, height=size)

@@ -222,36 +222,6 @@ def test_a_run_pauses_resumes_and_is_cancelled(page, wall):
     assert page.results == 2
 
 
-@pytest.mark.slow
-def test_an_earlier_result_is_shown_during_a_run(page, wall):
-    page.script("page.auto.checked = false")
-    drop(page.driver, wall)
-    page.result(1)
-    assert not page.one(".strip .current").is_displayed()
-    page.put("Result width", 1000)
-    page.put("Result height", 750)
-    page.button("Make the texture").click()
-    until(lambda: page.script("return page.running"))
-    until(lambda: page.one(".strip .current button").get_attribute("aria-current") == "true")
-    until(lambda: page.script("return page.view.frame.of") == "run")
-    page.all(".strip button")[0].click()
-    until(lambda: page.script("return page.view.frame.of") == 1)
-    assert page.script("return page.running && page.view.frame.rows") == 128, "the run goes on"
-    until(lambda: page.labelled("Result width").get_attribute("value") == "144")
-    before = page.script("return page.progress.value")
-    until(lambda: page.script("return page.progress.value") > before)
-    page.button("Present run").click()
-    until(lambda: page.script("return page.view.frame.rows") == 750)
-    assert not page.one(".result [aria-label=Download]").is_displayed()
-    page.all(".strip button")[0].click()
-    until(lambda: page.script("return page.view.frame.of") == 1)
-    page.result(2, timeout=180)
-    assert page.script("return page.shown") == 1, "it is not taken away from whoever looks at it"
-    assert not page.one(".strip .current").is_displayed()
-    page.all(".strip button")[1].click()
-    until(lambda: page.script("return page.view.frame.rows") == 750)
-
-
 def test_a_painted_hole_is_filled_and_nothing_else_changes(page, wall, tmp_path):
     drop(page.driver, wall)
     page.result(1)
@@ -344,15 +314,6 @@ def test_everything_is_done_by_the_keyboard_alone(page):
 
 
 @pytest.mark.slow
-def test_a_page_that_is_loaded_again_has_its_results(page, wall):
-    drop(page.driver, wall)
-    page.result(1)
-    page.driver.refresh()
-    page.result(1)
-    assert "wall.png" in page.one(".named").text
-
-
-@pytest.mark.slow
 def test_a_killed_server_is_told_and_a_new_one_found(chromium, wall):
     with live("--device", "reference", SIMDTEX_LIVE_TOKEN=TOKEN) as (process, address):
         page = Page(chromium, address)
@@ -387,7 +348,6 @@ def test_nothing_keeps_people_out(page, wall, dark):
     drop(page.driver, wall)
     page.result(1)
     page.script("document.querySelectorAll('details').forEach((one) => (one.open = true))")
-    until(lambda: page.all(".figures dt"))
     assert page.faults() == []
 
 

@@ -1,6 +1,5 @@
-"""The sessions of the live page: lines that repeat a result, restarts, pauses, frames, and error messages."""
+"""The sessions of the live page: command lines that repeat a result, restarts, pauses, frames, and error messages."""
 
-import runpy
 import shlex
 from types import SimpleNamespace
 
@@ -68,46 +67,40 @@ JOBS = {
 SLOW = ("guide-everywhere", "guide-of-a-part", "extend-a-part", "multires-auto")
 
 
-def assert_lines_repeat(page, number, folder, monkeypatch):
-    """The command line and the script of a package write the bytes of its outputs from its other files."""
+def assert_command_repeats(page, number, folder, monkeypatch):
+    """The command line of a package writes the bytes of its outputs from its other files."""
     files, result = page.package(number), page.session.results[number]
-    assert files["again.txt"].decode() == result.job.command and files["again.py"].decode() == result.job.python
+    assert files["again.txt"].decode() == result.job.command
     outputs = [name for name in files if name.startswith("texture")]
     assert len(outputs) == 1 + len(result.maps)
     for name in set(files) - set(outputs):
         (folder / name).write_bytes(files[name])
     monkeypatch.chdir(folder)
     monkeypatch.setenv("SIMDTEX_DEVICE", "reference")
-
-    def run_command():
-        words = shlex.split(result.job.command)
-        done = CliRunner().invoke(cli.main, [*words[1:], "--quiet"], catch_exceptions=False)
-        assert (words[0], done.exit_code) == ("simdtex", 0), done.output
-
-    for run in (run_command, lambda: runpy.run_path("again.py")):
-        run()
-        for name in outputs:
-            assert (folder / name).read_bytes() == files[name], name
-            (folder / name).unlink()
+    words = shlex.split(result.job.command)
+    done = CliRunner().invoke(cli.main, [*words[1:], "--quiet"], catch_exceptions=False)
+    assert (words[0], done.exit_code) == ("simdtex", 0), done.output
+    for name in outputs:
+        assert (folder / name).read_bytes() == files[name], name
 
 
 @pytest.mark.parametrize("case", [pytest.param(one, marks=[pytest.mark.slow] * (one in SLOW)) for one in JOBS])
-def test_the_lines_of_a_result_repeat_its_bytes(opened, case, tmp_path, monkeypatch):
+def test_the_command_of_a_result_repeats_its_bytes(opened, case, tmp_path, monkeypatch):
     carries = JOBS[case].get("method") != "pyramid"
     opened.ask("maps", png(texture(channels=1, seed=2)), kind="map", name="Height map.png")
     result = opened.result(**JOBS[case])
     maps = ["map height-map"] * carries
     assert [layer for layer in result["layers"] if layer.startswith("map")] == maps
-    assert_lines_repeat(opened, 1, tmp_path, monkeypatch)
+    assert_command_repeats(opened, 1, tmp_path, monkeypatch)
 
 
 @pytest.mark.parametrize("of_result", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_the_lines_of_a_filled_hole_repeat_its_bytes(opened, of_result, tmp_path, monkeypatch):
+def test_the_command_of_a_filled_hole_repeats_its_bytes(opened, of_result, tmp_path, monkeypatch):
     opened.ask("maps", png(texture(channels=1, seed=2)), kind="map", name="h.png")
     before = opened.result()["result"] if of_result else None
     result = opened.result(job="fill", of=before, hole=[stroke((30, 20), (40, 24)), stroke((35, 22), label=0, width=2)])
     assert set(result["files"]) == {"texture.png", "texture-h.png", "arrangement.npz", "texture.zip"}
-    assert_lines_repeat(opened, result["result"], tmp_path, monkeypatch)
+    assert_command_repeats(opened, result["result"], tmp_path, monkeypatch)
 
 
 @pytest.mark.parametrize("name", ["hole.png", "guide-sample.png", "texture.png"])
@@ -301,25 +294,6 @@ def test_the_last_request_counts(opened):
     assert opened.kinds().count("result") == 1
     begin_and_pause(opened, seed=1)
     assert opened.ask("result", **asked(seed=2))[0]["settings"]["seed"] == 2, "and ends a paused run"
-
-
-def test_another_picture_ends_the_run(opened):
-    begin_and_pause(opened)
-    after = len(opened.got)
-    opened.ask("ended", png(texture(seed=3)), kind="open", name="other.png")
-    assert [kind for kind in opened.kinds(after) if kind in ("picture", "ended")] == ["picture", "ended"]
-
-
-def test_figures_of_quality_come_when_nothing_else_is_asked_for(page, monkeypatch):
-    monkeypatch.setattr(sessions, "IDLE", 0.02)
-    page.ask("picture", png(texture(64, 64)), kind="open", name="a.png")
-    page.result(width=64, height=64)
-    while len(page.wait("quality", after=len(page.got) - 1)[0]["figures"]) < 8:
-        pass
-    figures = {one["label"]: one["value"] for one in page.latest.figures}
-    found = simdtex.quality.measure(texture(64, 64), page.latest.image, page.latest.source)
-    assert figures["Effective share of the sample"] == found.effective_share
-    assert figures["Repeats in the result"] == found.repeats
 
 
 def test_a_page_that_is_loaded_again_gets_everything(opened):

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The one writer: a file or folder is written completely or not at all, and a checked file carries its SHA-256.
 
-What is being written has a hidden name in the target's folder, ``.simdtex-HOST-PROCESS-TOKEN`` with the target's
-suffix, and is renamed at the end. HOST and PROCESS identify the writer: the next write into the folder removes what
-killed processes have left, and spares what other processes are writing.
+While it is written it has a hidden name in the target's folder, ``.simdtex-TOKEN`` with the target's suffix, and is
+renamed at the end. A killed process leaves its hidden file, which a later write into the folder removes after a day.
 """
 
 from __future__ import annotations
@@ -14,17 +13,18 @@ import os
 import re
 import secrets
 import shutil
-import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
 PathLike = str | os.PathLike[str]
 
-_HIDDEN = re.compile(r"\.simdtex-([0-9a-f]{8})-([0-9]+)-[0-9a-f]{8}(\..*)?")
+_HIDDEN = re.compile(r"\.simdtex-[0-9a-f]{16}(\..*)?")
+_LEFT = 86400.0
+"""Age in seconds from which on a hidden file is one that a killed process has left."""
+
 _HEADER = b"simdtex sha256 %s\n"
 _HEADER_SIZE = len(_HEADER % (b"0" * 64))
 
@@ -72,7 +72,7 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
     """
     target = Path(os.path.realpath(path))
     temporary = _hidden(target)
-    old = target.with_name(f".simdtex-old-{_digits(target.name)}")
+    old = target.with_name(f".simdtex-old-{hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]}")
     try:
         _remove_leftovers(target)
         if old.exists() and not target.exists():  # a process was killed while it replaced the folder
@@ -159,22 +159,18 @@ def _sync(path: Path, flags: int = os.O_RDWR) -> None:
 
 def check_target(target: Path) -> None:
     """Raise ValueError unless a file can be written at `target`."""
-    folder = target.parent
     try:
         if target.is_dir():
             raise ValueError(f"{target} is a folder: add a file name to it")
         if target.exists() and not target.is_file():
             raise ValueError(f"{target} is not a regular file: give another name")
-        if not folder.is_dir():
-            remedy = "is not a folder: give another path" if folder.exists() else "does not exist: create it first"
-            raise ValueError(f"the folder {folder} {remedy}")
+        if not target.parent.is_dir():
+            raise ValueError(f"there is no folder {target.parent}: create it first")
         os.stat(target)
     except FileNotFoundError:
         pass
     except OSError as error:
-        text = str(target)
-        text = text if len(text) <= 100 else text[:97] + "..."
-        raise ValueError(f"{text} cannot be written ({error.strerror}): give another path") from None
+        raise ValueError(f"{str(target)[:100]} cannot be written ({error.strerror}): give another path") from None
     check_folder_writable(target)
 
 
@@ -185,18 +181,9 @@ def check_folder_writable(target: Path) -> None:
 
 
 def _not_written(path: PathLike, error: OSError) -> NotWritten:
-    full = error.errno in (errno.ENOSPC, errno.EDQUOT)
-    if error.errno is None:  # NumPy and others report how much was written, and not why writing stopped
-        try:
-            full = shutil.disk_usage(os.path.dirname(os.path.realpath(path))).free < 2**16
-        except OSError:
-            full = False
-    if full or error.errno:
-        reason = os.strerror(error.errno or errno.ENOSPC)
-    else:
-        reason = " ".join(str(error).split())[:100] or "unknown reason"
-    remedy = "free some space" if full else "choose another path"
-    return NotWritten(f"{os.fspath(path)} could not be written ({reason}): {remedy}")
+    number = error.errno or errno.ENOSPC  # NumPy and others do not say why only a part was written
+    remedy = "free some space" if number in (errno.ENOSPC, errno.EDQUOT) else "choose another path"
+    return NotWritten(f"{os.fspath(path)} could not be written ({os.strerror(number)}): {remedy}")
 
 
 @contextmanager
@@ -229,43 +216,23 @@ def exclusive(path: PathLike) -> Iterator[None]:
             hidden.unlink(missing_ok=True)
 
 
-@cache
-def _host() -> str:
-    """Eight digits for the host and, in a container, its process namespace."""
-    try:
-        namespace = os.readlink("/proc/self/ns/pid")
-    except OSError:
-        namespace = ""
-    return _digits(f"{socket.gethostname()} {namespace}")
-
-
-def _digits(text: str) -> str:
-    return hashlib.sha256(text.encode(errors="surrogateescape")).hexdigest()[:8]
-
-
 def _hidden(target: Path) -> Path:
-    return target.with_name(f".simdtex-{_host()}-{os.getpid()}-{secrets.token_hex(4)}{target.suffix}")
+    return target.with_name(f".simdtex-{secrets.token_hex(8)}{target.suffix}")
 
 
-def is_leftover(name: str) -> bool:
-    """Return whether a file name is that of an unfinished write by a process of this host that has ended."""
-    found = _HIDDEN.fullmatch(name)
-    if found is None or found[1] != _host() or os.name != "posix":  # elsewhere os.kill would end the process
-        return False
+def is_leftover(path: Path) -> bool:
+    """Return whether a path is that of an unfinished write, begun more than a day ago."""
     try:
-        os.kill(int(found[2]), 0)
-    except ProcessLookupError:
-        return True
-    except (OSError, OverflowError):
-        pass
-    return False
+        return bool(_HIDDEN.fullmatch(path.name)) and time.time() - path.stat().st_mtime > _LEFT
+    except OSError:  # it has been renamed meanwhile
+        return False
 
 
 def _remove_leftovers(target: Path) -> None:
     """Remove what killed processes have left in the target's folder."""
     for entry in target.parent.iterdir():
-        if is_leftover(entry.name):
-            if entry.is_dir() and not entry.is_symlink():
+        if is_leftover(entry):
+            if entry.is_dir():
                 shutil.rmtree(entry, ignore_errors=True)
             else:
                 entry.unlink(missing_ok=True)

@@ -108,8 +108,8 @@ def _read_tiff(data: bytes, most: int) -> Array:
         if any(offset + count > len(data) for offset, count in ends):
             raise ValueError("it ends before its last pixel")
         kind, compression = int(page.photometric), int(page.compression)
-        if kind > 3 or compression in (6, 7):
-            return _read_pillow(data, most)  # JPEG, and print and video colours, which Pillow converts to RGB
+        if kind > 2 or compression in (6, 7):
+            return _read_pillow(data, most)  # JPEG, palettes, and print and video colours, which Pillow converts to RGB
         if compression not in _COMPRESSIONS:
             raise ValueError(f"it is compressed by the method {compression}; save it with Deflate or uncompressed")
         pixels = page.asarray()
@@ -121,11 +121,8 @@ def _read_tiff(data: bytes, most: int) -> Array:
             raise ValueError(f"its axes are {page.axes}, not rows, columns and channels")
         orientation = int(page.tags.valueof(274, 1))
         alpha = bool(page.extrasamples) and int(page.extrasamples[-1]) in (1, 2)
-        colours = page.colormap
     if kind == 0:  # white is zero
-        pixels = ~pixels if pixels.dtype.kind in "bu" else -pixels
-    if kind == 3 and colours is not None:
-        pixels = (np.moveaxis(colours, 0, -1)[pixels] >> 8).astype(np.uint8)
+        pixels = ~pixels
     if pixels.dtype == bool:
         pixels = pixels * np.uint8(255)
     return _finished(pixels, orientation, alpha)

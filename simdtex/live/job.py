@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What the page asks for: the call of a public function, and the command line and Python lines that repeat it."""
+"""What the page asks for: the call of a public function, and the command line that repeats it."""
 
 from __future__ import annotations
 
@@ -48,10 +48,6 @@ WHOLE = (slice(None), slice(None))
 RESERVED = ("", "texture", "hole", "guide-sample", "guide-texture")
 """Names that a picture's files cannot have, since other files of a package have them."""
 
-READ_GUIDE = """own = image.read('guide-sample.png').pixels
-wanted, left_open = image.split_alpha(image.read('guide-texture.png').pixels)
-guide = own, np.where(left_open, np.nan, wanted)"""
-
 
 class Picture(NamedTuple):
     """A picture that was given: the name of its file, its pixels, and their channel axis or None."""
@@ -85,9 +81,9 @@ class Job:
     options : dict
         Of the method, those that differ from their defaults.
     files : dict
-        The pictures that the command line and the Python lines read, by file name.
+        The pictures that the command line reads, by file name.
     output, carried : str, dict
-        The files that they write: the picture, and the further maps by name.
+        The files that it writes: the picture, and the further maps by name.
 
     Raises ValueError or TypeError if the message is wrong; the sentence says how.
     """
@@ -102,7 +98,7 @@ class Job:
         whole("seed", seed, 0, 2**32 - 1)
         maps = {} if self.method == "pyramid" else maps
         self._keywords: dict[str, Any] = {}
-        self._arguments, self._flags = ["picture.pixels"], list[str]()
+        self._flags: list[str] = []
         part = _part(message.get("part") if self.kind != "fill" else None, picture.pixels.shape)
         number = message.get("of") if self.kind == "fill" else None
         if number is None:
@@ -119,7 +115,7 @@ class Job:
         else:
             self._fill(message.get("hole", []))
         self._add("rng", seed, "--seed", str(seed))
-        self._add("channel_axis", picture.channel_axis, text="picture.channel_axis")
+        self._add("channel_axis", picture.channel_axis)
         self.options = _options(message.get("options", {}), self.method if self.kind == "synth" else self.kind)
         for name, value in self.options.items():
             self._add(name, value, f"--{name.replace('_', '-')}", *([] if value is True else [str(value)]))
@@ -137,21 +133,6 @@ class Job:
         words += [word for read, write in self._also for word in ("--also", f"{read}={write}")]
         return shlex.join(words) + "\n"
 
-    @property
-    def python(self) -> str:
-        """The lines of Python that make the same bytes from the files."""
-        guided = "guide" in self._keywords
-        arguments = ", ".join([*self._arguments, *["full_output=True"] * bool(self.maps)])
-        lines = ["import numpy as np\n"] if guided else []
-        lines += ["import simdtex", "from simdtex.io import image"]
-        lines += ["from simdtex.model.source_map import apply_source_map"] if self.maps else []
-        lines += ["", f"picture = image.read({next(iter(self.files))!r})", *[READ_GUIDE] * guided]
-        lines += [f"texture{', output' * bool(self.maps)} = simdtex.{FUNCTIONS[self.kind].__name__}({arguments})"]
-        lines += [f"image.write({self.output!r}, texture)"]
-        for read, write in self._also:
-            lines += [f"image.write({write!r}, apply_source_map(output.source, image.read({read!r}).pixels))"]
-        return "\n".join(lines) + "\n"
-
     def _read(self, name: str, sample: Array, maps: Maps) -> None:
         """Take the sample and its maps, whose files begin with `name`."""
         self.sample, self.maps = sample, maps
@@ -161,10 +142,9 @@ class Job:
         self._also = list(zip(files, self.carried.values(), strict=True))
         self.files = {f"{name}{_suffix(sample)}": sample, **files}
 
-    def _add(self, name: str, value: Any, *flags: str, text: str = "") -> None:
-        """Add an argument to the call, to the command line, and to the lines of Python, where it is `text`."""
+    def _add(self, name: str, value: Any, *flags: str) -> None:
+        """Add an argument to the call and to the command line."""
         self._keywords[name] = value
-        self._arguments.append(f"{name}={text or repr(value)}")
         self._flags += flags
 
     def _synthesize(self, message: Message, picture: Picture, part: tuple[slice, slice]) -> None:
@@ -184,8 +164,8 @@ class Job:
             raise ValueError(f"label {missing[0]} is on the output and not on the sample; paint it on the sample too")
         transparent = np.stack([wanted, np.where(wanted > 0, 255, 0)], -1).astype(np.uint8)
         self.files |= {"guide-sample.png": own, "guide-texture.png": transparent}
-        flags = ("--guide", "guide-sample.png=guide-texture.png")
-        self._add("guide", (own, np.where(wanted == 0, np.nan, wanted)), *flags, text="guide")
+        guide = own, np.where(wanted == 0, np.nan, wanted)
+        self._add("guide", guide, "--guide", "guide-sample.png=guide-texture.png")
         self._add("labels", True)
 
     def _fill(self, strokes: Any) -> None:
@@ -195,7 +175,7 @@ class Job:
         if hole.all():
             raise ValueError("the hole covers the whole picture; leave some of it")
         self.files["hole.png"] = hole * np.uint8(255)
-        self._add("mask", hole, "--mask", "hole.png", text="image.read_mask('hole.png', picture.pixels.shape)")
+        self._add("mask", hole, "--mask", "hole.png")
 
 
 def paint(strokes: Any, shape: tuple[int, ...]) -> NDArray[np.uint8]:

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The results of a page: what it shows of them, their files, and their figures of quality."""
+"""The results of a page: what it shows of them, and their files."""
 
 from __future__ import annotations
 
 from functools import cached_property, partial
-from math import isfinite
 from pathlib import Path
 from shutil import make_archive
 from tempfile import TemporaryDirectory
@@ -13,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.experiments.quality import measure
 from simdtex.io.image import write
 from simdtex.live import frames
 from simdtex.live.job import Job
@@ -32,25 +30,6 @@ THUMBNAIL = 96
 
 ARRANGEMENT, ARCHIVE = "arrangement.npz", "texture.zip"
 
-MEASURED = 384
-"""Figures of quality are those of the middle of a result, of so many rows and columns at most."""
-
-FIGURES = {
-    "effective_use": {
-        "effective_share": ("Effective share of the sample", "1 uses all of it alike"),
-        "most_used": ("Most used piece, times its fair share", "1 is fair"),
-    },
-    "seam": {"seam": ("Seam where the result tiles", "1 does not show")},
-    "repeats": {
-        "repeats": ("Repeats in the result", "0 has none"),
-        "own_repeats": ("Repeats in the sample", "for comparison"),
-    },
-    "plausibility": {"plausibility": ("Distance of its patches from the sample's", "0 is best")},
-    "coverage": {"coverage": ("Distance of the sample's patches from its own", "0 is best")},
-    "copying": {"copying": ("Share of patches that are copied whole", "1 is a copy")},
-}
-"""The figures of `simdtex.quality` that the page shows, in the order of computation, with labels and hints."""
-
 
 class Result:
     """A result: its ``number``, from 1, its job, what the job returned, and the duration of the run with its frames."""
@@ -62,9 +41,6 @@ class Result:
         complete = self.source is not None and bool((self.source[..., 0] >= 0).all())  # every pixel has a source
         source: Any = self.source if complete else None
         self.maps = {name: apply_source_map(source, one) for name, one in job.maps.items() if complete}
-        self.figures: list[dict[str, Any]] = []
-        measurable = job.kind == "synth" and min(*image.shape[:2], *job.sample.shape[:2]) >= 48
-        self.unmeasured = [name for name in FIGURES if measurable and (complete or name != "effective_use")]
         arrays = [None if one is None else partial(np.asarray, one) for one in (source, self.temperature)]
         self.layers = frames.layers(job.sample, job.shape, lambda: image, *arrays)
         for name, one in self.maps.items():
@@ -87,8 +63,7 @@ class Result:
             **{"result": self.number, "width": self.job.shape[1], "height": self.job.shape[0]},
             **{"seconds": self.seconds, "device": self.device, "settings": self.job.message},
             **{"layers": ["sample", *self.layers], "files": self.files},
-            **{"command": self.job.command, "python": self.job.python, "figures": self.figures},
-            "thumbnail": [self.thumbnail.width, self.thumbnail.height],
+            **{"command": self.job.command, "thumbnail": [self.thumbnail.width, self.thumbnail.height]},
         }
 
     @property
@@ -98,7 +73,7 @@ class Result:
 
     @property
     def files(self) -> list[str]:
-        """The names of its files; the last is an archive of the others, the files that the job reads, and its lines."""
+        """The names of its files; the last is an archive of the others, the files the job reads, and its command."""
         return [*self._pictures, *[ARRANGEMENT] * (self.source is not None), ARCHIVE]
 
     def file(self, name: str) -> bytes:
@@ -115,20 +90,7 @@ class Result:
             if name != ARCHIVE:
                 return (folder / name).read_bytes()
             (folder / "again.txt").write_text(self.job.command, encoding="utf-8")
-            (folder / "again.py").write_text(self.job.python, encoding="utf-8")
             return Path(make_archive(str(folder), "zip", folder)).read_bytes()
-
-    def measure(self) -> None:
-        """Compute the next figures of quality."""
-        name = self.unmeasured.pop(0)
-        sample, image, source = self.job.sample, self.image, self.source if name == "effective_use" else None
-        if name not in ("seam", "effective_use"):  # which are of edges, or quick
-            sample, image = _middle(sample), _middle(image)
-        found = measure(sample, image, source, figures=(name,))
-        for key, (label, hint) in FIGURES[name].items():
-            value = getattr(found, key)
-            known = value is not None and isfinite(value)
-            self.figures.append({"label": label, "hint": hint, "value": float(value) if known else None})
 
 
 class Results(dict[int, Result]):
@@ -153,8 +115,3 @@ class Results(dict[int, Result]):
         if number not in self:
             raise ValueError(f"result {number} is no longer kept; make it again with its command line")
         return self[number]
-
-
-def _middle(pixels: NDArray[Any]) -> NDArray[Any]:
-    top, left = (max(0, (side - MEASURED) // 2) for side in pixels.shape[:2])
-    return pixels[top : top + MEASURED, left : left + MEASURED]

@@ -58,9 +58,6 @@ MAX_RATE = 30
 MAX_UNSEEN = 2
 """Frames that are sent before the page has shown one, at most."""
 
-IDLE = 0.5
-"""Seconds without a message before figures of quality are computed."""
-
 EXAMPLES = ("brick", "grass", "gravel")
 """Pictures of scikit-image that the page offers."""
 
@@ -97,7 +94,7 @@ class Session:
         self._window = frames.Window()
         self._wanted: Message | None = None  # the job that is asked for, until it is finished
         self._begun: Message | None = None  # what the page was told of the present run
-        self._paused = self._measuring = self._closed = False
+        self._paused = self._closed = False
         self._stale = False  # whether the page waits for another frame
         self._unseen = 0  # frames that the page has not shown yet
         self._next_frame = 0.0  # when the run may be shown again
@@ -120,12 +117,7 @@ class Session:
 
     def _work(self) -> None:
         while not self._closed:
-            result = self._unmeasured
-            try:
-                self._handle(*self._messages.get(timeout=IDLE if result else None))
-            except queue.Empty:
-                self._measuring = True
-                threading.Thread(target=self._measure, args=(result,), daemon=True).start()
+            self._handle(*self._messages.get())
             self._handle_all()
             while self._wanted and not self._closed:
                 self._run(self._wanted)
@@ -348,26 +340,6 @@ class Session:
         elif self._stale:
             self._show_selected()
         self._next_frame = began + max(1 / MAX_RATE, INTERVAL * (time.perf_counter() - began))
-
-    # -- quality --------------------------------------------------------------------------------------------------
-
-    @property
-    def _unmeasured(self) -> Result | None:
-        """The selected result, if it has figures of quality left to compute, and none is being computed."""
-        result = self.results.get(self._selected or 0)
-        return result if result and result.unmeasured and not self._measuring else None
-
-    def _measure(self, result: Result) -> None:
-        """Compute the next figures of a result, in a thread of its own: they may take seconds."""
-        try:
-            result.measure()
-        finally:
-            self.receive({"kind": "measured", "result": result.number})
-
-    def _on_measured(self, message: Message, buffers: Sequence[Any]) -> None:
-        self._measuring = False
-        if result := self.results.get(message.get("result", 0)):
-            self.send({"kind": "quality", "result": result.number, "figures": result.figures}, [])
 
 
 def _read(message: Message, buffers: Sequence[Any]) -> Picture:

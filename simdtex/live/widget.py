@@ -46,7 +46,7 @@ class Live(AnyWidget):
     channel_axis : int, optional
         The axis of the sample that holds channels; None for a grey sample.
     name : str
-        What its file is called in the lines that make a result again.
+        What its file is called in the command line that makes a result again.
     device : str, optional
         As of `simdtex.synthesize`.
 
@@ -58,8 +58,8 @@ class Live(AnyWidget):
         Its source map.
     maps : dict
         Further maps in its arrangement, by name.
-    command, python : str
-        The lines that make the same bytes.
+    command : str
+        The command line that makes the same bytes.
 
     Raises
     ------
@@ -124,10 +124,6 @@ class Live(AnyWidget):
     @property
     def command(self) -> str:  # noqa: D102
         return self._latest.job.command if self._latest else ""
-
-    @property
-    def python(self) -> str:  # noqa: D102
-        return self._latest.job.python if self._latest else ""
 
     def close(self) -> None:
         """End what is being made, and take the widget away."""

@@ -34,7 +34,7 @@ def earlier_files(folder: Path, what: str, own: Callable[[str], bool]) -> list[P
     """
     try:
         if folder.is_dir():
-            found = sorted(path for path in folder.iterdir() if not is_leftover(path.name))
+            found = sorted(path for path in folder.iterdir() if not is_leftover(path))
         elif folder.exists() or folder.is_symlink():
             raise ValueError(f"{folder} is a file: give a folder for {what}")
         elif not folder.parent.is_dir():

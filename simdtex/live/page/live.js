@@ -612,21 +612,15 @@ class Page {
     this.strip = make("ol", { class: "strip", "aria-label": "Results" }, this.currentItem);
     this.files = bar();
     this.command = make("pre", { tabindex: 0, "aria-label": "Command line" });
-    this.python = make("pre", { tabindex: 0, "aria-label": "Python" });
     this.downloads = make(
       "section",
       { "aria-label": "Download", hidden: true },
       make("h3", {}, "Download"),
       this.files,
-      make("p", {}, "These lines make the same bytes from the files in texture.zip:"),
+      make("p", {}, "This line makes the same bytes from the files in texture.zip:"),
       this.command,
       button("Copy the command line", () => this.copy(this.command.textContent)),
-      this.python,
-      button("Copy the lines of Python", () => this.copy(this.python.textContent)),
     );
-    this.figures = make("dl", { class: "figures" });
-    const quality = make("h3", {}, "Figures of quality");
-    this.quality = make("section", { "aria-label": "Quality", hidden: true }, quality, this.figures);
     return make(
       "section",
       { "aria-label": "Result", class: "result" },
@@ -638,7 +632,6 @@ class Page {
       this.paintSet(),
       this.strip,
       this.downloads,
-      this.quality,
     );
   }
 
@@ -721,10 +714,8 @@ class Page {
     this.doing.textContent = this.summary(found);
     this.view.canvas.setAttribute("aria-label", `Result ${result}: ${this.summary(found)}. Arrow keys move, plus and minus zoom, 0 fits.`);
     this.command.textContent = found.command;
-    this.python.textContent = found.python;
     const download = (name) => button(name, () => this.send({ kind: "download", result, name }), { "data-file": name });
     this.files.replaceChildren(...found.files.map(download));
-    this.on_quality(found);
   }
 
   /** Mark a result, or the present run, as the one that is shown. */
@@ -733,7 +724,7 @@ class Page {
     this.shown = result;
     this.mark(result, true);
     const found = this.results.get(result);
-    this.downloads.hidden = this.quality.hidden = !found;
+    this.downloads.hidden = !found;
     if (found || this.running) this.offer(found?.layers ?? this.runLayers);
   }
 
@@ -741,16 +732,6 @@ class Page {
     const marked = result === null ? this.current : this.results.get(result)?.button;
     if (current) marked?.setAttribute("aria-current", "true");
     else marked?.removeAttribute("aria-current");
-  }
-
-  on_quality({ result, figures }) {
-    const found = this.results.get(result);
-    if (found) found.figures = figures;
-    if (result !== this.shown) return;
-    this.quality.hidden = figures.length === 0;
-    const text = (value) => (value === null ? "–" : Number(value).toPrecision(3));
-    const row = ({ label, hint, value }) => [make("dt", {}, label), make("dd", {}, text(value), " ", make("small", {}, hint))];
-    this.figures.replaceChildren(...figures.flatMap(row));
   }
 
   on_file({ name }, [bytes]) {
