@@ -21,7 +21,6 @@ JOBS = {
     "mrf": {"rng": 1},
     "mrf, exact": {"search": "exact", "rng": 1},
     "multires": {"method": "multires", "rng": 1},
-    "multires, alpha auto": {"method": "multires", "alpha": "auto", "rng": 1},
     "pyramid": {"method": "pyramid", "rng": 1},
 }
 

@@ -45,7 +45,7 @@ def main():
     print(f"device: {machine.name}")
     options.out.mkdir(parents=True, exist_ok=True)
     collection = samples.grey() | samples.colour()
-    gravel, tissue = collection["gravel"], collection["tissue"]
+    gravel = collection["gravel"]
     made = {
         "pyramid": partial(pyramids, machine, gravel),
         "filters": partial(responses, machine, gravel),
@@ -56,7 +56,6 @@ def main():
         "beta-0": partial(series, machine, gravel, 0),
         "beta-1": partial(series, machine, gravel, 1),
         "parity": partial(parities, machine, gravel),
-        "colour": partial(colours, machine, tissue),
         "edges": partial(edges, {name: collection[name] for name in ("brick", "gravel", "tissue", "wood")}),
         "seams": partial(seams, machine, {name: collection[name] for name in ("gravel", "brick", "tissue")}),
     }
@@ -92,7 +91,7 @@ def grown(picture, side):
 def responses(machine, gravel):
     """The taps of the default bank, and G_1's responses to them."""
     settings = simdtex.methods.multires.Options()
-    taps = bank(settings.orientations, settings.sigma, settings.filter_size)
+    taps = bank(settings.orientations)
     stretched = machine.put(Stretched(gravel[..., None]).planes)
     gaussian, laplacian = pyramid(machine, stretched, 3, torus=True)
     features = machine.get(filters(machine, gaussian[1], laplacian[1], machine.put(taps), True))
@@ -361,16 +360,6 @@ def parities(machine, gravel):
             image, output = run(machine, gravel, 192, alpha=alpha, parity=parity, seams="cut")
             pictures.append((f"{parity}, alpha {alpha:g}: {mean_candidates(output):.2f} candidates", image))
     return png(contact_sheet(pictures, columns=4))
-
-
-def colours(machine, tissue):
-    """What features of the luminance and of every channel let through."""
-    pictures = [("the sample", tissue)]
-    for features in ("luminance", "channels"):
-        for alpha in (0.2, 0.5):
-            image, output = run(machine, tissue, 192, alpha=alpha, features=features)
-            pictures.append((f"{features}, alpha {alpha:g}: {mean_candidates(output):.2f}", image))
-    return png(contact_sheet(pictures, columns=5))
 
 
 if __name__ == "__main__":

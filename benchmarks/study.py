@@ -83,8 +83,6 @@ MULTIRES = {
     "alpha=0.6": {"alpha": 0.6},
     "alpha=1": {"alpha": 1.0},
     "alpha=inf": {"alpha": np.inf},
-    "alpha=auto": {"alpha": "auto"},
-    "alpha=auto, beta=1": {"alpha": "auto", "beta": 1.0},
     "alpha=1, beta=1": {"alpha": 1.0, "beta": 1.0},
     "alpha=4, beta=2": {"alpha": 4.0, "beta": 2.0},
     "alpha=8, beta=3": {"alpha": 8.0, "beta": 3.0},
@@ -92,10 +90,6 @@ MULTIRES = {
     "orientations=0": {"orientations": 0},
     "orientations=2": {"orientations": 2},
     "orientations=8": {"orientations": 8},
-    "sigma=0.5": {"sigma": 0.5},
-    "sigma=1": {"sigma": 1.0},
-    "filter_size=5, sigma=1": {"filter_size": 5, "sigma": 1.0},
-    "features=channels": {"features": "channels"},
     "boundary=open": {"boundary": "open"},
 }
 PYRAMID = {
@@ -118,11 +112,8 @@ PYRAMID = {
     "color=channels": {"color": "channels"},
 }
 UNSEEN = {  # not on the sheets, where they look like others
-    "alpha=auto, beta=1",
     "orientations=2",
     "orientations=8",
-    "sigma=0.5",
-    "sigma=1",
     "xi=-2",
     "free_sweeps=0",
     "iterations=2",
@@ -173,7 +164,7 @@ STUDIES = {
     ),
     "multires": Study(
         settings=MULTIRES,
-        skipped={"colour": [], "grey": ["features=channels"]},
+        skipped={"colour": [], "grey": []},
         figures=(*FIGURES, "repetition"),
         seeds=3,
         table="multires.csv",
@@ -252,21 +243,18 @@ def main():
             figures, seconds = [], []
             for seed in range(1, (fixed or options.seeds or study.seeds) + 1):
                 began = time.perf_counter()
-                made, output = simdtex.synthesize(
+                made = simdtex.synthesize(
                     sample,
                     (2 * sample.shape[0], 2 * sample.shape[1]),
                     channel_axis=-1 if in_colour else None,
                     rng=seed,
                     device=machine,
-                    full_output=True,
                     **given,
                 )
                 seconds.append(time.perf_counter() - began)
                 wanted = ["tones" if name == "contrast" else name for name in study.figures if name != "repetition"]
                 found = {**asdict(measure(sample, made, figures=wanted)), "repetition": repetition(sample, made)}
                 figures.append([found[figure] for figure in study.figures])
-            if given.get("alpha") == "auto":
-                setting = f"{setting} ({output.statistics['options']['alpha']:g})"
             mean = np.mean(figures, 0)
             rows.append([name, setting, *(f"{value:.2f}" for value in mean)])
             print(f"{name:8}{setting:32}", *rows[-1][2:], f"{np.mean(seconds):.1f} s", flush=True)

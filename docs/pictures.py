@@ -151,8 +151,8 @@ def methods():
 
 
 def alpha():
-    found = [simdtex.synthesize(gravel(), SHAPE, method="multires", alpha=a, rng=1) for a in (0, "auto", 1)]
-    return [("alpha 0", found[0]), ("alpha auto", found[1]), ("alpha 1", found[2])]
+    found = [simdtex.synthesize(gravel(), SHAPE, method="multires", alpha=a, rng=1) for a in (0, 0.3, 1)]
+    return [("alpha 0", found[0]), ("alpha 0.3", found[1]), ("alpha 1", found[2])]
 
 
 def paper():

@@ -142,16 +142,6 @@ def tables():
     }
 
 
-def thresholds():
-    """Tables of thresholds."""
-    return {
-        "thresholds.txt": b"0.1\n0.2\n0.3\n0.4\n",
-        "wide.csv": b"0.1,0.2,0.3\n0.1,0.2,0.3\n",
-        "ragged.txt": b"1 2\n3\n",
-        "inf.txt": b"inf\ninf\ninf\ninf\n",
-    }
-
-
 def volumes():
     """Blocks in every format, 6 x 6 x 6."""
     import tifffile
@@ -209,7 +199,6 @@ def build():
         "picture": pictures(),
         "mask": masks(),
         "table": tables(),
-        "thresholds": thresholds(),
         "volume": volumes(),
         "strange": strange(),
     }

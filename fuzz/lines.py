@@ -22,7 +22,6 @@ COMMANDS = {
     "solid": 8,
     "mix": 8,
     "ising": 6,
-    "sheet": 1,
     "resume": 0.5,
     "schedules": 0.1,
     "devices": 0.1,
@@ -48,11 +47,9 @@ MODEST = {
     **dict.fromkeys(("left", "right", "top", "bottom", "band", "reach"), (0, 1, 3)),
     **dict.fromkeys(("seeds", "sweeps"), (2, 3)),
     **dict.fromkeys(("burn_in", "number", "jobs", "first"), (0, 1, 2)),
-    "filter_size": (3, 5),
     "seed": (0, 1, 2**63),
     "xi": (-1, -0.5, -5),
     "tiles": (8, 12, 16),
-    "sigma": (0.5, 0.7, 2),
 }
 """Values that make sense on pictures of ten pixels a side; other numbers are small ones."""
 
@@ -78,7 +75,7 @@ LONG = ("free_sweeps", "iterations", "sweeps", "burn_in", "number", "seeds")
 OTHERS = ("workers",)
 """Options that start processes or ask the network."""
 
-DEEP = {"synth": 0.6, "sheet": 0.8, "schedules": 0.7, "demo": 0.2, "bench": 0.0}
+DEEP = {"synth": 0.6, "schedules": 0.7, "demo": 0.2, "bench": 0.0}
 """Share of tries with options that make sense alone."""
 
 OUTPUTS = {
@@ -202,8 +199,6 @@ class _Maker:
             words += ["--seeds", "1", "--schedule", "coloring", "--order", "1"]
         if name == "bench":  # which measures for minutes
             words += ["--json", "no/such/file.json"]
-        if name == "sheet":
-            words += ["--alpha", "0.1", "--beta", "0"]
         if name in ("simulate", "synth", "fill", "extend") and method in (None, "mrf"):
             words += ["--order", rng.choice("1124")]
         words += ["--number", rng.choice("1112")] if name == "simulate" else []
@@ -213,7 +208,7 @@ class _Maker:
         usual = [option for option in options if not taken & set(option.opts) and option.name not in OTHERS]
         if method and fitting:
             usual = [option for option in usual if _of_method(option, method)]
-        self.method = {"solid": "pyramid", "mix": "pyramid", "sheet": "multires"}.get(name, method or "mrf")
+        self.method = {"solid": "pyramid", "mix": "pyramid"}.get(name, method or "mrf")
         if fitting:
             useless = ("profile", *(("source_map", "also") if self.method == "pyramid" else ()))
             usual = [option for option in usual if option.name not in useless]
@@ -288,7 +283,7 @@ class _Maker:
             return rng.choice(("pages", "a/b", "out.png") if rng.random() < 0.3 else ("pages",))
         if name in ("source_map", "picture", "json", "plot"):
             return rng.choice(("map.npz", "map.npy", "map.png", "out.png", "view.png"))
-        role = {"sample_mask": "mask", "known": "table", "thresholds": "thresholds"}.get(name, "picture")
+        role = {"sample_mask": "mask", "known": "table"}.get(name, "picture")
         if name == "start" and command == "solid":
             role = "volume"
         if name == "known" and rng.random() < 0.4:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from simdtex.machine.devices import DeviceError, devices
     from simdtex.methods.pyramid.mixtures import mix
     from simdtex.run import Output, Progress
-    from simdtex.synthesis import lcpdf, suggest_alpha, synthesize, synthesize_solid
+    from simdtex.synthesis import lcpdf, synthesize, synthesize_solid
 
     __version__: str
 
@@ -37,7 +37,6 @@ __all__ = [
     "quality",
     "read_hard_data",
     "simulate",
-    "suggest_alpha",
     "synthesize",
     "synthesize_solid",
 ]
@@ -57,7 +56,6 @@ _HOMES = {
     "place_hard_data": "simdtex.io.hard_data",
     "read_hard_data": "simdtex.io.hard_data",
     "simulate": "simdtex.jobs.simulation",
-    "suggest_alpha": "simdtex.synthesis",
     "synthesize": "simdtex.synthesis",
     "synthesize_solid": "simdtex.synthesis",
 }

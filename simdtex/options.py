@@ -65,27 +65,22 @@ class Whole:
 
 @dataclass(frozen=True)
 class Number:
-    """A number from `least` to `most`, one of which may be excluded; or, if given, the word `word`."""
+    """A number from `least` to `most`, one of which may be excluded."""
 
     least: float
     most: float = GREATEST
     above: bool = False
     below: bool = False
-    word: str = ""
 
     def check(self, name: str, value: Any) -> None:
-        """Raise unless the value is a number within the range, or the word."""
-        if not self.word or not isinstance(value, str):
-            real(name, value, self.least, self.most, above=self.above, below=self.below)
-        elif value != self.word:
-            raise ValueError(f"{name} is {shown(value)}; give a number of at least {self.least}, or {self.word!r}")
+        """Raise unless the value is a number within the range."""
+        real(name, value, self.least, self.most, above=self.above, below=self.below)
 
     def __str__(self) -> str:
         if self.below:
             return f"float, below {self.most}"
         least = f"above {self.least}" if self.above else f"{self.least} or more"
-        least = least if self.most in (GREATEST, np.inf) else f"{self.least} to {self.most:g}"
-        return f'float, {least}, or "{self.word}"' if self.word else f"float, {least}"
+        return f"float, {least if self.most in (GREATEST, np.inf) else f'{self.least} to {self.most:g}'}"
 
 
 @dataclass(frozen=True)

@@ -263,61 +263,6 @@ def synthesize_solid(
     return execute("synthesize_solid", run, lambda: {"shape": size, "options": chosen, "sample": pixels}, axis, call)
 
 
-def suggest_alpha(
-    sample: ArrayLike,
-    *,
-    channel_axis: int | None = None,
-    device: str | Machine | None = None,
-    **options: Any,
-) -> float:
-    """Return the threshold of the method ``multires`` that leaves as much choice as seams allow.
-
-    Parameters
-    ----------
-    sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
-        As in `synthesize`.
-    channel_axis : int, optional
-        As in `synthesize`.
-    device : str, optional
-        As in `synthesize`.
-    **options
-        Others of the method, see `simdtex.methods.multires.Options`.
-
-    Returns
-    -------
-    float
-        alpha, which ``alpha="auto"`` takes: the largest multiple of 1/100 up to 0.4 at which a texture as large as the
-        sample has a strain of 0.05 or less, 0 if there is none. The strain is how much pieces of the sample that meet
-        differ from what either would go on with: 0 is nothing, 1 as much as unrelated pieces.
-
-    Raises
-    ------
-    ValueError, TypeError
-        What is wrong and what would be right, in one sentence.
-
-    Notes
-    -----
-    Cost: six textures of the sample's size.
-
-    Examples
-    --------
-    >>> from skimage import data
-    >>> import simdtex
-    >>> gravel = data.gravel()[:64, :64]
-    >>> simdtex.suggest_alpha(gravel)
-    0.3
-    """
-    from simdtex.methods.multires import Options, alpha
-    from simdtex.methods.multires.analysis import analyse
-
-    pixels = check_sample(sample, channel_axis)
-    for name in {"alpha", "thresholds"} & set(options):
-        raise TypeError(f"suggest_alpha finds alpha; leave {name} out")
-    chosen = resolve(Options, "synth", options)
-    machine = open_machine(device)
-    return alpha.suggest_alpha(machine, analyse(machine, pixels, chosen), chosen)
-
-
 def lcpdf(
     image: ArrayLike,
     sample: ArrayLike,

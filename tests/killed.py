@@ -32,9 +32,7 @@ HOLE = np.zeros((20, 22), bool)
 HOLE[3:6, 4:7] = HOLE[14:18, 13:17] = True
 JOBS = {
     "mrf": lambda **how: simdtex.synthesize(GREY, (20, 18), order=2, **how),
-    "multires": lambda **how: simdtex.synthesize(
-        COLOUR, (96, 80), method="multires", alpha="auto", channel_axis=-1, **how
-    ),
+    "multires": lambda **how: simdtex.synthesize(COLOUR, (96, 80), method="multires", channel_axis=-1, **how),
     "pyramid": lambda **how: simdtex.synthesize(COLOUR, (64, 64), method="pyramid", channel_axis=-1, **how),
     "solid": lambda **how: simdtex.synthesize_solid(GREY, (16, 16, 16), **how),
     "fill": lambda **how: simdtex.fill(GREY, HOLE, order=2, levels=1, **how),

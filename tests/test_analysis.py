@@ -39,9 +39,6 @@ def analyses(draw):
     most = 1 + (max(shape) - 1).bit_length()
     return texture(shape, channels, dtype, draw(st.integers(0, 99))), {
         "orientations": draw(st.sampled_from([0, 1, 2, 4])),
-        "sigma": draw(st.sampled_from([0.5, 0.7])),
-        "filter_size": draw(st.sampled_from([3, 5])),
-        "features": draw(st.sampled_from(["luminance", "channels"])),
         "levels": draw(st.none() | st.integers(1, most)),
         "boundary": draw(st.sampled_from(["torus", "open"])),
     }
@@ -101,25 +98,23 @@ def test_the_reference_is_the_rule(case):
     """Bands, features and energy from the pixels on."""
     pixels, options = case
     found = analyse(REFERENCE, pixels, **options)
-    torus, side = options["boundary"] == "torus", options["filter_size"]
+    torus = options["boundary"] == "torus"
     assert found.torus == torus
     sample = Stretched(pixels)
-    seen = sample.luminance if options["features"] == "luminance" else sample.planes
     for plane, own in enumerate(sample.planes):
         _, bands = plain.pyramid(own, found.levels, torus)
         for level, band in enumerate(bands):
             assert (found.bands[level][plane] == band).all()
     if found.levels == 1:
         return
-    taps = bank(options["orientations"], options["sigma"], side)
-    pyramids = [plain.pyramid(plane, found.levels, torus) for plane in seen]
+    taps = bank(options["orientations"])
+    [luminance] = sample.luminance
+    gaussian, bands = plain.pyramid(luminance, found.levels, torus)
     assert found.features.dtype == np.int32
     for level, features in enumerate(by_level(found), 1):
-        columns = []
-        for gaussian, bands in pyramids:
-            fits = min(found.shapes[level]) >= side
-            nothing = np.zeros(found.shapes[level])
-            columns += [bands[level], *(plain.response(gaussian[level], f, torus) if fits else nothing for f in taps)]
+        fits = min(found.shapes[level]) >= 3
+        nothing = np.zeros(found.shapes[level])
+        columns = [bands[level], *(plain.response(gaussian[level], f, torus) if fits else nothing for f in taps)]
         assert (features == np.stack(columns, -1).reshape(len(features), -1)).all()
         for m, column in enumerate(features.T.tolist()):
             assert found.energy[level, m] == energy(column, level == found.levels - 1 and m % (1 + len(taps)) == 0)
@@ -152,12 +147,11 @@ def test_the_energy_has_a_row_for_every_level_and_none_for_the_finest():
 
 
 @pytest.mark.parametrize("boundary", ["torus", "open"])
-@pytest.mark.parametrize("filter_size", [3, 5])
-def test_levels_smaller_than_the_filters_have_no_responses_but_a_band(filter_size, boundary):
-    found = analyse(REFERENCE, texture((40, 20), 1), filter_size=filter_size, boundary=boundary)
+def test_levels_smaller_than_the_filters_have_no_responses_but_a_band(boundary):
+    found = analyse(REFERENCE, texture((40, 20), 1), boundary=boundary)
     fitting = 0
     for (rows, cols), features, z in zip(found.shapes[1:], by_level(found), found.energy[1:], strict=True):
-        if min(rows, cols) >= filter_size:
+        if min(rows, cols) >= 3:
             assert features.any(0).all()
             assert (z > 0).all()
             fitting += 1
@@ -165,42 +159,26 @@ def test_levels_smaller_than_the_filters_have_no_responses_but_a_band(filter_siz
             assert features[:, 0].any()
             assert not features[:, 1:].any()
             assert not z[1:].any()
-    assert fitting == (3 if filter_size == 3 else 2)
+    assert fitting == 3
 
 
 @pytest.mark.parametrize("channels", [1, 2, 3, 5])
 @pytest.mark.parametrize("orientations", [0, 1, 4])
 def test_how_many_features_there_are(channels, orientations):
     pixels = texture((9, 8), channels)
-    for features, planes in (("luminance", 1), ("channels", channels)):
-        found = analyse(REFERENCE, pixels, orientations=orientations, features=features)
-        width = planes * (1 + 2 * orientations)
-        nodes = sum(rows * cols for rows, cols in found.shapes[1:])
-        assert found.features.shape == (nodes, width)
-        assert found.energy.shape == (found.levels, width)
-        assert found.bands[0].shape == (channels, 9, 8), "bands have all channels"
+    found = analyse(REFERENCE, pixels, orientations=orientations)
+    width = 1 + 2 * orientations
+    nodes = sum(rows * cols for rows, cols in found.shapes[1:])
+    assert found.features.shape == (nodes, width)
+    assert found.energy.shape == (found.levels, width)
+    assert found.bands[0].shape == (channels, 9, 8), "bands have all channels"
 
 
-def test_one_channel_is_its_own_luminance():
-    pixels = texture((9, 8), 1)
-    assert_same_bits(run(REFERENCE, pixels, features="channels"), run(REFERENCE, pixels, features="luminance"))
-
-
-def test_features_of_channels_stand_side_by_side():
-    pixels = texture((9, 8), 3)
-    found = analyse(REFERENCE, pixels, features="channels", orientations=2)
-    for c, own in enumerate(Stretched(pixels).planes):
-        _, bands = pyramid(REFERENCE, own[None], found.levels, torus=True)
-        first = np.concatenate([band.ravel() for band in bands[1:]])
-        assert_same_bits(found.features[:, 5 * c], first)
-
-
-@pytest.mark.parametrize("features", ["luminance", "channels"])
-def test_no_orientations_leave_the_bands_alone(machine, features):
+def test_no_orientations_leave_the_bands_alone(machine):
     pixels = texture((9, 8), 2)
     for m in (REFERENCE, machine):
-        bare = run(m, pixels, orientations=0, features=features)
-        whole = run(REFERENCE, pixels, orientations=2, features=features)
+        bare = run(m, pixels, orientations=0)
+        whole = run(REFERENCE, pixels, orientations=2)
         assert_same_bits(bare[:-2], whole[:-2])
         assert_same_bits(bare[-2:], [np.ascontiguousarray(a[:, ::5]) for a in whole[-2:]])
 
@@ -208,11 +186,10 @@ def test_no_orientations_leave_the_bands_alone(machine, features):
 # -- what does not matter -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("features", ["luminance", "channels"])
 @pytest.mark.parametrize("boundary", ["torus", "open"])
-def test_contrast_and_a_constant_change_nothing(features, boundary):
+def test_contrast_and_a_constant_change_nothing(boundary):
     byte = texture((13, 10), 3)
-    options = {"features": features, "boundary": boundary}
+    options = {"boundary": boundary}
     expected = run(REFERENCE, byte, **options)
     for a, b, dtype in ((1, 1000, np.uint16), (257, 0, np.uint16), (100, -20000, np.int16), (0.25, -3, np.float32)):
         assert_same_bits(run(REFERENCE, (byte.astype(np.float64) * a + b).astype(dtype), **options), expected)
@@ -247,8 +224,6 @@ def test_on_a_torus_a_shift_of_the_sample_shifts_its_features():
         ((4, 4), {}, True),
         ((4, 40), {}, True),
         ((5, 5), {}, False),
-        ((8, 8), {"filter_size": 5}, True),
-        ((9, 9), {"filter_size": 5}, False),
         ((64, 64), {}, False),
         ((64, 64), {"levels": 2}, False),
         ((4, 4), {"orientations": 0}, False),
@@ -277,7 +252,7 @@ def test_a_device_has_the_references_bits(machine, case):
 @pytest.mark.parametrize("work_group", [3, 16])
 def test_the_shape_of_a_launch_changes_no_bit(cl_device, work_group):
     machine = opencl(cl_device, work_group=work_group)
-    for features, boundary in (("luminance", "torus"), ("channels", "open")):
-        options = {"features": features, "boundary": boundary}
+    for boundary in ("torus", "open"):
+        options = {"boundary": boundary}
         pixels = texture((21, 14), 3)
         assert_same_bits(run(machine, pixels, **options), run(REFERENCE, pixels, **options))

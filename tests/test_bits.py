@@ -77,13 +77,6 @@ RUNS = {
     "coherent-block": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "schedule": "block:5x4"}),
     "coherent-array": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "array": "4x8"}),
     "multires": ((13, 11), None, np.uint8, (15, 18), MULTIRES),
-    "multires-colour": (
-        (11, 14),
-        3,
-        np.uint8,
-        (12, 23),
-        MULTIRES | {"features": "channels", "orientations": 2, "sigma": 1.0, "filter_size": 5, "alpha": 0.9},
-    ),
     "multires-luminance": ((9, 10), 3, np.uint8, (13, 8), MULTIRES | {"alpha": 3, "beta": 1, "levels": 4}),
     "multires-open-free": (
         (12, 9),
@@ -95,14 +88,6 @@ RUNS = {
     "multires-16-bit": ((12, 12), None, np.uint16, (9, 16), MULTIRES | {"boundary": "open", "alpha": 1}),
     "multires-float64-two-channels": ((10, 13), 2, np.float64, (14, 7), MULTIRES | {"parity": "free", "beta": 0.5}),
     "multires-bool": ((12, 11), None, np.bool_, (13, 13), MULTIRES | {"alpha": 1.5}),
-    "multires-thresholds": (
-        (9, 7),
-        None,
-        np.uint8,
-        (11, 15),
-        MULTIRES | {"orientations": 1, "thresholds": [[0, 0, 0], [2, 1, np.inf], [0.5, 4, 1], [0.2, 0.7, 0.3]]},
-    ),
-    "multires-auto": ((14, 13), None, np.uint8, (17, 12), MULTIRES | {"alpha": "auto"}),
     "multires-mended": ((17, 20), 3, np.uint8, (21, 23), MULTIRES | {"alpha": 0.4}),
     "multires-keep-cut": ((17, 20), 3, np.uint8, (21, 23), MULTIRES | {"edges": "keep", "seams": "cut"}),
     "multires-larger-than-the-sample": ((7, 6), None, np.uint8, (33, 29), MULTIRES | {"alpha": 1.5}),
@@ -222,7 +207,7 @@ def test_small_scratch_memory_makes_many_pieces(cl_device):
 
 def test_the_work_group_changes_no_bit_of_multires(cl_device):
     """It has no other form: its launches keep no distances."""
-    check("multires-colour", opencl(cl_device, work_group=3))
+    check("multires-luminance", opencl(cl_device, work_group=3))
 
 
 def test_the_form_of_a_launch_changes_no_bit_of_a_pyramid(cl_device):
@@ -364,7 +349,7 @@ runs = [
     (grey, None, {"order": 1, "levels": 1, "schedule": "luby"}),
     (grey, None, {"order": 1, "levels": 1, "schedule": "block:2x3", "array": "2x2"}),
     (grey, None, {"method": "multires", "alpha": 0.6}),
-    (colour, -1, {"method": "multires", "boundary": "open", "parity": "free", "features": "channels", "alpha": 0.5}),
+    (colour, -1, {"method": "multires", "boundary": "open", "parity": "free", "alpha": 0.5}),
     (grey, None, {"method": "pyramid", "iterations": 1, "levels": 1, "orientations": 2}),
     (grey, None, {"method": "pyramid", "iterations": 1, "pyramid": "laplacian", "match": "lookup"}),
 ]

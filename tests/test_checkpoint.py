@@ -44,9 +44,7 @@ JOBS = {
     "mrf-known-guide": lambda **how: simdtex.synthesize(
         GREY, (12, 13), known=KNOWN, guide=(GREY // 90, texture((12, 13), seed=4) // 90), **MRF, **how
     ),
-    "multires": lambda **how: simdtex.synthesize(
-        COLOUR, (12, 21), method="multires", alpha="auto", channel_axis=-1, **how
-    ),
+    "multires": lambda **how: simdtex.synthesize(COLOUR, (12, 21), method="multires", channel_axis=-1, **how),
     "pyramid": lambda **how: simdtex.synthesize(
         COLOUR, (17, 16), method="pyramid", iterations=2, channel_axis=-1, **how
     ),

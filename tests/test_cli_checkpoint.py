@@ -23,7 +23,7 @@ SYNTH = ("synth", "sample.png", "-o", "out.png", "--size", "14x13", "--seed", "5
 MRF = (*SYNTH, "--order", "2", "--xi", "-2", "--no-labels", "--array", "4x4", "--source-map", "where.npz")
 RUNS = {
     "synth-mrf": (*MRF, "--stages", "stages", "--also", "height.png=more.png"),
-    "synth-multires": (*SYNTH, "--method", "multires", "--alpha", "auto", "--stages", "stages"),
+    "synth-multires": (*SYNTH, "--method", "multires", "--stages", "stages"),
     "synth-pyramid": (*SYNTH, "--method", "pyramid", "--stages", "stages"),
     "fill": (
         "fill",

@@ -40,7 +40,7 @@ def test_there_are_not_too_many_options():
     assert len({max(one.opts, key=len) for _, one in OPTIONS} | {"--help", "--version"}) <= 80
 
 
-@pytest.mark.parametrize("name", ["synth", "fill", "extend", "simulate", "schedules", "mix", "solid", "sheet"])
+@pytest.mark.parametrize("name", ["synth", "fill", "extend", "simulate", "schedules", "mix", "solid"])
 def test_a_command_has_the_options_of_the_tables_that_it_shows(name):
     params = {one.name: one for one in load(name).params if getattr(one, "kind", None)}
     tables = [table(import_module(f"simdtex.methods.{method}").Options) for method in METHODS.get(name, ("mrf",))]
@@ -54,12 +54,12 @@ def test_a_command_has_the_options_of_the_tables_that_it_shows(name):
             shown = f"{default:g}" if isinstance(default, float) else str(default)
             assert f"[{shown}]" in params[option].help
         number = {Whole: "integer", Number: "float"}.get(type(one.kind), "")
-        assert is_flag(one.kind) or params[option].type.name == ("text" if option == "alpha" else number or "text")
+        assert is_flag(one.kind) or params[option].type.name == (number or "text")
 
 
 def test_a_group_names_its_method():
     said = help_of("synth")
-    assert re.search(r"Method multires: appearance:\n  --alpha FLOAT\|auto +Exchange places", said)
+    assert re.search(r"Method multires: appearance:\n  --alpha FLOAT +Exchange places", said)
     assert re.search(r"--known FILE +mrf: keep these", said), "a group of several methods names each method"
     assert "Method" not in help_of("fill") and "\nSearch:\n" in help_of("fill")
     assert said.index("Job:") < said.index("Scales and edges:") < said.index("Device and messages:")
@@ -143,7 +143,6 @@ def test_near_misses_are_named():
         (["synth", "--method"], "", ["mrf", "multires", "pyramid"]),
         (["synth", "--schedule"], "ra", ["random-subset", "raster", "random-scan"]),
         (["synth", "--edges"], "", ["auto", "reflect", "whole", "mend", "keep", "wrap"]),
-        (["synth", "--alpha"], "", ["auto"]),
         (["extend", "--seamless"], "b", ["both"]),
         (["synth", "--order"], "1", []),
     ],

@@ -31,7 +31,7 @@ TEXTS = {
     *("weights", "shares", "proportions", "alpha", "pyramid", "seamless", "workers"),
     *("color", "schedule", "array", "average", "names", "alphas", "betas", "palette", "pattern", "low", "high"),
 }
-PICTURES = ("synth", "fill", "extend", "mix", "sheet")
+PICTURES = ("synth", "fill", "extend", "mix")
 ISING_START = ("ising", "start")  # up or random
 
 

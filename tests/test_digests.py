@@ -49,7 +49,7 @@ LARGE = {
     "array-exact": ("brick-64", (40, 40), {"array": "16x32", "order": 5, "search": "exact"}),
     "array-luby": ("brick-64", (40, 40), {"array": "16x16:hierarchical", "order": 5, "schedule": "luby"}),
     "multires-brick": ("brick", (256, 200), {"method": "multires"}),
-    "multires-coffee": ("coffee", (130, 96), {"method": "multires", "alpha": "auto"}),
+    "multires-coffee": ("coffee", (130, 96), {"method": "multires", "alpha": 0.33}),
     "multires-brick-paper": ("brick", (256, 200), {"method": "multires"} | PAPER),
     "multires-coffee-paper": ("coffee", (130, 96), {"method": "multires", "alpha": 0.93} | PAPER),
     "pyramid-grass": ("grass", (128, 160), {"method": "pyramid"}),

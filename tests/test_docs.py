@@ -29,7 +29,7 @@ PAGES = sorted(path for path in (ROOT / "docs").rglob("*.rst") if not {"_build",
 STORIES = [page for page in PAGES if page.parent.name == "readers"]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 METHODS = {"mrf": mrf, "multires": multires, "pyramid": pyramid}
-OF_COMMANDS = {"sheet": METHODS["multires"], "mix": METHODS["pyramid"], "solid": solid}
+OF_COMMANDS = {"mix": METHODS["pyramid"], "solid": solid}
 REFERENCE = "\n".join(
     (ROOT / "docs" / "reference" / name).read_text(encoding="utf-8") for name in ("command-line.rst", "bench.rst")
 )

@@ -57,14 +57,13 @@ JOBS = {
     "guide-of-a-part": {"guide": GUIDE, "part": [2, 1, 44, 38]},
     "guide-everywhere": {"guide": GUIDE | {"output": [stroke((0, 20), (55, 20), width=99)]}},
     "multires": {"method": "multires"},
-    "multires-auto": {"method": "multires", "options": {"alpha": "auto"}},
     "pyramid": {"method": "pyramid", "options": {"iterations": 2}},
     "extend": {"job": "extend"},
     "extend-a-part": {"job": "extend", "part": [0, 0, 40, 36]},
 }
 
 
-SLOW = ("guide-everywhere", "guide-of-a-part", "extend-a-part", "multires-auto")
+SLOW = ("guide-everywhere", "guide-of-a-part", "extend-a-part")
 
 
 def assert_command_repeats(page, number, folder, monkeypatch):

@@ -37,7 +37,6 @@ def test_controls_are_what_options_may_be_and_the_command_line_has_them(name):
 
 def test_the_controls_of_a_texture():
     assert {one["name"] for one in controls("mrf")} >= {"order", "finish", "boundary", "categorical", "levels"}
-    assert {one["blank"] for one in controls("multires") if one["name"] == "alpha"} == {"auto"}
     assert not {"schedule", "array", "weights", "labels"} & {one["name"] for one in controls("mrf")}
     assert controls("mrf")[0]["group"] == "Appearance"
 

@@ -210,7 +210,7 @@ def reconstructions(sample, output, torus, blend=True):
 @pytest.mark.parametrize("seams", ["blend", "cut"])
 def test_every_level_is_its_copied_bands_added_up(size, shape, boundary, seams):
     sample = texture(size, 3)
-    for options in ({}, {"alpha": INF, "parity": "free"}, {"alpha": 1.0, "features": "channels"}):
+    for options in ({}, {"alpha": INF, "parity": "free"}, {"alpha": 1.0}):
         _, output = run(sample, shape, boundary=boundary, edges="keep", seams=seams, **options)
         pictures = reconstructions(sample, output, boundary == "torus", seams == "blend")
         for stage, expected in zip(output.stages, pictures, strict=True):
@@ -298,9 +298,7 @@ def check_candidates(sample, shape, table, **options):
         optional={
             "parity": st.just("free"),
             "boundary": st.just("open"),
-            "features": st.just("channels"),
             "orientations": st.sampled_from([1, 3]),
-            "filter_size": st.just(5),
             "levels": st.sampled_from([1, 2, 3]),
         },
     ),
@@ -313,21 +311,13 @@ def test_candidates_are_those_of_the_equations(size, shape, channels, alpha, bet
     check_candidates(texture(size, channels), shape, table, alpha=alpha, beta=beta, **options)
 
 
-@pytest.mark.parametrize("parity", ["match", "free"])
-def test_candidates_are_those_of_a_table_of_thresholds(parity):
-    rng = np.random.default_rng(5)
-    for columns in (1, 9):
-        table = rng.choice([0.1, 0.5, 2.0, 3.0, INF], (4, columns))
-        check_candidates(texture((13, 12)), (20, 17), table, thresholds=table, parity=parity)
-
-
 def test_without_orientations_bands_are_compared_alone():
     table = [[0.5]] * 4
     check_candidates(texture((13, 12)), (20, 17), table, alpha=0.5, orientations=0)
-    check_candidates(texture((13, 7), 3), (20, 17), table, alpha=0.5, orientations=0, features="channels")
+    check_candidates(texture((13, 7), 3), (20, 17), table, alpha=0.5, orientations=0)
 
 
-@pytest.mark.parametrize("options", [{}, {"parity": "free", "boundary": "open", "features": "channels"}], ids=str)
+@pytest.mark.parametrize("options", [{}, {"parity": "free", "boundary": "open"}], ids=str)
 def test_a_device_gives_the_same_bits(any_device, options):
     sample = texture((13, 7), 3)
     given = {"alpha": 0.6, "beta": 0.5} | options
@@ -368,8 +358,7 @@ def test_candidates_grow_with_alpha_at_every_level(parity):
     nodes = lattice - [[0, 0, begins[1], 0]]
     before = np.zeros(begins[-1])
     for alpha in ALPHAS:
-        table = thresholds(found.levels, multires.Options(alpha=alpha), alpha)
-        structure = Structure(found.features, differences(found, table), nodes)
+        structure = Structure(found.features, differences(found, multires.Options(alpha=alpha)), nodes)
         counts = np.ones((begins[-1], 2), np.int32)
         for level, size in enumerate(found.shapes[:-1]):  # all of it is the sample itself
             source = np.concatenate([np.arange(math.prod(size), dtype=np.int32) for size in found.shapes])
@@ -382,43 +371,11 @@ def test_candidates_grow_with_alpha_at_every_level(parity):
 @pytest.mark.parametrize("beta", [0, 0.5, 1, 2.5])
 @pytest.mark.parametrize("levels", [2, 5, 9])
 def test_thresholds_are_alpha_over_the_number_of_the_level_from_the_top(levels, beta):
-    table = thresholds(levels, multires.Options(alpha=0.3, beta=beta), 0.3)
+    table = thresholds(levels, 0.3, beta)
     assert len(table) == levels
     expected = [0.3 / (levels - level) ** beta for level in range(1, levels)]
-    assert np.array_equal(table[1:, 0].astype(np.float32), np.float32(expected))
+    assert np.array_equal(table[1:].astype(np.float32), np.float32(expected))
     assert table[-1] == 0.3
-
-
-def test_a_table_that_says_what_alpha_and_beta_do_gives_the_same():
-    sample = texture((13, 14))
-    for beta in (0, 1):
-        image, output = run(sample, (20, 22), alpha=0.7, beta=beta)
-        rows = [0.7 / k**beta for k in range(1, 4 + 1)]
-        for table in (rows, tuple(rows), np.array(rows)[:, None], np.tile(np.array(rows)[:, None], 9)):
-            same, other = run(sample, (20, 22), thresholds=table)
-            assert_same_bits(same, image)
-            assert same_places(output, other)
-
-
-def test_the_first_row_of_a_table_is_the_lowest_frequency():
-    sample = texture((12, 12))
-    _, output = run(sample, (12, 12), levels=3, thresholds=[INF, 0])
-    assert (output.stages[1].candidates == 9).all(), "every node of the top"
-    assert (output.stages[2].candidates == 1).all()
-    _, output = run(sample, (12, 12), levels=3, thresholds=[0, INF])
-    assert (output.stages[1].candidates == 1).all()
-    assert (output.stages[2].candidates == 4).all(), "all the children of one node of the top"
-
-
-def test_a_column_of_a_table_is_a_feature():
-    sample, free = texture((12, 12)), [INF] * 9
-    counts = [run(sample, (12, 12), levels=2, thresholds=[free])[1].stages[1].candidates]
-    for column in range(9):
-        row = [0.01 if m == column else INF for m in range(9)]
-        counts.append(run(sample, (12, 12), levels=2, thresholds=[row])[1].stages[1].candidates)
-    assert (counts[0] == 36).all()
-    assert all((c < 36).any() and c.min() >= 1 for c in counts[1:])
-    assert len({c.tobytes() for c in counts}) == 10
 
 
 # -- contrast and constants -----------------------------------------------------------------------------------
@@ -439,7 +396,7 @@ SCALED = {
 
 @pytest.mark.parametrize("name", SCALED)
 def test_neither_contrast_nor_a_constant_changes_an_arrangement(name):
-    for options in ({}, {"alpha": 0.8, "beta": 1}, {"parity": "free", "boundary": "open", "alpha": "auto"}):
+    for options in ({}, {"alpha": 0.8, "beta": 1}, {"parity": "free", "boundary": "open"}):
         _, output = run(DARK, (20, 22), **options)
         image, other = run(SCALED[name], (20, 22), **options)
         assert image.dtype == SCALED[name].dtype
@@ -453,17 +410,10 @@ def test_neither_contrast_nor_a_constant_changes_an_arrangement(name):
 def test_equal_channels_are_as_good_as_one():
     grey = texture((13, 12))
     image, output = run(grey, (20, 22), alpha=0.6)
-    for count, features in [(1, "luminance"), (1, "channels"), (2, "channels"), (3, "channels"), (3, "luminance")]:
-        many, other = run(np.repeat(grey[..., None], count, -1), (20, 22), alpha=0.6, features=features)
+    for count in (1, 2, 3):
+        many, other = run(np.repeat(grey[..., None], count, -1), (20, 22), alpha=0.6)
         assert same_places(output, other)
         assert_same_bits(many, np.ascontiguousarray(np.repeat(image[..., None], count, -1)))
-
-
-def test_the_features_of_channels_are_more_to_agree_in_than_those_of_the_luminance():
-    sample = texture((16, 16), 3)
-    counts = [run(sample, (32, 32), alpha=1.0, levels=3, features=f)[1] for f in ("luminance", "channels")]
-    luminance, channels = (output.stages[1].candidates.mean() for output in counts)
-    assert 1 <= channels < luminance
 
 
 def test_luminance_sees_nothing_of_a_texture_of_equal_luminance():
@@ -472,6 +422,3 @@ def test_luminance_sees_nothing_of_a_texture_of_equal_luminance():
     sample = np.stack([red, green, np.full((16, 16), 2**20)], -1).astype(np.int32)
     _, blind = run(sample, (32, 32), alpha=0, edges="keep")
     assert (blind.stages[-1].candidates == 64).all(), "all there are"
-    _, seeing = run(sample, (32, 32), alpha=0, features="channels", edges="keep")
-    assert (seeing.stages[-1].candidates == 1).all()
-    assert np.array_equal(seeing.source, tiling((32, 32), (16, 16)))

@@ -5,16 +5,12 @@ import math
 from dataclasses import fields
 
 import numpy as np
-import plain_multires as plain
 import pytest
-from cases import REFERENCE, analyse, assert_same_bits, opencl, texture
+from cases import REFERENCE, assert_same_bits, opencl, texture
 
 import simdtex
-from simdtex.driver import drive
 from simdtex.machine import memory
 from simdtex.methods import multires
-from simdtex.methods.multires.algorithm import Plan
-from simdtex.methods.multires.alpha import strain, suggest_alpha
 
 INF = math.inf
 
@@ -80,7 +76,7 @@ def test_any_size(shape, boundary):
 @pytest.mark.parametrize("size", [(1, 1), (1, 5), (5, 1), (2, 2), (3, 3), (4, 4)], ids=str)
 def test_a_sample_too_small_for_the_filters_works_and_says_so(size, caplog):
     sample = texture(size, 3)
-    for options in ({"alpha": 0}, {}, {"alpha": "auto", "parity": "free"}, {"boundary": "open", "alpha": INF}):
+    for options in ({"alpha": 0}, {}, {"parity": "free"}, {"boundary": "open", "alpha": INF}):
         caplog.clear()
         image, output = run(sample, (10, 15), **options)
         assert image.shape == (10, 15, 3)
@@ -92,12 +88,6 @@ def test_a_sample_too_small_for_the_filters_works_and_says_so(size, caplog):
     assert_same_bits(image, np.tile(sample, (3, 2, 1)))
 
 
-@pytest.mark.parametrize(("size", "side"), [((5, 6), 3), ((9, 9), 5), ((8, 40), 5)], ids=str)
-def test_the_filters_fit_where_the_level_above_the_finest_is_as_large(size, side, caplog):
-    synthesize(texture(size), (10, 10), filter_size=side)
-    assert bool(caplog.records) == (min(size) == 8), "4 x 20 holds no filter of 5 x 5"
-
-
 def test_no_filters_are_missed_where_none_are_wanted(caplog):
     synthesize(texture((4, 4)), (10, 10), orientations=0)
     synthesize(texture((4, 4)), (10, 10), levels=1)
@@ -106,7 +96,7 @@ def test_no_filters_are_missed_where_none_are_wanted(caplog):
 
 def test_a_constant_sample_gives_a_constant():
     for dtype in (np.uint8, np.uint16, np.float64, np.bool_):
-        for options in ({"alpha": 0}, {"alpha": INF}, {"alpha": "auto"}):
+        for options in ({"alpha": 0}, {"alpha": INF}):
             image, output = run(np.ones((6, 8), dtype), (9, 20), **options)
             assert_same_bits(image, np.ones((9, 20), dtype))
             assert (output.stages[-1].candidates == 12).all(), "nothing tells one node from another"
@@ -159,7 +149,6 @@ def test_one_level_is_a_tiling(shape, boundary):
     assert_same_bits(image, tiled(sample, shape))
     [stage] = output.stages
     assert (stage.candidates == 1).all()
-    assert_same_bits(synthesize(sample, shape, levels=1, alpha="auto"), image)
 
 
 @pytest.mark.parametrize(
@@ -194,15 +183,14 @@ def test_the_stages_are_the_levels_of_every_tile_coarsest_first(size, shape, lev
     assert output.temperature is None
 
 
-@pytest.mark.parametrize("alpha", [0.5, INF, "auto"])
+@pytest.mark.parametrize("alpha", [0.5, INF])
 def test_the_statistics_count_what_was_done(alpha):
     sample = texture((13, 7))
     _, output = run(sample, (20, 17), alpha=alpha, rng=7)
     told = output.statistics
     assert (told["device"], told["seed"], told["device_seconds"]) == (REFERENCE.name, 7, None)
     assert set(told["options"]) == {option.name for option in fields(multires.Options)}
-    expected = simdtex.suggest_alpha(sample, device=REFERENCE) if alpha == "auto" else alpha
-    assert told["options"]["alpha"] == expected
+    assert told["options"]["alpha"] == alpha
     assert told["options"]["levels"] == 5
     assert [level["level"] for level in told["levels"]] == [4, 3, 2, 1, 0]
     nodes = [0, 1, 1 + 2, 1 + 2 + 8, 1 + 2 + 8 + 28]
@@ -216,14 +204,6 @@ def test_the_statistics_count_what_was_done(alpha):
         assert stage.level == 4 or 1 <= level["compared"] <= level["nodes"]
         assert level["seconds"] >= 0
     assert told["seconds"] >= sum(level["seconds"] for level in told["levels"])
-
-
-def test_the_statistics_tell_the_table_that_stood_for_alpha():
-    table = [[0.1], [0.2], [0.3], [0.4]]
-    for given in (table, np.array(table)):
-        _, output = run(texture((13, 7)), (9, 9), thresholds=given)
-        told = output.statistics["options"]
-        assert (told["alpha"], told["thresholds"]) == (None, table)
 
 
 # -- callbacks ------------------------------------------------------------------------------------------------
@@ -260,7 +240,7 @@ def test_progress_tells_every_piece_of_every_level(axis, monkeypatch):
         assert marks.shape == candidates.shape and 0 <= marks.min() <= marks.max() <= 1
 
 
-@pytest.mark.parametrize("options", [{}, {"levels": 1}, {"alpha": "auto"}], ids=str)
+@pytest.mark.parametrize("options", [{}, {"levels": 1}], ids=str)
 def test_progress_ends_at_1_and_a_callback_changes_nothing(options):
     sample, seen = texture((13, 7)), []
     image = synthesize(sample, (20, 17), callback=seen.append, **options)
@@ -334,94 +314,14 @@ def test_an_output_beyond_32_bits_is_refused_before_any_work(shape, monkeypatch)
         synthesize(texture((13, 7)), shape)
 
 
-# -- suggest_alpha --------------------------------------------------------------------------------------------
-
-
-def test_a_suggested_alpha_is_the_freest_whose_strain_is_small_enough(monkeypatch):
-    sample = texture((24, 20), 3)
-    analysis = analyse(REFERENCE, sample)
-    for beta in (0, 1):
-        strains = {}
-        for most in (0, 0.02, 0.1, 0.3, 9):
-            monkeypatch.setattr("simdtex.methods.multires.alpha.STRAIN", most)
-            options = multires.Options(beta=beta)
-            alpha = suggest_alpha(REFERENCE, analysis, options)
-            found = simdtex.suggest_alpha(sample, beta=beta, channel_axis=-1, device=REFERENCE)
-            assert found == alpha
-            strains[alpha] = strain(REFERENCE, analysis, options, alpha)
-            assert strains[alpha] <= most
-            if alpha < 0.4:
-                assert strain(REFERENCE, analysis, options, alpha + 0.01) > most
-        assert min(strains) < max(strains) == 0.4
-        assert list(strains) == sorted(strains)
-
-
-def test_where_nothing_meets_nothing_strains():
-    """A sample of one level, of one value, or without a choice; then the freest alpha is the paper's largest."""
-    for sample in (texture((1, 1)), np.ones((8, 8))):
-        assert simdtex.suggest_alpha(sample, device=REFERENCE) == 0.4
-    assert simdtex.suggest_alpha(texture((9, 9)), levels=1, device=REFERENCE) == 0.4
-    analysis = analyse(REFERENCE, texture((32, 32), 1))
-    assert strain(REFERENCE, analysis, multires.Options(), 0) == 0
-
-
-@pytest.mark.parametrize("boundary", ["torus", "open"])
-def test_a_strain_is_what_neighbours_differ_by_from_what_the_other_goes_on_with(boundary):
-    sample, torus = texture((24, 20), 2), boundary == "torus"
-    options = multires.Options(boundary=boundary, alpha=1.0, edges="keep")
-    analysis = analyse(REFERENCE, sample, boundary=boundary, edges="keep")
-    _, output = drive(Plan(sample, (24, 20), options, analysis), REFERENCE, 0)
-    levels = []
-    for level, source in ((stage.level, stage.source) for stage in output.stages if stage.level < 2):
-        band = analysis.bands[level].astype(float)
-        rows, cols = band.shape[1:]
-        total = 0.0
-        for i, j in np.ndindex(rows, cols):
-            for a, b in ((1, 0), (0, 1)):
-                if torus or (i + a < rows and j + b < cols):
-                    goes_on = source[i, j] + (a, b)
-                    row, col = (plain.within(int(k), n, torus) for k, n in zip(goes_on, (rows, cols), strict=True))
-                    there = source[(i + a) % rows, (j + b) % cols]
-                    total += ((band[:, row, col] - band[:, there[0], there[1]]) ** 2).sum()
-        levels.append(total / (4 * (band**2).sum()))
-    assert len(levels) == 2
-    assert strain(REFERENCE, analysis, options, 1.0) == pytest.approx(np.mean(levels), rel=1e-3)
-
-
-def test_strangers_strain_by_1():
-    noise = np.random.default_rng(1).integers(0, 256, (80, 80, 1)).astype(np.uint8)
-    analysis = analyse(REFERENCE, noise, edges="keep", levels=3)
-    free = strain(REFERENCE, analysis, multires.Options(parity="free"), INF)
-    assert free == pytest.approx(1, abs=0.05)
-
-
-def test_a_device_suggests_the_same_alpha(any_device):
-    sample = texture((13, 7), 3)
-    ours, theirs = (simdtex.suggest_alpha(sample, channel_axis=-1, device=d) for d in (REFERENCE, opencl(any_device)))
-    assert ours == theirs
-
-
-@pytest.mark.parametrize("axis", [None, 0])
-def test_automatic_alpha_is_the_suggested_one(axis):
-    sample = texture((12, 11), None if axis is None else 3)
-    given = sample if axis is None else np.moveaxis(sample, -1, axis)
-    options = {"beta": 0.5, "orientations": 2, "channel_axis": axis}
-    alpha = simdtex.suggest_alpha(given, device=REFERENCE, **options)
-    image, output = run(given, (13, 15), alpha="auto", **options)
-    assert output.statistics["options"]["alpha"] == alpha
-    same, other = run(given, (13, 15), alpha=alpha, **options)
-    assert_same_bits(same, image)
-    assert_same_bits(other.source, output.source)
-
-
 # -- what it refuses ------------------------------------------------------------------------------------------
 
 
 SAMPLE = texture((13, 7))
 FLOAT = texture((13, 7), dtype=np.float64)
 UNKNOWN = (
-    "unknown option '{}' of the method 'multires'; choose from: preset, alpha, beta, thresholds, seams, "
-    "parity, features, levels, boundary, edges, orientations, sigma, filter_size"
+    "unknown option '{}' of the method 'multires'; choose from: preset, alpha, beta, seams, parity, "
+    "levels, boundary, edges, orientations"
 )
 
 
@@ -449,7 +349,7 @@ BAD = [
     ({"alpha": -1}, ValueError, "alpha is -1; give a number of at least 0"),
     ({"alpha": -math.inf}, ValueError, "alpha is -inf; give a number of at least 0"),
     ({"alpha": math.nan}, ValueError, "alpha is nan; give a number of at least 0"),
-    ({"alpha": "x"}, ValueError, "alpha is 'x'; give a number of at least 0, or 'auto'"),
+    ({"alpha": "x"}, TypeError, "alpha must be a number, not 'x'"),
     ({"alpha": True}, TypeError, "alpha must be a number, not True"),
     ({"alpha": [0.1, 0.2]}, TypeError, "alpha must be a number"),
     ({"beta": -0.5}, ValueError, "beta is -0.5; give a number of at least 0"),
@@ -460,31 +360,11 @@ BAD = [
     ({"seams": "fade"}, ValueError, "unknown seams 'fade'; choose one of: blend, cut"),
     ({"orientations": -1}, ValueError, "orientations is -1; give 0 or more"),
     ({"orientations": 2.5}, TypeError, "orientations must be an integer, not 2.5"),
-    ({"sigma": 0}, ValueError, "sigma is 0; give a number of at least 0.2"),
-    ({"sigma": -0.7}, ValueError, "sigma is -0.7; give a number of at least 0.2"),
-    ({"sigma": math.inf}, ValueError, "sigma is inf; give a number of at least 0.2"),
-    ({"sigma": 101}, ValueError, "sigma is 101; give at most 100"),
-    ({"sigma": "wide"}, TypeError, "sigma must be a number, not 'wide'"),
-    ({"filter_size": 4}, ValueError, "filter_size is 4; give an odd number, 3 or 5"),
-    ({"filter_size": 1}, ValueError, "filter_size is 1; give 3 or more"),
-    ({"filter_size": 2.0}, TypeError, "filter_size must be an integer, not 2.0"),
     ({"parity": "both"}, ValueError, "unknown parity 'both'; choose one of: match, free"),
-    ({"features": "hue"}, ValueError, "unknown features 'hue'; choose one of: luminance, channels"),
     ({"boundary": "mirror"}, ValueError, "unknown boundary 'mirror'; choose one of: torus, open"),
     ({"levels": 0}, ValueError, "levels is 0; give 1 or more"),
     ({"levels": 2.0}, TypeError, "levels must be an integer, not 2.0"),
     ({"levels": 6}, ValueError, "levels=6 is too many for this sample; give at most 5"),
-    # thresholds
-    ({"thresholds": [[0.1], [0.1, 0.2]]}, ValueError, "thresholds is ragged; give rows of equal length"),
-    ({"thresholds": ["a", "b", "c", "d"]}, TypeError, "an array of numbers"),
-    ({"thresholds": "low"}, TypeError, "an array of numbers"),
-    ({"thresholds": [0.1, 0.2, -0.3, 0.4]}, ValueError, "thresholds must be numbers of at least 0"),
-    ({"thresholds": [0.1, 0.2, math.nan, 0.4]}, ValueError, "thresholds must be numbers of at least 0"),
-    ({"thresholds": np.ones((4, 9, 1))}, ValueError, r"shape \(4, 9, 1\); give one row for each level but the finest"),
-    ({"thresholds": []}, ValueError, r"shape \(0,\); give one row for each level but the finest"),
-    ({"thresholds": [[]] * 4}, ValueError, r"shape \(4, 0\); give one row for each level but the finest"),
-    ({"thresholds": 0.3}, ValueError, r"shape \(\); give one row for each level but the finest"),
-    ({"thresholds": [0.3] * 3}, ValueError, "thresholds has 3 rows; give 4, one for .* but the finest, or levels=4"),
     # names, the seed and the device
     ({"gamma": 1}, TypeError, UNKNOWN.format("gamma")),
     ({"order": 8}, TypeError, UNKNOWN.format("order")),
@@ -501,43 +381,3 @@ def test_bad_input_is_refused_with_a_remedy(change, error, words):
         simdtex.synthesize(arguments.pop("sample"), arguments.pop("shape"), **arguments)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 500
-
-
-@pytest.mark.parametrize(
-    ("change", "error", "words"),
-    [
-        ({"order": 8}, TypeError, UNKNOWN.format("order")),
-        ({"levels": 6}, ValueError, "levels=6 is too many for this sample; give at most 5"),
-        ({"thresholds": [0.3] * 4}, TypeError, "suggest_alpha finds alpha; leave thresholds out"),
-        ({"sample": with_value(np.nan)}, ValueError, "NaN|not finite"),
-    ],
-    ids=lambda v: None,
-)
-def test_suggest_alpha_refuses_bad_input_with_a_remedy(change, error, words):
-    arguments = {"sample": SAMPLE, "device": "reference"} | change
-    with pytest.raises(error, match=words):
-        simdtex.suggest_alpha(arguments.pop("sample"), **arguments)
-
-
-@pytest.mark.parametrize("rows", [3, 5, 7])
-@pytest.mark.parametrize("columns", [1, 9])
-def test_a_table_of_too_few_or_too_many_rows_is_told_the_right_number(rows, columns):
-    table = np.full((rows, columns), 0.3)
-    for levels in (None, 5):
-        with pytest.raises(ValueError, match=f"thresholds has {rows} rows; give 4, one .* but the finest"):
-            synthesize(SAMPLE, (9, 9), levels=levels, thresholds=table)
-    for levels in (2, 4, 5):
-        assert synthesize(SAMPLE, (9, 9), levels=levels, thresholds=[0.3] * (levels - 1)).shape == (9, 9)
-
-
-def test_a_table_of_the_wrong_width_is_told_the_right_one():
-    colour = texture((13, 7), 3)
-    for options, width in [
-        ({}, 9),
-        ({"orientations": 2}, 5),
-        ({"features": "channels"}, 27),
-        ({"features": "channels", "orientations": 1}, 9),
-    ]:
-        with pytest.raises(ValueError, match=f"thresholds has 4 columns; give 1, or {width}, one for each feature"):
-            synthesize(colour, (9, 9), thresholds=np.full((4, 4), 0.3), **options)
-        assert synthesize(colour, (9, 9), thresholds=np.full((4, width), 0.3), **options).shape == (9, 9, 3)

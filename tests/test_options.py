@@ -86,9 +86,7 @@ TOO_MUCH = {
     "xi": ("mrf", {"xi": -3e6}),
     "a finish of next to nothing": ("mrf", {"finish": 1e-320}),
     "beta": ("multires", {"beta": 1e308}),
-    "filters": ("multires", {"filter_size": 1001}),
     "orientations": ("multires", {"orientations": 65}),
-    "sigma": ("multires", {"sigma": 1e308}),
     "iterations": ("pyramid", {"iterations": 2**31}),
 }
 
@@ -106,11 +104,11 @@ LARGEST = {
         **{"finish": 16, "chance": 4096, "overview": MOST},
         **{"xi": -GREATEST, "guide_weight": GREATEST, "weights": (GREATEST,), "shares": (GREATEST,)},
     },
-    "multires": {"alpha": 1e308, "beta": GREATEST, "orientations": 64, "sigma": 100, "filter_size": 101},
+    "multires": {"alpha": 1e308, "beta": GREATEST, "orientations": 64},
 }
 SMALLEST = {
     "mrf": {"bandwidth": 1e-320, "coherence": 5e-324, "balance": 1e-320, "finish": 0.01, "xi": -0.1},
-    "multires": {"alpha": 1e-320, "beta": 1e-320, "sigma": 0.2},
+    "multires": {"alpha": 1e-320, "beta": 1e-320},
 }
 EXTREME = [
     (method, {name: value})
@@ -162,13 +160,6 @@ def test_the_ends_of_the_range_of_temperatures_work(temperature):
 def test_schedules_are_not_compared_near_the_largest_number():
     with pytest.raises(ValueError, match="values beyond 1e\\+100: give them in a larger unit"):
         compare(np.full((12, 12), 1.7e308), (9, 9), ["coloring"], device="reference")
-
-
-def test_no_work_is_done_for_filters_that_fit_no_level():
-    made = simdtex.synthesize(
-        SAMPLE, (1, 1), method="multires", filter_size=101, orientations=64, device="reference", rng=1
-    )
-    assert made.shape == (1, 1)
 
 
 def test_memory_errors_are_said_in_one_sentence():

@@ -32,7 +32,6 @@ PUBLIC = {
         "mix",
         "open_machine",
         "quality",
-        "suggest_alpha",
     ),
     *("place_hard_data", "read_hard_data", "synthesize", "synthesize_solid", "__version__"),
     *("Checkpoint", "extend", "fill", "simulate"),
@@ -62,7 +61,7 @@ def test_the_package_is_imported_without_numpy():
     assert not imported("import simdtex; dir(simdtex); simdtex.__version__") & {*HEAVY, "numpy", "PIL"}
 
 
-@pytest.mark.parametrize("command", ["synth", "solid", "mix", "sheet", "schedules"])
+@pytest.mark.parametrize("command", ["synth", "solid", "mix", "schedules"])
 def test_the_help_of_a_command_needs_no_heavy_module(command):
     assert not imported(COMMAND_LINE.format(words=[command, "--help"])) & HEAVY
 

@@ -60,7 +60,7 @@ class AnyOptions(MrfOptions, MultiresOptions, PyramidOptions, total=False):
 def type_of(one):
     kinds = {Choice: "str", Whole: "int", Switch: "bool", Numbers: "tuple[float, ...] | list[float]"}
     if isinstance(one.kind, Number):
-        found = "float | str" if one.kind.word else "float"
+        found = "float"
     elif isinstance(one.kind, Other):
         says = one.kind.says.replace("simdtex.schedules.", "").replace("tuple of int", "tuple[int, ...]")
         found = says.replace("array", "ArrayLike").replace(" or ", " | ")

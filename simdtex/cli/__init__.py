@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The command line: ``simdtex synth``, ``fill``, ``extend``, ``solid``, ``mix``, ``sheet`` and the rest."""
+"""The command line: ``simdtex synth``, ``fill``, ``extend``, ``solid``, ``mix`` and the rest."""
 
 from __future__ import annotations
 
@@ -29,8 +29,6 @@ GROUPS = {
     "Studies": {
         "schedules": "Run the same job under several schedules and compare them in a report.",
         "ising": "Relax Ising spins by each schedule and compare with the exact energy and magnetisation.",
-        "sheet": "Show what thresholds alpha / k^beta make of SAMPLE: Figures 11 and 12 of De Bonet (1997) "
-        "on one sheet.",
     },
     "This machine": {
         "demo": "Synthesise brick, grass and gravel from scikit-image's own pictures.",

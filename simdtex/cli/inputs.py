@@ -174,11 +174,6 @@ def output_shape(size: str | None, pixels: Any, *like: Any) -> tuple[int, int]:
     return (2 * pixels.shape[0], 2 * pixels.shape[1])
 
 
-def candidates_per_level(levels: list[dict[str, Any]]) -> str:
-    """Return the mean candidates of each level that was sampled, the coarsest first."""
-    return " ".join(f"{level['candidates']:.3g}" for level in levels[1:])
-
-
 def last_iteration(statistics: dict[str, Any]) -> str:
     """Return levels, iterations, and how far the last iteration had to move the subbands on average."""
     reports = statistics["iterations"]

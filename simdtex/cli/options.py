@@ -21,7 +21,6 @@ Command = Callable[..., Any]
 METHODS = {
     "synth": ("mrf", "multires", "pyramid"),
     "mix": ("pyramid",),
-    "sheet": ("multires",),
     "solid": ("pyramid.solid",),
 }
 """The methods of a command, in `simdtex.methods`; any other has ``mrf``."""
@@ -96,8 +95,7 @@ def _option(job: str, name: str, methods: dict[str, Declared]) -> Callable[[Comm
     if isinstance(kind, Numbers):
         return option(flag, metavar="N,N,...", **how)
     if isinstance(kind, Number):
-        number = {"metavar": f"FLOAT|{kind.word}", "words": [kind.word]} if kind.word else {"type": float}
-        return option(flag, **number, **how)
+        return option(flag, type=float, **how)
     words = [word for one in methods.values() if isinstance(one.kind, (Choice, Other)) for word in one.kind.valid]
     return option(flag, type=int if isinstance(kind, Whole) else str, words=words, **how)
 
@@ -115,36 +113,21 @@ def _help(job: str, one: Declared) -> str:
 
 
 def given(options: dict[str, Any], without: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return the options that were given, the texts of numbers as numbers; some left out."""
+    """Return the options that were given, lists of numbers as such; some left out."""
     kinds = {one.name: getattr(one, "kind", None) for one in click.get_current_context().command.params}
     chosen = {name: value for name, value in options.items() if value is not None and name not in without}
     for name, value in chosen.items():
-        kind, flag = kinds.get(name), f"--{name.replace('_', '-')}"
-        if isinstance(kind, Numbers):
-            chosen[name] = tuple(numbers(flag, value))
-        elif isinstance(kind, Number) and isinstance(value, str) and value != kind.word:
-            try:
-                chosen[name] = float(value)
-            except ValueError:
-                raise ValueError(f"{flag} {value} is not a number; give one, or {kind.word}") from None
+        if isinstance(kinds.get(name), Numbers):
+            chosen[name] = tuple(numbers(f"--{name.replace('_', '-')}", value))
     return chosen
 
 
 def numbers(name: str, text: str) -> list[float]:
-    """Return numbers separated by commas; ``a,b,...,z`` continues in steps of b - a, ``a,...,z`` in steps of a."""
-    words = [word.strip() for word in text.split(",")]
+    """Return numbers separated by commas."""
     try:
-        if "..." not in words:
-            return [float(word) for word in words]
-        gap = words.index("...")
-        begin, (last,) = [float(word) for word in words[:gap]], [float(word) for word in words[gap + 1 :]]
-        step = begin[-1] - begin[-2] if len(begin) > 1 else begin[0]
-        if not step > 0 or not 0 <= (last - begin[-1]) / step <= 1000:
-            raise ValueError
-    except (ValueError, IndexError):
-        raise ValueError(f"{name} {text} must be numbers parted by commas, as 0.1,0.2 or 0.05,0.10,...,0.30") from None
-    steps = int((last - begin[-1]) / step + 1e-9)
-    return [*begin, *(round(begin[-1] + i * step, 9) for i in range(1, steps + 1))]
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        raise ValueError(f"{name} {text} must be numbers parted by commas, as 0.1,0.2") from None
 
 
 SEED = option(

@@ -11,7 +11,6 @@ import click
 
 from simdtex.cli.guides import read_guides
 from simdtex.cli.inputs import (
-    candidates_per_level,
     channels,
     check_source_map,
     last_iteration,
@@ -123,10 +122,8 @@ def synth(
 
     def more(statistics: dict[str, Any]) -> None:
         if method == "multires":
-            alpha = statistics["options"]["alpha"]
-            thresholds = "thresholds as given" if alpha is None else f"alpha {alpha}"
-            counts = candidates_per_level(statistics["levels"])
-            click.echo(f"{thresholds}; candidates per level, coarse to fine: {counts}")
+            counts = " ".join(f"{level['candidates']:.3g}" for level in statistics["levels"][1:])
+            click.echo(f"candidates per level, coarse to fine: {counts}")
         elif method == "pyramid":
             click.echo(last_iteration(statistics))
         if options["array"]:

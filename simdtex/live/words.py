@@ -32,7 +32,7 @@ def controls(name: str) -> list[dict[str, Any]]:
     A control has ``name``, ``group``, ``label``, ``hint``, ``kind`` (``"words"``, ``"whole"``, ``"number"`` or
     ``"switch"``) and ``default``, None if the method decides. Words have ``valid``, pairs of a value and its label.
     Numbers have ``least``, None if there is none; ``span``, the least, the largest and the step of the slider;
-    ``empty``, the text of an empty field, and ``blank``, its value.
+    and ``empty``, the text of an empty field.
     """
     options, job = TABLES[name]
     made = [_control(name, one, one.default_of(job)) for name, one in table(options).items() if job in one.shown]
@@ -50,8 +50,7 @@ def _control(name: str, one: Option, default: Any) -> dict[str, Any]:
     if is_flag(kind) and default is not None:
         return control | {"kind": "switch"}
     if isinstance(kind, (Whole, Number)) and one.slider:
-        word = getattr(kind, "word", "")
         control |= {"least": kind.least if isfinite(kind.least) else None, "span": one.slider}
-        control |= {"empty": word or ("automatic" if default is None else ""), "blank": word or None}
+        control["empty"] = "automatic" if default is None else ""
         return control | {"kind": "whole" if isinstance(kind, Whole) else "number"}
     return control

@@ -65,18 +65,14 @@ class MultiresOptions(Common, total=False):
     """The options of the method ``multires``."""
 
     preset: str
-    alpha: float | str
+    alpha: float
     beta: float
-    thresholds: ArrayLike | None
     seams: str
     parity: str
-    features: str
     levels: int | None
     boundary: str
     edges: str
     orientations: int
-    sigma: float
-    filter_size: int
 
 
 class PyramidOptions(Common, total=False):

@@ -13,40 +13,36 @@ UNIT_BITS = 14
 """Taps are whole multiples of 2**-14."""
 
 
-def bank(orientations: int, sigma: float, side: int) -> NDArray[np.int32]:
-    """First and second derivatives of a Gaussian in a number of directions: edges and lines.
+SIDE, SIGMA = 3, 0.7
+"""Rows and columns of a filter, and the standard deviation of its Gaussian, pixels."""
 
-    Parameters
-    ----------
-    orientations : int
-        n of them: directions of the derivative at the angles pi a / n, a = 0 .. n-1, from the column axis towards the
-        row axis.
-    sigma : float
-        Of the Gaussian, in pixels.
-    side : int
-        Rows and columns of a filter; odd.
+
+def bank(orientations: int) -> NDArray[np.int32]:
+    """Return first and second derivatives of a Gaussian in a number of directions: edges and lines.
+
+    The derivatives have the angles pi a / n, a = 0 .. n-1, n the orientations, from the column axis towards the row
+    axis.
 
     Returns
     -------
-    (2 n, side, side) int32 array
+    (2 n, `SIDE`, `SIDE`) int32 array
         In 2**-14, the n first derivatives first; to be correlated with a picture. The positive taps of each add up to
         about 1, all of them to 0.
     """
-    y, x = np.mgrid[:side, :side] - side // 2
-    sigma = float(sigma)
-    gauss = np.exp(-(x * x + y * y) / (2 * sigma * sigma))
+    y, x = np.mgrid[:SIDE, :SIDE] - SIDE // 2
+    gauss = np.exp(-(x * x + y * y) / (2 * SIGMA * SIGMA))
     taps = []
     for degree in (1, 2):
         for a in range(orientations):
             angle = np.pi * a / orientations
-            u = (x * np.cos(angle) + y * np.sin(angle)) / sigma
+            u = (x * np.cos(angle) + y * np.sin(angle)) / SIGMA
             f = gauss * (u if degree == 1 else u * u - 1)
             if degree == 2:
                 f -= gauss * f.sum() / gauss.sum()
             whole = np.rint(f / f[f > 0].sum() * 2**UNIT_BITS).astype(np.int32)
-            whole[side // 2, side // 2] -= whole.sum()
+            whole[SIDE // 2, SIDE // 2] -= whole.sum()
             taps.append(whole)
-    return np.array(taps, np.int32).reshape(-1, side, side)
+    return np.array(taps, np.int32).reshape(-1, SIDE, SIDE)
 
 
 @Operation

@@ -178,9 +178,9 @@ class Options {
     slider.addEventListener("input", () => (input.value = slider.value));
     slider.addEventListener("change", onchange);
     input.addEventListener("input", follow);
-    const get = () => (input.value === "" ? control.blank : Number(input.value));
+    const get = () => (input.value === "" ? null : Number(input.value));
     const set = (value) => {
-      input.value = value === control.blank ? "" : (value ?? "");
+      input.value = value ?? "";
       follow();
     };
     this.fields.set(name, { get, set });

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
-from simdtex.methods.multires.alpha import alpha_of
 from simdtex.methods.multires.analysis import Analysis, analyse
 from simdtex.methods.multires.levels import (
     copied,
@@ -28,7 +27,6 @@ from simdtex.methods.multires.levels import (
     places,
     read_sources,
     structure_of,
-    thresholds,
 )
 from simdtex.methods.multires.options import Options
 from simdtex.model.use import effective_use
@@ -72,11 +70,10 @@ class Plan:
 class State(NamedTuple):
     """The state between two launches.
 
-    ``alpha`` of (13), None with a table of thresholds; ``level`` that is sampled now, ``done`` pixels of it that are;
+    ``level`` that is sampled now, ``done`` pixels of it that are;
     ``source``, ``counts`` of all levels, as of `simdtex.ops.candidates.Sampled`; ``picture`` G of the level above.
     """
 
-    alpha: float | None
     level: int
     done: int
     source: Array
@@ -131,13 +128,11 @@ class Run:
         """Return the state whose top level is the sample's, copied and repeated."""
         top = self.analysis.levels - 1
         sampled = copied(self.machine, self.shapes, self.analysis.shapes[top])
-        alpha = alpha_of(self.machine, self.analysis, self.options)
-        return self._prepared(State(alpha, top, pixels([self.shapes[top]]), sampled.source, sampled.counts, None))
+        return self._prepared(State(top, pixels([self.shapes[top]]), sampled.source, sampled.counts, None))
 
     def _prepared(self, state: State) -> State:
         """Return the state, once what launches need is ready."""
-        table = thresholds(self.analysis.levels, self.options, state.alpha)
-        self._structure = structure_of(self.machine, self.analysis, table)
+        self._structure = structure_of(self.machine, self.analysis, self.options)
         return self._entered(state)
 
     def _entered(self, state: State) -> State:
@@ -183,11 +178,8 @@ class Run:
         """Return the finest level's picture, with its source map, stages and statistics."""
         finest = observer.stages[-1]
         assert finest.source is not None
-        used: dict[str, Any] = {"alpha": state.alpha, "levels": self.analysis.levels}
-        if self.options.thresholds is not None:
-            used["thresholds"] = np.asarray(self.options.thresholds).tolist()
         statistics = {
-            "options": vars(self.options) | used,
+            "options": vars(self.options) | {"levels": self.analysis.levels},
             "levels": observer.reports,
             "use": effective_use(finest.source, self.analysis.shapes[0]).as_dict(),
         }

@@ -16,7 +16,7 @@ from simdtex.machine.interface import Array
 from simdtex.methods.multires.mend import mend
 from simdtex.methods.multires.options import Options
 from simdtex.model.stretched import Stretched
-from simdtex.ops.filters import bank, filters
+from simdtex.ops.filters import SIDE, bank, filters
 from simdtex.ops.laplacian import half, laplacian_band, laplacian_reduce
 
 _log = logging.getLogger(__name__)
@@ -89,7 +89,7 @@ def analyse(machine: Machine, pixels: NDArray[Any], options: Options) -> Analysi
     machine : Machine
     pixels : (rows, cols, channels) array
     options : Options
-        ``orientations``, ``sigma``, ``filter_size``, ``features``, ``levels``, ``boundary`` and ``edges`` matter.
+        ``orientations``, ``levels``, ``boundary`` and ``edges`` matter.
 
     Returns
     -------
@@ -102,13 +102,12 @@ def analyse(machine: Machine, pixels: NDArray[Any], options: Options) -> Analysi
 
     Notes
     -----
-    Cost: 45 multiply-adds for every pixel and channel, and a third of filter_size**2 for every pixel and filter. Memory
-    on the device: 16 bytes for every pixel and channel (and luminance, where there is one beside them), 3 for every
-    pixel and feature. `simdtex.methods.multires.mend.mend` says what mending takes.
+    Cost: 45 multiply-adds for every pixel and channel, and 3 for every pixel and filter. Memory on the device: 16 bytes
+    for every pixel and channel (and luminance, if there are several channels), 3 for every pixel and feature.
+    `simdtex.methods.multires.mend.mend` says what mending takes.
     """
     rows, cols, channels = pixels.shape
-    seen = 1 if options.features == "luminance" else channels  # planes that features are made of
-    width = seen * (1 + 2 * options.orientations)
+    width = 1 + 2 * options.orientations
     if rows * cols * max(width, channels) >= 2**31:
         raise ValueError(
             f"a sample of {rows} rows x {cols} columns with {width} features is beyond 2**31 values; give a smaller one"
@@ -118,14 +117,13 @@ def analyse(machine: Machine, pixels: NDArray[Any], options: Options) -> Analysi
     if options.edges == "mend":
         sample = Stretched(pixels.reshape(-1, channels)[place])
     shapes = _level_shapes((rows, cols), options.levels)
-    fits = [min(shape) >= options.filter_size for shape in shapes]
-    size = options.filter_size if any(fits[1:]) else 3  # of no level, filters are left out
-    taps = bank(options.orientations, options.sigma, size)
-    memory.require(machine, rows * cols * (16 * (channels + (seen < channels)) + 3 * width))
+    fits = [min(shape) >= SIDE for shape in shapes]
+    taps = bank(options.orientations)
+    memory.require(machine, rows * cols * (16 * (channels + (channels > 1)) + 3 * width))
 
     gaussian, bands = pyramid(machine, machine.put(sample.planes), len(shapes), torus)
     guide = gaussian, bands
-    if seen < channels:
+    if channels > 1:
         guide = pyramid(machine, machine.put(sample.luminance), len(shapes), torus)
     measured, energy = [np.zeros((0 if len(shapes) > 1 else 1, width), np.int32)], [np.zeros(width)]
     for level in range(1, len(shapes)):
@@ -138,7 +136,7 @@ def analyse(machine: Machine, pixels: NDArray[Any], options: Options) -> Analysi
         _log.warning(
             "no level above the finest of a sample of %d rows x %d columns is as large as the filters, %d x %d: "
             "candidates are compared by their bands alone",
-            *(*shapes[0], options.filter_size, options.filter_size),
+            *(*shapes[0], SIDE, SIDE),
         )
     return Analysis(sample, shapes, bands, machine.put(np.concatenate(measured)), np.array(energy), torus, place)
 

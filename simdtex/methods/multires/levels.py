@@ -21,29 +21,17 @@ LAUNCH = 4e8
 """Comparisons that the first launch of a level may take if no node fails."""
 
 
-def thresholds(levels: int, options: Options, alpha: float | None) -> NDArray[np.float64]:
-    """T of every level (levels, 1 or M), the finest first: alpha / k**beta (13), or the user's table without alpha."""
-    if alpha is not None:
-        k = np.arange(levels, 0, -1, dtype=np.float64)[:, None]  # 1 at the top
-        with np.errstate(over="ignore"):
-            divisor = (k ** float(options.beta)).astype(np.float32)  # so that the last bit of a libm does not show
-        return np.full_like(k, inf) if alpha == inf else float(alpha) / divisor.astype(np.float64)
-    table = np.asarray(options.thresholds, np.float64)
-    table = table if table.ndim == 2 else table[:, None]
-    if len(table) != levels - 1:
-        fewer = f", or levels={len(table) + 1}" if len(table) < levels - 1 else ""
-        raise ValueError(
-            f"thresholds has {len(table)} rows; give {levels - 1}, one for each level but the finest{fewer}"
-        )
-    return np.concatenate([np.zeros((1, table.shape[1])), table[::-1]])
+def thresholds(levels: int, alpha: float, beta: float) -> NDArray[np.float64]:
+    """Return T of every level (levels,), the finest first: alpha / k**beta (13), k = 1 at the top."""
+    k = np.arange(levels, 0, -1, dtype=np.float64)
+    with np.errstate(over="ignore"):
+        divisor = (k ** float(beta)).astype(np.float32)  # so that the last bit of a libm does not show
+    return np.full_like(k, inf) if alpha == inf else float(alpha) / divisor.astype(np.float64)
 
 
-def differences(analysis: Analysis, table: NDArray[np.float64]) -> NDArray[np.uint32]:
-    """The largest difference of each feature (levels, M) whose square, divided by Z, is not above T, (9) to (11)."""
-    if table.shape[1] not in (1, analysis.energy.shape[1]):
-        raise ValueError(
-            f"thresholds has {table.shape[1]} columns; give 1, or {analysis.energy.shape[1]}, one for each feature"
-        )
+def differences(analysis: Analysis, options: Options) -> NDArray[np.uint32]:
+    """Return the largest difference of each feature (levels, M) whose square is not above T Z: (9), (10)."""
+    table = thresholds(analysis.levels, options.alpha, options.beta)[:, None]
     with np.errstate(invalid="ignore", over="ignore"):
         largest = np.sqrt(table * analysis.energy)
     return np.where(np.isinf(table), ANY, np.minimum(largest, ANY)).astype(np.uint32)
@@ -66,9 +54,9 @@ def lattice(shapes: Sequence[tuple[int, int]], first: int) -> NDArray[np.int32]:
     return np.array([(*shape, *rest) for shape, *rest in zip(shapes, begins, ragged, strict=False)], np.int32)
 
 
-def structure_of(machine: Machine, analysis: Analysis, table: NDArray[np.float64]) -> Structure:
-    """The parents' features, and what may differ from them by a table of thresholds."""
-    most = differences(analysis, table)
+def structure_of(machine: Machine, analysis: Analysis, options: Options) -> Structure:
+    """Return the parents' features, and how much a candidate's may differ from them."""
+    most = differences(analysis, options)
     return Structure(analysis.features, machine.put(most), machine.put(lattice(analysis.shapes, 1)))
 
 
