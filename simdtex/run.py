@@ -272,9 +272,9 @@ class Output:
         callback sees every iteration.
     statistics : dict
         ``device``, ``seed``, ``options``, ``seconds``, ``device_seconds`` (of kernels; None unless the machine was
-        opened with ``profile=True``; then there are ``kernels`` and ``gaps`` too, as of
-        `simdtex.machine.log.Log.take`), and ``levels``: one dict per level with ``level``, ``rows``, ``cols``,
-        ``candidates``, ``seconds``, and what is particular to the method. Where there is a source map, ``use`` says how
+        opened with ``profile=True``; then there are ``kernels`` too, as of `simdtex.machine.log.Log.take`), and
+        ``levels``: one dict per level with ``level``, ``rows``, ``cols``, ``candidates``, ``seconds``, and what is
+        particular to the method. If there is a source map, ``use`` says how
         evenly the sample is used, as in `simdtex.model.use.effective_use`: ``effective_share``, above 0, to 1, and
         ``most_used``, the piece of the sample of which most is taken: ``times_fair_share``, its first pixel
         (``row``, ``col``) and its size (``rows``, ``cols``), pixels.

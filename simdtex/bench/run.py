@@ -8,18 +8,62 @@ import platform
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import simdtex
-from simdtex.bench.cases import Case, Sizes, measure, once
-from simdtex.bench.limits import measure_copy, measure_peak
+from simdtex.machine import Machine
 from simdtex.machine.devices import DeviceError, DeviceInfo, devices, find
 from simdtex.machine.opencl import OpenCL
 from simdtex.machine.reference import Reference
 
-FORMAT = "simdtex bench 2"
+REPEATS, BUDGET = 3, 2.0
+"""Timed runs of a case at most, and seconds after which no other run begins."""
+
+
+class Case(NamedTuple):
+    """A synthesis from gravel, a grey picture of scikit-image.
+
+    ``method`` is ``"solid"`` or one of `simdtex.synthesize`; ``sample`` and ``output`` are pixels a side, of a solid
+    voxels; ``order`` and ``search`` are those of ``mrf``.
+    """
+
+    method: str
+    sample: int
+    output: int
+    order: int = 0
+    search: str = ""
+
+    @property
+    def name(self) -> str:
+        """A unique name."""
+        order = f" {self.search}, order {self.order}" if self.order else ""
+        return f"{self.method}{order}, {self.sample} -> {self.output}{'^3' if self.method == 'solid' else ''}"
+
+
+class Sizes(NamedTuple):
+    """The cases of a benchmark: those of the devices alone, and those that the NumPy reference does too."""
+
+    devices: tuple[Case, ...]
+    reference: tuple[Case, ...]
+
+
+def _searches(sample: int, output: int) -> tuple[Case, ...]:
+    return tuple(Case("mrf", sample, output, n, search) for n in (8, 18, 32) for search in ("exact", "coherent"))
+
+
+QUICK = Sizes(
+    (*_searches(64, 64), Case("multires", 64, 128), Case("pyramid", 64, 128), Case("solid", 64, 32)),
+    (Case("mrf", 32, 32, 8, "exact"), Case("multires", 32, 64), Case("pyramid", 64, 64), Case("solid", 32, 16)),
+)
+FULL = Sizes(
+    (*_searches(128, 256), Case("multires", 256, 1024), Case("pyramid", 256, 1024), Case("solid", 128, 64)),
+    (
+        *(Case("mrf", 32, 32, 8, "exact"), Case("mrf", 32, 32, 18, "exact"), Case("multires", 64, 128)),
+        *(Case("pyramid", 128, 256), Case("solid", 64, 32)),
+    ),
+)
 
 
 def chosen(device: str | None = None) -> list[DeviceInfo]:
@@ -47,7 +91,7 @@ def run(sizes: Sizes, infos: Sequence[DeviceInfo], tell: Callable[[str], None] =
     Parameters
     ----------
     sizes : Sizes
-        The jobs.
+        `QUICK` or `FULL`.
     infos : sequence of DeviceInfo
         From `chosen`.
     tell : callable
@@ -56,24 +100,28 @@ def run(sizes: Sizes, infos: Sequence[DeviceInfo], tell: Callable[[str], None] =
     Returns
     -------
     dict
-        ``format``, ``simdtex`` (version), ``sizes`` (name), ``date``, ``seconds``, ``host``, and ``devices``, a dict
-        for each with
-
-        - ``device``, its description; ``peak`` and ``copy``, see `simdtex.bench.limits`;
-        - ``cases``, see `simdtex.bench.cases.measure`, each with ``job`` (whether it is reported by itself) and the
-          ratios of `ratios`;
-        - ``growth``, curves: ``name``, ``what``, ``sizes``, ``seconds`` and the fitted ``exponent``.
+        ``simdtex`` (version), ``date``, ``seconds``, ``host``, and ``devices``, a dict for each with ``device``, its
+        description, and ``cases``: dicts with ``name``; ``seconds`` of the fastest run; ``busy``, seconds of that run
+        in kernels; and ``reference``, how many times longer the reference took, None if it did not run the case.
     """
     began, date = perf_counter(), datetime.now(UTC).isoformat(timespec="seconds")
     plain = {}
     for case in sizes.reference:
         tell(f"the NumPy reference: {case.name}")
-        plain[case.name] = measure(Reference(), case)
-    found = [_device(sizes, info, plain, tell) for info in infos]
+        plain[case], _ = once(Reference(), case)
+    found = []
+    for info in infos:
+        machine = OpenCL(info, profile=True)
+        cases = []
+        for case in (*sizes.devices, *sizes.reference):
+            tell(f"{machine.name}: {case.name}")
+            seconds, busy = fastest(machine, case)
+            ratio = plain[case] / seconds if case in plain else None
+            cases.append({"name": case.name, "seconds": seconds, "busy": busy, "reference": ratio})
+        about = {name: getattr(info, name) for name in ("kind", "version", "driver", "compute_units", "memory")}
+        found.append({"device": about | {"name": machine.name}, "cases": cases})
     return {
-        "format": FORMAT,
         "simdtex": simdtex.__version__,
-        "sizes": sizes.name,
         "date": date,
         "seconds": perf_counter() - began,
         "host": {
@@ -87,103 +135,27 @@ def run(sizes: Sizes, infos: Sequence[DeviceInfo], tell: Callable[[str], None] =
     }
 
 
-def _device(
-    sizes: Sizes, info: DeviceInfo, plain: dict[str, dict[str, Any]], tell: Callable[[str], None]
-) -> dict[str, Any]:
-    machine = OpenCL(info, profile=True)
-    tell(f"{machine.name}: limits")
-    peak, copied = measure_peak(machine, sizes.seconds), measure_copy(machine, sizes.seconds)
-    for method, order, search in dict.fromkeys((case.method, case.order, case.search) for case in sizes.cases):
-        once(machine, Case(method, 16, 8 if method == "solid" else 16, order, search))  # builds the programs
-    machine.profile()  # forget the kernels so far
-    cases = {}
-    for case in sizes.cases:
-        tell(f"{machine.name}: {case.name}")
-        near = measure_peak(machine, sizes.seconds / 2, [peak["width"]])  # close in time to the case
-        result = measure(machine, case, sizes.repeats, sizes.budget)
-        cases[case.name] = ratios(result, near["fma"], copied["bytes"], plain.get(case.name))
-        cases[case.name]["job"] = case in sizes.jobs
-    return {
-        "device": {
-            "name": machine.name,
-            "kind": info.kind,
-            "version": info.version,
-            "driver": info.driver,
-            "units": info.compute_units,
-            "memory": info.memory,
-        },
-        "peak": peak,
-        "copy": copied,
-        "cases": list(cases.values()),
-        "growth": [_curve(what, row, cases) for what, rows in sizes.growth.items() for row in rows],
-    }
+def fastest(machine: Machine, case: Case) -> tuple[float, float]:
+    """Return the seconds of the fastest of a few runs of a case, after one that compiles, and those in kernels."""
+    once(machine, case)
+    began = perf_counter()
+    runs: list[tuple[float, float]] = []
+    while not runs or (len(runs) < REPEATS and perf_counter() - began < BUDGET):
+        runs.append(once(machine, case))
+    return min(runs)
 
 
-def ratios(case: dict[str, Any], peak: float, copied: float, plain: dict[str, Any] | None) -> dict[str, Any]:
-    """Return a measured case with ratios.
+def once(machine: Machine, case: Case) -> tuple[float, float]:
+    """Run a case and return its seconds, and those of them in kernels."""
+    from skimage import data
 
-    Parameters
-    ----------
-    case, plain : dict
-        From `simdtex.bench.cases.measure`; `plain` of the reference, None if it did not run the case.
-    peak, copied : float
-        Limits of the device: multiply-adds and bytes a second.
-
-    Returns
-    -------
-    dict
-        The case with ``peak``; ``fma_rate``, multiply-adds a second in kernels, and ``of_peak``, over the peak;
-        ``of_copy``, bytes a second over those of a copy; ``effective``, the multiply-adds of weighing every candidate
-        over the wall time over the peak; ``reference``, how many times longer the reference took. Each of its phases
-        with ``rate``, the multiply-adds of weighing every candidate over the time in kernels, ``of_peak``,
-        ``effective`` and ``reference``, the latter for a relaxation. None is unknown; a rate is unknown if the kernels
-        that state their work take less than half of the time.
-    """
-    rate = _ratio(case["fma"], case["busy"]) if case["fma"] else _stated(case["kernels"], "fma")
-    phases = []
-    for number, phase in enumerate(case["phases"] or []):
-        own = _ratio(phase["brute_force"], phase["busy"])
-        other = plain["phases"][number] if plain else None
-        each = _ratio(phase["seconds"], phase["relaxations"])
-        phases.append(
-            phase
-            | {
-                "rate": own,
-                "of_peak": _ratio(own, peak),
-                "effective": _ratio(_ratio(phase["brute_force"], phase["seconds"]), peak),
-                "reference": other and _ratio(_ratio(other["seconds"], other["relaxations"]), each),
-            }
-        )
-    return case | {
-        "peak": peak,
-        "fma_rate": rate,
-        "of_peak": _ratio(rate, peak),
-        "of_copy": _ratio(_stated(case["kernels"], "bytes"), copied),
-        "effective": _ratio(_ratio(case["brute_force"], case["seconds"]), peak),
-        "reference": plain and _ratio(plain["seconds"], case["seconds"]),
-        "phases": phases or None,
-    }
-
-
-def _ratio(one: float | None, other: float | None) -> float | None:
-    return None if one is None or not other else one / other
-
-
-def _stated(kernels: list[dict[str, Any]] | None, what: str) -> float | None:
-    """Return ``"fma"`` or ``"bytes"`` a second over the time of all kernels, None if most of it is of others."""
-    own = [kernel for kernel in kernels or [] if kernel[what] is not None]
-    total = sum(kernel["seconds"] for kernel in kernels or [])
-    if 2 * sum(kernel["seconds"] for kernel in own) <= total:
-        return None
-    return _ratio(sum(kernel[what] for kernel in own), total)
-
-
-def _curve(what: str, row: Sequence[Case], cases: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    sizes, seconds = [case.size[what] for case in row], [cases[case.name]["seconds"] for case in row]
-    name = f"{row[0].method} {row[0].search}".strip()
-    return {"name": name, "what": what, "sizes": sizes, "seconds": seconds, "exponent": exponent(sizes, seconds)}
-
-
-def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> float | None:
-    """Return the power of the size that the time grows with, by least squares on logarithms; None for one size."""
-    return float(np.polyfit(np.log(sizes), np.log(seconds), 1)[0]) if len(set(sizes)) > 1 else None
+    gravel: Any = data.gravel
+    sample = np.ascontiguousarray(gravel()[: case.sample, : case.sample])
+    given: dict[str, Any] = {"rng": 1, "device": machine, "full_output": True}
+    began = perf_counter()
+    if case.method == "solid":
+        _, output = simdtex.synthesize_solid(sample, (case.output,) * 3, **given)
+    else:
+        given |= {"order": case.order, "search": case.search} if case.order else {}
+        _, output = simdtex.synthesize(sample, (case.output, case.output), method=case.method, **given)
+    return perf_counter() - began, output.statistics["device_seconds"] or 0.0

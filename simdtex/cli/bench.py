@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""``simdtex bench``: what the devices here can do, and what the methods make of it."""
+"""``simdtex bench``: how long the methods take on the devices here."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import click
 
 from simdtex.cli.command import command
 from simdtex.cli.ending import afterwards
-from simdtex.cli.places import FOLDER, WRITE
+from simdtex.cli.places import WRITE
 
 
 @command(
@@ -22,42 +22,32 @@ from simdtex.cli.places import FOLDER, WRITE
     help="Measure that device alone whose name or platform has this in it, or a number of `simdtex devices`.  "
     "[all usable]",
 )
-@click.option("--quick", is_flag=True, help="Take small sizes: a minute instead of some six.")
+@click.option("--quick", is_flag=True, help="Take small sizes: a minute instead of some four.")
 @click.option("--json", "path", type=WRITE, metavar="FILE", help="Write all that was measured.")
-@click.option("--plot", "folder", type=FOLDER, metavar="DIR", help="Draw rooflines and growth.")
 @click.option("-q", "--quiet", is_flag=True, help="Say nothing on what is being measured, and show no tables.")
-def bench(device: str | None, quick: bool, path: Path | None, folder: Path | None, quiet: bool) -> None:
-    """Measure what devices can do at most, and what the methods take.
+def bench(device: str | None, quick: bool, path: Path | None, quiet: bool) -> None:
+    """Measure how long the methods take on devices, and how many times longer in NumPy.
 
-    Everything is measured in one run and compared in ratios: with the device's own limits and with the NumPy
-    reference. Leave the machine alone meanwhile.
+    Everything is measured in one run. Leave the machine alone meanwhile.
     """
     from simdtex.bench import run as benchmark
-    from simdtex.bench.cases import SIZES
     from simdtex.io.atomic import atomic_path
     from simdtex.io.image import check_writable
-    from simdtex.report.bench import plot, render
-    from simdtex.report.folder import earlier_files
+    from simdtex.report.bench import render
 
     if path:
         check_writable(path, suffixes=(".json",))
-    if folder:
-        earlier_files(folder, "the plots", lambda name: name.endswith(".png"))
     infos = benchmark.chosen(device)
 
     def tell(what: str) -> None:
         if not quiet:
             click.echo(what, err=True)
 
-    found = benchmark.run(SIZES["quick" if quick else "full"], infos, tell)
+    found = benchmark.run(benchmark.QUICK if quick else benchmark.FULL, infos, tell)
     if path:
         with afterwards(), atomic_path(path) as whole:
             whole.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    pictures: list[Path] = []
-    if folder:
-        with afterwards():
-            pictures = plot(found, folder)
     if not quiet:
         render(found)
-        for picture in [*([path] if path else []), *pictures]:
-            click.echo(picture)
+        if path:
+            click.echo(path)

@@ -7,13 +7,11 @@ from collections.abc import Callable
 from functools import update_wrapper
 from typing import TYPE_CHECKING, Any, Concatenate, Generic, ParamSpec, TypeAlias, TypeVar
 
-from simdtex.machine.log import Work, touching
-
 if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
     from simdtex.machine.reference import Reference
 
-__all__ = ["Array", "Launcher", "Machine", "Operation", "Work", "touching"]
+__all__ = ["Array", "Launcher", "Machine", "Operation"]
 
 P = ParamSpec("P")
 R = TypeVar("R")

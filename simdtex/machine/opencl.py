@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from simdtex.machine import runtimes
 from simdtex.machine.devices import DeviceError, DeviceInfo
-from simdtex.machine.log import Log, Work
+from simdtex.machine.log import Log
 from simdtex.model.sample import BLOCK
 
 SMALL_COPY = 2**16
@@ -290,22 +290,12 @@ class OpenCL:
             self._kernels[key] = cl.Kernel(self._programs[files, options], function)
         return self._kernels[key]
 
-    def launch(
-        self,
-        kernel: Any,
-        size: tuple[int, ...],
-        *args: Any,
-        local: tuple[int, ...] | None = None,
-        work: Work | None = None,
-    ) -> None:
-        """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels check the range.
-
-        `work` is the work of the launch, for profiles.
-        """
+    def launch(self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None) -> None:
+        """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels check the range."""
         local = local if local and not self._forced else (self._group,) + (1,) * (len(size) - 1)
         size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
         data = [a.data if type(a) is DeviceArray else a for a in args]
-        self.log.add(kernel(self.queue, size, local, *data), kernel, work)
+        self.log.add(kernel(self.queue, size, local, *data), kernel)
 
     def launch_groups(self, kernel: Any, groups: NDArray[np.int64], *args: Any) -> None:
         """Enqueue a kernel for one range of work-items after another, from ``groups[g, 0]`` up to ``groups[g, 1]``.

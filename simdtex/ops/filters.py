@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.machine.interface import Array, Launcher, Operation, touching
+from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.ops.laplacian import within
 
 UNIT_BITS = 14
@@ -73,6 +73,5 @@ def filters(machine: Launcher | None, picture: Array, band: Array, taps: Array, 
         (rows * cols, planes * (1 + count)),
         *(picture, band, np.int32(planes), np.int32(rows), np.int32(cols), np.int32(torus)),
         *(taps, np.int32(count), np.int32(side), features),
-        work=touching(picture, band, features, fma=picture.size * taps.size),
     )
     return features

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.machine.interface import Array, Launcher, Operation, touching
+from simdtex.machine.interface import Array, Launcher, Operation
 
 
 def sizes(*numbers: int) -> tuple[np.int32, ...]:
@@ -75,7 +75,6 @@ def _up(machine: Launcher, kernel: str, each: float, band: Array, source: Array,
         machine.kernel("laplacian", kernel),
         (rows * cols, band.shape[0]),
         *(band, *sizes(*band.shape, torus), source, *sizes(rows, cols), coarse, *sizes(*coarse.shape[1:]), fine),
-        work=touching(band, source, coarse, fine, fma=each * fine.size),
     )
     return fine
 
@@ -96,7 +95,6 @@ def laplacian_reduce(machine: Launcher | None, fine: Array, torus: bool) -> Arra
         machine.kernel("laplacian", "laplacian_reduce"),
         (coarse.shape[1] * coarse.shape[2], planes),
         *(fine, *sizes(planes, rows, cols, torus), coarse),
-        work=touching(fine, coarse, fma=25 * coarse.size),
     )
     return coarse
 
@@ -112,7 +110,6 @@ def laplacian_band(machine: Launcher | None, fine: Array, coarse: Array, torus: 
         machine.kernel("laplacian", "laplacian_band"),
         (rows * cols, planes),
         *(fine, coarse, *sizes(planes, rows, cols, torus), band),
-        work=touching(fine, coarse, band, fma=25 / 4 * band.size),
     )
     return band
 

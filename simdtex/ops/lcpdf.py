@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.machine.interface import Array, Launcher, Operation, touching
+from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import BLOCK, Candidates
 from simdtex.ops.arithmetic import exp32, fma32
@@ -133,7 +133,6 @@ def distance(machine: Launcher | None, near: Neighbourhoods, candidates: Candida
         *(candidates.pixels, _plane(candidates), candidates.positions, np.int32(candidates.size)),
         *(candidates.reach, np.int32(blocks), distance, nearest),
         local=machine.tile,
-        work=touching(*near[:2], distance, fma=2 * near.weighted.size / padded * near.sites * candidates.size),
     )
     return Distances(distance, nearest, near.sites)
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.machine.interface import Array, Launcher, Operation, touching
+from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.ops.laplacian import sizes, within
 
 PADDED = 2**24
@@ -93,7 +93,6 @@ def steerable_split(machine: Launcher | None, picture: Array, taps: Array, torus
             (_up(some, unit) // unit * across // v, together),
             *(padded, *sizes(together, height, pitch), taps, *sizes(side, planes, rows, cols)),
             *(*sizes(first, first_row, some), bands),
-            work=touching(padded, bands, fma=together * some * cols * taps.size),
         )
     return bands
 
@@ -148,6 +147,5 @@ def steerable_join(
                 *(padded, *sizes(together, height, pitch), taps, *sizes(count, own, skip)),
                 *sizes(number == 0, number == len(terms) - 1),
                 *(total, *sizes(rows, cols, first, first_row, some), picture),
-                work=touching(padded, picture, fma=count * together * some * cols * own**2 / skip),
             )
     return picture

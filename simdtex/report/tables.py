@@ -12,7 +12,7 @@ from math import floor, log10
 import rich.table
 from rich.console import Console
 
-__all__ = ["Table", "duration_text", "number_text", "print_table", "rate_text", "seconds_text", "three_digits", "warns"]
+__all__ = ["Table", "duration_text", "number_text", "print_table", "seconds_text", "three_digits", "warns"]
 
 _NUMBER = re.compile(r"[-+\u2212]?\d.*|[-\u2013]|n/a|inf")
 
@@ -115,17 +115,8 @@ def three_digits(value: float | None, unit: str = "") -> str:
 
 def seconds_text(seconds: float) -> str:
     """Return a duration with three digits: ``"1.23 s"``, ``"45.6 ms"``, ``"789 us"``."""
-    return _prefixed(seconds, {" s": 1.0, " ms": 1e-3, " us": 1e-6})
-
-
-def rate_text(rate: float | None) -> str:
-    """Return a rate with three digits and a prefix, ``"12.3 G"``; ``"-"`` if unknown."""
-    return "-" if rate is None else _prefixed(rate, {" T": 1e12, " G": 1e9, " M": 1e6, " k": 1e3, "": 1.0})
-
-
-def _prefixed(value: float, units: Mapping[str, float]) -> str:
-    unit = next((unit for unit, size in units.items() if value >= size), list(units)[-1])
-    return three_digits(value / units[unit], unit)
+    unit, length = next(((u, x) for u, x in ((" s", 1.0), (" ms", 1e-3)) if seconds >= x), (" us", 1e-6))
+    return three_digits(seconds / length, unit)
 
 
 def duration_text(seconds: float) -> str:

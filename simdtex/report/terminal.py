@@ -8,7 +8,7 @@ from importlib.metadata import version
 from typing import Any
 
 from simdtex.machine.devices import DeviceError, find
-from simdtex.report.tables import Table, duration_text, print_table, rate_text, seconds_text
+from simdtex.report.tables import Table, duration_text, print_table, seconds_text
 
 __all__ = ["print_accounting", "print_profile", "profile_summary", "profile_table", "version_lines"]
 
@@ -25,11 +25,9 @@ def profile_table(statistics: dict[str, Any]) -> Table:
         {
             "kernel": kernel["name"],
             "calls": f"{kernel['calls']:,}",
-            **{name: seconds_text(kernel[name]) for name in ("min", "median", "max")},
+            "each": seconds_text(kernel["seconds"] / kernel["calls"]),
             "total": seconds_text(kernel["seconds"]),
             "share": f"{kernel['share']:.1%}",
-            "fma/s": rate_text(kernel["fma_rate"]),
-            "bytes/s": rate_text(kernel["byte_rate"]),
         }
         for kernel in statistics["kernels"]
     ]
@@ -37,16 +35,9 @@ def profile_table(statistics: dict[str, Any]) -> Table:
 
 
 def profile_summary(statistics: dict[str, Any]) -> str:
-    """Return a sentence on the wall time, the time in kernels and the gaps between them."""
-    wall, busy, gaps = statistics["seconds"], statistics["device_seconds"], statistics["gaps"]
-    text = f"wall time {seconds_text(wall)}: kernels {seconds_text(busy)} ({busy / wall:.1%})"
-    if not gaps["calls"]:
-        return text
-    return (
-        f"{text}; between them {seconds_text(gaps['seconds'])} ({gaps['seconds'] / wall:.1%}) in {gaps['calls']:,} "
-        f"gaps, median {seconds_text(gaps['median'])}, longest {seconds_text(gaps['max'])}; "
-        f"before the first and after the last {seconds_text(max(0.0, wall - busy - gaps['seconds']))}"
-    )
+    """Return a sentence on the wall time and the time in kernels."""
+    wall, busy = statistics["seconds"], statistics["device_seconds"]
+    return f"wall time {seconds_text(wall)}: kernels {seconds_text(busy)} ({busy / wall:.1%})"
 
 
 def print_accounting(accounting: dict[str, Any]) -> None:
