@@ -91,15 +91,12 @@ def measured(given: argparse.Namespace, way: str) -> dict:
 def sizes(size: int) -> None:
     """Print redundant work and memory by the side of tiles."""
     writer = csv.writer(sys.stdout, lineterminator="\n")
-    writer.writerow(["side of a tile", "tiles", "redundant work, torus, %", "redundant work, open, %", "memory, MiB"])
+    writer.writerow(["side of a tile", "tiles", "redundant work, %", "memory, MiB"])
     colour = data.astronaut()[:128, :128]
     for side in (256, 512, 1024, 2048, 4096, 8192):
-        plans = [
-            distributed.plan(colour, (size, size), tiles=side, boundary=boundary, channel_axis=-1)
-            for boundary in ("torus", "open")
-        ]
-        redundant = [f"{100 * plan.levels[0].redundant:.0f}" for plan in plans]
-        writer.writerow([side, plans[0].levels[0].count, *redundant, f"{plans[0].memory / 2**20:.0f}"])
+        plan = distributed.plan(colour, (size, size), tiles=side, channel_axis=-1)
+        finest = plan.levels[0]
+        writer.writerow([side, finest.count, f"{100 * finest.redundant:.0f}", f"{plan.memory / 2**20:.0f}"])
 
 
 def main() -> None:
@@ -123,9 +120,7 @@ def main() -> None:
         return
     pixels = sample(given.sample)
     axis = -1 if pixels.ndim == 3 else None
-    plan = distributed.plan(
-        pixels, (given.size, given.size), tiles=given.tiles, workers=given.workers, channel_axis=axis
-    )
+    plan = distributed.plan(pixels, (given.size, given.size), tiles=given.tiles, channel_axis=axis)
     print("\n".join(plan.lines()))
     found = {}
     for way in given.only or WAYS:

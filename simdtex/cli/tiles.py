@@ -83,8 +83,7 @@ def synthesize_in_tiles(context: click.Context, sample: Any, shape: tuple[int, i
     given, began = context.params, time.perf_counter()
     output: Path = given["output"]
     workers = workers_of(given["workers"])
-    count = workers if isinstance(workers, int) else 1
-    plan = distributed.plan(sample, shape, tiles=given["tiles"], workers=count, **options)
+    plan = distributed.plan(sample, shape, tiles=given["tiles"], **options)
     if given["dry_run"] or not given["quiet"]:
         for line in plan.lines():
             click.echo(line, err=not given["dry_run"])

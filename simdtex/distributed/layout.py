@@ -3,28 +3,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from math import ceil, prod
 
 from simdtex.methods.mrf.plan import Plan
-from simdtex.methods.mrf.tiles import Tile, framed
+from simdtex.methods.mrf.tiles import Tile
 from simdtex.model.lattice import Grid
 from simdtex.ops.finish import around
 from simdtex.options import whole
 from simdtex.schedules.schedule import Windowed
-
-SMALLEST = 64
-"""Side of the smallest tiles that a level is cut into to occupy more workers."""
 
 CHUNK = 512
 """Sites to the side of a chunk in the store, at most, if the tile's side has such a divisor."""
 
 TILES = 2**22
 """Tiles of a level, at most: one process counts them."""
-
-MOST = 10**5
-"""Workers of a plan, at most."""
 
 PROCESS = 2**30
 """Bytes of an idle worker: Python, libraries, an OpenCL runtime that compiles kernels for the first time.
@@ -96,21 +90,17 @@ class LevelLayout:
         down, across = sides if self.count > 1 else (self.rows, self.cols)
         return down * across
 
-    def relaxed(self, tile: Tile) -> int:
-        """Return how many sites a free sweep of a tile relaxes: all columns of its window, and fewer rows each step."""
-        if self.count == 1:
-            return self.rows * self.cols
-        window = framed(self.lattice, tile, self.halo).window
-        rows = window.rows if window.rows == self.rows else (tile.rows + window.rows) // 2
-        return rows * window.cols
-
     @property
     def redundant(self) -> float:
-        """Relaxations that several tiles repeat, over those that are needed."""
-        first = self.relaxed(self.tile(0)) or 1  # a sum of products is the product of two sums
-        down = sum(self.relaxed(self.tile(i * self.across)) for i in range(self.down))
-        across = sum(self.relaxed(self.tile(j)) for j in range(self.across))
-        return down * across / first / (self.rows * self.cols) - 1
+        """Relaxations that several tiles repeat, over those that are needed, at a tile that touches no edge.
+
+        A sweep of a tile relaxes all columns of its window, and fewer rows at each step.
+        """
+        if self.count == 1:
+            return 0.0
+        rows, cols = (min(self.side, n) for n in (self.rows, self.cols))
+        down, across = (min(self.side + 2 * self.halo, n) for n in (self.rows, self.cols))
+        return (down if down == self.rows else (rows + down) // 2) * across / (rows * cols) - 1
 
 
 @dataclass(frozen=True)
@@ -123,8 +113,6 @@ class Layout:
         The finest first.
     channels : int
         Of the sites' values.
-    workers : int
-        The number that the layout is for; any number makes the same bytes.
     memory : int
         Bytes that a worker needs at most, whatever the output's size.
     disk : int
@@ -133,7 +121,6 @@ class Layout:
 
     levels: tuple[LevelLayout, ...]
     channels: int
-    workers: int
     memory: int
     disk: int
 
@@ -149,14 +136,12 @@ class Layout:
         return [*found, f"a worker needs at most {memory:.0f} MiB, the store {disk:.0f} MiB before compression"]
 
 
-def planned(plan: Plan, seed: int, tile: int, workers: int) -> Layout:
+def planned(plan: Plan, seed: int, tile: int) -> Layout:
     """Return the layout of an output in tiles of at most ``tile`` sites to the side.
 
-    Coarse levels, which are small, are cut into smaller tiles if that occupies more workers. Raises ValueError if the
-    schedule does not relax a window as it does the whole, or if there are too many tiles.
+    Raises ValueError if the schedule does not relax a window as it does the whole, or if there are too many tiles.
     """
     whole("tiles", tile, 1)
-    whole("workers", workers, 1, MOST)
     options, schedule = plan.options, plan.schedule
     if not (schedule.windows and isinstance(schedule, Windowed)) or options.array:
         given = f"array {options.array}" if options.array else f"schedule {schedule.name}"
@@ -164,25 +149,14 @@ def planned(plan: Plan, seed: int, tile: int, workers: int) -> Layout:
     count = ceil(plan.shape[0] / tile) * ceil(plan.shape[1] / tile)
     if count > TILES:
         raise ValueError(f"tiles of {tile}x{tile} pixels are {count}, more than {TILES}; give larger ones")
-    sides = []
-    for number in range(plan.levels):
-        some = [_level(plan, seed, number, tile)]
-        while number and some[-1].side // 2 >= max(SMALLEST, some[0].halo):
-            some.append(replace(some[-1], side=some[-1].side // 2))
-        sides.append(min(some, key=lambda one: _span(one, workers)).side)
-    return laid(plan, seed, sides, workers)
-
-
-def laid(plan: Plan, seed: int, sides: Sequence[int], workers: int) -> Layout:
-    """Return the layout with these sides of tiles, level by level."""
-    sample, levels = plan.sample, tuple(_level(plan, seed, number, side) for number, side in enumerate(sides))
-    channels, sites, finest, sd = sample.working.shape[0], prod(plan.shape), levels[0], plan.options.finish or 0
-    shown = finest.side + (2 * int(around(sd)[0].max(initial=0)) if sd else 0)  # with the margin of the finish
-    window = max(*(one.window for one in levels), min(shown, finest.rows) * min(shown, finest.cols))
+    levels = tuple(_level(plan, seed, number, tile) for number in range(plan.levels))
+    sample, channels, sd = plan.sample, plan.sample.working.shape[0], plan.options.finish or 0
+    shown = tile + (2 * int(around(sd)[0].max(initial=0)) if sd else 0)  # with the margin of the finish
+    window = max(*(one.window for one in levels), min(shown, levels[0].rows) * min(shown, levels[0].cols))
     each, pixel = (fixed + more * channels for fixed, more in (SITE, PIXEL))
     memory = PROCESS + window * each + sample.rows * sample.cols * pixel
-    disk = int(sites * (6 + 2 * channels) * 2.25) + sites * sample.shown * sample.pixels.dtype.itemsize
-    return Layout(levels, channels, workers, memory, disk)
+    disk = int(prod(plan.shape) * ((6 + 2 * channels) * 2.25 + sample.shown * sample.pixels.dtype.itemsize))
+    return Layout(levels, channels, memory, disk)
 
 
 def _level(plan: Plan, seed: int, number: int, side: int) -> LevelLayout:
@@ -191,8 +165,3 @@ def _level(plan: Plan, seed: int, number: int, side: int) -> LevelLayout:
     assert isinstance(plan.schedule, Windowed)
     steps = plan.schedule.count(Grid(lattice.rows, lattice.cols, 1, torus), plan.options.order, seed)
     return LevelLayout(number, lattice.rows, lattice.cols, side, steps * int(plan.offsets.max()), torus)
-
-
-def _span(level: LevelLayout, workers: int) -> float:
-    """Return the duration of a sweep of a level, in sites that one worker relaxes."""
-    return ceil(level.count / workers) * level.relaxed(level.tile(0))

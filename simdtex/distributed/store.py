@@ -29,17 +29,15 @@ from numpy.typing import NDArray
 
 from simdtex.checkpoint import pack, unpack
 from simdtex.distributed.description import described, restored
-from simdtex.distributed.layout import Layout, LevelLayout, laid
+from simdtex.distributed.layout import Layout, LevelLayout, planned
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Held
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.tiles import Tally, Tile
 from simdtex.model.lattice import Grid
 from simdtex.ops.neighbourhood import Confidences, Field
 
-FORMAT = 3
+FORMAT = 4
 """Format of the store; another one is refused."""
-
-KIND = "simdtex tiles"
 
 TOGETHER = 2**22
 """Numbers of tallies that are read at a time."""
@@ -82,7 +80,7 @@ class Work(NamedTuple):
 
 
 class Store:
-    """A store: ``where`` is a folder, or an address of a file system that all workers reach."""
+    """A store: ``where`` is a folder that all workers reach."""
 
     def __init__(self, where: str) -> None:
         self.where = where
@@ -116,11 +114,10 @@ class Store:
         store._pixels("image", finest, (sample.shown,) if channels else (), sample.pixels.dtype)
         if source:
             store._pixels("source", finest, (2 + (len(sample.boxes) > 1),), np.dtype(np.int32))
-        work.attrs["kind"] = KIND
         work.attrs["about"] = {
             **{"format": FORMAT, "version": own, "name": secrets.token_hex(8), "run": tree, "seed": seed},
-            **{"sides": [one.side for one in layout.levels], "workers": layout.workers},
-            **{"confidences": [float(one) for one in conditions.confidences], "held": held, "given": given is not None},
+            **{"tile": layout.levels[0].side, "confidences": [float(one) for one in conditions.confidences]},
+            **{"held": held, "given": given is not None},
         }
         store.save(first_turn(layout))
         root.attrs["simdtex"] = {"version": own, "seed": seed, "options": asdict(options)}
@@ -143,7 +140,7 @@ class Store:
         plan, seed = restored(unpack(about["run"], arrays)), about["seed"]
         guides, own, centre, hard = about["confidences"]
         confidences = Confidences(int(guides), bool(own), np.float32(centre), np.float32(hard))
-        layout = laid(plan, seed, about["sides"], about["workers"])
+        layout = planned(plan, seed, about["tile"])
         return Work(plan, seed, layout, confidences, about["held"], about["given"])
 
     # -- turns ----------------------------------------------------------------------------------------------------

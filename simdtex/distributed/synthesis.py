@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -66,8 +66,7 @@ def synthesize(
     shape : (int, int)
         Rows and columns of the output.
     store : path
-        Folder of the Zarr store to make, or an address of a file system that every worker reaches. `resume` goes on
-        from it if the run is stopped.
+        Folder of the Zarr store to make, which every worker reaches. `resume` goes on from it if the run is stopped.
     tiles : int
         Sites to the side of a tile, which determine the memory of a worker and not the result.
     client : distributed.Client, optional
@@ -107,10 +106,10 @@ def synthesize(
     inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
     run, seed = _plan(inputs, size, options), as_seed(rng)
     count = _workers(client, workers)
-    layout, target = planned(run, seed, tiles, count), _address(store)
+    layout = planned(run, seed, tiles)
     if client is None:
         memory.require_host(layout.memory * count, "give smaller tiles or fewer workers")
-    with _made(target) as temporary:
+    with _made(store) as temporary:
         from simdtex.distributed.store import Store
 
         Store.create(temporary, run, seed, layout, channels=channel_axis is not None, source=source_map)
@@ -150,10 +149,9 @@ def resume(
     from simdtex.distributed.cluster import across, connected, here
     from simdtex.distributed.tiling import Tiles
 
-    where = _address(store)
-    opened = _opened(where)
+    opened = _opened(store)
     _workers(client, workers)
-    with nullcontext() if "://" in where else exclusive(where), connected(workers) as own:
+    with exclusive(store), connected(workers) as own:
         crew = client or own
         if crew is not None and not (device is None or isinstance(device, (str, int))):
             raise TypeError("each worker opens its own device; give its name, not an open machine")
@@ -163,12 +161,12 @@ def resume(
         else:
             crewed = here(opened, device) if crew is None else across(crew, opened, name)
             drive(Tiles(opened, crewed), Reference(), 0, callback)
-    return _array(where, channel_axis)
+    return _array(opened.where, channel_axis)
 
 
 def finished(store: PathLike) -> bool:
     """Return whether an output is complete; raise ValueError if the store holds none, as `resume` does."""
-    return bool(_opened(_address(store)).turn.phase == "done")
+    return bool(_opened(store).turn.phase == "done")
 
 
 def plan(
@@ -176,7 +174,6 @@ def plan(
     shape: tuple[int, int],
     *,
     tiles: int = TILES,
-    workers: int = 1,
     channel_axis: int | None = None,
     **options: Any,
 ) -> Layout:
@@ -186,8 +183,6 @@ def plan(
     ----------
     sample, shape, tiles, channel_axis, **options
         As of `synthesize`; ``mask``, ``known`` and the like may be among the options.
-    workers : int
-        The number that the layout is for.
 
     Returns
     -------
@@ -196,7 +191,7 @@ def plan(
     """
     size = check_shape(shape)
     given = {name: options.pop(name, None) for name in ("mask", "known", "known_source", "guide")}
-    return planned(_plan(check_inputs(sample, size, channel_axis, **given), size, options), 0, tiles, workers)
+    return planned(_plan(check_inputs(sample, size, channel_axis, **given), size, options), 0, tiles)
 
 
 def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any]) -> Plan:
@@ -216,21 +211,11 @@ def _workers(client: Client | None, workers: int | None) -> int:
     return 1 if client is None else max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
 
 
-def _address(store: PathLike) -> str:
-    where = os.fspath(store)
-    if not isinstance(where, str):
-        raise TypeError(f"store must be a path or an address, not {store!r}")
-    return where if "://" in where else os.path.abspath(where)
-
-
 @contextmanager
-def _made(where: str) -> Iterator[str]:
+def _made(store: PathLike) -> Iterator[str]:
     """Yield where to make a store, so that it exists completely or not at all."""
     _libraries()
-    if "://" in where:
-        yield where
-        return
-    path = Path(where)
+    path = Path(store)
     if path.exists():
         raise ValueError(f"{path} is there already; remove it, give another name, or go on with: simdtex resume {path}")
     if not path.parent.is_dir():
@@ -239,13 +224,14 @@ def _made(where: str) -> Iterator[str]:
         yield str(temporary)
 
 
-def _opened(where: str) -> Any:
+def _opened(path: PathLike) -> Any:
     """Open a store; raise ValueError unless this version can go on with it."""
     _libraries()
-    from simdtex.distributed.store import FORMAT, KIND, Store
+    from simdtex.distributed.store import FORMAT, Store
 
+    where = os.path.abspath(path)
     try:
-        if "://" not in where and not os.path.isdir(where):
+        if not os.path.isdir(where):
             raise FileNotFoundError  # Zarr would make it
         store = Store(where)
     except (OSError, ValueError, KeyError):
@@ -253,9 +239,8 @@ def _opened(where: str) -> Any:
     if "simdtex" not in store.root.attrs and "work" not in store.root:
         raise ValueError(f"{where} is no output in tiles; give one that simdtex has begun")
     if "work" in store.root:
-        attributes = store.root["work"].attrs
-        about, own = attributes.get("about", {}), version("simdtex")
-        if attributes.get("kind") != KIND or about.get("format") != FORMAT or about.get("version") != own:
+        about, own = store.root["work"].attrs.get("about", {}), version("simdtex")
+        if about.get("format") != FORMAT or about.get("version") != own:
             raise ValueError(
                 f"{where} was begun by simdtex {about.get('version', 'of another kind')} and this is {own}; "
                 "go on with that version, or begin anew"

@@ -16,7 +16,7 @@ from simdtex.distributed.layout import LevelLayout
 from simdtex.distributed.store import PLANES, Store, Stored, Turn, phase_of
 from simdtex.machine import Machine
 from simdtex.methods.mrf.level import Lattices
-from simdtex.methods.mrf.record import expected_work
+from simdtex.methods.mrf.record import expected_work, fraction_done
 from simdtex.ops.use import use_penalty
 from simdtex.run import Callback, Output, Tiling
 
@@ -146,22 +146,17 @@ class Watch:
         """Do nothing: the store holds the state."""
 
     def _share(self, turn: Turn, level: LevelLayout, part: float) -> float:
-        """Return the share of the expected work that is done; the last hundredth is for writing the picture."""
-        total = sum(map(sum, self._expected.values()))
-        coarser = range(turn.level + 1, self._run.lattices.levels)
-        over = sum(sum(self._expected[number]) for number in coarser)
-        cooling, free = self._expected[turn.level]
+        """Return the share of the expected work that is done."""
+        cooled, free = (0.0, 0.0) if turn.phase == "begin" else (part, part)
         if turn.phase == "show":
-            return 0.99 + 0.01 * part
-        if turn.phase == "sweep" and not turn.active:
-            over += cooling + free * min(1.0, (turn.free + part) / max(1, self._run.lattices.options.free_sweeps))
-        elif turn.phase == "sweep":
+            cooled = free = 1.0
+        elif turn.phase == "sweep" and turn.active:
             first = 1.0 if turn.level == self._run.lattices.levels - 1 else 0.75  # mean temperature at the beginning
             left = turn.temperature_sum / (1024 * level.rows * level.cols * first)
-            over += cooling * min(1.0, 1 - sqrt(left) + 0.1 * part)
-        elif turn.phase == "whole":
-            over += (cooling + free) * part
-        return 0.99 * min(1.0, over / total)
+            cooled, free = max(0.0, 1 - sqrt(left)), 0.0
+        elif turn.phase == "sweep":
+            cooled, free = 1.0, min(1.0, (turn.free + part) / max(1, self._run.lattices.options.free_sweeps))
+        return fraction_done(self._expected, turn.level, cooled, free)
 
     def _picture(self, turn: Turn, level: LevelLayout) -> NDArray[Any]:
         """Return every n-th site of the state before the turn, at most about `SHOWN` to the side."""

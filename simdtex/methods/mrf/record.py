@@ -95,15 +95,13 @@ class Record:
 
         The share of a level's cooling that is done is about 1 - sqrt(t / t_0); a sweep cools by about a tenth.
         """
-        cooling, free = self._expected[level]
+        cooled, free = 1.0, 0.0
         if state.active:
             cooled = 1 - sqrt(left / self._first_left)
-            done = cooling * (cooled + min(0.1, 1 - cooled) * share)
+            cooled += min(0.1, 1 - cooled) * share
         else:
-            done = cooling + free * min(1.0, (state.free + share) / max(1, self._run.options.free_sweeps))
-        before = sum(sum(work) for number, work in self._expected.items() if number > level)
-        total = sum(map(sum, self._expected.values()))
-        self._fraction = max(self._fraction, min(1.0, (before + done) / total))
+            free = min(1.0, (state.free + share) / max(1, self._run.options.free_sweeps))
+        self._fraction = max(self._fraction, fraction_done(self._expected, level, cooled, free))
 
     def step(self, state: State, info: Info) -> None:
         """Count what a sweep would cost on an array; at a level's end, keep its picture."""
@@ -224,3 +222,10 @@ def expected_work(run: Lattices) -> dict[int, tuple[float, float]]:
         sites = grid.rows * grid.cols * candidates
         work[number] = (sites * sweeps, float(sites * options.free_sweeps))
     return work
+
+
+def fraction_done(expected: dict[int, tuple[float, float]], level: int, cooled: float, free: float) -> float:
+    """Return the share of the expected work that is done at these shares of a level's cooling and free sweeps."""
+    cooling, sweeps = expected[level]
+    before = sum(sum(work) for number, work in expected.items() if number > level)
+    return min(1.0, (before + cooling * cooled + sweeps * free) / sum(map(sum, expected.values())))
