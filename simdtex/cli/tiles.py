@@ -90,8 +90,10 @@ def synthesize_in_tiles(context: click.Context, sample: Any, shape: tuple[int, i
     if given["dry_run"]:
         return
     options |= {"rng": given["seed"], "device": given["device"]}
-    with _workers(workers) as client, _progress(output, given["quiet"]) as callback:
-        distributed.synthesize(sample, shape, output, tiles=given["tiles"], callback=callback, **client, **options)
+    with _progress(output, given["quiet"]) as callback:
+        distributed.synthesize(
+            sample, shape, output, tiles=given["tiles"], workers=workers, callback=callback, **options
+        )
     _done(output, given["quiet"], began)
 
 
@@ -103,20 +105,9 @@ def resume_tiles(store: Path, workers: str | None, device: str | None, quiet: bo
     if distributed.finished(store):
         click.echo(f"{store} is finished; there is nothing to go on with")
         return
-    with _workers(workers_of(workers)) as client, _progress(store, quiet) as callback:
-        distributed.resume(store, device=device, callback=callback, **client)
+    with _progress(store, quiet) as callback:
+        distributed.resume(store, workers=workers_of(workers), device=device, callback=callback)
     _done(store, quiet, began)
-
-
-@contextmanager
-def _workers(workers: int | str | None) -> Iterator[dict[str, Any]]:
-    """Yield the Dask client whose workers make the tiles, as a keyword; none if this process makes them."""
-    from simdtex.distributed.cluster import connected
-
-    with connected(workers) as client:
-        if client is not None and not client.scheduler_info(n_workers=-1)["workers"]:
-            click.echo("the scheduler has no workers yet; start some with: dask worker ADDRESS", err=True)
-        yield {} if client is None else {"client": client}
 
 
 @contextmanager

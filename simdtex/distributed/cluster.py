@@ -35,10 +35,10 @@ def here(store: Store, device: str | Machine | None) -> Execute:
     return execute
 
 
-def across(client: Client, store: Store, device: str | None) -> Execute:
+def across(client: Client, store: Store, device: str | Machine | None) -> Execute:
     """Return what has the workers of a cluster do tiles; a tile that is lost with its worker is done by another."""
     distributed: Any = import_module("distributed")
-    what = store.where, store.name, device
+    what = store.where, store.name, None if device is None else str(device)
 
     def execute(turn: Turn, tiles: Sequence[int]) -> Iterator[int]:
         token, todo = os.urandom(8).hex(), iter(tiles)
@@ -68,11 +68,21 @@ def across(client: Client, store: Store, device: str | None) -> Execute:
     return execute
 
 
-@contextmanager
-def connected(workers: int | str | None) -> Iterator[Client | None]:
-    """Yield a client of a cluster of so many processes on this machine, of the scheduler at an address, or None."""
+def check_workers(workers: Any, device: Any) -> None:
+    """Raise unless workers of a valid number can open the device."""
     if workers is None:
-        yield None
+        return
+    if isinstance(workers, (int, float)):
+        whole("workers", workers, 1, 4 * (os.cpu_count() or 1))
+    if not (device is None or isinstance(device, (str, int))):
+        raise TypeError("each worker opens its own device; give its name, not an open machine")
+
+
+@contextmanager
+def connected(workers: int | str | Client | None) -> Iterator[Client | None]:
+    """Yield a client of so many processes on this machine, of the scheduler at an address, the one given, or None."""
+    if workers is None or not isinstance(workers, (int, str)):
+        yield workers
         return
     try:
         distributed: Any = import_module("distributed")
@@ -87,7 +97,6 @@ def connected(workers: int | str | None) -> Iterator[Client | None]:
         with client:
             yield client
         return
-    whole("workers", workers, 1, 4 * (os.cpu_count() or 1))
     each = max(1, (os.cpu_count() or 1) // workers)
     limits = {name: str(each) for name in ("POCL_MAX_PTHREAD_COUNT", "POCL_CPU_MAX_CU_COUNT")}
     with (

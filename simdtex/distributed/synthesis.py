@@ -23,7 +23,7 @@ from simdtex.machine.reference import Reference
 from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.plan import plan as planned_run
-from simdtex.options import resolve, whole
+from simdtex.options import resolve
 from simdtex.random import as_seed
 from simdtex.run import Callback
 
@@ -44,8 +44,7 @@ def synthesize(
     store: PathLike,
     *,
     tiles: int = TILES,
-    client: Client | None = None,
-    workers: int | None = None,
+    workers: int | str | Client | None = None,
     source_map: bool = False,
     channel_axis: int | None = None,
     mask: ArrayLike | Sequence[ArrayLike] | None = None,
@@ -69,11 +68,9 @@ def synthesize(
         Folder of the Zarr store to make, which every worker reaches. `resume` goes on from it if the run is stopped.
     tiles : int
         Sites to the side of a tile, which determine the memory of a worker and not the result.
-    client : distributed.Client, optional
-        The workers of its cluster do the tiles; each opens its own device.
-    workers : int, optional
-        Start so many worker processes on this machine, which divide its cores among them. Without `client` and
-        `workers` this process does one tile after another.
+    workers : int, str or distributed.Client, optional
+        What does the tiles: so many processes on this machine, which divide its cores among them; the workers of the
+        Dask scheduler at an address; those of a client. Each opens its own device. None: this process, one by one.
     source_map : bool
         Also write ``source``, for every output pixel the (row, column[, picture]) of the sample pixel it is from.
     mask, known, known_source, guide, rng
@@ -105,22 +102,24 @@ def synthesize(
     size = check_shape(shape)
     inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
     run, seed = _plan(inputs, size, options), as_seed(rng)
-    count = _workers(client, workers)
     layout = planned(run, seed, tiles)
-    if client is None:
-        memory.require_host(layout.memory * count, "give smaller tiles or fewer workers")
-    with _made(store) as temporary:
-        from simdtex.distributed.store import Store
+    _libraries()
+    from simdtex.distributed.cluster import check_workers, connected
+    from simdtex.distributed.store import Store
 
-        Store.create(temporary, run, seed, layout, channels=channel_axis is not None, source=source_map)
-    return resume(store, client=client, workers=workers, channel_axis=channel_axis, device=device, callback=callback)
+    check_workers(workers, device)
+    if workers is None or isinstance(workers, int):
+        memory.require_host(layout.memory * (workers or 1), "give smaller tiles or fewer workers")
+    with connected(workers) as client:
+        with _made(store) as temporary:
+            Store.create(temporary, run, seed, layout, channels=channel_axis is not None, source=source_map)
+        return resume(store, workers=client, channel_axis=channel_axis, device=device, callback=callback)
 
 
 def resume(
     store: PathLike,
     *,
-    client: Client | None = None,
-    workers: int | None = None,
+    workers: int | str | Client | None = None,
     channel_axis: int | None = -1,
     device: str | Machine | None = None,
     callback: Callback | None = None,
@@ -131,7 +130,7 @@ def resume(
     ----------
     store : path
         As of `synthesize`.
-    client, workers, device, callback
+    workers, device, callback
         As of `synthesize`; they may be others than before.
     channel_axis : int, optional
         Where the channels of the array that is returned are, if it has any.
@@ -146,21 +145,17 @@ def resume(
     ValueError
         There is no such store, or one of another version, or another process is at work in it.
     """
-    from simdtex.distributed.cluster import across, connected, here
+    opened = _opened(store)
+    from simdtex.distributed.cluster import across, check_workers, connected, here
     from simdtex.distributed.tiling import Tiles
 
-    opened = _opened(store)
-    _workers(client, workers)
-    with exclusive(store), connected(workers) as own:
-        crew = client or own
-        if crew is not None and not (device is None or isinstance(device, (str, int))):
-            raise TypeError("each worker opens its own device; give its name, not an open machine")
-        name = None if device is None else str(device)
+    check_workers(workers, device)
+    with exclusive(store), connected(workers) as client:
         if opened.turn.phase == "done":
             opened.finish()
         else:
-            crewed = here(opened, device) if crew is None else across(crew, opened, name)
-            drive(Tiles(opened, crewed), Reference(), 0, callback)
+            each = here(opened, device) if client is None else across(client, opened, device)
+            drive(Tiles(opened, each), Reference(), 0, callback)
     return _array(opened.where, channel_axis)
 
 
@@ -201,20 +196,9 @@ def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any]) -> Pla
     return planned_run(inputs.pictures, size, chosen, inputs.given, inputs.guide)
 
 
-def _workers(client: Client | None, workers: int | None) -> int:
-    """Return the number of workers."""
-    if workers is not None:
-        whole("workers", workers, 1, 4 * (os.cpu_count() or 1))
-        if client is not None:
-            raise TypeError("a client has its own workers; give client or workers, not both")
-        return workers
-    return 1 if client is None else max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
-
-
 @contextmanager
 def _made(store: PathLike) -> Iterator[str]:
     """Yield where to make a store, so that it exists completely or not at all."""
-    _libraries()
     path = Path(store)
     if path.exists():
         raise ValueError(f"{path} is there already; remove it, give another name, or go on with: simdtex resume {path}")
