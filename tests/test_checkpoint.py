@@ -320,7 +320,7 @@ def test_other_paths_are_refused(tmp_path):
     photo.write_bytes(b"mine")
     refused(photo, r"photo.png is no checkpoint, or is damaged; remove it")
     refused(tmp_path, "is a folder: add a file name")
-    refused(tmp_path / "a" / "b", "there is no folder .*: create it first")
+    refused(tmp_path / "a" / "b", "does not exist: create it first")
     with pytest.raises(ValueError, match="every is -1"):
         Checkpoint(tmp_path / "new", every=-1)
     assert [path.name for path in tmp_path.iterdir()] == ["photo.png"]

@@ -114,7 +114,7 @@ def test_a_device_finds_what_the_reference_finds(any_device, tmp_path):
         (["--start", "down"], "unknown start 'down'; choose one of: up, random"),
         (["--seed", "-1"], "give an integer from 0 to 2**64 - 1"),
         (["--device", "no such device"], "no such device"),
-        (["-o", "nowhere/report"], "there is no folder nowhere: create it first"),
+        (["-o", "nowhere/report"], "the folder nowhere does not exist: create it first"),
     ],
 )
 def test_bad_input_gives_one_sentence_and_nothing_else(arguments, sentence, tmp_path, monkeypatch):

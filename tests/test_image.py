@@ -385,7 +385,7 @@ def test_formats_that_cannot_hold_the_pixels(tmp_path, suffix, dtype, channels, 
 
 def test_places_that_cannot_be_written(tmp_path, monkeypatch):
     for path, words in [
-        (tmp_path / "none" / "a.png", "there is no folder"),
+        (tmp_path / "none" / "a.png", "the folder .* does not exist"),
         (tmp_path / "a.xyz", "ends in .xyz"),
         (tmp_path / "a", "has no suffix"),
         (tmp_path, "is a folder"),
@@ -395,7 +395,7 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch):
         with pytest.raises(ValueError, match=words):
             image.check_writable(path, np.uint8, 3)
     (tmp_path / "file").touch()
-    with pytest.raises(ValueError, match="there is no folder"):
+    with pytest.raises(ValueError, match="the folder .* does not exist"):
         image.check_writable(tmp_path / "file" / "a.png")
     image.check_writable(tmp_path / "a.npz", suffixes={".npz"})
     with pytest.raises(ValueError, match=r"\.npz"):

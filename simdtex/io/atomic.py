@@ -165,7 +165,7 @@ def check_target(target: Path) -> None:
         if target.exists() and not target.is_file():
             raise ValueError(f"{target} is not a regular file: give another name")
         if not target.parent.is_dir():
-            raise ValueError(f"there is no folder {target.parent}: create it first")
+            raise ValueError(f"the folder {target.parent} does not exist: create it first")
         os.stat(target)
     except FileNotFoundError:
         pass
