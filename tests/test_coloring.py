@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from simdtex import random
 from simdtex.model.lattice import Grid, coloring_sublattice
 from simdtex.ops import coloring as module
-from simdtex.ops.coloring import coloring, colors_of
+from simdtex.ops.coloring import coloring, lattice_plan
 
 TINY = [(1, 1), (1, 2), (1, 5), (5, 1), (2, 2), (2, 3), (3, 3), (4, 2)]
 SMALL = [(6, 6), (7, 7), (8, 13), (13, 8), (12, 10), (9, 15)]
@@ -165,13 +165,13 @@ def test_a_window_has_the_colours_of_the_whole(order, shape, torus, corner, size
     top, left = corner if torus else (min(at, n - k) for at, n, k in zip(corner, shape, (rows, cols), strict=True))
     window = grid.window(top, left, rows, cols)
     assert_same_bits(coloring(window, order, 7), window.cut(coloring(grid, order, 7)))
-    assert colors_of(window, order, 7).colors == coloring(grid, order, 7).max() + 1
+    assert lattice_plan(*shape, torus, order, 7).colors == coloring(grid, order, 7).max() + 1
 
 
 def test_sites_are_looked_at_piece_by_piece(monkeypatch):
     whole = [colour(order, 30, 37, True) for order in (8, 18)]
     monkeypatch.setattr(module, "TOGETHER", 500)
-    module._plan.cache_clear()
+    module.lattice_plan.cache_clear()
     assert_same_bits([colour(order, 30, 37, True) for order in (8, 18)], whole)
 
 
@@ -181,7 +181,7 @@ def test_the_colours_of_a_vast_torus_are_known_by_its_seam():
     window = grid.window(99_980, 99_990, 30, 40)
     colors = coloring(window, 2, 1)
     assert not conflicts(colors, 2, False)
-    assert colors.max() < colors_of(grid, 2, 1).colors <= 9
+    assert colors.max() < lattice_plan(99_991, 100_003, True, 2, 1).colors <= 9
 
 
 def test_a_vast_torus_takes_a_pattern_that_fits():
@@ -189,5 +189,5 @@ def test_a_vast_torus_takes_a_pattern_that_fits():
     grid = Grid(2**20, 2**20)
     window = grid.window(2**20 - 20, 2**20 - 25, 45, 50)
     assert not conflicts(coloring(window, 18, 1), 18, False)
-    plan = colors_of(grid, 18, 1)
+    plan = lattice_plan(2**20, 2**20, True, 18, 1)
     assert (plan.seam.size, plan.colors) == (0, coloring_sublattice(18, 2**20, 2**20, limit=61).index)

@@ -21,7 +21,7 @@ from simdtex.methods.mrf.plan import plan as planned_run
 from simdtex.methods.mrf.tiles import Tile, framed
 from simdtex.model.lattice import Grid
 from simdtex.model.pictures import Pictures
-from simdtex.ops.coloring import colors_of
+from simdtex.ops.coloring import lattice_plan
 from simdtex.ops.neighbourhood import Field
 
 zarr = pytest.importorskip("zarr")
@@ -320,7 +320,7 @@ def test_the_plan_says_what_is_needed():
     plan = distributed.plan(SAMPLE, (4096, 4096), tiles=1024, order=18)
     finest = plan.levels[0]
     assert (finest.count, finest.side, finest.rows, finest.chunk) == (16, 1024, 4096, 512)
-    assert finest.halo == 4 * colors_of(Grid(4096, 4096), 18, 0).colors
+    assert finest.halo == 4 * lattice_plan(4096, 4096, True, 18, 0).colors
     assert 0.3 < finest.redundant < 0.4
     lines = plan.lines()
     assert lines[-2].startswith("level 0: 4096x4096 sites in 16 tiles of 1024x1024, halo 116, 3")

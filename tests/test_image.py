@@ -395,7 +395,7 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch):
         with pytest.raises(ValueError, match=words):
             image.check_writable(path, np.uint8, 3)
     (tmp_path / "file").touch()
-    with pytest.raises(ValueError, match="the folder .* does not exist"):
+    with pytest.raises(ValueError, match=r"the folder .* does not exist"):
         image.check_writable(tmp_path / "file" / "a.png")
     image.check_writable(tmp_path / "a.npz", suffixes={".npz"})
     with pytest.raises(ValueError, match=r"\.npz"):

@@ -253,7 +253,7 @@ class Sublattice:
 
     def shortest(self) -> int:
         """Squared length of its shortest vector."""
-        reach = isqrt(2 * self.index) + 1
+        reach = isqrt(2 * self.a * self.c) + 1
         best = self.a * self.a
         for m in range(1, reach // self.c + 2):
             row = (m * self.b) % self.a

@@ -64,7 +64,8 @@ def coloring(grid: Grid, order: int, seed: int = 0) -> NDArray[np.int32]:
     (rows, cols) int32 array
         0 .. colours - 1. Cost: O(rows cols), and once for a whole lattice a few tens of rounds along its seam.
     """
-    whole, plan = grid.within, colors_of(grid, order, seed)
+    whole = grid.within
+    plan = lattice_plan(whole.rows, whole.cols, grid.torus, order, seed)
     row = (whole.top + np.arange(grid.rows)) % whole.rows
     col = (whole.left + np.arange(grid.cols)) % whole.cols
     colors = _cosets(plan.pattern, row[:, None], col[None, :])
@@ -76,13 +77,9 @@ def coloring(grid: Grid, order: int, seed: int = 0) -> NDArray[np.int32]:
     return plan.compact[colors]
 
 
-def colors_of(grid: Grid, order: int, seed: int) -> Plan:
-    """Return the plan of the whole lattice of a grid."""
-    return _plan(grid.within.rows, grid.within.cols, grid.torus, order, seed)
-
-
 @lru_cache(maxsize=32)
-def _plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Plan:
+def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Plan:
+    """Return the colouring of a whole lattice."""
     best = coloring_sublattice(order)
     assert best is not None  # a square pattern always exists in the plane
     neighbours = len(neighbourhood_offsets(order))

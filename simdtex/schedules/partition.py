@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from simdtex import random
 from simdtex.machine.interface import Machine
 from simdtex.model.lattice import Grid
-from simdtex.ops.coloring import coloring, colors_of
+from simdtex.ops.coloring import coloring, lattice_plan
 from simdtex.options import whole
 from simdtex.schedules.schedule import Active, Info, Setting
 
@@ -108,7 +108,7 @@ class Coloring(Partition):
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
         """Colours of the whole lattice."""
-        return colors_of(grid, order, seed).colors
+        return lattice_plan(grid.within.rows, grid.within.cols, grid.torus, order, seed).colors
 
 
 class FixedColoring(Coloring):
