@@ -19,7 +19,7 @@ import samples
 import simdtex
 from simdtex.experiments.comparison import FIGURES, compare
 from simdtex.report.page import Figure
-from simdtex.report.schedules import reading, sections, tables
+from simdtex.report.schedules import sections, tables
 from simdtex.report.tables import print_table
 
 DOCS = Path(__file__).parent.parent / "docs"
@@ -53,7 +53,6 @@ def main():
         print(f"\n{name}, {time.perf_counter() - began:.0f} s\n")
         for table in tables(found):
             print_table(table, 220)
-        print(f"\n{reading(found)}", flush=True)
         figures = [part for section in sections(found) for part in section.parts if isinstance(part, Figure)]
         for figure in figures:
             # temperatures depend on the schedule and the seed, not on the pixels: one plot is every sample's

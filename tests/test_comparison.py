@@ -9,8 +9,7 @@ from cases import texture
 
 from simdtex.experiments.comparison import Entry, Recorder, Spread, compare
 from simdtex.report.page import Figure
-from simdtex.report.schedules import reading, sections, tables
-from simdtex.schedules import Checkerboard
+from simdtex.report.schedules import sections, tables
 
 
 def feed(recorder, pictures, level=0, phase="free", **more):
@@ -154,24 +153,6 @@ def test_a_level_at_which_it_breaks_is_enough():
     assert "At level 1 block:6x6 keeps equation (14)" in section.parts[0].note
 
 
-class Liar(Checkerboard):
-    """Claims what it does not keep."""
-
-    name = "liar"
-
-    def independent(self, grid, offsets):
-        return True
-
-
-def test_a_false_claim_is_caught_and_told():
-    found = compare(SAMPLE, (12, 12), [Liar(), "luby"], seeds=[1], **JOB)
-    liar, luby = found.entries
-    assert liar.caught and not liar.independent and all(liar.claims)
-    assert luby.independent and not luby.caught
-    assert tables(found)[0].rows[0]["Equation (14)"] == "breaks (14), against its claim"
-    assert "liar breaks it" in reading(found)
-
-
 def test_every_table_says_who_breaks_it(found):
     assert len(tables(found)) == 4
     for table in tables(found):
@@ -181,13 +162,6 @@ def test_every_table_says_who_breaks_it(found):
             ("block:4x4", "breaks (14)"),
         ]
         assert "n/a" not in table.rows[0].values() or "Device time, s" in table.header
-
-
-def test_the_reading_names_the_extremes(found):
-    steps = {entry.name: entry.figure("steps").mean for entry in found.entries}
-    least, most = min(steps, key=steps.get), max(steps, key=steps.get)
-    line = next(line for line in reading(found).splitlines() if line.startswith("Parallelism"))
-    assert f"with {least} to" in line and line.endswith(f"with {most}.")
 
 
 def test_figures_of_the_page(found):

@@ -86,11 +86,10 @@ def test_enlarged_puts_decimated_pixels_back(rows, cols, level):
     np.testing.assert_array_equal(shown, full[i // step * step, j // step * step])
 
 
-@pytest.mark.parametrize("suffix", [".gif", ".png", ".apng", ".webp"])
-def test_animation(tmp_path, suffix):
+def test_animation(tmp_path):
     frames = [np.full((6, 8), shade, np.uint8) for shade in (0, 80, 160, 240)]
-    path = tmp_path / f"a{suffix}"
-    sheet.animation(iter(frames), path, ms=50)
+    path = tmp_path / "a.gif"
+    sheet.animation(iter(frames), path)
     with PIL.Image.open(path) as film:
         assert film.n_frames == 4
         assert film.size == (8, 6)
@@ -104,13 +103,9 @@ def test_an_animation_is_bounded_and_checked(tmp_path):
     with PIL.Image.open(tmp_path / "a.gif") as film:
         assert max(film.size) <= 512
     frame = np.zeros((4, 4), np.uint8)
-    for frames, name, ms, words in [
-        ([], "b.gif", 50, "no frames"),
-        ([frame], "b.jpg", 50, r"\.gif"),
-        ([frame], "b.gif", 0, "ms is 0"),
-    ]:
+    for frames, name, words in [([], "b.gif", "no frames"), ([frame], "b.jpg", r"\.gif")]:
         with pytest.raises(ValueError, match=words):
-            sheet.animation(frames, tmp_path / name, ms=ms)
+            sheet.animation(frames, tmp_path / name)
     assert os.listdir(tmp_path) == ["a.gif"]
 
 

@@ -17,9 +17,8 @@ ALWAYS = {
     "maps.png",
     "entropy.png",
     "variograms.png",
-    "distances.png",
 }
-OF_CATEGORIES = {"connectivity.png", "dead-ends.png"}
+OF_CATEGORIES = {"connectivity.png"}
 
 
 def test_a_report_of_categories(tmp_path):
@@ -57,7 +56,7 @@ def test_a_single_small_realisation_of_many_categories_has_a_report(tmp_path, mo
     monkeypatch.setattr(report, "MOST_PANELS", 2)
     training = np.arange(144).reshape(12, 12) % 9
     write_ensemble(tmp_path / "r", training, training[np.newaxis, :10, :11])
-    assert {path.name for path in (tmp_path / "r").iterdir()} == (ALWAYS | OF_CATEGORIES) - {"dead-ends.png"}
+    assert {path.name for path in (tmp_path / "r").iterdir()} == ALWAYS | OF_CATEGORIES
     text = read_page(tmp_path / "r" / "index.html").text
     assert "n/a" in text and "9 categories" in text and "There are no hard data." in text
 
@@ -75,19 +74,3 @@ def test_the_two_most_common_categories_are_drawn(monkeypatch):
     monkeypatch.setattr(report, "MOST_PANELS", 2)
     image = np.repeat([0, 1, 2, 3], [4, 1, 3, 8]).reshape(4, 4)
     assert report._drawn(ensemble.summary(image[np.newaxis], image)) == [0, 3]
-
-
-def test_dead_ends_have_a_ring_around_them():
-    picture = np.zeros((60, 60, 3), np.uint8)
-    ring = (report._ringed(picture, np.array([[10, 20]]), 2) == report.END).all(axis=-1)
-    rows, cols = np.nonzero(ring)
-    assert (rows.min() + rows.max()) / 2 == 21 and (cols.min() + cols.max()) / 2 == 41
-    assert not ring[21, 41] and not picture.any()
-
-
-def test_the_map_of_distances_keeps_them():
-    places = np.array([[0.0, 0], [3, 0], [0, 4], [1, 1]])
-    table = np.linalg.norm(places[:, None] - places, axis=-1)
-    found = report._scaled(table)
-    np.testing.assert_allclose(np.linalg.norm(found[:, None] - found, axis=-1), table, atol=1e-9)
-    np.testing.assert_allclose(report._scaled(np.zeros((3, 3))), 0)

@@ -10,18 +10,15 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-import PIL.Image
-import PIL.ImageDraw
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure as Plot
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.experiments.ensemble import Summary, dead_ends, summary
-from simdtex.experiments.ensemble.connectivity import MARGIN
+from simdtex.experiments.ensemble import Summary, summary
 from simdtex.io.image import to_display
 from simdtex.report.page import Figure, Part, Section, check_folder, write_report
 from simdtex.report.plots import FAINT, INK, legend, new_figure, tidy
-from simdtex.report.sheet import contact_sheet, magnified
+from simdtex.report.sheet import contact_sheet
 from simdtex.report.tables import Table, number_text
 
 __all__ = ["write_ensemble"]
@@ -30,12 +27,10 @@ Array = NDArray[Any]
 Floats = NDArray[np.float64]
 
 SHOWN = 5  # realisations shown with the training image
-MARKED = 2  # realisations shown with their dead ends
 MOST_PANELS = 6  # categories drawn, those with the largest shares of the training image
 SHOWN_SIDE = 300  # smaller images are enlarged by a whole factor, pixels
 SIDE = 3.4  # of a map's longer side, inches
 THEIRS, OWN = "#0072B2", "#D55E00"  # realisations, and the training image
-END = (214, 0, 110)  # the mark of a dead end, sRGB; no category has it
 # From light to dark in turn, so that neighbours differ in grey too; later categories begin again.
 _COLOURS = ["#f2ead3", "#1f4e79", "#8fbf9f", "#d08c3a", "#7a5195", "#4a4a4a", "#b8d4e8", "#5c7a29"]
 
@@ -84,7 +79,7 @@ def write_ensemble(
         Section("The realisations", [_realisations(images, own, found)]),
         Section("Uncertainty", _uncertainty(found)),
         Section("Variograms", [_variograms(found)]),
-        *([Section("Connectivity of the categories", _connectivity(images, own, found))] if categorical else []),
+        *([Section("Connectivity of the categories", _connectivity(found))] if categorical else []),
         Section("Variety and likeness", _distances(found)),
     ]
     kind = f"{len(found.categories)} categories" if categorical else "continuous values"
@@ -128,10 +123,9 @@ def _mapped(found: Summary) -> list[int]:
     return [1] if len(found.categories) == 2 else _drawn(found)
 
 
-def _labelled(
-    images: Array, own: Array, found: Summary, number: int
-) -> tuple[list[tuple[str, Array, NDArray[np.uint8]]], int]:
-    """Return the training image and some realisations with their labels and pictures, and the factor to enlarge by."""
+def _realisations(images: Array, own: Array, found: Summary) -> Figure:
+    """Return the training image and some realisations, in one scale."""
+    number = min(SHOWN, len(images))
     limits, palette = (float(own.min()), float(own.max())), np.array([to_rgb(colour) for colour in _COLOURS])
     shown = []
     for label, image in [("the training image", own), *((f"realisation {i}", images[i]) for i in range(number))]:
@@ -140,16 +134,10 @@ def _labelled(
         else:
             place = (image[..., np.newaxis] == found.categories).argmax(axis=-1)
             picture = np.rint(palette[place % len(_COLOURS)] * 255).astype(np.uint8)
-        shown.append((label, image, picture))
-    return shown, -(-SHOWN_SIDE // max(*own.shape, *images.shape[1:]))
-
-
-def _realisations(images: Array, own: Array, found: Summary) -> Figure:
-    number = min(SHOWN, len(images))
-    shown, factor = _labelled(images, own, found, number)
+        shown.append((label, picture))
     return Figure(
         "realisations.png",
-        contact_sheet([(label, picture) for label, _, picture in shown], columns=3, scale=factor),
+        contact_sheet(shown, columns=3, scale=-(-SHOWN_SIDE // max(*own.shape, *images.shape[1:]))),
         f"The training image and the first {number} of {len(images)} realisations, in one scale. No "
         "figure below replaces this look: shapes, widths and directions should be those of the training image, and no "
         "realisation should repeat a piece of it, or of another, as a whole.",
@@ -261,7 +249,7 @@ def _lagged(found: Summary, table: Floats, names: Sequence[str], label: str) -> 
     return figure
 
 
-def _connectivity(images: Array, own: Array, found: Summary) -> list[Part]:
+def _connectivity(found: Summary) -> list[Part]:
     shown = _drawn(found)
     names = [f"category {found.categories[k]}" for k in shown]
     figures = {
@@ -279,7 +267,7 @@ def _connectivity(images: Array, own: Array, found: Summary) -> list[Part]:
         "Realisations: mean ± standard deviation. Many components are specks, and many dead ends are channels that "
         "break off."
     )
-    parts: list[Part] = [
+    return [
         Figure(
             "connectivity.png",
             _lagged(found, found.connectivity[:, shown], names, "connectivity"),
@@ -288,13 +276,8 @@ def _connectivity(images: Array, own: Array, found: Summary) -> list[Part]:
             "broken ones; here, a band below the line of the training image means that its bodies are broken, one "
             "above that they merge. A smaller image cuts bodies apart, so compare images of one size if you can.",
         ),
-        Table(
-            "Figures of the categories",
-            rows,
-            note,
-        ),
+        Table("Figures of the categories", rows, note),
     ]
-    return [*parts, _ends(images, own, found)] if np.isfinite(found.dead_ends).all() else parts
 
 
 def _spread(values: Floats) -> str:
@@ -302,30 +285,6 @@ def _spread(values: Floats) -> str:
     if len(known) == 0:
         return "n/a"
     return number_text(known.mean(), known.std(ddof=1) if len(known) > 1 else None, 3)
-
-
-def _ends(images: Array, own: Array, found: Summary) -> Figure:
-    category = found.categories[found.shares[:, -1].argmin()]
-    shown, factor = _labelled(images, own, found, min(MARKED, len(images)))
-    pictures = []
-    for label, image, picture in shown:
-        places = dead_ends(image, category)
-        pictures.append((f"{label}: {len(places)}", _ringed(magnified(picture, factor), places, factor)))
-    return Figure(
-        "dead-ends.png",
-        contact_sheet(pictures, columns=3),
-        f"The dead ends of category {category} that are counted, in rings: free ends of its skeleton, without short "
-        f"spurs and without those within {MARGIN} pixels of the border.",
-    )
-
-
-def _ringed(picture: NDArray[np.uint8], places: NDArray[np.intp], factor: int) -> NDArray[np.uint8]:
-    """Return an enlarged picture with a ring around places of the original."""
-    image = PIL.Image.fromarray(picture)
-    draw, radius = PIL.ImageDraw.Draw(image), 4 * factor + 4
-    for row, col in (places * factor + factor // 2).tolist():
-        draw.ellipse((col - radius, row - radius, col + radius, row + radius), outline=END, width=3)
-    return np.array(image)
 
 
 # ---------------------------------------------------------------- distances
@@ -356,31 +315,8 @@ def _distances(found: Summary) -> list[Part]:
         "that are as different from one another as from the training image, as other images of the same kind are; far "
         "below 1 the realisations are more alike than that, or all of them lack something."
     )
-    caption = (
-        "The same distances as a map: two images are about as far apart as their patterns differ. The training image "
-        "should lie within the cloud; a cloud beside it means a fault that all realisations share, and a narrow cloud "
-        "little variety."
-    )
-    places = _scaled(one.distances)
-    plot = new_figure(4.6, 4.2)
-    axes = plot.subplots()
-    axes.plot(*places[:-1].T, "o", color=THEIRS, alpha=0.75, markersize=6, label="realisations")
-    axes.plot(*places[-1:].T, "D", color=OWN, markersize=9, label="training image")
-    axes.set_aspect("equal", adjustable="datalim")
-    tidy(axes)
-    legend(plot, axes)
-    figure = Figure("distances.png", plot, caption)
-    return [words, Table("Distances", rows, note), figure]
+    return [words, Table("Distances", rows, note)]
 
 
 def _decimal(value: float) -> str:
     return f"{value:.3f}" if np.isfinite(value) else "n/a"
-
-
-def _scaled(table: Floats) -> Floats:
-    """Return places (n, 2) for a table of distances (n, n), by classical multidimensional scaling."""
-    centre = np.eye(len(table)) - 1.0 / len(table)
-    values, vectors = np.linalg.eigh(-0.5 * centre @ table**2 @ centre)
-    places = vectors[:, :-3:-1] * np.sqrt(np.clip(values[:-3:-1], 0.0, None))
-    signs = np.sign(places[np.abs(places).argmax(axis=0), [0, 1]])
-    return np.asarray(places * np.where(signs == 0, 1.0, signs))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from simdtex.report.plots import legend, new_figure, styles, tidy
 from simdtex.report.sheet import contact_sheet
 from simdtex.report.tables import Table, number_text
 
-__all__ = ["reading", "sections", "tables", "write_comparison"]
+__all__ = ["sections", "tables", "write_comparison"]
 
 LEAST_FREE = 6  # free sweeps from which on oscillation can be told from settling
 SHOWN_SIDE = 256  # smaller pictures are enlarged by a whole factor, pixels
@@ -145,7 +145,6 @@ def sections(comparison: Comparison) -> list[Section]:
         f"Pixels that return to their value before last, sweep by sweep; markers are free sweeps. {hollow}",
     )
     return [
-        Section("Reading", [reading(comparison)]),
         Section("Pictures", _pictures(comparison)),
         Section(EQUILIBRIUM.title, [equilibrium, temperature]),
         Section(TIME.title, [time]),
@@ -196,17 +195,15 @@ def _text(name: str, found: Spread | None) -> str:
 
 
 def _verdict(entry: Entry) -> str:
-    if entry.caught:
-        return "breaks (14), against its claim"
     return "keeps (14)" if entry.independent else "breaks (14)"
 
 
 def _kept_levels(entry: Entry) -> str:
     """Return a sentence on a schedule that keeps equation (14) at some levels only, else nothing."""
     kept = [str(level) for level, claim in enumerate(reversed(entry.claims)) if claim]
-    if not kept or len(kept) == len(entry.claims) or entry.caught:
+    if not kept or len(kept) == len(entry.claims):
         return ""
-    return f" At level {_listed(kept)} {entry.name} keeps equation (14)."
+    return f" At level {', '.join(kept)} {entry.name} keeps equation (14)."
 
 
 def _few_free(free: int) -> str:
@@ -228,50 +225,6 @@ def _job(comparison: Comparison) -> Table:
         **comparison.options,
     }
     return Table("The same for every schedule", [{"What": k, "Value": str(v)} for k, v in about.items()])
-
-
-# ---------------------------------------------------------------- the text
-
-
-def reading(comparison: Comparison) -> str:
-    """Return a few paragraphs on the most important differences between the schedules."""
-    entries = comparison.entries
-    keeps = [entry.name for entry in entries if entry.independent]
-    breaks = [entry.name for entry in entries if not entry.independent]
-    said = []
-    if keeps:
-        said.append(f"{_listed(keeps)} keep{'s' * (len(keeps) == 1)} equation (14), which was checked at every step.")
-    if breaks:
-        said.append(
-            f"{_listed(breaks)} break{'s' * (len(breaks) == 1)} it: neighbours relax at once, or one sees an old value "
-            "of the other."
-        )
-    free = comparison.options["free_sweeps"] >= LEAST_FREE
-    parts = [
-        " ".join(said),
-        _range(entries, "steps", "Parallelism, steps until equilibrium at the finest level"),
-        _range(entries, "seconds", "Wall time of a run on this device in seconds"),
-        _range(entries, "oscillation_free", "Pixels that still flip back in the last free sweep")
-        if free
-        else _range(entries, "oscillation_cooling", "Pixels that flip back in a sweep, until equilibrium"),
-        _range(entries, "plausibility", "Plausibility, 0 is best"),
-        _range(entries, "coverage", "Coverage, 0 is best"),
-    ]
-    return "\n\n".join(part for part in parts if part)
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names[:-1]) + " and " * (len(names) > 1) + names[-1]
-
-
-def _range(entries: Sequence[Entry], figure: str, what: str) -> str:
-    """Return the lowest and the highest mean of a figure, and how much of the difference may be chance."""
-    found = [(entry.name, entry.figure(figure)) for entry in entries]
-    ranked = sorted(((name, spread) for name, spread in found if spread), key=lambda pair: pair[1].mean)
-    if len(ranked) < 2:
-        return ""
-    (low, least), (high, most) = ([name, _text(figure, spread)] for name, spread in (ranked[0], ranked[-1]))
-    return f"{what}: from {least} with {low} to {most} with {high}."
 
 
 # ---------------------------------------------------------------- pictures and plots

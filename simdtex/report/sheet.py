@@ -7,7 +7,6 @@ import io
 import os
 from collections.abc import Iterable, Sequence
 from math import ceil
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +29,7 @@ GAP = 8  # between the cells of a sheet, pixels
 TEXT = 13  # height of a label's letters, pixels
 STRIP = TEXT + 6  # height of a line of text, pixels
 FRAME_SIDE = 512  # longest side of an animation's frames, pixels
+FRAME_MS = 120  # time of one frame, milliseconds
 
 
 def contact_sheet(
@@ -163,34 +163,29 @@ def enlarged(picture: Picture, shape: tuple[int, int], step: float) -> Picture:
     return np.asarray(picture[rows[:, np.newaxis], cols], dtype=np.uint8)
 
 
-def animation(frames: Iterable[ArrayLike], path: PathLike, *, ms: int = 120) -> None:
-    """Write frames as an animation that repeats for ever.
+def animation(frames: Iterable[ArrayLike], path: PathLike) -> None:
+    """Write frames as a GIF animation that repeats for ever.
 
     Parameters
     ----------
     frames : iterable of (rows, cols[, channels])
         All of one shape; reduced to at most 512 pixels a side.
     path : path
-        ``.gif``, ``.webp``, ``.apng`` or ``.png`` (an APNG).
-    ms : int
-        Time of one frame, milliseconds, 1 or more.
+        ``.gif``
 
     Raises
     ------
     ValueError
-        There are no frames, `ms` is less than 1, or `path` cannot be written.
+        There are no frames, or `path` cannot be written.
 
     Notes
     -----
     Holds all reduced frames, 0.8 MB each for the largest.
     """
-    check_writable(path, suffixes=(".gif", ".webp", ".apng", ".png"))
-    if ms < 1:
-        raise ValueError(f"ms is {ms}: give the time of a frame, 1 millisecond or more")
+    check_writable(path, suffixes=(".gif",))
     pictures = [PIL.Image.fromarray(fitted(rgb(frame), FRAME_SIDE)) for frame in frames]
     if not pictures:
         raise ValueError("there are no frames for the animation: give at least one")
-    kind = {".gif": "GIF", ".webp": "WEBP"}.get(Path(path).suffix.lower(), "PNG")
-    options: dict[str, Any] = {"save_all": True, "append_images": pictures[1:], "duration": ms, "loop": 0}
+    film: dict[str, Any] = {"save_all": True, "append_images": pictures[1:], "duration": FRAME_MS, "loop": 0}
     with atomic_path(path) as temporary:
-        temporary.write_bytes(pillow_bytes(pictures[0], kind, **options, lossless=True))
+        temporary.write_bytes(pillow_bytes(pictures[0], "GIF", **film))
