@@ -166,7 +166,7 @@ def test_every_table_says_who_breaks_it(found):
 
 def test_figures_of_the_page(found):
     figures = [part for section in sections(found) for part in section.parts if isinstance(part, Figure)]
-    names = ["pictures.png", "seeds.png", "temperature.png", "changed.png", "oscillation.png"]
+    names = ["pictures.png", "seeds.png", "temperature.png", "oscillation.png"]
     assert [figure.file for figure in figures] == names
     again = [part for section in sections(found) for part in section.parts if isinstance(part, Figure)]
     assert [figure.png for figure in figures] == [figure.png for figure in again]

@@ -87,7 +87,7 @@ class Recorder:
     ----------
     sweeps : list of Sweep
     seconds : float
-        What the recording itself took.
+        Time spent on recording.
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class Run:
     image : array
         The output, with the sample's type and axes.
     figures : dict
-        The `FIGURES` by name; None for each that the run has none of.
+        The `FIGURES` by name; None for each that the run lacks.
     sweeps : tuple of Sweep
         All levels, the coarsest first.
     levels : list of dict
@@ -199,7 +199,7 @@ def _figures(statistics: dict[str, Any], sweeps: Sequence[Sweep]) -> dict[str, f
         cooling = [getattr(sweep, what) for sweep in at_finest if sweep.phase == "relax"]
         cooling = [value for value in cooling if value is not None]
         found[f"{name}_cooling"] = mean(cooling) if cooling else None
-        # of a change and its return, both are to be free
+        # a change and its return both lie in free sweeps
         found[f"{name}_free"] = getattr(free[-1], what) if len(free) >= least else None
     return found
 
@@ -238,7 +238,7 @@ class Entry:
     def figure(self, name: str) -> Spread | None:
         """Return one of `FIGURES` over the seeds; None if a run has none of it, or one that is not finite."""
         values = tuple(value for run in self.runs if (value := run.figures[name]) is not None)
-        if len(values) < len(self.runs) or not all(map(isfinite, values)):  # not finite near the largest number
+        if len(values) < len(self.runs) or not all(map(isfinite, values)):
             return None
         return Spread(mean(values), stdev(values) if len(values) > 1 else None, values)
 
@@ -376,17 +376,17 @@ def compare(
     machine = open_machine(device, profile=True)
     call = _Call(np.asarray(sample), pixels, channel_axis, machine, settings)
     found: dict[str, list[tuple[Run, tuple[bool, ...]]]] = {name: [] for name in chosen}
-    turns = [(seed, name) for seed in keys for name in chosen]  # a slow hour then slows all schedules alike
+    turns = [(seed, name) for seed in keys for name in chosen]  # so that a change of the load affects all alike
     for number, (seed, name) in enumerate(turns):
 
-        def tell(progress: Relaxing, number: int = number, seed: int = seed, name: str = name) -> None:
+        def report(progress: Relaxing, number: int = number, seed: int = seed, name: str = name) -> None:
             if callback:
                 job = f"run {number + 1} of {len(turns)}: {name}, seed {seed}"
                 callback((number + progress.fraction) / len(turns), job, progress)
 
         if not found[name]:
             call.build_kernels(chosen[name], size)
-        run, claims, settings = call.run(chosen[name], seed, size, tell)
+        run, claims, settings = call.run(chosen[name], seed, size, report)
         found[name].append((run, claims))
     entries = [Entry(name, done[0][1], tuple(run for run, _ in done)) for name, done in found.items()]
     settings = {name: value for name, value in settings.items() if name != "schedule"}
@@ -395,7 +395,7 @@ def compare(
 
 @dataclass(frozen=True)
 class _Call:
-    """What is the same for every run: the sample as given, its pixels with channels last, and the options."""
+    """The job that every run does: the sample as given, its pixels with channels last, and the options."""
 
     sample: NDArray[Any]
     pixels: NDArray[Any]

@@ -19,7 +19,7 @@ FAIR = 10
 """Correlation lengths that a side must have for |m| of a finite lattice to stand for that of the infinite one."""
 
 LEVEL = 0.001
-"""Chance that a table of right results has one that is said to differ."""
+"""Probability that a table of correct results has one with the verdict `differs`."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def estimate(series: NDArray[np.float64], least: float = 0.0) -> Estimate:
     series : (R, n) array
         R independent chains of n sweeps each.
     least : float
-        The least error: a series in which nothing happens to change has no spread.
+        The least error: a series without changes has no spread.
 
     Returns
     -------
@@ -130,7 +130,7 @@ class Finding:
 
 
 def findings(runs: Sequence[Chains]) -> list[Finding]:
-    """Compare runs with what is known exactly.
+    """Compare runs with the exact values.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The Ising model on a torus by heat-bath relaxation under any schedule.
 
-The conditional distributions are as simple as can be, so whatever is wrong with a result is due to the schedule.
+The conditional distributions are known exactly, so any deviation of a result is due to the schedule.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from simdtex.ops.snapshot import snapshot
 from simdtex.options import one_of, real, whole
 
 AT_ONCE = 2**22
-"""Relaxations in one launch at most, so that none is long."""
+"""Relaxations in one launch at most, which bounds its time."""
 
 HOST, MEASURED = 24, 40
 """Bytes on the host for each spin, and for each chain and sweep (benchmarks/memory.py)."""
@@ -34,20 +34,20 @@ QUEUE = 2**16
 
 @dataclass(frozen=True)
 class Experiment:
-    """What is simulated and measured, whatever the schedule.
+    """The settings of the experiment that all schedules share.
 
     Attributes
     ----------
     size : (int, int)
         Rows and columns, 2 or more.
     temperatures : sequence of float
-        Above 0, in units of J / k_B. All run side by side; none changes another's result.
+        Above 0, in units of J / k_B. They run together and independently.
     seeds : int
         R, independent chains at each temperature; they share the schedule's choices.
     sweeps, burn_in : int
         Sweeps that are measured, 1 or more, and sweeps before them.
     start : {"up", "random"}
-        All spins up, which below T_c is close to equilibrium, or each by the toss of a coin, which may freeze into
+        All spins up, which below T_c is close to equilibrium, or each up or down at random, which may freeze into
         stripes there.
 
     Raises
@@ -202,7 +202,7 @@ class _Run:
         self.spins = machine.put(np.tile(_first(experiment, seed), (len(experiment.temperatures), 1, 1)))
         self.chains = int(self.spins.shape[0])
         self.state = schedule.init(self.setting)
-        self.single: list[tuple[int, int]] = []  # steps of one site each, put off until another step needs them
+        self.single: list[tuple[int, int]] = []  # postponed steps of one site each
         self.steps = self.relaxations = 0
 
     def look(self) -> NDArray[np.uint8]:
@@ -212,7 +212,7 @@ class _Run:
 
     def sweep(self) -> None:
         """Relax by the schedule until it says that a sweep has ended."""
-        if self.schedule.tile:  # what tiles see of one another until the sweep ends
+        if self.schedule.tile:  # tiles see one another as they were before the sweep
             self.spins = snapshot(self.machine, self.spins, self.grid.height)
         last = False
         while not last:
@@ -241,7 +241,7 @@ class _Run:
             self.spins = ising_commit(self.machine, self.spins, sites, drawn)
 
     def _relax_single(self) -> None:
-        """Do the steps that have been put off."""
+        """Do the postponed steps."""
         most = min(QUEUE, max(1, 4 * AT_ONCE // self.chains))
         for k in range(0, len(self.single), most):
             part = self.machine.put(np.array(self.single[k : k + most], np.uint32).view(np.int32))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is known exactly of the Ising model on the square lattice, J = k_B = 1, no field.
+"""Exact results for the Ising model on the square lattice, J = k_B = 1, no field.
 
 References: L. Onsager, Phys. Rev. 65, 117 (1944); B. Kaufman, Phys. Rev. 76, 1232 (1949), in the form of A. E.
 Ferdinand and M. E. Fisher, Phys. Rev. 185, 832 (1969); C. N. Yang, Phys. Rev. 85, 808 (1952).

@@ -23,7 +23,6 @@ from simdtex.report.tables import Table, number_text
 
 __all__ = ["sections", "tables", "write_comparison"]
 
-LEAST_FREE = 6  # free sweeps from which on oscillation can be told from settling
 SHOWN_SIDE = 256  # smaller pictures are enlarged by a whole factor, pixels
 
 
@@ -82,7 +81,8 @@ MOVEMENT = Topic(
         "Oscillation, last free sweep": "oscillation_free",
     },
     "Changed: another value than a sweep ago. Oscillation: another value than a sweep ago, and the same as two sweeps "
-    "ago. Cooling: mean over the sweeps until equilibrium. In a free sweep all sites relax, at temperature 0 too.",
+    "ago. Cooling: mean over the sweeps until equilibrium. In a free sweep all sites relax, at temperature 0 too; "
+    "it takes 6 of them or more to tell oscillation from settling.",
 )
 LIKENESS = Topic(
     "Likeness to the sample",
@@ -134,21 +134,16 @@ def sections(comparison: Comparison) -> list[Section]:
         _temperature(comparison),
         f"Mean temperature left at the finest level after every sweep, against steps. {hollow}",
     )
-    changed = Figure(
-        "changed.png",
-        _per_sweep(comparison, "changed", "Share of pixels that changed"),
-        f"Pixels that change, sweep by sweep; markers are free sweeps. {hollow}",
-    )
     oscillation = Figure(
         "oscillation.png",
-        _per_sweep(comparison, "returned", "Oscillation index"),
+        _oscillation(comparison),
         f"Pixels that return to their value before last, sweep by sweep; markers are free sweeps. {hollow}",
     )
     return [
         Section("Pictures", _pictures(comparison)),
         Section(EQUILIBRIUM.title, [equilibrium, temperature]),
         Section(TIME.title, [time]),
-        Section(MOVEMENT.title, [movement, changed, oscillation]),
+        Section(MOVEMENT.title, [movement, oscillation]),
         Section(LIKENESS.title, [likeness]),
         Section("The job", [_job(comparison)]),
     ]
@@ -176,11 +171,7 @@ def tables(comparison: Comparison) -> list[Table]:
             "".join(map(_kept_levels, comparison.entries)),
         ),
         table(TIME, model),
-        table(
-            MOVEMENT,
-            "Share of the finest level's pixels, a sweep",
-            _few_free(int(comparison.options["free_sweeps"])),
-        ),
+        table(MOVEMENT, "Share of the finest level's pixels, a sweep"),
         table(LIKENESS, "Figures of merit of the outputs"),
     ]
 
@@ -204,15 +195,6 @@ def _kept_levels(entry: Entry) -> str:
     if not kept or len(kept) == len(entry.claims):
         return ""
     return f" At level {', '.join(kept)} {entry.name} keeps equation (14)."
-
-
-def _few_free(free: int) -> str:
-    if free >= LEAST_FREE:
-        return ""
-    return (
-        f" With {free} free sweep{'s' * (free != 1)} settling is not distinguished from oscillation; give {LEAST_FREE} "
-        "or more."
-    )
 
 
 def _job(comparison: Comparison) -> Table:
@@ -291,15 +273,15 @@ def _temperature(comparison: Comparison) -> Plot:
     return plot
 
 
-def _per_sweep(comparison: Comparison, what: str, title: str) -> Plot:
-    """Plot a share of the finest level's pixels, ``"changed"`` or ``"returned"``, against its sweeps."""
+def _oscillation(comparison: Comparison) -> Plot:
+    """Plot the share of the finest level's pixels that return to their value before last, against its sweeps."""
 
     def points(run: Run) -> Points:
-        known = [(sweep, getattr(sweep, what)) for sweep in run.finest if getattr(sweep, what) is not None]
+        known = [(sweep, sweep.returned) for sweep in run.finest if sweep.returned is not None]
         free = [place for place, (sweep, _) in enumerate(known) if sweep.phase == "free"]
         return [float(sweep.sweep) for sweep, _ in known], [100 * share for _, share in known], free
 
-    plot, axes = _curves(comparison, points, title, "Sweep of the finest level", "Pixels, %")
+    plot, axes = _curves(comparison, points, "Oscillation index", "Sweep of the finest level", "Pixels, %")
     axes.set_yscale("symlog", linthresh=0.1, linscale=0.3)
     axes.set_ylim(bottom=0.0)
     axes.yaxis.set_major_formatter("{x:g}")

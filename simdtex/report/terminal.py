@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What commands print of a run: its profile, its accounting, and the versions that it depends on."""
+"""The tables of a run that commands print: its profile, its accounting, and the versions in use."""
 
 from __future__ import annotations
 

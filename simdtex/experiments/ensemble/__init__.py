@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Judging an ensemble of realisations: what it leaves open, and whether it is like its training image.
+"""Figures of an ensemble of realisations: its uncertainty, and its likeness to the training image.
 
 An ensemble is an array (realisations, rows, cols). Categorical ones hold the values of categories, continuous ones
 integers or floats. The training image is (rows, cols), of the same kind and of any size. Axis 0 is down, axis 1 to the

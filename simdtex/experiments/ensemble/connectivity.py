@@ -26,7 +26,7 @@ class Connectivity(NamedTuple):
     ----------
     function : ndarray of float64, (2, max_lag + 1)
         Along axis 0 (down) and 1 (to the right), for h = 0, 1, ...: of the pairs of pixels at a distance of h that both
-        have the category, the share whose pixels lie in the same component, 0 to 1. NaN where there is no such pair.
+        have the category, the share whose pixels lie in the same component, 0 to 1. NaN if there is no such pair.
     components : float
         Connected components in 10,000 pixels of the image.
     largest : float
@@ -60,7 +60,7 @@ def connectivity(image: ArrayLike, category: int, max_lag: int) -> Connectivity:
 
     Notes
     -----
-    Pixels are connected by their sides, because flow is reckoned through the sides that two cells share; by corners, a
+    Pixels are connected by their sides, because flow is computed through the sides that two cells share; by corners, a
     channel and the ground on both sides of it would each pass through the other. Two pieces that meet outside of the
     image are two. Cost: a few passes over the image, and two for each lag.
     """
@@ -122,7 +122,7 @@ def dead_ends(image: ArrayLike, category: int) -> NDArray[np.intp]:
     inside = np.pad(np.ones(pixels.shape, bool), beyond)
     figure = np.pad(_filled(pixels == category), beyond, mode="edge")
     distance = ndimage.distance_transform_edt(np.pad(figure, 1, mode="edge"))[1:-1, 1:-1]
-    draw_lines: Any = skeletonize  # skimage tells no types
+    draw_lines: Any = skeletonize  # skimage is not typed
     lines = draw_lines(figure)
     width = 2.0 * float(np.median(distance[lines])) if lines.any() else 0.0
     pruned = lines

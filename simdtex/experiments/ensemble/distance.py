@@ -26,13 +26,13 @@ class Anodi(NamedTuple):
     Attributes
     ----------
     variety : float
-        Mean distance between two realisations: the larger, the more the ensemble leaves open. NaN for a single
+        Mean distance between two realisations: the larger, the greater the uncertainty. NaN for a single
         realisation.
     likeness : float
         Mean distance between a realisation and the training image: the smaller, the better its patterns are kept.
     ratio : float
-        Variety over likeness. About 1 where realisations are as far from one another as from the training image, as
-        other images of the same kind would be; near 0 where all are the same; NaN where the likeness is 0.
+        Variety over likeness. About 1 if realisations are as far from one another as from the training image, as
+        other images of the same kind would be; near 0 if all are the same; NaN if the likeness is 0.
     by_level : ndarray of float64, (levels, 2)
         Variety and likeness at each level, the finest first.
     distances : ndarray of float64, (realisations + 1, realisations + 1)
@@ -76,8 +76,8 @@ def anodi(ensemble: ArrayLike, training: ArrayLike, *, categories: Sequence[int]
     Notes
     -----
     After Tan, Tahmasebi and Caers, "Comparing training-image based algorithms using an analysis of distance",
-    Mathematical Geosciences 46, 2014, and simpler: patterns are counted exactly, also where the paper puts them into
-    clusters; coarse levels take every second pixel instead of resampling the image; and the distance is the square
+    Mathematical Geosciences 46, 2014, and simpler: patterns are counted exactly where the paper
+    clusters them; coarse levels take every second pixel instead of resampling the image; and the distance is the square
     root of the divergence. The paper compares two algorithms by the quotient of their ratios; the ratio here is that
     of one ensemble, so that two ensembles can be compared if they are of the same size.
 
@@ -124,7 +124,7 @@ def _distances(images: list[NDArray[np.intp]], count: int, side: int, spread: in
         for start in range(one + 1, len(rows), step):
             block = histograms[start : start + step]
             found[one, start : start + step] = jensenshannon(histograms[one][np.newaxis], block, base=2, axis=1)
-    found = np.nan_to_num(found)  # rounding may leave a root of less than nothing between equal ones
+    found = np.nan_to_num(found)  # rounding may leave the root of a negative number between equal ones
     return found + found.T
 
 

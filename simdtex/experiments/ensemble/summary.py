@@ -18,22 +18,22 @@ from simdtex.experiments.ensemble.distance import Anodi, anodi
 Floats = NDArray[np.float64]
 
 LEAST = 4
-"""Pixels to the side of what figures can be computed of."""
+"""Smallest side of an image, pixels."""
 
 LARGEST = 1e100
-"""Of numbers that figures are computed of: sums of their squares, and axes of plots, stay finite."""
+"""Largest absolute value of a pixel: sums of squares, and axes of plots, stay finite."""
 
 MOST_LAG = 100  # of variograms and connectivity functions, pixels; half of the shortest side is less in small images
 
 
 @dataclass(frozen=True, eq=False)
 class Summary:
-    """The figures of n realisations; where there are n + 1 of them the last is the training image's.
+    """The figures of n realisations; in an axis of length n + 1 the last entry is that of the training image.
 
     Attributes
     ----------
     categories : ndarray, (K,)
-        Empty where the values are continuous; then `shares`, `connectivity`, `components`, `largest` and `dead_ends`
+        Empty if the values are continuous; then `shares`, `connectivity`, `components`, `largest` and `dead_ends`
         are empty too.
     lags : ndarray of int, (L,)
         Pixels.
@@ -42,7 +42,7 @@ class Summary:
     maps : ndarray of float64, (K, rows, cols)
         Share of the realisations in which a pixel has each category; of continuous values one map, the mean.
     open : ndarray of float64, (rows, cols)
-        Entropy of each pixel's shares of categories in bits, 0 where all realisations agree, at most log2 n; of
+        Entropy of each pixel's shares of categories in bits, 0 if all realisations agree, at most log2 n; of
         continuous values their standard deviation (divisor n - 1), in their unit.
     variograms : ndarray of float64, (2, K, n + 1, L)
         Along axis 0 (down) and 1 (to the right), of each category's indicator or, with K = 1, of continuous values:

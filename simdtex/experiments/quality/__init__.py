@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures of merit: how well a synthesised texture stands for its sample.
+"""Figures of merit: how well a synthesised texture represents its sample.
 
 No figure is enough alone. An output that repeats one patch is plausible and covers nothing; one that copies the sample
 whole is perfect in both, and only its copying tells. Pictures are arrays (rows, cols) or (rows, cols, channels) in any
@@ -82,18 +82,18 @@ class Quality:
     seam : float or None
         Ratio; 1 is a seam that does not show.
     repeats, own_repeats : float or None
-        Share of the output's patches that stand in it again, and of the sample's in the sample, 0 to 1; None where a
-        picture is smaller than 48 x 48 pixels.
+        Share of the output's patches that recur in it, and of the sample's in the sample, 0 to 1; None if a picture
+        is smaller than 48 x 48 pixels.
     salt : float or None
         Odd pixels as a multiple of the sample's; 1 is as many.
     contrast, shift, coarse_contrast : float or None
-        `tones`: a ratio, where 1 is best, and two differences in sample standard deviations, where 0 is; None where a
-        picture is smaller than 32 x 32 pixels.
+        `tones`: a ratio, 1 is best, and two differences in sample standard deviations, 0 is best; None if a picture is
+        smaller than 32 x 32 pixels.
     innovation : float or None
         Share of neighbour pixels, 0 to 1; 0 is a copy.
     effective_share, most_used : float or None
         `effective_use`: a share above 0, to 1, and how many times its fair share the most used piece is taken; None
-        where no source map was given.
+        if no source map was given.
     """
 
     plausibility: float | None = None
@@ -129,7 +129,7 @@ def measure(
         The output's source map.
     figures : collection of str, optional
         Names out of `FIGURES`, as ``("plausibility", "repeats")``. By default all for which the pictures are large
-        enough and a source map is there.
+        enough, and `source` if it is given.
 
     Returns
     -------
@@ -138,7 +138,7 @@ def measure(
     Raises
     ------
     ValueError
-        There is no figure of a name, one that was named cannot be computed, or the pictures do not suit each other.
+        A name is unknown, a named figure cannot be computed, or the pictures have different channels.
 
     Notes
     -----

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures of patches: whether either picture stands in the other, in pieces how large, and what comes back."""
+"""Figures of merit that compare patches: plausibility, coverage, copying, innovation and repeats."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def plausibility(sample: ArrayLike, output: ArrayLike) -> float:
     Returns
     -------
     float
-        0 where every patch looked up stands in the sample.
+        0 if every patch looked up occurs in the sample.
 
     Notes
     -----
@@ -52,8 +52,8 @@ def plausibility(sample: ArrayLike, output: ArrayLike) -> float:
 def coverage(sample: ArrayLike, output: ArrayLike) -> float:
     """Return the mean distance from a 7 x 7 patch of the sample to the nearest patch of the output.
 
-    `plausibility` the other way round: it grows with every part of the sample that the output lacks. Parameters, units
-    and cost are those of `plausibility`.
+    `plausibility` with the pictures exchanged: it grows with every part of the sample that the output lacks.
+    Parameters, units and cost are those of `plausibility`.
     """
     return _mean_nearest(sample, output, of_output=False)
 
@@ -75,7 +75,7 @@ def _every(planes: Planes) -> Indices:
     """Return the patches of a picture that are looked up."""
     total = count(planes, PATCH)
     stride = -(-total // QUERIES)
-    # no common divisor with a row of patches, or the queries would stand in columns
+    # no common divisor with a row of patches, or the queries would line up in columns
     while gcd(stride, planes.shape[1] - PATCH + 1) > 1:
         stride += 1
     return np.arange(0, total, stride)
@@ -102,9 +102,9 @@ def innovation(sample: ArrayLike, output: ArrayLike) -> float:
     Returns
     -------
     float
-        0 to 1: 0 where the output is one piece of the sample, 1 where it continues nothing of it. Patches across the
-        joints of pieces have sources of their own. Where patches of the sample are equal to the last bit the first
-        stands for all, so flat parts count as innovation.
+        0 to 1: 0 if the output is one piece of the sample, 1 if it continues nothing of it. Patches across the
+        joints of pieces have sources of their own. Of identical patches of the sample the first
+        is taken, so flat parts count as innovation.
 
     Notes
     -----
@@ -125,7 +125,7 @@ def innovation(sample: ArrayLike, output: ArrayLike) -> float:
 
 
 def copying(sample: ArrayLike, output: ArrayLike) -> float:
-    """Return the share of the 9 x 9 patches of the output that stand verbatim in the sample.
+    """Return the share of the 9 x 9 patches of the output that occur unchanged in the sample.
 
     Parameters
     ----------
@@ -135,12 +135,12 @@ def copying(sample: ArrayLike, output: ArrayLike) -> float:
     Returns
     -------
     float
-        0 to 1. Flat parts count as copied: the same flat patch does stand in the sample.
+        0 to 1. Flat parts count as copied, since the same flat patch occurs in the sample.
 
     Notes
     -----
-    Patches are compared by hashes of 64 bits: of n different patches of the output and m of the sample, n m / 2**64 are
-    taken for equal.
+    Patches are compared by hashes of 64 bits: of n different patches of the output and m of the sample, n m / 2**64 on
+    average are wrongly taken as equal.
     """
     first, second = as_pair(sample, output, COPIED_PATCH)
     numbers = np.unique(np.concatenate([first.ravel(), second.ravel()]), return_inverse=True)[1]
@@ -158,14 +158,14 @@ def _hashes(numbers: Array) -> NDArray[np.uint64]:
 
 
 class Repeats(NamedTuple):
-    """How much of the output, and of the sample, stands in it again, see `repeats`."""
+    """Shares of the patches of the output and of the sample that recur, see `repeats`."""
 
     share: float
     own: float
 
 
 def repeats(sample: ArrayLike, output: ArrayLike) -> Repeats:
-    r"""Return the share of the 32 x 32 patches of the output that stand elsewhere in the output once more.
+    r"""Return the share of the 32 x 32 patches of the output that occur elsewhere in the output.
 
     The output is reduced to half its size by means of 2 x 2 blocks, where patches :math:`a_x` have 16 x 16 pixels. A
     patch is repeated if
@@ -189,8 +189,8 @@ def repeats(sample: ArrayLike, output: ArrayLike) -> Repeats:
         Of the output's patches, 0 to 1.
     own : float
         The same of the sample's own patches in the sample: about 0 for most materials, and large for a regular one such
-        as bricks, where repeats are right. A small sample has fewer places where a patch could stand again, so `own` is
-        rather too low than too high.
+        as bricks, where repeats are right. A small sample has fewer places where a patch could recur, so `own` is
+        biased towards 0.
 
     Notes
     -----
@@ -205,7 +205,7 @@ def repeats(sample: ArrayLike, output: ArrayLike) -> Repeats:
 
 
 def _share(planes: Planes) -> float:
-    """Return the share of a picture's patches, at half its size, that stand in it again."""
+    """Return the share of a picture's patches, at half its size, that recur in it."""
     side = REPEATED_PATCH // 2
     rows, cols = (length - side + 1 for length in planes.shape[:2])
     spacing = GRID // 2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Figures of single values: histograms, tones, odd pixels, and the seam."""
+"""Figures of merit of single pixels: histograms, tones, odd pixels, and the seam."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def histogram_distance(sample: ArrayLike, output: ArrayLike) -> float:
     Returns
     -------
     float
-        In sample standard deviations; 0 where the histograms agree.
+        In sample standard deviations; 0 if the histograms agree.
     """
     first, second = as_pair(sample, output, 1)
     channels = range(first.shape[2])
@@ -57,8 +57,8 @@ def seam(output: ArrayLike) -> float:
     Returns
     -------
     float
-        About 1 for a picture that tiles (and for a constant one), larger where the seam is an edge; infinite where it
-        is the only edge.
+        About 1 for a picture that tiles (and for a constant one), larger if the seam is an edge; infinite if it is
+        the only edge.
     """
     planes = as_planes(output).astype(np.float64)
     if min(planes.shape[:2]) < 2:
@@ -95,7 +95,7 @@ def salt(sample: ArrayLike, output: ArrayLike) -> float:
     -------
     float
         0 to 200; 1 is as much as the sample has. Above 1 single pixels stand out, below 1 the output is smoother than
-        the sample, or its odd pixels have a place where none stand out.
+        the sample, or its odd pixels lie where none stand out.
 
     Notes
     -----
