@@ -216,30 +216,16 @@ OUT = ["-o", "out.tif"]
 ONE, TWO = ["sample.png", *OUT], ["sample.png", "second.png", *OUT]
 CATEGORIES = ["facies.tif", *OUT, "--categorical"]
 BAD = {
-    "samples of two kinds": (["sample.png", "colour.png", *OUT], "the samples have 2 and 3 axes"),
     "samples of another method": ([*TWO, "--method", "pyramid"], "takes one sample"),
-    "known values of another method": ([*ONE, "--method", "multires", "--known", "known.png"], "no known values"),
     "an option of another method": ([*ONE, "--method", "multires", "--order", 1], "unknown option 'order'"),
-    "shares of one": ([*ONE, "--shares", "1,2"], "2 shares and 1 samples"),
-    "shares of nothing": ([*TWO, "--shares", "0,0"], "above 0"),
     "a mask too few": ([*TWO, "--sample-mask", "left.png"], "once for each sample"),
     "a mask too many": ([*ONE, "--sample-mask", "left.png", "--sample-mask", "all.png"], "once for each sample"),
     "a mask of another size": ([*ONE, "--sample-mask", "all.png"], "20 x 24"),
-    "a mask of nothing": ([*ONE, "--sample-mask", "none.png"], "leaves nothing of the sample"),
     "a map too few": ([*TWO, "--also", "normal.png=n.png"], "give one for each"),
     "maps of two kinds": ([*TWO, "--also", "normal.png,second.png=n.png"], "convert them to one type"),
     "maps of another size": ([*TWO, "--also", "normal.png,normal.png=n.png"], "28x16"),
     "a report of several": ([*TWO, "--report", "report"], "leave it out"),
     "a missing table": ([*ONE, "--known", "nothing.csv"], "does not exist"),
-    "data outside": ([*ONE, "--known", "outside.csv"], "outside of a picture"),
-    "data that disagree": ([*ONE, "--known", "disagree.csv"], "line 2 and line 3"),
-    "data beyond the type": ([*ONE, "--known", "beyond.csv"], "uint8 cannot hold"),
-    "data of two variables": ([*ONE, "--known", "two.csv"], "a datum has 2 values"),
-    "an unknown category": ([*CATEGORIES, "--known", "strange.csv"], "has the category 1"),
-    "known in 16 bits": ([*ONE, "--known", "known16.png"], "which the sample's type uint8 does not"),
-    "known in colour": ([*ONE, "--known", "colourful.png"], "known is 3-dimensional"),
-    "known everywhere": ([*ONE, "--known", "second.png"], "leaves nothing to do"),
-    "known has no value": ([*ONE, "--known", "unknown.png"], "known has no value"),
     "known of another size": (
         [*ONE, "--known", "known.png", "--size", "20x20"],
         "known is 14x20x1 and the output 20x20x1",
@@ -249,16 +235,9 @@ BAD = {
     "a source map that holds no -1": ([*ONE, "--known", "known.png", "--source-map", "s.png"], ".npz"),
     "one guide alone": ([*ONE, "--guide", "labels.png"], "SAMPLE-GUIDE=OUTPUT-GUIDE"),
     "a guide too few": ([*TWO, "--guide", "labels.png=wanted.png"], "give one for each"),
-    "a guide of another size": ([*ONE, "--guide", "wanted.png=wanted.png"], "is 16x18 and the sample 24x20"),
     "a size beside a guide": ([*ONE, "--guide", "labels.png=wanted.png", "--size", 20], "16x18"),
-    "guides of two kinds": ([*ONE, "--guide", "grey.png=wanted.png"], "1 channels and that of the output 3"),
     "a strange colour": ([*ONE, "--guide", "labels.png=strange.png"], "the colour (0, 255, 0)"),
-    "a strange label": ([*ONE, "--guide", "grey.png=grey-strange.png"], "asks for the label 127"),
-    "categories of a photo": ([*ONE, "--categorical"], "categories; give 16 or fewer"),
     "the mask overwritten": (["sample.png", "--sample-mask", "left.png", "-o", "left.png"], "overwritten"),
-    "the data overwritten": (["sample.png", "--known", "known.png", "-o", "known.png"], "overwritten"),
-    "the guide overwritten": (["sample.png", "--guide", "grey.png=grey.png", "-o", "grey.png"], "overwritten"),
-    "the second sample overwritten": (["sample.png", "second.png", "-o", "second.png"], "overwritten"),
 }
 
 

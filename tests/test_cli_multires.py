@@ -62,9 +62,6 @@ def test_alpha_0_tiles(folder):
 
 BAD = {
     "negative alpha": (["--alpha", -1], "alpha is -1.0; give a number of at least 0"),
-    "beta": (["--beta", -1], "beta is -1.0"),
-    "edges": (["--edges", "reflect"], "choose one of: mend, keep"),
-    "levels": (["--levels", 9], "levels=9 is too many for this sample; give at most 5"),
     "an option of mrf": (["--order", 8], "choose from: preset, alpha, beta"),
 }
 

@@ -124,11 +124,7 @@ def test_stages_of_synth_replace_those_of_an_earlier_run(folder):
 
 BAD_PYRAMID = {
     "pyramid": (["--pyramid", "wavelet"], "choose one of: steerable, laplacian"),
-    "orientations": (["--orientations", 5], "orientations is 5"),
-    "iterations": (["--iterations", -1], "iterations is -1; give 0 or more"),
-    "edges": (["--edges", "whole"], "choose one of: reflect, wrap"),
     "levels": (["--levels", 9], "levels=9 is too many"),
-    "seed": (["--seed", -1], "seed"),
     "device": (["--device", "no such device"], "no such device"),
     "size 0": (["--size", "0"], "size '0' is not WIDTHxHEIGHT"),
     "suffix": (["-o", "out.xyz"], "end its name in"),
@@ -137,7 +133,6 @@ BAD_PYRAMID = {
 }
 BAD_SYNTH = BAD_PYRAMID | {
     "boundary": (["--boundary", "open"], "unknown option 'boundary' of the method 'pyramid'"),
-    "option of mrf": (["--order", 8], "unknown option 'order' of the method 'pyramid'"),
     "source map": (["--source-map", "map.npz"], "takes no pixel from the sample; leave --source-map and --also out"),
     "another map": (["--also", "colour.png=c.png"], "leave --source-map and --also out"),
     "too large": (["--size", "60000x60000"], "give a smaller size"),
@@ -313,14 +308,8 @@ BAD_MIX = {k: v for k, v in BAD_PYRAMID.items() if k != "overwritten sample"} | 
     "negative": (["--low", -1, "--high", 1], f"--low -1 is none of the samples; {P}"),
     "no number": (["--high", "1.0", "--low", 1], f"--high 1.0 is none of the samples; {P}"),
     "low alone": (["--low", 1], "low and high go together; give both, or neither"),
-    "high alone": (["--high", 1], "low and high go together; give both, or neither"),
     "two patterns": (["--pattern", 1, "--average", "1,1"], "a mixture has one pattern"),
-    "three patterns": (["--pattern", 1, "--low", 1, "--high", 2], "a mixture has one pattern"),
     "weights in words": (["--average", "much,little"], "--average much,little must be numbers parted by commas"),
-    "a weight too many": (["--average", "1,2,3"], "average has 3 weights for 2 samples; give one for each"),
-    "negative weight": (["--average", "1,-1"], "give a number of at least 0"),
-    "no weight": (["--average", "0,0"], "give one above 0"),
-    "no finite weight": (["--average", "inf,1"], "give a number of at least 0"),
     "overwritten sample": (["-o", "other.png"], "other.png is an input and would be overwritten"),
 }
 

@@ -1,7 +1,5 @@
 """What the method ``mrf`` counts, asks for and says, which no picture shows: survivors of mutation had it changed."""
 
-import math
-import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,50 +15,8 @@ from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.ops.relax import Everything, Listed
-from simdtex.options import resolve
 
 # -- options ------------------------------------------------------------------------------------------------------
-
-REFUSED = [
-    *(
-        (name, "other", f"unknown {name} 'other'; choose one of: {valid}")
-        for name, valid in {
-            "relaxation": "icm, gibbs",
-            "pixel": "source, density",
-            "phases": "all, decimated",
-            "edges": "auto, reflect, whole",
-            "boundary": "torus, open",
-            "search": "auto, exact, coherent",
-            "preset": "default, paper",
-        }.items()
-    ),
-    ("order", 0, "order is 0; give 1 "),
-    ("levels", 0, "levels is 0; give 1 or more"),
-    ("overview", 0, "overview is 0; give 1 or more"),
-    ("bandwidth", 0, "bandwidth is 0; give a number above 0"),
-    ("coherence", -0.1, "coherence is -0.1; give a number of at least 0"),
-    *(
-        (name, -0.1, f"{name} is -0.1; give a number of at least 0")
-        for name in ("balance", "structure", "novelty", "finish")
-    ),
-    ("xi", 0, "xi is 0; give a number below 0"),
-    ("xi", math.nan, "xi is nan; give a number of at least -1e+06"),
-    ("free_sweeps", -1, "free_sweeps is -1; give 0 or more"),
-    ("chance", -1, "chance is -1; give 0 or more"),
-    ("anything", 1, "unknown option 'anything' of the method 'mrf'; choose from: preset, order, "),
-]
-
-
-@pytest.mark.parametrize(("name", "value", "words"), REFUSED, ids=[name for name, *_ in REFUSED])
-def test_every_option_is_refused_by_its_name(name, value, words):
-    with pytest.raises((TypeError, ValueError), match="^" + re.escape(words)):
-        resolve(mrf.Options, "synth", {name: value})
-
-
-def test_the_least_of_every_option_is_accepted():
-    least = {"order": 1, "levels": 1, "coherence": 0, "free_sweeps": 0}
-    mrf.Options(**least, chance=0, overview=1)
-    mrf.Options(balance=0, structure=0, novelty=0, finish=0)
 
 
 def test_a_density_is_drawn_from():
