@@ -10,7 +10,7 @@ from simdtex.bench.run import FULL, QUICK, Case, Sizes
 from simdtex.cli import main
 from simdtex.machine.devices import DeviceError
 from simdtex.machine.reference import Reference
-from simdtex.report.bench import table
+from simdtex.report.terminal import benchmark_table
 
 MRF = Case("mrf", 16, 16, 2, "exact")
 TINY = Sizes((Case("multires", 16, 16), Case("pyramid", 16, 16), Case("solid", 16, 8)), (MRF,))
@@ -71,7 +71,7 @@ def test_everything_is_measured(command, any_device):
 def test_the_table_shows_ratios():
     case = {"name": "a", "seconds": 2.0, "busy": 1.5, "reference": None}
     device = {"name": "d", "compute_units": 2, "version": "OpenCL 3.0", "driver": "5"}
-    shown = table({"device": device, "cases": [case, case | {"name": "b", "reference": 123.4}]})
+    shown = benchmark_table({"device": device, "cases": [case, case | {"name": "b", "reference": 123.4}]})
     assert shown.caption == "d, 2 compute units, OpenCL 3.0, driver 5"
     assert [list(row.values()) for row in shown.rows] == [
         ["a", "2.00 s", "75%", "-"],

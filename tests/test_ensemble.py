@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.ndimage import binary_dilation, binary_erosion, distance_transform_edt
+from scipy.ndimage import binary_dilation, binary_erosion
 from scipy.special import kl_div
 
 from simdtex.experiments import ensemble
@@ -297,16 +297,6 @@ def test_the_channels_of_the_package_are_those_that_the_benchmark_draws(make_cha
     assert digest == "5c4f8284690ef1a95bd8b55732f0555e3bf72c474793046a453affd913ba9901"
     with pytest.raises(ValueError, match="the shape is 20 x 99"):
         make_channels((20, 99), 1)
-
-
-def test_channels_are_like_channels():
-    for image in ensemble.channels():
-        assert image.dtype == np.uint8 and set(np.unique(image)) == {0, 1}
-        assert 0.28 <= image.mean() <= 0.335 and 5 <= len(ensemble.dead_ends(image, 1)) <= 14
-        right, down = (_variogram(image == 1, axis, 20)[8] for axis in (1, 0))
-        assert right < 0.7 * down  # they run to the right
-        # the ground is a half-width away from the middle of a channel, which few pixels are further from
-        assert 6.5 <= 2 * np.quantile(distance_transform_edt(image)[image > 0], 0.85) <= 11
 
 
 # ---------------------------------------------------------------- bad input

@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import simdtex
 from simdtex.experiments import quality
 from simdtex.experiments.quality import likeness, patches
 
@@ -378,12 +377,6 @@ def test_measure_computes_what_is_asked_for():
         quality.measure(sample, output, figures=["effective_use"])
     with pytest.raises(ValueError, match="give at least 48 x 48"):
         quality.measure(sample, output, figures=["repeats"])
-
-
-def test_the_public_name_has_all_that_the_module_has():
-    assert simdtex.quality is quality
-    assert all(hasattr(quality, name) for name in quality.__all__)
-    assert set(quality.FIGURES) <= set(quality.__all__)
 
 
 def test_constant_pictures_and_errors():

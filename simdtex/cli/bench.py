@@ -33,7 +33,7 @@ def bench(device: str | None, quick: bool, path: Path | None, quiet: bool) -> No
     from simdtex.bench import run as benchmark
     from simdtex.io.atomic import atomic_path
     from simdtex.io.image import check_writable
-    from simdtex.report.bench import render
+    from simdtex.report.terminal import print_benchmark
 
     if path:
         check_writable(path, suffixes=(".json",))
@@ -48,6 +48,6 @@ def bench(device: str | None, quick: bool, path: Path | None, quiet: bool) -> No
         with afterwards(), atomic_path(path) as whole:
             whole.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     if not quiet:
-        render(found)
+        print_benchmark(found)
         if path:
             click.echo(path)

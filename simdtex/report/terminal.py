@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The tables of a run that commands print: its profile, its accounting, and the versions in use."""
+"""The tables that commands print: a run's profile and accounting, a benchmark, and the versions in use."""
 
 from __future__ import annotations
 
@@ -8,9 +8,17 @@ from importlib.metadata import version
 from typing import Any
 
 from simdtex.machine.devices import DeviceError, find
-from simdtex.report.tables import Table, duration_text, print_table, seconds_text
+from simdtex.report.tables import Table, duration_text, print_table, seconds_text, three_digits
 
-__all__ = ["print_accounting", "print_profile", "profile_summary", "profile_table", "version_lines"]
+__all__ = [
+    "benchmark_table",
+    "print_accounting",
+    "print_benchmark",
+    "print_profile",
+    "profile_summary",
+    "profile_table",
+    "version_lines",
+]
 
 
 def print_profile(statistics: dict[str, Any]) -> None:
@@ -58,6 +66,34 @@ def print_accounting(accounting: dict[str, Any]) -> None:
     }
     caption = f"On an array of {accounting['array']} PEs ({accounting['mapping']})"
     print_table(Table(caption, [{"What": what, "How much": much} for what, much in rows.items()]))
+
+
+def print_benchmark(results: dict[str, Any]) -> None:
+    """Print the results of `simdtex.bench.run.run`."""
+    host = results["host"]
+    print(
+        f"{host['cpu']}, {host['cores']} cores; {host['system']}; simdtex {results['simdtex']}, numpy {host['numpy']}; "
+        f"{results['date']}, {results['seconds']:.0f} s"
+    )
+    for entry in results["devices"]:
+        print()
+        print_table(benchmark_table(entry))
+
+
+def benchmark_table(entry: dict[str, Any]) -> Table:
+    """Return a table of the cases on a device."""
+    device = entry["device"]
+    rows = [
+        {
+            "job": case["name"],
+            "time": seconds_text(case["seconds"]),
+            "in kernels": f"{case['busy'] / case['seconds']:.0%}",
+            "vs reference": three_digits(case["reference"], " x"),
+        }
+        for case in entry["cases"]
+    ]
+    units = f"{device['compute_units']} compute units"
+    return Table(f"{device['name']}, {units}, {device['version']}, driver {device['driver']}", rows)
 
 
 def version_lines() -> list[str]:
