@@ -48,7 +48,7 @@ def philox(counter: list[NDArray[np.uint32]], key: tuple[int, int]) -> list[NDAr
 
 
 def draw4(seed: int, level: int, turn: Any, site: Any, purpose: int, attempt: Any = 0) -> list[NDArray[np.uint32]]:
-    """Four random 32-bit numbers per site, the counter being (site, turn, site and level and purpose, attempt).
+    """Return four random 32-bit numbers per site; the counter is (site, turn, site and level and purpose, attempt).
 
     A site's place has 48 bits: the lower 32 are the first word, the upper 16 stand above level and purpose in the
     third.
@@ -64,7 +64,7 @@ def draw4(seed: int, level: int, turn: Any, site: Any, purpose: int, attempt: An
 
 
 def below(lo: NDArray[np.uint32], hi: NDArray[np.uint32], n: Any) -> NDArray[np.uint64]:
-    """Integers 0 .. n-1 from 64 random bits: the high half of the 128-bit product with n."""
+    """Return integers 0 .. n-1 from 64 random bits: the high half of the 128-bit product with n."""
     lo, hi, n = lo.astype(np.uint64), hi.astype(np.uint64), np.asarray(n, np.uint64)
     n_lo, n_hi = n & _LOW, n >> _SHIFT
     carry = (lo * n_lo) >> _SHIFT
@@ -75,7 +75,7 @@ def below(lo: NDArray[np.uint32], hi: NDArray[np.uint32], n: Any) -> NDArray[np.
 
 
 def as_seed(rng: Any = None) -> int:
-    """A 64-bit seed from what scikit-image calls `rng`.
+    """Return a 64-bit seed from what scikit-image calls `rng`.
 
     Parameters
     ----------

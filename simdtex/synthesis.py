@@ -205,7 +205,7 @@ def synthesize_solid(
     checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
-    """A solid texture: a block whose slices look like a sample (Heeger and Bergen 1995, section 4).
+    """Make a solid texture: a block whose slices look like a sample (Heeger and Bergen 1995, section 4).
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def lcpdf(
     boundary: str = "torus",
     device: str | Machine | None = None,
 ) -> NDArray[np.float64]:
-    """The local conditional probability density function of a nonparametric MRF.
+    """Return the local conditional probability density function of a nonparametric MRF.
 
     Parameters
     ----------

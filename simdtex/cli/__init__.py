@@ -48,7 +48,7 @@ EXAMPLES = (
 
 
 def load(name: str) -> click.Command:
-    """The command of a name."""
+    """Return the command of a name."""
     command: click.Command = getattr(import_module(f"simdtex.cli.{name}"), name)
     return command
 
@@ -59,17 +59,17 @@ class Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The name of a command, the command itself and its arguments."""
+        """Return the name of a command, the command itself and its arguments."""
         name, _, rest = super().resolve_command(ctx, args)
         return name, load(str(name)), rest
 
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """What it does, and the examples."""
+        """Write what the program does, and the examples."""
         super().format_help_text(ctx, formatter)
         write_examples(EXAMPLES, formatter)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The commands, in groups of one width."""
+        """Write the commands, in groups of one width."""
         width = max(map(len, COMMANDS))
         for title, group in GROUPS.items():
             with formatter.section(title):

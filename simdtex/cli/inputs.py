@@ -59,24 +59,24 @@ class Also(NamedTuple):
     out: Path
 
     def carried(self, source: Any) -> NDArray[Any]:
-        """The map in the arrangement of an output."""
+        """Return the map, arranged as an output."""
         from simdtex.model.source_map import apply_source_map
 
         return apply_source_map(source, self.maps.array, self.maps.sizes if self.maps.several else self.maps.sizes[0])
 
 
 def channels(pixels: NDArray[Any]) -> int:
-    """How many a picture (rows, cols) or (rows, cols, channels) has."""
+    """Return the number of channels of a picture (rows, cols) or (rows, cols, channels)."""
     return 1 if pixels.ndim == 2 else pixels.shape[2]
 
 
 def size(pixels: NDArray[Any]) -> str:
-    """Width x height in words."""
+    """Return width x height as text."""
     return f"{pixels.shape[1]}x{pixels.shape[0]}"
 
 
 def kind(pixels: NDArray[Any]) -> str:
-    """Channels and type in words."""
+    """Return channels and type as text."""
     count = channels(pixels)
     return f"{count} channel{'s' * (count != 1)} of {pixels.dtype}"
 

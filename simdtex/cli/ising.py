@@ -112,5 +112,5 @@ def ising(
 
 
 def _distinct(chosen: list[Any]) -> list[Any]:
-    """The schedules, each once."""
+    """Return the schedules, each once."""
     return list({schedule.name: schedule for schedule in chosen}.values())

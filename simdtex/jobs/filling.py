@@ -53,7 +53,7 @@ class Window(NamedTuple):
 
 
 def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
-    """Windows that hold the holes of a picture and what their sites look at.
+    """Return windows that hold the holes of a picture and the neighbourhoods of their sites.
 
     Parameters
     ----------

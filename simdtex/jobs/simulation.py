@@ -49,7 +49,7 @@ def simulate(
     checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> xarray.DataArray:
-    """Realisations that look like a training image and honour data: multiple-point simulation.
+    """Simulate realisations that look like a training image and honour data: multiple-point simulation.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def simulate(
 
 
 def realisation_seed(seed: int, number: int) -> int:
-    """The seed of a realisation, from that of the simulation and its number."""
+    """Return the seed of a realisation, from that of the simulation and its number."""
     return int(np.random.SeedSequence(seed, spawn_key=(number,)).generate_state(1, np.uint64)[0])
 
 

@@ -21,7 +21,7 @@ SIDE = 512
 
 
 def as_html(made: NDArray[Any] | None, source: NDArray[np.int32] | None, statistics: dict[str, Any]) -> str:
-    """A picture and its arrangement beside each other, and below them where and how they were made.
+    """Return a picture and its source map side by side, with the statistics below them.
 
     Parameters
     ----------

@@ -55,11 +55,11 @@ class Given:
         return bool((self.known.any(-1) & ~self.whole).any())
 
     def colocated(self, samples: tuple[NDArray[Any], ...]) -> Colocated:
-        """The variables that are given where others are not, as a guide for these."""
+        """Return the variables that are known at sites where others are not, as a guide for these."""
         return Colocated(samples, self.values, self.known & ~self.whole[..., None])
 
     def shown(self, picture: NDArray[Any], grid: Grid) -> NDArray[Any]:
-        """The picture (rows, cols, C) of a level with what is given at its sites."""
+        """Return the picture (rows, cols, C) of a level with the known values at its sites."""
         step = (slice(None, None, grid.spacing),) * 2
         found: NDArray[Any] = np.where(self.known[step], self.values[step], picture)
         return found
@@ -76,7 +76,7 @@ NO_STAND_IN = Stand(np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 
 def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
-    """The sites of a level's lattice that stand for data between them.
+    """Return the sites of a level's lattice that stand in for off-grid data.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ class Planes(NamedTuple):
 
 
 def planes(given: Given, sample: Sample) -> Planes:
-    """Lay what is given out on a sample's channels: of a site from the sample all, else those that its values tell."""
+    """Return the known values in a sample's channels: all of them at sites that are from the sample."""
     shape = given.whole.shape
     values = np.full((sample.channels, *shape), UNKNOWN, np.uint16)
     source = np.full(shape, -1, np.int32) if given.place is None else sample.index(given.place)

@@ -45,7 +45,7 @@ class AnyGuide(Protocol):
         ...
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
-        """Its working levels, 0..top; ``spread`` is the variance of the pixels' levels, summed over channels."""
+        """Return the working levels, 0..top; ``spread`` is the variance of the pixels', summed over channels."""
         ...
 
 
@@ -82,7 +82,7 @@ class Guide:
         return np.unique(np.concatenate([np.unique(sample[..., channel]) for sample in self.samples]))
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
-        """One channel for each of its own; of three labels or more one for each label."""
+        """Return a channel for each of the guide's; of three labels or more one for each label."""
         silent = unknown_in(self.output)
         parts = [self._channel(channel, silent, spread, top) for channel in range(self.output.shape[-1])]
         counts = zip(*(part.samples for part in parts), strict=True)
@@ -141,7 +141,7 @@ class Colocated:
         return int(self.known.shape[-1]) * MOST
 
     def planes(self, scale: Scale, spread: float, top: int) -> Planes:
-        """The channels of those variables again."""
+        """Return the channels of the known variables."""
         owner = scale.owners
         those = [channel for channel, variable in enumerate(owner) if self.known[..., variable].any()]
         output = scale.levels(self.values)[those]

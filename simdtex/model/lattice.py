@@ -18,7 +18,7 @@ MOST_ORDER = 4096
 
 
 def neighbourhood_offsets(order: int) -> NDArray[np.int32]:
-    """Offsets r - s of the neighbourhood of an order, equation (3).
+    """Return the offsets r - s of the neighbourhood of an order, equation (3).
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ class Grid:
         return struct
 
     def window(self, top: int, left: int, rows: int, cols: int) -> Grid:
-        """A window of this lattice, which lies in a picture of its own, site by site.
+        """Return a window of this lattice, which lies in a picture of its own, site by site.
 
         Parameters
         ----------
@@ -191,7 +191,7 @@ class Grid:
         return (top, rows), (left, cols)
 
     def cut(self, whole: NDArray[Any]) -> NDArray[Any]:
-        """The window's part of an array (..., rows, cols) over the whole lattice."""
+        """Return the window's part of an array (..., rows, cols) over the whole lattice."""
         row = (self.within.top + np.arange(self.rows)) % self.within.rows
         col = (self.within.left + np.arange(self.cols)) % self.within.cols
         return whole[..., row[:, None], col[None, :]]
@@ -204,7 +204,7 @@ class Grid:
         return sites
 
     def places(self, sites: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
-        """The pixel index in the whole picture of sites that are given by theirs here: what keys random numbers."""
+        """Return the pixel indices in the whole picture of sites of this grid; they key random numbers."""
         whole = self.within
         row, col = np.divmod(sites.astype(np.int64), self.width)
         row = (whole.top + row // self.spacing) % whole.rows
@@ -213,7 +213,7 @@ class Grid:
         return places
 
     def view(self, picture: NDArray[Any]) -> NDArray[Any]:
-        """The sites of this grid as a view of a picture (..., H, W); older pictures below it do not show."""
+        """Return the sites of this grid as a view of a picture (..., H, W), without older pictures below it."""
         return picture[..., : self.height : self.spacing, :: self.spacing]
 
     def neighbours(self, sites: NDArray[np.int32], offsets: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -252,7 +252,7 @@ class Sublattice:
         return self.a * self.c
 
     def shortest(self) -> int:
-        """Squared length of its shortest vector."""
+        """Return the squared length of the shortest vector."""
         reach = isqrt(2 * self.a * self.c) + 1
         best = self.a * self.a
         for m in range(1, reach // self.c + 2):
@@ -262,7 +262,7 @@ class Sublattice:
         return best
 
     def fits(self, rows: int, cols: int) -> bool:
-        """Whether a torus of this size holds the pattern without a seam."""
+        """Return whether a torus of this size holds the pattern without a seam."""
         return rows % self.a == 0 and cols % self.c == 0 and (cols // self.c * self.b) % self.a == 0
 
 
@@ -270,7 +270,7 @@ class Sublattice:
 def coloring_sublattice(
     order: int, rows: int | None = None, cols: int | None = None, limit: int | None = None
 ) -> Sublattice | None:
-    """The sublattice of fewest cosets whose shortest vector is longer than a neighbourhood reaches.
+    """Return the sublattice of fewest cosets whose shortest vector is longer than a neighbourhood reaches.
 
     Parameters
     ----------

@@ -61,13 +61,13 @@ class Pictures:
         return len(self.pixels) == 1 and self.known is None and self.usable is None
 
     def categories(self, variable: int) -> NDArray[Any] | None:
-        """The categories of a variable in ascending order; None where it has none."""
+        """Return the categories of a variable in ascending order; None if it has none."""
         if not (self.categorical and self.categorical[variable]):
             return None
         return np.unique(np.concatenate([self.values(variable, number) for number in range(len(self.pixels))]))
 
     def values(self, variable: int, number: int) -> NDArray[Any]:
-        """The known values of a variable in one of the pictures, (n,)."""
+        """Return the known values of a variable in one of the pictures, (n,)."""
         plane = self.pixels[number][..., variable]
         return plane[self.known[number]] if self.known else plane.ravel()
 
@@ -79,7 +79,7 @@ class Pictures:
 
 
 def unknown_in(picture: NDArray[Any]) -> Mask:
-    """Where a picture (rows, cols, C) is NaN in any channel."""
+    """Return where a picture (rows, cols, C) is NaN in any channel."""
     if picture.dtype.kind != "f":
         return np.zeros(picture.shape[:2], bool)
     found: Mask = np.isnan(picture).any(-1)
@@ -87,7 +87,7 @@ def unknown_in(picture: NDArray[Any]) -> Mask:
 
 
 def completed(picture: NDArray[Any], unknown: Mask) -> NDArray[Any]:
-    """The picture (rows, cols, C) with each unknown pixel replaced by the nearest known one."""
+    """Return the picture (rows, cols, C) with each unknown pixel replaced by the nearest known one."""
     if not unknown.any():
         return picture
     from scipy.ndimage import distance_transform_edt  # only where something is unknown: it takes long to load

@@ -165,7 +165,7 @@ class Sample:
 
     @classmethod
     def of_levels(cls, levels: NDArray[Any], count: int) -> Sample:
-        """A grey sample that is given in working levels 0 .. count - 1 already."""
+        """Return a grey sample that is given in working levels 0 .. count - 1."""
         sample = cls.__new__(cls)
         sample.pixels, sample.shown, sample.pictures = levels[..., None], 1, Pictures((levels[..., None],))
         sample.top, sample.unit, sample.direct = count - 1, 1.0, True
@@ -192,7 +192,7 @@ class Sample:
         self.working = canvas.reshape(len(canvas), -1)
 
     def _stacked(self, pictures: Sequence[NDArray[Any]], between: Any) -> NDArray[Any]:
-        """Arrays (rows, cols, ...), one for each picture, as one of the height and width of all, without the margin."""
+        """Return arrays (rows, cols, ...), one for each picture, stacked without the margin."""
         if len(pictures) == 1:
             return pictures[0]
         stacked = np.full((self.height, self.width, *pictures[0].shape[2:]), between, pictures[0].dtype)
@@ -294,14 +294,14 @@ class Sample:
         return fair
 
     def picture_of(self, source: NDArray[np.integer]) -> NDArray[np.intp]:
-        """The number of the picture that pixel indices lie in, or below whose first row they lie."""
+        """Return the number of the picture that pixel indices lie in, or below whose first row they lie."""
         tops = np.array([top for top, *_ in self.boxes])
         row = np.asarray(source) // self.cols - self.margin
         found: NDArray[np.intp] = np.maximum(np.searchsorted(tops, row, "right") - 1, 0)
         return found
 
     def planes(self, machine: Any) -> Any:
-        """The working levels as an array (C, rows * cols) of a machine, float32."""
+        """Return the working levels as an array (C, rows * cols) of a machine, float32."""
         return machine.put(self.working.astype(np.float32))
 
     def candidates(self, machine: Any, places: Places, planes: Any | None = None, every: bool = False) -> Candidates:
@@ -328,7 +328,7 @@ class Sample:
         )
 
     def place(self, source: NDArray[np.int32]) -> NDArray[np.int32]:
-        """(row, column) in the user's sample of pixel indices, on a last axis; -1 where a pixel has no source.
+        """Return (row, column) in the user's sample of pixel indices, on a last axis; -1 for a pixel without source.
 
         Of several pictures, the number of the picture is the third.
         """
@@ -340,7 +340,7 @@ class Sample:
         return np.where((source < 0)[..., None], np.int32(-1), place) if (source < 0).any() else place
 
     def index(self, place: NDArray[np.integer]) -> NDArray[np.int32]:
-        """The pixel index of (row, column[, number of the picture]) on a last axis; -1 where the row is below 0."""
+        """Return the pixel index of (row, column[, number of the picture]) on a last axis; -1 if the row is below 0."""
         row, col = place[..., 0], place[..., 1]
         if place.shape[-1] == 3:
             row = row + np.array([top for top, *_ in self.boxes])[np.maximum(place[..., 2], 0)]
@@ -348,7 +348,7 @@ class Sample:
         return np.where(place[..., 0] < 0, -1, found).astype(np.int32)
 
     def picture(self, values: NDArray[Any], source: NDArray[Any]) -> NDArray[Any]:
-        """The picture that working levels and sources stand for, in the sample's own type.
+        """Return the picture that working levels and sources stand for, in the sample's own type.
 
         Parameters
         ----------
@@ -375,7 +375,7 @@ class Sample:
         return own
 
     def moved(self, source: NDArray[Any], by: NDArray[np.int16]) -> NDArray[Any]:
-        """The pixels of some sources, moved by what `simdtex.ops.finish` says.
+        """Return the pixels of some sources, plus the differences from `simdtex.ops.finish`.
 
         Parameters
         ----------
@@ -403,7 +403,7 @@ class Sample:
 
 
 def variance(*pictures: NDArray[np.integer]) -> float:
-    """The mean over channels of the variance of working levels (C, rows, cols) of one or several pictures."""
+    """Return the mean over channels of the variance of working levels (C, rows, cols) of one or several pictures."""
     n, total, channels = sum(levels[0].size for levels in pictures), 0.0, len(pictures[0])
     for c in range(channels):  # integers: the same sum on every machine
         planes = [levels[c].astype(np.int64) for levels in pictures]
@@ -413,7 +413,7 @@ def variance(*pictures: NDArray[np.integer]) -> float:
 
 
 def moved(own: NDArray[Any], by: NDArray[np.floating[Any]], pixels: NDArray[Any]) -> NDArray[Any]:
-    """Pixels of a sample moved by a difference and projected onto the closest legal ones; others stay as they are.
+    """Return pixels of a sample plus a difference, as the closest legal ones; a difference of 0 keeps the pixel.
 
     Legal are 0 to 255 for 8 bits, and what lies between the sample's smallest and largest pixel otherwise.
     """

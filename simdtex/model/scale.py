@@ -76,7 +76,7 @@ class Scale:
         return [variable for variable, one in enumerate(self._variables) for _ in range(one.channels)]
 
     def levels(self, pixels: NDArray[Any]) -> NDArray[np.uint16]:
-        """The working levels (channels, ...) of pixels (..., C) of the sample's type; beyond its range, the nearest."""
+        """Return the working levels (channels, ...) of pixels (..., C) of the sample's type, clipped to its range."""
         planes = np.moveaxis(pixels, -1, 0)
         if not self.direct:
             found = [one.levels(plane) for plane, one in zip(planes, self._variables, strict=True)]
@@ -113,11 +113,11 @@ class _Stretched:
         return self.unit * self.spread / self.scale if self.scale else 0.0
 
     def stretched(self, pixels: NDArray[Any]) -> NDArray[np.int64]:
-        """Whole numbers 0..top for pixels of any shape."""
+        """Return integers 0..top for pixels of any shape."""
         return stretch(np.clip(pixels, *self.ends), self.top, self.ends)[0]
 
     def levels(self, plane: NDArray[Any]) -> NDArray[np.int64]:
-        """One channel."""
+        """Return the variable's one channel."""
         if not self.spread:
             return np.zeros((1, *plane.shape), np.int64)
         found: NDArray[np.int64] = np.rint(self.stretched(plane)[None] * (self.scale / self.spread)).astype(np.int64)
@@ -139,7 +139,7 @@ class _Categories:
         self.steepness = sqrt(2 / (alike * differing)) if differing else 0.0
 
     def levels(self, plane: NDArray[Any]) -> NDArray[np.int64]:
-        """A channel for each category."""
+        """Return a channel for each category."""
         height = round(self.scale * self.steepness)
         those = self.categories[1:] if len(self.categories) < 3 else self.categories
         found = [(plane == category) * height for category in those] or [np.zeros(plane.shape, np.int64)]
@@ -147,12 +147,12 @@ class _Categories:
 
 
 def highest(values: int) -> int:
-    """The highest level for which the distance of (12) over so many values is exact in float64."""
+    """Return the highest level for which the distance of (12) over so many values is exact in float64."""
     return int(2 ** min(EXACT, int((33 - log2(values)) / 2)) - 1)
 
 
 def stretch(pixels: NDArray[Any], top: int, ends: tuple[Any, Any] | None = None) -> tuple[NDArray[np.int64], float]:
-    """Pixels of any real type stretched over the integers 0..top, and the size of 1 in their own unit.
+    """Return pixels of any real type stretched over the integers 0..top, and the size of 1 in their own unit.
 
     ``ends`` what becomes 0 and top; None: the least and the greatest pixel.
     """

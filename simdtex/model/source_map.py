@@ -98,7 +98,7 @@ def apply_source_map(
 def _maps(
     positions: SourceMap, other_map: Any, sample_shape: Any
 ) -> tuple[list[NDArray[Any]], list[tuple[int, ...] | None]]:
-    """The map of each sample and the sample's size, or None where it is not known."""
+    """Return the map of each sample and the sample's size, None if unknown."""
     if positions.shape[2] == 3 and isinstance(other_map, (list, tuple)):
         for one in other_map:
             unmasked("another map", one)

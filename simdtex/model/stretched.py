@@ -52,7 +52,7 @@ class Stretched:
         return np.asarray((2 * planes.sum(0) + len(planes)) // (2 * len(planes)), np.int32)[None]
 
     def picture(self, values: NDArray[np.int32], source: NDArray[np.int32] | None = None) -> NDArray[Any]:
-        """The picture that values stand for, projected onto legal pixels of the sample's type.
+        """Return the picture that values stand for, projected onto legal pixels of the sample's type.
 
         Parameters
         ----------

@@ -23,7 +23,7 @@ FLAT = 0.85
 def structure(
     pictures: Sequence[NDArray[np.integer]], weight: float, variance: float, top: int
 ) -> list[NDArray[np.uint16]]:
-    """The signed distance to the edges of a sample's pictures, as working levels.
+    """Return the signed distance to the edges of a sample's pictures, as working levels.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def structure(
 
 
 def _signed(edge: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """The distance to the edge, below 0 inside it, in 1/256 of a pixel."""
+    """Return the distance to the edge, below 0 inside it, in 1/256 of a pixel."""
     squared = np.where(edge, -distance(~edge), distance(edge))
     found: NDArray[np.int64] = np.rint(np.sign(squared) * np.sqrt(np.abs(squared).astype(np.float64)) * 256).astype(
         np.int64
@@ -74,7 +74,7 @@ def _signed(edge: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 
 def distance(marked: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Squared distance of each pixel from the nearest marked one, pixels squared, at most REACH**2; (rows, cols)."""
+    """Return the squared distance of each pixel from the nearest marked one, at most REACH**2; (rows, cols)."""
     along = np.where(marked, 0, REACH).astype(np.int64)
     for _ in range(REACH):  # along columns first, then every row looks up to REACH to either side
         along[1:] = np.minimum(along[1:], along[:-1] + 1)
@@ -88,7 +88,7 @@ def distance(marked: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 
 def steepness(levels: NDArray[np.integer]) -> NDArray[np.int64]:
-    """The squared gradient of a picture (C, rows, cols), summed over channels, as of `_gradient`."""
+    """Return the squared gradient of a picture (C, rows, cols), summed over channels, as of `_gradient`."""
     total = np.zeros(levels.shape[1:], np.int64)
     for channel in levels:
         total += _gradient(channel.astype(np.int64))
@@ -96,7 +96,7 @@ def steepness(levels: NDArray[np.integer]) -> NDArray[np.int64]:
 
 
 def _gradient(channel: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Squared gradient of a channel smoothed; in (1/256 of a level)^2 per (2 pixels)^2."""
+    """Return the squared gradient of a channel smoothed, in (1/256 of a level)^2 per (2 pixels)^2."""
     for axis in (0, 1):
         around = np.pad(channel, [(2, 2) if a == axis else (0, 0) for a in (0, 1)], mode="edge")
         n = channel.shape[axis]

@@ -34,7 +34,7 @@ class Use(NamedTuple):
     most_used: MostUsed
 
     def as_dict(self) -> dict[str, Any]:
-        """The same as `simdtex.run.Output.statistics` has it."""
+        """Return the figures as in `simdtex.run.Output.statistics`."""
         return {"effective_share": self.effective_share, "most_used": self.most_used._asdict()}
 
 
@@ -66,7 +66,7 @@ def checked(source: ArrayLike) -> SourceMap:
 
 
 def counts(source: ArrayLike, sample_shape: tuple[int, ...], *, sample: int | None = None) -> NDArray[np.intp]:
-    """How many output pixels each pixel of the sample was taken for.
+    """Return how many output pixels each pixel of the sample was taken for.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def counts(source: ArrayLike, sample_shape: tuple[int, ...], *, sample: int | No
 def effective_use(
     source: ArrayLike, sample_shape: tuple[int, ...], piece: int = PIECE, *, sample: int | None = None
 ) -> Use:
-    r"""How evenly the output uses the pieces of its sample, and which one it uses most.
+    r"""Return how evenly the output uses the pieces of its sample, and which one it uses most.
 
     The sample is cut into pieces of about 8 x 8 pixels. With :math:`u_p` the number of output
     pixels taken from the piece p, of :math:`a_p` pixels, the effective share is
@@ -171,6 +171,6 @@ def effective_use(
 
 
 def _starts(length: int, piece: int) -> NDArray[np.intp]:
-    """Where the parts of a side begin."""
+    """Return where the parts of a side begin."""
     parts = max(1, round(length / piece))
     return np.arange(parts) * length // parts

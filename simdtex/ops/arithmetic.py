@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 
 def fma32(a: Any, b: Any, c: Any) -> NDArray[np.float32]:
-    """A * b + c in float32, rounded once.
+    """Return a * b + c in float32, rounded once.
 
     The product of two float32 is exact in float64. The sum is rounded to odd there, which makes the second
     rounding, to float32, the right one (Boldo and Melquiond, 2008).

@@ -83,7 +83,7 @@ def _drawn(
 
 
 def _whole(node: NDArray[np.intp], parent: NDArray[np.intp], count: int, ragged: int) -> NDArray[np.bool_]:
-    """Whether nodes have all the pixels below them that pixels' parents have, (S, nodes), along one axis."""
+    """Return whether nodes have all the pixels below them that pixels' parents have, (S, nodes), along one axis."""
     last = count - 1
     return np.asarray((node[None] != last) | (parent[:, None] == last) | (ragged == 0))
 

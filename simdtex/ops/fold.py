@@ -15,7 +15,7 @@ from simdtex.machine.interface import Array, Launcher, Operation
 
 
 def folded(n: int) -> NDArray[np.intp]:
-    """The rows, or columns, of a picture with n of them that those of the result come from, in order."""
+    """Return which of n rows, or columns, of a picture those of the result come from, in order."""
     return np.arange(n if n % 2 else n // 2) * 2 % n
 
 

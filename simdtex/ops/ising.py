@@ -22,7 +22,7 @@ from simdtex.model.lattice import Grid
 
 
 def heat_bath_chances(temperatures: Sequence[float], neighbours: int) -> NDArray[np.uint32]:
-    """The probabilities of up, in integers of 2**-32.
+    """Return the probabilities of up, in integers of 2**-32.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ BINS = 256
 
 
 def inverse_cdf(sorted_values: NDArray[np.int32], bins: int = BINS) -> NDArray[np.int32]:
-    """The inverse of a target's cdf, in a table.
+    """Return the inverse of a target's cdf, in a table.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def inverse_cdf(sorted_values: NDArray[np.int32], bins: int = BINS) -> NDArray[n
 
 
 def _bins_of(above: NDArray[np.int64], width: NDArray[np.int64] | np.int64, bins: int) -> NDArray[np.int64]:
-    """The bins of values so far above the least; the greatest stands at the end of the last."""
+    """Return the bins of values so far above the least; the greatest stands at the end of the last."""
     number: NDArray[np.int64] = np.minimum(above * bins // np.maximum(width, 1), bins - 1)
     return number
 

@@ -17,7 +17,7 @@ SHORT, LONG = 2**15, 2**22
 
 
 def alone(machine: Launcher, segments: int, n: int) -> bool:
-    """Whether one work-item is to sort a whole segment; it changes no bit.
+    """Return whether one work-item is to sort a whole segment; it changes no bit.
 
     It saves a dozen launches. A long segment is divided on a GPU, or where cores would go without one.
     """

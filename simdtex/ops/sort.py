@@ -15,7 +15,7 @@ DIGITS = 256
 
 
 def run_length(machine: Launcher, segments: int, n: int) -> int:
-    """How many values of a segment a work-item takes in turn; it changes no bit.
+    """Return how many values of a segment a work-item takes in turn; it changes no bit.
 
     Enough work-items to fill the device, but no run so short that its table of counters is the greater work.
     """

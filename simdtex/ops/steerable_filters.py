@@ -49,7 +49,7 @@ class Filters:
 
 @cache
 def filters(orientations: int) -> Filters:
-    """The bank of a number of orientations: 1, 2, 4 or 6.
+    """Return the bank of a number of orientations: 1, 2, 4 or 6.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def _numbers(text: str) -> NDArray[np.float64]:
 
 
 def _even(octant: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A filter that no mirror changes, from its taps at 0 <= x <= y, row by row from the centre."""
+    """Return a filter that no mirror changes, from its taps at 0 <= x <= y, row by row from the centre."""
     reach = int(np.sqrt(2 * octant.size)) - 1
     y, x = abs(np.mgrid[-reach : reach + 1, -reach : reach + 1])
     far, near = np.maximum(y, x), np.minimum(y, x)
@@ -88,7 +88,7 @@ def _even(octant: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _odd(half: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A filter that changes its sign when turned by 180 degrees, from its taps before the centre, row by row."""
+    """Return a filter that changes its sign when turned by 180 degrees, from its taps before the centre, in rows."""
     side = int(np.sqrt(2 * half.size + 1))
     return np.concatenate([half, [0.0], -half[::-1]]).reshape(side, side)
 

@@ -118,7 +118,7 @@ class StageWriter:
 
 
 def _order(stem: str) -> tuple[int, int]:
-    """The place of a stage among the others, coarse levels first."""
+    """Return the place of a stage among the others, coarse levels first."""
     found = _STAGE.search(stem)
     assert found
     return -int(found["level"] or 0), int(found["sweep"] or found["iteration"] or 0)
@@ -129,7 +129,7 @@ def _level(path: Path) -> int:
 
 
 def _caption(path: Path) -> str:
-    """The name of the level or iteration of a stage."""
+    """Return the name of the level or iteration of a stage."""
     level, number = _order(path.stem)
     return f"iteration {number}" if path.stem.startswith("iteration") else f"level {-level}"
 

@@ -69,7 +69,7 @@ GROUP = "simdtex.schedules"
 
 
 def get(schedule: str | Schedule) -> Schedule:
-    """The schedule of a name.
+    """Return the schedule of a name.
 
     Parameters
     ----------

@@ -39,11 +39,11 @@ class Partition:
     windows = False
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """(rows, cols) integers from 0: the group of each site of a lattice, or of a window where `windows` is true."""
+        """Return the group of each site of a lattice, or of a window if `windows` is true: (rows, cols) integers."""
         raise NotImplementedError
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
-        """How many groups the whole lattice has, where `windows` is true."""
+        """Return the number of groups of the whole lattice, if `windows` is true."""
         raise NotImplementedError
 
     def init(self, setting: Setting) -> State:
@@ -63,7 +63,7 @@ class Partition:
         return State(grid.sites()[place], starts, 0)
 
     def step(self, setting: Setting, state: State, active: Active) -> tuple[State, Info]:
-        """All groups that have active sites; a sweep goes by what was active when it began."""
+        """Return all groups that have active sites; a sweep goes by what was active when it began."""
         sweep, groups = state.sweep + 1, state.starts.size - 1
         turn = np.arange(groups)
         if self.shuffled:
@@ -81,7 +81,7 @@ AHEAD = 32
 
 @lru_cache(maxsize=8)
 def _orders(seed: int, level: int, first: int, groups: int) -> NDArray[np.intp]:
-    """Random orders of groups, (sweeps, groups): a sweep at a time they cost ten times as much."""
+    """Return random orders of groups, (sweeps, groups): a sweep at a time they cost ten times as much."""
     sweeps = np.repeat(first + np.arange(AHEAD), groups)
     bits = random.draw4(seed, level, sweeps, np.tile(np.arange(groups), AHEAD), random.SCHEDULE)[0]
     return np.argsort(bits.reshape(AHEAD, groups), 1, kind="stable")
@@ -103,11 +103,11 @@ class Coloring(Partition):
         return True
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Colours; O(sites)."""
+        """Return the colours; O(sites)."""
         return coloring(grid, order, seed)
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
-        """Colours of the whole lattice."""
+        """Return the number of colours of the whole lattice."""
         return lattice_plan(grid.within.rows, grid.within.cols, grid.torus, order, seed).colors
 
 
@@ -134,7 +134,7 @@ class Checkerboard(Partition):
     windows = True
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
-        """Whether every neighbour is of the other colour."""
+        """Return whether every neighbour is of the other colour."""
         even = not grid.torus or all(n == 1 or n % 2 == 0 for n in (grid.rows, grid.cols))
         return even and bool((offsets.sum(1) % 2 == 1).all())
 
@@ -165,7 +165,7 @@ class Synchronous(Partition):
         return neighbourless(grid)
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """One for all."""
+        """Return one group for all sites."""
         return np.zeros((grid.rows, grid.cols), np.int64)
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
@@ -187,7 +187,7 @@ class Raster(Partition):
         return True
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """Each site its own."""
+        """Return a group for each site."""
         return np.arange(grid.rows * grid.cols).reshape(grid.rows, grid.cols)
 
 
@@ -216,7 +216,7 @@ class Block(Partition):
         return grid.rows <= self.tile[0] and grid.cols <= self.tile[1]
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
-        """The place within the tile."""
+        """Return the place within the tile."""
         assert self.tile is not None
         row, col = np.indices((grid.rows, grid.cols))
         place: NDArray[Any] = row % self.tile[0] * self.tile[1] + col % self.tile[1]
@@ -224,5 +224,5 @@ class Block(Partition):
 
 
 def neighbourless(grid: Grid) -> bool:
-    """Whether no site of the lattice has a neighbour: every neighbourhood holds the four nearest."""
+    """Return whether no site of the lattice has a neighbour: every neighbourhood holds the four nearest."""
     return grid.rows * grid.cols == 1

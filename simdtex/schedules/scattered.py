@@ -114,7 +114,7 @@ class RandomScan(Scattered):
         return True
 
     def choose(self, setting: Setting, steps: int, active: Active) -> NDArray[np.int64]:
-        """One of them."""
+        """Choose one of the active sites."""
         wanting = active.numbers()
         first, at = divmod(steps, AHEAD)
         lo, hi = (bits[at : at + 1] for bits in _ahead(setting.seed, setting.level, first * AHEAD))
@@ -126,6 +126,6 @@ AHEAD = 1024
 
 @lru_cache(maxsize=8)
 def _ahead(seed: int, level: int, first: int) -> list[NDArray[np.uint32]]:
-    """Random bits of many steps in one go: one step at a time they cost a hundred times as much."""
+    """Return random bits of many steps at once: one step at a time they cost a hundred times as much."""
     steps = first + np.arange(AHEAD)
     return random.draw4(seed, level, steps, np.zeros(AHEAD), random.SCHEDULE)[:2]

@@ -33,15 +33,15 @@ class Active(Protocol):
     """Which sites want relaxing now."""
 
     def mask(self) -> NDArray[np.bool_]:
-        """Whether each site does, (rows, cols), on the host."""
+        """Return whether each site is active, (rows, cols), on the host."""
         ...
 
     def numbers(self) -> NDArray[np.int64]:
-        """The numbers, row cols + column, of those that do, in ascending order, on the host."""
+        """Return the numbers, row cols + column, of the active sites, in ascending order, on the host."""
         ...
 
     def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
-        """Those of a list of pixel indices, group after group.
+        """Return the active ones of a list of pixel indices, group after group.
 
         Parameters
         ----------
@@ -75,7 +75,7 @@ class Masked:
         self._mask = np.ones((grid.rows, grid.cols), bool) if mask is None else mask
 
     def mask(self) -> NDArray[np.bool_]:
-        """As given."""
+        """Return the mask as given."""
         return self._mask
 
     @cached_property
@@ -87,7 +87,7 @@ class Masked:
         return self._numbers
 
     def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
-        """In NumPy."""
+        """Return the active ones, computed in NumPy."""
         if self._mask.all():
             return sites, starts
         plane = np.zeros(self._grid.plane, bool)
@@ -116,7 +116,7 @@ class Info(NamedTuple):
         return np.array([[0, self.sites.size]], np.int64) if self.steps is None else self.steps
 
     def apart(self, machine: Machine) -> Iterator[Info]:
-        """The same step by step, the sites on the host."""
+        """Yield the steps one by one, their sites on the host."""
         sites = self.sites if isinstance(self.sites, np.ndarray) else machine.get(self.sites)
         ranges = self.ranges.tolist()
         for number, (begin, end) in enumerate(ranges, 1):
@@ -146,15 +146,15 @@ class Schedule(Protocol):
     windows: bool
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
-        """Whether every step's sites are i.i.d. in the sense of equation (14) on this lattice."""
+        """Return whether every step's sites are i.i.d. in the sense of equation (14) on this lattice."""
         ...
 
     def init(self, setting: Setting) -> Any:
-        """The state before the first sweep of a level."""
+        """Return the state before the first sweep of a level."""
         ...
 
     def step(self, setting: Setting, state: Any, active: Active) -> tuple[Any, Info]:
-        """The next state, and what to relax now."""
+        """Return the next state, and the sites to relax now."""
         ...
 
 
@@ -163,7 +163,7 @@ class Windowed(Schedule, Protocol):
     """A schedule whose `windows` is true, and which knows how far a sweep reaches."""
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
-        """How many steps a sweep of the whole lattice has at most."""
+        """Return the most steps of a sweep of the whole lattice."""
         ...
 
 
@@ -192,15 +192,15 @@ class Watched:
         self.name, self.tile, self.windows = schedule.name, schedule.tile, schedule.windows
 
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
-        """As the schedule says."""
+        """Return what the schedule claims."""
         return self.schedule.independent(grid, offsets)
 
     def init(self, setting: Setting) -> Any:
-        """The schedule's own state."""
+        """Return the schedule's own state."""
         return self.schedule.init(setting)
 
     def step(self, setting: Setting, state: Any, active: Active) -> tuple[Any, Info]:
-        """The schedule's own step, once it has been looked at."""
+        """Return the schedule's own step, after looking at it."""
         state, info = self.schedule.step(setting, state, active)
         for one in info.apart(setting.machine):
             self.look(setting, one)
@@ -259,7 +259,7 @@ class Trimmed(Watched):
         self.top, self.bottom = top, bottom
 
     def step(self, setting: Setting, state: Any, active: Active) -> tuple[Any, Info]:
-        """The schedule's own step, without the rows that do not matter."""
+        """Return the schedule's own step, without the rows that do not matter."""
         state, info = self.schedule.step(setting, state, active)
         sites = info.sites if isinstance(info.sites, np.ndarray) else setting.machine.get(info.sites)
         ranges, radius, width = info.ranges.copy(), int(setting.offsets.max()), setting.grid.width

@@ -148,7 +148,7 @@ class Lists:
         self._known: dict[int, tuple[NDArray[np.int32], Array, Array, NDArray[np.int64]]] = {}
 
     def of(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, Array, NDArray[np.int64]]:
-        """The list on the machine, where its stretches begin, and which of them begin its groups."""
+        """Return the list on the machine, where its stretches begin, and which of them begin its groups."""
         if id(sites) not in self._known:
             begins, firsts = active.stretches(starts)
             put = self._machine.put
@@ -264,7 +264,7 @@ class Lattices:
         return len(self.offsets) * self.sample.channels * self.sample.variance
 
     def exhaustive(self, number: int) -> bool:
-        """Whether a site of a level weighs all its candidates."""
+        """Return whether a site of a level weighs all its candidates."""
         if self.options.search == "exact" or number == self.levels - 1:
             return True
         return bool(self.places(number).positions.size <= EXHAUSTIVE)
@@ -278,7 +278,7 @@ class Lattices:
         return FairUse((places.row.size, places.col.size), around, fair, not self.exhaustive(number), *kinds)
 
     def _kinds(self, places: Places) -> tuple[NDArray[np.intp] | None, tuple[float, ...]]:
-        """The category of each place where candidates may lie, and the shares that are asked for."""
+        """Return the category of each place where candidates may lie, and the wanted shares."""
         categories, wanted = self.sample.pictures.categories(0), self.options.proportions
         if categories is None or wanted is None:
             return None, ()
@@ -289,7 +289,7 @@ class Lattices:
         return self.sample.places(self.offsets, 2**number, self.options.phases, self.options.edges)
 
     def candidates(self, number: int) -> Candidates:
-        """The candidates of a level."""
+        """Return the candidates of a level."""
         return self.sample.candidates(self.machine, self.places(number), self.planes)
 
 

@@ -39,7 +39,7 @@ class Framed(NamedTuple):
     cols: slice
 
     def cut(self, array: NDArray[Any]) -> NDArray[Any]:
-        """The tile's part of an array (..., rows, cols) over the window."""
+        """Return the tile's part of an array (..., rows, cols) over the window."""
         return np.ascontiguousarray(array[..., self.rows, self.cols])
 
 
@@ -55,7 +55,7 @@ class Tally(NamedTuple):
 
 
 def framed(lattice: Grid, tile: Tile, halo: int) -> Framed:
-    """A tile in the window that holds it and all sites within a halo, as far as the lattice has them."""
+    """Return a tile in the window that holds it and all sites of the lattice within a halo."""
     sides = []
     for first, size, whole in ((tile.top, tile.rows, lattice.rows), (tile.left, tile.cols, lattice.cols)):
         if size + 2 * halo >= whole:

@@ -259,7 +259,7 @@ class Record:
 
 
 def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int], spacing: int) -> tuple[int, int]:
-    """Rows and columns of a level of the output, which is made of whole tiles and the beginning of one more.
+    """Return rows and columns of a level of the output: whole tiles and the beginning of one more.
 
     Parameters
     ----------

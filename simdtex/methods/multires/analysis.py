@@ -58,7 +58,7 @@ class Analysis:
 
 
 def pyramid(machine: Machine, picture: Array, levels: int, torus: bool) -> tuple[list[Array], list[Array]]:
-    """The Gaussian and the Laplacian pyramid of a picture, (5) and (6).
+    """Return the Gaussian and the Laplacian pyramid of a picture, (5) and (6).
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def analyse(machine: Machine, pixels: NDArray[Any], options: Options) -> Analysi
 
 
 def _level_shapes(shape: tuple[int, ...], levels: int | None) -> list[tuple[int, int]]:
-    """Rows and columns of every level, down to a single pixel or to so many levels."""
+    """Return rows and columns of every level, down to a single pixel or to so many levels."""
     shapes = [(shape[0], shape[1])]
     while max(shapes[-1]) > 1:
         shapes.append(half(shapes[-1]))
@@ -152,7 +152,7 @@ def _level_shapes(shape: tuple[int, ...], levels: int | None) -> list[tuple[int,
 
 
 def _energy(features: NDArray[np.int32], about_mean: bool = False) -> NDArray[np.float64]:
-    """Z (M,): the mean square of each column, or its variance, from sums in integers."""
+    """Return Z (M,): the mean square of each column, or its variance, from sums in integers."""
     n = len(features)
     squares, total = np.zeros((2, features.shape[1]), object)
     for first in range(0, n, 2**20):  # the sum of so many squares fits 64 bits

@@ -38,17 +38,17 @@ def differences(analysis: Analysis, options: Options) -> NDArray[np.uint32]:
 
 
 def pixels(shapes: Sequence[tuple[int, int]]) -> int:
-    """Of some levels together."""
+    """Return the number of pixels of some levels."""
     return sum(rows * cols for rows, cols in shapes)
 
 
 def first_launch(analysis: Analysis, level: int) -> int:
-    """Pixels of a level in its first launch."""
+    """Return the number of pixels in the first launch of a level."""
     return 1 + int(LAUNCH / (pixels(analysis.shapes[level + 1 :]) * analysis.features.shape[1]))
 
 
 def lattice(shapes: Sequence[tuple[int, int]], first: int) -> NDArray[np.int32]:
-    """Lattices as of `Structure` and `Sampled`, where levels stand one after another, from one of them on."""
+    """Return the lattices of `Structure` and `Sampled`: levels one after another, from one of them on."""
     begins = np.cumsum([0, *(rows * cols * (level >= first) for level, (rows, cols) in enumerate(shapes))])
     ragged = [sum((n % 2**level > 0) << axis for axis, n in enumerate(shapes[0])) for level in range(len(shapes))]
     return np.array([(*shape, *rest) for shape, *rest in zip(shapes, begins, ragged, strict=False)], np.int32)
@@ -61,7 +61,7 @@ def structure_of(machine: Machine, analysis: Analysis, options: Options) -> Stru
 
 
 def sampled_from(machine: Machine, shapes: Sequence[tuple[int, int]], source: Sequence[NDArray[np.int32]]) -> Sampled:
-    """Levels whose pixels are copied from these places, the finest first."""
+    """Return levels whose pixels are copied from these places, the finest first."""
     together = np.concatenate(source)
     counts = np.zeros((together.size, 2), np.int32)
     counts[-pixels(shapes[-1:]) :, 0] = 1  # of the top; the others are to be counted
@@ -69,7 +69,7 @@ def sampled_from(machine: Machine, shapes: Sequence[tuple[int, int]], source: Se
 
 
 def copied(machine: Machine, shapes: Sequence[tuple[int, int]], own: tuple[int, int]) -> Sampled:
-    """The top level, copied and repeated to fill; nothing yet below it."""
+    """Return the top level, copied and repeated to fill, and empty levels below it."""
     row, col = np.indices(shapes[-1], np.int32)
     source = row % np.int32(own[0]) * np.int32(own[1]) + col % np.int32(own[1])
     return sampled_from(machine, shapes, [np.zeros(pixels(shapes[:-1]), np.int32), source.ravel()])
@@ -78,14 +78,14 @@ def copied(machine: Machine, shapes: Sequence[tuple[int, int]], own: tuple[int, 
 def read_sources(
     machine: Machine, sampled: Sampled, shapes: Sequence[tuple[int, int]], level: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """A level's source (rows, cols) and counts (rows, cols, 2)."""
+    """Return a level's source (rows, cols) and counts (rows, cols, 2)."""
     begin, end = pixels(shapes[:level]), pixels(shapes[: level + 1])
     source, counts = (machine.get(machine.part(a, begin, end)) for a in (sampled.source, sampled.counts))
     return source.reshape(shapes[level]), counts.reshape(*shapes[level], 2)
 
 
 def places(source: NDArray[np.int32], cols: int) -> NDArray[np.int32]:
-    """(row, column) of pixels on a last axis."""
+    """Return (row, column) of pixels on a last axis."""
     place = np.empty((*source.shape, 2), np.int32)
     place[..., 0] = row = source // np.int32(cols)
     place[..., 1] = source - row * np.int32(cols)  # quicker than divmod

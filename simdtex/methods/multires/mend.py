@@ -26,7 +26,7 @@ _FAR = np.int64(2**62)
 
 
 def mend(planes: NDArray[np.int32]) -> NDArray[np.intp]:
-    """Where each pixel of a picture that wraps around comes from in one that does not.
+    """Return a picture that wraps around, made of one that does not, as the source of each pixel.
 
     Columns first: the picture is turned by half its width, so that the seam of its left and right edges stands in the
     middle; a strip of the picture, of the place where it fits best, is laid over the seam; on either side of the seam
@@ -59,14 +59,14 @@ def mend(planes: NDArray[np.int32]) -> NDArray[np.intp]:
 
 
 def _fits(values: NDArray[np.int64]) -> bool:
-    """Whether the last column goes with the first, or there are too few."""
+    """Return whether the last column fits the first, or there are too few columns."""
     cols = values.shape[1]
     inside, across = int(np.abs(np.diff(values, axis=1)).sum()), int(np.abs(values[:, -1] - values[:, 0]).sum())
     return bool(cols < 2 * SHARE or across * (cols - 1) * FITS[1] <= inside * FITS[0])
 
 
 def _covered(values: NDArray[np.int64], place: NDArray[np.intp], closed: bool) -> NDArray[np.intp]:
-    """``place`` with a strip over the seam of the last column with the first."""
+    """Return ``place`` with a strip over the seam of the last column with the first."""
     cols = values.shape[1]
     reach, turn = min(cols // SHARE, WIDEST), cols // 2
     left = turn - reach  # of the strip, where the seam is before column `turn`
@@ -85,7 +85,7 @@ def _covered(values: NDArray[np.int64], place: NDArray[np.intp], closed: bool) -
 
 
 def _seams(there: NDArray[np.int64], strip: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """What it costs to cut right of each column of either half, (rows, reach - 1) each."""
+    """Return the costs of cutting right of each column of either half, (rows, reach - 1) each."""
     square = ((there - strip) ** 2).sum(-1)
     cost = square[:, :-1] + square[:, 1:]
     reach = strip.shape[1] // 2
@@ -101,7 +101,7 @@ def _path(cost: NDArray[np.int64], closed: bool) -> NDArray[np.intp]:
 
 
 def _least(cost: NDArray[np.int64], begin: int | None) -> NDArray[np.intp]:
-    """The least path, or the least of those that begin at a column and end beside it."""
+    """Return the least path, or the least of those that begin at a column and end beside it."""
     rows, cols = cost.shape
     total = cost[0].copy()
     if begin is not None:

@@ -72,7 +72,7 @@ class Texture:
     own: NDArray[Any] | None = None
 
     def image(self, channels: Sequence[NDArray[np.int32]]) -> NDArray[Any]:
-        """The image (..., C) that channels, each of any one shape, stand for."""
+        """Return the image (..., C) that channels, each of any one shape, stand for."""
         shape = channels[0].shape
         pixels = []
         flat = np.stack([channel.reshape(-1) for channel in channels])
@@ -83,12 +83,12 @@ class Texture:
 
 
 def transform(machine: Machine, options: Options, levels: int, torus: bool) -> Transform:
-    """The 2-D pyramid that options describe."""
+    """Return the 2-D pyramid that options describe."""
     return Transform(machine, options.pyramid, levels, options.orientations, torus)
 
 
 def number_of_levels(options: Options, *sides: int) -> int:
-    """Of the pyramids of pictures, or blocks, with these sides."""
+    """Return the number of levels of pyramids of pictures, or blocks, with these sides."""
     most = most_levels(*sides)
     if options.levels is None:
         return max(0, min(most, (min(sides) // RESIDUE).bit_length() - 1))
@@ -98,7 +98,7 @@ def number_of_levels(options: Options, *sides: int) -> int:
 
 
 def analyse(machine: Machine, sample: NDArray[Any], options: Options, *pyramids: Transform) -> Texture:
-    """The histograms of a sample (rows, cols, channels): analysis-pyr of every decorrelated channel."""
+    """Return the histograms of a sample (rows, cols, channels): analysis-pyr of every decorrelated channel."""
     memory.require(machine, prod(sample.shape[:2]) * MEMORY)
     stretched = Stretched(sample)
     colours = palette([stretched.planes], [1.0], options.color == "decorrelate")
@@ -298,7 +298,7 @@ class Run:
 def _begin(
     machine: Machine, texture: Texture, shape: tuple[int, ...], options: Options, seed: int
 ) -> Callable[[int], Array]:
-    """What gives each channel (1, 1, ...) to begin with: noise, or that of the start."""
+    """Return a function that gives each channel (1, 1, ...) to begin with: noise, or that of the start."""
     if options.start is None:
         return lambda c: noise(machine, 1, prod(shape), seed, c).reshape((1, 1, *shape))
     start = np.asarray(options.start)
@@ -313,7 +313,7 @@ def _begin(
 
 
 def _own_channels(image: NDArray[Any]) -> NDArray[np.int32]:
-    """Channels (C, ...) of an image (..., C) under colours of its own, in 2**-14 standard deviations."""
+    """Return the decorrelated channels (C, ...) of an image (..., C), in 2**-14 standard deviations."""
     planes = Stretched(image.reshape(-1, 1, image.shape[-1])).planes
     normal = palette([planes], [1.0]).decorrelated(planes)
     channels = np.rint(np.clip(normal, -64, 64) * 2**14).astype(np.int32)

@@ -33,7 +33,7 @@ class Histograms:
 
 
 def histograms(machine: Machine, channel: NDArray[np.int32], *pyramids: Transform) -> Histograms:
-    """The histograms of a channel (rows, cols) and of its pyramids, one after another: analysis-pyr."""
+    """Return the histograms of a channel (rows, cols) and of its pyramids, one after another: analysis-pyr."""
     picture = machine.put(channel[None])
     subbands = [band for pyramid in pyramids for band in pyramid.make(picture)]
     values = [np.asarray(machine.get(band)) for band in subbands]
@@ -41,7 +41,7 @@ def histograms(machine: Machine, channel: NDArray[np.int32], *pyramids: Transfor
 
 
 def average(parts: Sequence[Sorted], weights: Sequence[float], blend: str) -> Sorted:
-    """The average of some histograms, band by band.
+    """Return the average of some histograms, band by band.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def averaged(textures: Sequence[Histograms], weights: Sequence[float], blend: st
 
 
 def spliced(low: Histograms, high: Histograms, split: int) -> Histograms:
-    """The low frequencies of one texture, and its pixels, with the high frequencies of another.
+    """Return the low frequencies of one texture, and its pixels, with the high frequencies of another.
 
     Parameters
     ----------

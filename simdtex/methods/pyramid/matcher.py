@@ -62,7 +62,7 @@ class Matcher:
         self.moved: list[tuple[str, Array, NDArray[np.float64]]] = []
 
     def wanted(self, values: NDArray[np.int32]) -> Wanted:
-        """The histogram of sorted values (bands, m), as `match` takes it."""
+        """Return the histogram of sorted values (bands, m), as `match` takes it."""
         deviations = values.std(1, dtype=np.float64)
         deviations[deviations == 0] = 1.0
         if self._options.match == "lookup":
@@ -89,7 +89,7 @@ class Matcher:
         return sort(self._machine, segments, self._ties(segments.shape[1]))
 
     def _ties(self, n: int) -> Array:
-        """The order in which equal ones of n values come."""
+        """Return the order in which equal ones of n values come."""
         if n not in self._first:
             bits = noise(self._machine, 1, n, self._seed, TIES)
             itself = self._machine.put(np.arange(n, dtype=np.int32))

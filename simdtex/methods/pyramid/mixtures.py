@@ -88,7 +88,7 @@ def mix(
     checkpoint: Any = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
-    """A texture that looks a bit like each of several, by pyramid matching.
+    """Make a texture that looks a bit like each of several, by pyramid matching.
 
     Its pattern is that of one sample (`pattern`), the average of several (`average`, the default), or the low
     frequencies of one with the high ones of another (`low`, `high`). Its colours are those of its pattern, or of
@@ -231,16 +231,16 @@ class _Blender:
         }
 
     def averaged(self, blend: str) -> list[Histograms]:
-        """The average of the samples, channel by channel."""
+        """Return the average of the samples, channel by channel."""
         weights = [self._weights[i] for i in self._used]
         return [averaged(channel, weights, blend) for channel in zip(*self._found.values(), strict=True)]
 
     def spliced(self, low: int, high: int, finest: int) -> list[Histograms]:
-        """The finest subbands of `high`, the others of `low`, and with them its pixels."""
+        """Return the finest subbands of `high`, and the others and the pixels of `low`."""
         return [spliced(a, b, finest) for a, b in zip(self._found[low], self._found[high], strict=True)]
 
     def texture(self, found: list[Histograms], pixels_of: int | None) -> pyramid.Texture:
-        """What is to be matched; with the pixels of the palette where it is to give them."""
+        """Return what is to be matched, with the pixels of the palette if it gives them."""
         if pixels_of is not None:
             own: list[Sorted] = [np.sort(c.reshape(1, -1)) for c in self._scale.channels[-1]]
             found = [Histograms(pixels, one.subbands) for pixels, one in zip(own, found, strict=True)]
@@ -255,7 +255,7 @@ def _parted(planes: NDArray[np.int32], pictures: list[NDArray[Any]]) -> list[NDA
 
 
 def _high_subbands(split: int | None, levels: int, kind: str) -> int:
-    """How many subbands of a pyramid are high frequencies."""
+    """Return the number of subbands of a pyramid that are high frequencies."""
     if split is None:
         split = (levels + 1) // 2
     if split > levels:
@@ -264,7 +264,7 @@ def _high_subbands(split: int | None, levels: int, kind: str) -> int:
 
 
 def _checked(samples: Sequence[ArrayLike], channel_axis: int | None) -> list[NDArray[Any]]:
-    """The samples as (rows, cols, channels), grey ones with as many channels as the others."""
+    """Return the samples as (rows, cols, channels), grey ones with as many channels as the others."""
     if not isinstance(samples, Sequence):
         what = "a single array" if isinstance(samples, np.ndarray) else f"of {type(samples).__name__}"
         raise TypeError(f"samples is {what}; give a list of samples")
@@ -292,7 +292,7 @@ def _weights(
     high: int | None,
     split: int | None,
 ) -> list[float]:
-    """The weight of every sample in the pattern."""
+    """Return the weight of every sample in the pattern."""
     if (low is None) != (high is None):
         raise ValueError("low and high go together; give both, or neither")
     if (pattern is not None) + (average is not None) + (low is not None) > 1:

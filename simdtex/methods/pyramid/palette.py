@@ -68,7 +68,7 @@ class Palette:
 
 
 def palette(pictures: Sequence[NDArray[np.int32]], weights: Sequence[float], decorrelate: bool = True) -> Palette:
-    """The transform that decorrelates some pictures taken together.
+    """Return the transform that decorrelates some pictures taken together.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ class Decorrelated:
     spans: NDArray[np.float64]
 
     def normalised(self, channels: NDArray[np.int32]) -> NDArray[np.float64]:
-        """Channels (C, ...) in standard deviations."""
+        """Return channels (C, ...) in standard deviations."""
         return channels * (self.spans / TOP).reshape(-1, *(1,) * (channels.ndim - 1))
 
 

@@ -67,7 +67,7 @@ class Transform:
         return [*(["high"] if self._steerable else []), *levels, "low"]
 
     def make(self, picture: Array) -> list[Array]:
-        """The subbands of a picture.
+        """Return the subbands of a picture.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class Transform:
         return [*subbands, low]
 
     def collapse(self, subbands: list[Array]) -> Array:
-        """The picture (planes, rows, cols) that subbands add up to."""
+        """Return the picture (planes, rows, cols) that subbands add up to."""
         if not self._steerable:
             return self._collapse_laplacian(subbands)
         high, *bands, low = subbands
@@ -105,11 +105,11 @@ class Transform:
         return steerable_join(self._machine, [(high, self._high, 1), (low, self._low, 1)], high.shape[2:], self._torus)
 
     def _folds(self, shape: tuple[int, ...]) -> bool:
-        """Whether every second pixel of a picture would not be evenly spaced around it."""
+        """Return whether every second pixel of a picture would not be evenly spaced around it."""
         return self._torus and any(n % 2 for n in shape)
 
     def _next(self, low: Array) -> Array:
-        """2down(L1 low), (1, planes, ...)."""
+        """Return 2down(L1 low), (1, planes, ...)."""
         if not self._folds(low.shape[1:]):
             return steerable_split(self._machine, low, self._down, self._torus, 2)
         blurred = steerable_split(self._machine, low, self._down, self._torus, 1)
@@ -117,14 +117,14 @@ class Transform:
         return coarse.reshape((1, *coarse.shape))
 
     def _previous(self, low: Array, shape: tuple[int, int]) -> tuple[Array, Array, int]:
-        """The term of the level below, of these rows and columns, that is L1 2up(low)."""
+        """Return the term of the level below, of these rows and columns, that is L1 2up(low)."""
         if not self._folds(shape):
             return low, self._up[4], 2
         gain, spread = self._spread(low.reshape(low.shape[1:]), shape)
         return spread, self._up[gain], 1
 
     def _spread(self, coarse: Array, shape: tuple[int, ...]) -> tuple[int, Array]:
-        """A level at its places on the one below, (1, planes, ...), and what the zeros between them take away."""
+        """Return a level at its places on the one below, (1, planes, ...), and what the zeros between take away."""
         spread = unfold(self._machine, coarse, shape)
         return prod(1 if n % 2 else 2 for n in shape), spread.reshape((1, *spread.shape))
 
@@ -147,7 +147,7 @@ class Transform:
         return self._plus_expanded(fine, coarse, -1)
 
     def _plus_expanded(self, fine: Array, coarse: Array, sign: int) -> Array:
-        """A picture and the level above it expanded, or less that, on a torus with an odd side."""
+        """Return a picture plus, or minus, the level above it expanded, on a torus with an odd side."""
         gain, spread = self._spread(coarse, fine.shape[1:])
         terms = [(fine.reshape((1, *fine.shape)), self._itself, 1), (spread, self._binomial[sign * gain], 1)]
         return steerable_join(self._machine, terms, fine.shape[1:], self._torus)
@@ -166,7 +166,7 @@ class Transform:
 
 
 def most_levels(*sides: int) -> int:
-    """The most levels of pictures with these sides: until the shortest is a single pixel."""
+    """Return the most levels of pictures with these sides: until the shortest is a single pixel."""
     return min(sides).bit_length() - 1
 
 
@@ -197,7 +197,7 @@ class Pyramid:
     unit: float
 
     def collapse(self, *, device: str | Machine | None = None) -> NDArray[np.float64]:
-        """The picture (rows, cols, channels) that the subbands add up to.
+        """Return the picture (rows, cols, channels) that the subbands add up to.
 
         Subbands may have been changed, but for their shapes. An unchanged Laplacian pyramid gives back the picture to
         half a unit, and another for every level with an odd side on a torus; the steerable filters lose some
@@ -224,7 +224,7 @@ def decompose(
     channel_axis: int | None = None,
     device: str | Machine | None = None,
 ) -> Pyramid:
-    """The pyramid of a picture.
+    """Return the pyramid of a picture.
 
     Parameters
     ----------
@@ -289,7 +289,7 @@ def _whole(values: NDArray[np.float64]) -> NDArray[np.int32]:
 
 
 def _orders(shape: tuple[int, ...], levels: int, kind: str) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Where the rows and columns of every subband stand among those of the picture, on a torus, as ranks."""
+    """Return the ranks of the rows and columns of every subband among those of the picture, on a torus."""
     places = [np.arange(n) for n in shape]
     found = []
     for _ in range(levels + 1):

@@ -121,7 +121,7 @@ def block_run(machine: Machine, plan: Plan, seed: int) -> Run:
 
 
 def _matched_block(machine: Machine, block: Array, wanted: list[Wanted], matcher: Matcher) -> Array:
-    """The 3-D Laplacian pyramid of a block, matched and collapsed."""
+    """Match and collapse the 3-D Laplacian pyramid of a block."""
     gaussian = [block]
     while len(gaussian) < len(wanted):
         gaussian.append(solid_reduce(machine, gaussian[-1]))
@@ -136,6 +136,6 @@ def _matched_block(machine: Machine, block: Array, wanted: list[Wanted], matcher
 
 
 def slices_of(volume: NDArray[Any], name: str) -> NDArray[Any]:
-    """A family of slices (slice, row, column, ...) of a volume (depth, rows, cols, ...)."""
+    """Return a family of slices (slice, row, column, ...) of a volume (depth, rows, cols, ...)."""
     axes = FAMILIES[name][0]
     return np.transpose(volume, (*axes, *range(3, volume.ndim)))
