@@ -88,15 +88,6 @@ def mixture(distances, values, h, levels):
     return p / p.sum()
 
 
-def vector_density(distances, values, h, at):
-    """The same at one pixel vector, up to a constant."""
-    least = min(distances)
-    return sum(
-        exp(-(d - least + float(((np.asarray(at, float) - y) ** 2).sum())) / (2 * h * h))
-        for d, y in zip(distances, np.asarray(values, float), strict=True)
-    )
-
-
 def cooled(temperature, site, order, spacing, torus, xi):
     """Equation (13) in integers of 1/1024."""
     i, j = site[0] // spacing, site[1] // spacing

@@ -184,19 +184,6 @@ def test_no_folder_that_is_made_anew_holds_an_input(folder, pair):
         refused(folder, name, args, "is an input and lies in")
 
 
-def test_the_sample_in_the_folder_of_stages(folder):
-    """As the names are those that an earlier run writes, it would be removed."""
-    (folder / "st").mkdir()
-    os.rename("sample.png", "st/level0.png")
-    refused(folder, "synth", ["st/level0.png", "-o", "out.png", "--stages", "st"], "is an input and lies in st")
-
-
-def test_the_sample_among_the_slices_of_a_solid(folder):
-    (folder / "block").mkdir()
-    os.rename("sample.png", "block/slice-000.png")
-    refused(folder, "solid", ["block/slice-000.png", "-o", "block"], "is an input and lies in block")
-
-
 OUTPUTS = [
     (name, one, other)
     for name, one in parameters(*WRITE)

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import simdtex
-from simdtex.methods.mrf.options import few
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Sample
 from simdtex.model.source_map import apply_source_map
@@ -170,14 +169,6 @@ def test_a_finish_that_is_asked_for_averages_categories_too():
 def test_a_density_is_left_alone():
     _, output = run(texture((32, 30), seed=3), pixel="density", relaxation="gibbs", free_sweeps=0, xi=-8.0)
     assert output.statistics["options"]["finish"] == 0
-
-
-@pytest.mark.parametrize(("count", "expected"), [(1, True), (16, True), (17, False)])
-def test_few_pixels_are_up_to_sixteen(count, expected):
-    flat = np.arange(300 * 300) % count
-    pixels = np.stack([flat, flat * 3], -1).reshape(300, 300, 2).astype(np.int32)
-    assert few((pixels,)) is expected
-    assert few((pixels[::-1],)) is expected
 
 
 @pytest.mark.parametrize("value", [-1, np.inf, "soft"])

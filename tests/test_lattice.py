@@ -21,13 +21,6 @@ def test_offsets_are_those_of_equation_3_in_canonical_order(order):
     assert [tuple(o) for o in offsets.tolist()] == plain.offsets(order)
 
 
-@given(st.integers(1, 400))
-def test_a_neighbourhood_is_symmetric_and_without_its_centre(order):
-    offsets = {tuple(o) for o in neighbourhood_offsets(order).tolist()}
-    assert (0, 0) not in offsets
-    assert offsets == {(-i, -j) for i, j in offsets} == {(j, i) for i, j in offsets}
-
-
 @pytest.mark.parametrize("order", [0, -1, -18])
 def test_an_order_without_neighbours_is_an_error(order):
     with pytest.raises(ValueError, match=f"order is {order}; give 1"):
@@ -66,14 +59,6 @@ def test_the_neighbours_of_every_site(height, width, spacing, order, torus):
         i, j = site // width // spacing, site % width // spacing
         near = plain.neighbours(i, j, order, grid.rows, grid.cols, torus)
         assert column == [-1 if r is None else (r[0] * width + r[1]) * spacing for r in near]
-
-
-@given(sizes, sizes, spacings, st.integers(1, 13), st.booleans())
-def test_being_neighbours_is_mutual(height, width, spacing, order, torus):
-    grid = Grid(height, width, spacing, torus)
-    near = grid.neighbours(grid.sites(), neighbourhood_offsets(order))
-    pairs = {(s, r) for s, column in zip(grid.sites().tolist(), near.T.tolist(), strict=True) for r in column if r >= 0}
-    assert pairs == {(r, s) for s, r in pairs}
 
 
 def test_what_a_kernel_is_told():

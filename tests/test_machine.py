@@ -183,11 +183,6 @@ def test_another_type_of_device_is_a_type_error(wrong):
         simdtex.synthesize(np.eye(8), (4, 4), order=1, device=wrong)
 
 
-def test_a_line_of_the_listing_opens_its_device(any_device):
-    assert simdtex.open_machine(any_device).info == any_device
-    assert simdtex.open_machine(simdtex.devices(probe=False)[-1]).kind == "reference"
-
-
 def test_the_compilers_warnings_are_not_printed(cl_device, capfd):
     machine = OpenCL(cl_device)
     source = f"__kernel void f(__global int *a) {{ int b; a[0] = b; 7; }} // {uuid.uuid4()}"

@@ -311,15 +311,6 @@ def test_a_callback_sees_every_channel_of_every_iteration():
     assert_same_bits(pictures[2], alone)
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
-def test_what_a_callback_raises_passes_through(error):
-    def callback(progress):
-        raise error
-
-    with pytest.raises(error):
-        synthesize(texture((12, 11)), (10, 9), callback=callback)
-
-
 def test_statistics_say_what_was_done():
     _, output = synthesize(texture((24, 20)), (16, 17), full_output=True, rng=9, start=np.zeros((16, 17)))
     said = output.statistics

@@ -160,11 +160,6 @@ def test_any_size_ends_with_nothing_hot(name, shape):
 # -- the check ------------------------------------------------------------------------------------------------
 
 
-@every
-def test_the_check_changes_no_bit(name):
-    assert_same_bits(run(schedules.Checked(schedules.get(name)), "gibbs"), expected(name, "gibbs"))
-
-
 @pytest.mark.parametrize(
     ("sites", "words"), [([0, 1], "claims independent sites"), ([4, 4], "twice"), ([4, 99], "not of the level")]
 )
@@ -246,13 +241,6 @@ def test_the_statistics_count_what_the_schedule_did(name):
         assert whole["relaxations"] - cooling["relaxations"] >= 2 * sites
         if CLAIMS[name].partition:
             assert whole["relaxations"] - cooling["relaxations"] == 2 * sites
-
-
-def test_an_object_is_told_by_its_name():
-    assert (
-        watched(schedules.Checked(schedules.get("random-subset:0.2")))[2]["options"]["schedule"] == "random-subset:0.2"
-    )
-    assert watched("luby")[2]["options"]["schedule"] == "luby"
 
 
 @every

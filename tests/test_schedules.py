@@ -409,12 +409,6 @@ def test_an_honest_schedule_passes_and_is_told_nothing_else(name):
 # -- names ----------------------------------------------------------------------------------------------------
 
 
-@every
-def test_a_name_is_that_of_its_schedule(name):
-    assert get(name).name == name
-    assert plainly(walk(get(get(name).name), Grid(5, 6), 2)) == plainly(walk(get(name), Grid(5, 6), 2))
-
-
 @pytest.mark.parametrize(
     ("schedule", "name"),
     [
@@ -430,11 +424,6 @@ def test_a_name_is_that_of_its_schedule(name):
 def test_a_name_says_all_about_its_schedule(schedule, name):
     assert schedule.name == get(name).name == name
     assert vars(get(name)) == vars(schedule)
-
-
-def test_an_object_is_itself():
-    for schedule in (schedules.Luby(), Told([1]), Checked(Told([1]))):
-        assert get(schedule) is schedule
 
 
 @pytest.mark.parametrize("wrong", [None, 3, ["luby"], object(), schedules.Luby, schedules.Partition(), np.zeros(3)])

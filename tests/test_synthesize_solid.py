@@ -241,15 +241,6 @@ def test_a_callback_sees_every_part_of_a_turn():
     assert [end for _, _, end in seen] == ([False] * 11 + [True]) * 2
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
-def test_what_a_callback_raises_passes_through(error):
-    def callback(progress):
-        raise error
-
-    with pytest.raises(error):
-        solid(texture((12, 11)), (3, 4, 5), callback=callback)
-
-
 @pytest.mark.parametrize(
     ("shape", "options", "error", "words"),
     [

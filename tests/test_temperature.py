@@ -58,8 +58,3 @@ def test_the_least_xi_cools_everything_in_the_end():
     """Rounding down makes progress certain: 1/1024 a sweep at least."""
     p = problem(4, order=2, temperatures="one")
     assert set(run(REFERENCE, p, -1).tolist()) == {1023}
-
-
-def test_cold_stays_cold():
-    p = problem(5, order=8, temperatures="zero")
-    assert not run(REFERENCE, p, -1).any()
