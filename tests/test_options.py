@@ -11,7 +11,7 @@ from cases import ising
 from click.testing import CliRunner
 
 import simdtex
-from simdtex.cli.ending import report_errors
+from simdtex.cli.ending import reporting
 from simdtex.experiments import onsager
 from simdtex.experiments.comparison import compare
 from simdtex.machine.reference import Reference
@@ -164,7 +164,7 @@ def test_schedules_are_not_compared_near_the_largest_number():
 
 def test_memory_errors_are_said_in_one_sentence():
     @click.command()
-    @report_errors
+    @reporting()
     def command():
         raise MemoryError
 

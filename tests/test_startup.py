@@ -169,10 +169,10 @@ def test_ctrl_c_waits_where_an_exception_would_do_harm(module):
 
 
 def test_what_ctrl_c_leaves_undone_is_not_warned_of():
-    from simdtex.cli.ending import report_errors
+    from simdtex.cli.ending import reporting
 
     @click.command()
-    @report_errors
+    @reporting()
     def stopped():
         raise KeyboardInterrupt
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from simdtex.cli.ending import report_errors
+from simdtex.cli.ending import reporting
 
 Examples = Sequence[tuple[str, str]]
 """Words after ``simdtex``, and what they do."""
@@ -74,6 +74,6 @@ def command(*examples: tuple[str, str]) -> Callable[[Callable[..., None]], click
     """Return a decorator that makes a command of a function, whose errors are reported in one sentence."""
 
     def decorate(function: Callable[..., None]) -> click.Command:
-        return click.command(cls=Command, examples=examples)(report_errors(function))
+        return click.command(cls=Command, examples=examples)(reporting()(function))
 
     return decorate

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import signal
 import sys
@@ -11,7 +10,7 @@ import threading
 import time
 import warnings
 from _thread import interrupt_main
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -32,26 +31,22 @@ class Ended(KeyboardInterrupt):
     """The process was asked to end, by the signal of this number."""
 
 
-def report_errors(function: Callable[..., None]) -> Callable[..., None]:
-    """Check a command's paths, run it, and report errors and signals in one sentence."""
-
-    @functools.wraps(function)
-    def reported(*args: Any, **kwargs: Any) -> None:
-        context = click.get_current_context()
-        try:
-            with catch_signals(context):
-                check_places(context)
-                function(*args, **kwargs)
-        except (ValueError, TypeError, OSError) as error:
-            settle(error)
-        except MemoryError:
-            click.echo("simdtex: the memory does not suffice for this; give a smaller size", err=True)
-            sys.exit(2)
-        except KeyboardInterrupt as signalled:
-            give_up(context, signalled.args[0] if signalled.args else signal.SIGINT)
-        settle()
-
-    return reported
+@contextmanager
+def reporting() -> Iterator[None]:
+    """Check the paths of the running command, and report errors and signals in one sentence."""
+    context = click.get_current_context()
+    try:
+        with catch_signals(context):
+            check_places(context)
+            yield
+    except (ValueError, TypeError, OSError) as error:
+        settle(error)
+    except MemoryError:
+        click.echo("simdtex: the memory does not suffice for this; give a smaller size", err=True)
+        sys.exit(2)
+    except KeyboardInterrupt as signalled:
+        give_up(context, signalled.args[0] if signalled.args else signal.SIGINT)
+    settle()
 
 
 def give_up(context: click.Context, number: int) -> NoReturn:

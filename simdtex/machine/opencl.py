@@ -155,14 +155,17 @@ class OpenCL:
     def put(self, array: Any) -> Any:
         """Copy to the device; a small array is copied in the queue's order, without waiting."""
         array = np.array(array, order="C")
+        large = array.nbytes > SMALL_COPY  # without the pool, which would round the size up and keep the memory
         with self._plain_errors():
-            if array.nbytes > SMALL_COPY:  # without the pool, which would round the size up and keep the memory
-                buffer = cl.Buffer(self.context, cl.mem_flags.READ_WRITE, array.nbytes)
-                cl.enqueue_copy(self.queue, buffer, array)
-                return DeviceArray(buffer, array.shape, array.dtype)
-            result = self.empty(array.shape, array.dtype)
+            if large:
+                data: Any = cl.Buffer(self.context, cl.mem_flags.READ_WRITE, array.nbytes)
+            else:
+                with self._lock:
+                    data = self._pool.allocate(max(1, array.nbytes))
+            result = DeviceArray(data, array.shape, array.dtype)
             if array.size:
-                result.event = cl.enqueue_copy(self.queue, result.data, array, is_blocking=False)
+                event = cl.enqueue_copy(self.queue, data, array, is_blocking=large)
+                result.event = None if large else event
             return result
 
     def get(self, array: DeviceArray) -> Any:
@@ -250,7 +253,8 @@ class OpenCL:
     @contextmanager
     def _plain_errors(self) -> Iterator[None]:
         """Raise DeviceError if the process was forked, or if the device runs out of memory."""
-        runtimes.check_fork()
+        if runtimes.forked:
+            raise DeviceError(runtimes.FORKED)
         try:
             yield
         except cl.Error as error:

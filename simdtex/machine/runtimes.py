@@ -46,7 +46,9 @@ FORKED = (
     "OpenCL was in use before this process was forked, and its threads are not in the child; start processes with "
     'multiprocessing.get_context("spawn") or "forkserver", or take device="reference" here'
 )
-_in_use, _forked = False, False
+forked = False
+"""Whether this process was forked from one that had used OpenCL."""
+_in_use = False
 _building = RLock()
 
 
@@ -56,8 +58,8 @@ class DeviceError(ValueError):
 
 def _note_fork() -> None:
     """Remember in a forked child whether its parent used OpenCL; any call into a runtime would then hang."""
-    global _forked
-    _forked = _in_use
+    global forked
+    forked = _in_use
 
 
 if hasattr(os, "register_at_fork"):  # not on Windows
@@ -66,7 +68,7 @@ if hasattr(os, "register_at_fork"):  # not on Windows
 
 def check_fork() -> None:
     """Raise DeviceError if this process was forked from one that had used OpenCL."""
-    if _forked:
+    if forked:
         raise DeviceError(FORKED)
 
 
@@ -190,7 +192,7 @@ def failures(indices: Sequence[int]) -> list[str]:
 
 
 def _failure_apart(index: int) -> str:
-    if _forked:
+    if forked:
         return FORKED
     code = (
         f"import sys; sys.path[:] = {sys.path!r}\n"

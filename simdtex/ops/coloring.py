@@ -82,17 +82,19 @@ def lattice_plan(rows: int, cols: int, torus: bool, order: int, seed: int) -> Pl
     """Return the colouring of a whole lattice."""
     best = coloring_sublattice(order)
     assert best is not None  # a square pattern always exists in the plane
-    neighbours = len(neighbourhood_offsets(order))
-    seamless = coloring_sublattice(order, rows, cols, limit=max(best.index, neighbours + 1)) if torus else best
+    offsets = neighbourhood_offsets(order).astype(np.int64)
+    seamless = coloring_sublattice(order, rows, cols, limit=max(best.index, len(offsets) + 1)) if torus else best
     none, own = np.zeros(0, np.int64), None
     vast = rows + cols > VAST and seamless is not None
     if seamless != best and not vast:
-        seam = _clashing(rows, cols, order, best)
-        own = _greedy(rows, cols, order, best, seam, seed, max(best.index, seamless.index - 1) if seamless else inf)
+        seam = _clashing(rows, cols, offsets, best)
+        priority = random.draw4(seed, 0, 0, seam, random.COLOR)[0].astype(np.int64)
+        most = max(best.index, seamless.index - 1) if seamless else inf
+        own = _greedy(rows, cols, offsets, best, seam, priority, most)
     if own is None:
         assert seamless is not None  # else greedy colours have no limit
         best, seam, own = seamless, none, none.astype(np.int32)
-    used = _used(rows, cols, order, best, seam, own)
+    used = _used(rows, cols, offsets, best, seam, own)
     return Plan(best, seam, own, (np.cumsum(used) - 1).astype(np.int32), int(used.sum()))
 
 
@@ -122,9 +124,8 @@ def _along(rows: int, cols: int, radius: int) -> NDArray[np.int64]:
     )
 
 
-def _clashing(rows: int, cols: int, order: int, pattern: Sublattice) -> NDArray[np.int64]:
+def _clashing(rows: int, cols: int, offsets: NDArray[np.int64], pattern: Sublattice) -> NDArray[np.int64]:
     """Return the later of any two sites that are neighbours across the seam and of one coset."""
-    offsets = neighbourhood_offsets(order).astype(np.int64)
     site = _along(rows, cols, int(offsets.max()))
     clash = [np.zeros(0, bool)]
     for here in _pieces(site, len(offsets)):
@@ -144,14 +145,20 @@ def _pieces(sites: NDArray[np.int64], neighbours: int) -> list[NDArray[np.int64]
 
 
 def _greedy(
-    rows: int, cols: int, order: int, pattern: Sublattice, bare: NDArray[np.int64], seed: int, most: float
+    rows: int,
+    cols: int,
+    offsets: NDArray[np.int64],
+    pattern: Sublattice,
+    bare: NDArray[np.int64],
+    priority: NDArray[np.int64],
+    most: float,
 ) -> NDArray[np.int32] | None:
     """Parallel greedy colouring (Jones and Plassmann) of the sites of a torus that have no colour.
 
     In each round every site whose priority is above those of all its uncoloured neighbours takes the lowest colour
     that no neighbour has. None where some site needs the colour ``most`` or a higher one.
     """
-    offsets, n = neighbourhood_offsets(order).astype(np.int64), bare.size
+    n = bare.size
     taken = np.zeros((n, max(pattern.index, len(offsets) + 1) + 1), bool)
     near = np.empty((len(offsets), n), np.int64)
     first = 0
@@ -165,7 +172,6 @@ def _greedy(
         fixed = np.nonzero(~other)
         taken[first + fixed[1], _cosets(pattern, k[fixed], m[fixed])] = True
         first += here.size
-    priority = random.draw4(seed, 0, 0, bare, random.COLOR)[0].astype(np.int64)
     rank = np.empty(n, np.int64)
     rank[np.lexsort((bare, priority))] = np.arange(n)
     rank = np.append(rank, -1)  # for -1, no neighbour
@@ -183,12 +189,17 @@ def _greedy(
 
 
 def _used(
-    rows: int, cols: int, order: int, pattern: Sublattice, seam: NDArray[np.int64], own: NDArray[np.int32]
+    rows: int,
+    cols: int,
+    offsets: NDArray[np.int64],
+    pattern: Sublattice,
+    seam: NDArray[np.int64],
+    own: NDArray[np.int32],
 ) -> NDArray[np.bool_]:
     """Return which colours are used."""
     used = np.zeros(1 + max(pattern.index - 1, int(own.max(initial=0))), bool)
     used[own] = True
-    radius = int(neighbourhood_offsets(order).max())
+    radius = int(offsets.max())
     if rows - radius >= pattern.a and cols - 2 * radius >= pattern.c:
         used[: pattern.index] = True  # away from the seam lies one site of each coset
         return used

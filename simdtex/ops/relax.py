@@ -212,7 +212,8 @@ def relax_apart(
     made = len(field.values) - relaxation.confidences.guides
     relaxed = Relaxed(machine.empty((sites.size,), np.int32), machine.empty((made, sites.size), np.uint16))
     cooled = machine.empty((sites.size,), np.uint16)
-    name, defines, arguments = _fused(machine, sites, field, weighed, relaxation, turn)
+    noise = machine.constant(relaxation.choice.window.noise)
+    name, defines, arguments = _fused(machine, sites, field, weighed, noise, relaxation, turn)
     kernel = machine.kernel("relax", name, **defines, APART=1)
     machine.launch(kernel, (sites.size,), *arguments, relaxed.values, relaxed.choice, cooled)
     return relaxed, cooled
@@ -243,7 +244,8 @@ def relax(
                 field = commit.reference(field, here, relaxed, cooled)
         return field
     if relaxation.fused:
-        name, defines, arguments = _fused(machine, sites, field, weighed, relaxation, turn)
+        noise = machine.constant(relaxation.choice.window.noise)
+        name, defines, arguments = _fused(machine, sites, field, weighed, noise, relaxation, turn)
         machine.launch_groups(machine.kernel("relax", name, **defines), steps, *arguments, *_written(field))
         return field
     for begin, end in steps.tolist():
@@ -278,7 +280,7 @@ def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxatio
 
 
 def _fused(
-    machine: Launcher, sites: Array, field: Field, weighed: Array, relaxation: Relaxation, turn: int
+    machine: Launcher, sites: Array, field: Field, weighed: Array, noise: Array, relaxation: Relaxation, turn: int
 ) -> tuple[str, dict[str, int], list[Any]]:
     """Return the kernel of a relaxation, its -D constants, and its arguments but for its results."""
     grid, offsets, proposal, choice = relaxation.grid, relaxation.offsets, relaxation.proposal, relaxation.choice
@@ -291,7 +293,7 @@ def _fused(
         **{"centre": confidences.centre, "hard": confidences.hard},
     }
     common = (offsets, candidates.reach, candidates.index_of, candidates.positions)
-    noise, key = machine.constant(window.noise), np.uint32(turn)
+    key = np.uint32(turn)
     defines = {"C": len(field.values), "V": machine.vector} | ({"TILES": 1} if grid.tile else {})
     defines |= confidences.defines
     own: list[Any]
