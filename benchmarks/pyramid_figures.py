@@ -19,10 +19,10 @@ from scipy.spatial import cKDTree
 from scipy.stats import wasserstein_distance
 from skimage import data
 from skimage.transform import resize
+from subbands import decompose
 
 import simdtex
 from simdtex.experiments.quality import seam
-from simdtex.methods.pyramid.pyramids import decompose
 from simdtex.ops.steerable_filters import ORIENTATIONS, filters
 from simdtex.report.plots import FAINT, INK, figure_png, new_figure, tidy
 from simdtex.report.sheet import contact_sheet, enlarged

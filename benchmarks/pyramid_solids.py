@@ -15,9 +15,9 @@ from pyramid_figures import COLOURS, main, moved, png, reduced
 from scipy.ndimage import map_coordinates
 from scipy.stats import wasserstein_distance
 from skimage import data
+from subbands import decompose
 
 import simdtex
-from simdtex.methods.pyramid.pyramids import decompose
 from simdtex.report.plots import figure_png, new_figure, tidy
 from simdtex.report.sheet import contact_sheet
 from simdtex.report.solid import view

@@ -8,7 +8,7 @@ from skimage import data
 from tolerances import MIXED_BANDS, PALETTE
 
 import simdtex
-from simdtex.methods.pyramid.pyramids import decompose
+from benchmarks.subbands import decompose
 
 
 def mix(samples, shape, **options):

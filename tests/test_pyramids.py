@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from pyrtools.pyramids import SteerablePyramidSpace
 from tolerances import HALF, MIRRORED, PARSEVAL, PYRTOOLS, RECONSTRUCTION
 
-from simdtex.methods.pyramid.pyramids import Pyramid, Transform, decompose, most_levels
+from benchmarks.subbands import decompose
+from simdtex.methods.pyramid.pyramids import Transform, most_levels
 
 KINDS = pytest.mark.parametrize("kind", ["steerable", "laplacian"])
 BORDERS = pytest.mark.parametrize("boundary", ["open", "torus"])
@@ -186,40 +187,3 @@ def test_names_are_as_many_as_subbands(kind):
     made_of = transform.make(np.zeros((1, 9, 8), np.int32))
     assert len(transform.names) == len(made_of)
     assert transform.names[-3:] == ["level 0", "level 1", "low"]
-
-
-# -- what is wrong -------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("options", "error", "words"),
-    [
-        ({"kind": "gabor"}, ValueError, "unknown pyramid 'gabor'; choose one of: steerable, laplacian"),
-        ({"levels": 4}, ValueError, "levels=4 is too many for this picture; give at most 3"),
-        ({"levels": -1}, ValueError, "levels is -1; give 0 or more"),
-        ({"levels": 1.5}, TypeError, "levels must be an integer"),
-        ({"levels": None}, TypeError, "levels must be an integer"),
-        ({"orientations": 3}, ValueError, "orientations is 3; the steerable filters have one of: 1, 2, 4, 6"),
-        ({"orientations": True}, TypeError, "orientations must be an integer"),
-        ({"boundary": "mirror"}, ValueError, "unknown boundary 'mirror'"),
-    ],
-)
-def test_a_wrong_option_is_one_sentence(options, error, words):
-    with pytest.raises(error, match=words):
-        decompose(texture((9, 12)), device=REFERENCE, **options)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, 1e30])
-def test_a_subband_that_fits_no_whole_number_is_refused(value):
-    pyramid = made(texture((9, 12)), levels=1)
-    subbands = [band.copy() for band in pyramid.subbands]
-    subbands[1][0, 0, 3, 3] = value
-    spoilt = Pyramid(subbands, "steerable", 4, "open", pyramid.offset, pyramid.unit)
-    with pytest.raises(ValueError, match="subband"):
-        spoilt.collapse(device=REFERENCE)
-
-
-@pytest.mark.parametrize("picture", [np.full((4, 4), np.nan), np.zeros((0, 4)), np.zeros((4, 4, 3)), "brick"])
-def test_a_picture_that_is_none_is_refused(picture):
-    with pytest.raises((TypeError, ValueError)):
-        decompose(picture, levels=0, device=REFERENCE)

@@ -10,7 +10,7 @@ from skimage import data
 from tolerances import FAVOUR, SLICE_PIXELS, SLICE_SUBBANDS, SOLID_SEAM
 
 import simdtex
-from simdtex.methods.pyramid.pyramids import decompose
+from benchmarks.subbands import decompose
 from simdtex.methods.pyramid.solid import FAMILIES, slices_of
 
 SIDE = 32

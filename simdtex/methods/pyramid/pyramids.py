@@ -7,26 +7,19 @@ co-workers. Everything is in integers, so that a pyramid has the same bits on ev
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from math import prod
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from simdtex.io.image import check_sample
-from simdtex.machine import Machine, open_machine
+from simdtex.machine import Machine
 from simdtex.machine.interface import Array
-from simdtex.methods.pyramid.options import check_kind
-from simdtex.model.stretched import Stretched
-from simdtex.ops.fold import fold, folded, unfold
+from simdtex.ops.fold import fold, unfold
 from simdtex.ops.laplacian import laplacian_band, laplacian_collapse, laplacian_reduce
 from simdtex.ops.steerable import steerable_join, steerable_split
 from simdtex.ops.steerable_filters import filters
-from simdtex.options import one_of, whole
 
-__all__ = ["Pyramid", "Transform", "decompose"]
+__all__ = ["Transform", "most_levels"]
 
 BINOMIAL = np.outer([1, 4, 6, 4, 1], [1, 4, 6, 4, 1]).astype(np.float32) / 256
 """Of the Laplacian pyramid."""
@@ -168,132 +161,3 @@ class Transform:
 def most_levels(*sides: int) -> int:
     """Return the most levels of pictures with these sides: until the shortest is a single pixel."""
     return min(sides).bit_length() - 1
-
-
-@dataclass(frozen=True)
-class Pyramid:
-    """A picture as subbands.
-
-    Attributes
-    ----------
-    subbands : list of (bands, channels, rows, cols) float64 arrays
-        In the picture's unit. Steerable: the high-pass residue, the oriented bands of every level, finest first, the
-        low-pass residue; orientation i as in `simdtex.ops.steerable_filters.filters`. Laplacian: a band for every level
-        and the low-pass residue. A low-pass picture has the mean of what it was made from, at every level. A level has
-        half the rows and columns of the one below, rounded up; on a torus as many where they are odd.
-    kind, orientations, boundary
-        As given to `decompose`.
-    offset : float
-        What is to be added to the low-pass residue to have the picture's own zero.
-    unit : float
-        The subbands are whole multiples of it.
-    """
-
-    subbands: list[NDArray[np.float64]]
-    kind: str
-    orientations: int
-    boundary: str
-    offset: float
-    unit: float
-
-    def collapse(self, *, device: str | Machine | None = None) -> NDArray[np.float64]:
-        """Return the picture (rows, cols, channels) that the subbands add up to.
-
-        Subbands may have been changed, but for their shapes. An unchanged Laplacian pyramid gives back the picture to
-        half a unit, and another for every level with an odd side on a torus; the steerable filters lose some
-        thousandths of its standard deviation, and some hundredths in a mirror, near the edges.
-        """
-        machine = open_machine(device)
-        levels = len(self.subbands) - (2 if self.kind == "steerable" else 1)
-        whole_numbers = [_whole(band / self.unit) for band in self.subbands]
-        if self.boundary == "torus":
-            orders = _orders(self.subbands[0].shape[2:], levels, self.kind)
-            whole_numbers = [band[..., r[:, None], c] for band, (r, c) in zip(whole_numbers, orders, strict=True)]
-        transform = Transform(machine, self.kind, levels, self.orientations, self.boundary == "torus")
-        picture = machine.get(transform.collapse([machine.put(band) for band in whole_numbers]))
-        return np.ascontiguousarray(np.moveaxis(picture * self.unit + self.offset, 0, -1))
-
-
-def decompose(
-    image: ArrayLike,
-    *,
-    kind: str = "steerable",
-    levels: int = 4,
-    orientations: int = 4,
-    boundary: str = "open",
-    channel_axis: int | None = None,
-    device: str | Machine | None = None,
-) -> Pyramid:
-    """Return the pyramid of a picture.
-
-    Parameters
-    ----------
-    image : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
-        Any real type, finite.
-    kind : {"steerable", "laplacian"}
-    levels : int
-        Band-pass levels, 0 or more.
-    orientations : int
-        Of the steerable pyramid: 1, 2, 4 or 6.
-    boundary : {"open", "torus"}
-        Whether the picture continues as in a mirror, or wraps around.
-    channel_axis : int, optional
-        The axis that holds channels.
-    device : str, optional
-        As in `simdtex.synthesize`.
-
-    Returns
-    -------
-    Pyramid
-
-    Raises
-    ------
-    ValueError, TypeError
-        What is wrong and what would be right, in one sentence.
-
-    Notes
-    -----
-    Values are rounded to 2**-20 of the picture's range at every level. Cost of the steerable pyramid with 4
-    orientations: some 840 multiply-adds a pixel.
-
-    Examples
-    --------
-    >>> from skimage import data
-    >>> from simdtex.methods.pyramid.pyramids import decompose
-    >>> pyramid = decompose(data.brick()[:64, :64], levels=2)
-    >>> [band.shape for band in pyramid.subbands]
-    [(1, 1, 64, 64), (4, 1, 64, 64), (4, 1, 32, 32), (1, 1, 16, 16)]
-    """
-    whole("levels", levels, 0)
-    check_kind(kind, levels, orientations)
-    one_of("boundary", boundary, ("open", "torus"))
-    pixels = check_sample(image, channel_axis)
-    if levels > most_levels(*pixels.shape[:2]):
-        raise ValueError(f"levels={levels} is too many for this picture; give at most {most_levels(*pixels.shape[:2])}")
-    machine = open_machine(device)
-    picture = Stretched(pixels)
-    transform = Transform(machine, kind, levels, orientations, boundary == "torus")
-    subbands: list[Any] = [machine.get(band) for band in transform.make(machine.put(picture.planes))]
-    if boundary == "torus":
-        orders = _orders(pixels.shape[:2], levels, kind)
-        natural = [(np.argsort(rows)[:, None], np.argsort(cols)) for rows, cols in orders]
-        subbands = [band[..., rows, cols] for band, (rows, cols) in zip(subbands, natural, strict=True)]
-    offset = float(pixels.min())
-    return Pyramid([band * picture.unit for band in subbands], kind, orientations, boundary, offset, picture.unit)
-
-
-def _whole(values: NDArray[np.float64]) -> NDArray[np.int32]:
-    if not (np.abs(values) < 2**26).all():  # sums of some of them fit 32 bits
-        raise ValueError("a subband has a value that is NaN, infinite or beyond 64 times the picture's range")
-    return np.asarray(np.rint(values), np.int32)
-
-
-def _orders(shape: tuple[int, ...], levels: int, kind: str) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Return the ranks of the rows and columns of every subband among those of the picture, on a torus."""
-    places = [np.arange(n) for n in shape]
-    found = []
-    for _ in range(levels + 1):
-        rows, cols = (np.argsort(np.argsort(place)) for place in places)
-        found.append((rows, cols))
-        places = [place[folded(place.size)] for place in places]
-    return [found[0], *found] if kind == "steerable" else found
