@@ -9,7 +9,7 @@ from functools import partial
 from numpy.typing import ArrayLike
 
 from simdtex.ops.steerable_filters import ORIENTATIONS
-from simdtex.options import Choice, Other, Whole, check, documented, one_of, option, real_array, whole
+from simdtex.options import Choice, Other, Whole, check, documented, option, real_array
 
 KINDS = ("steerable", "laplacian")
 
@@ -17,17 +17,6 @@ ALL = ("synth", "mix", "solid")
 
 appearance = partial(option, group="Appearance", shown=ALL)
 scales = partial(option, group="Scales and edges", shown=ALL)
-
-
-def check_kind(kind: str, levels: int | None, orientations: int) -> None:
-    """Raise unless these describe a pyramid."""
-    one_of("pyramid", kind, KINDS)
-    if levels is not None:
-        whole("levels", levels, 0)
-    whole("orientations", orientations, 1)
-    if orientations not in ORIENTATIONS:
-        valid = ", ".join(str(n) for n in ORIENTATIONS)
-        raise ValueError(f"orientations is {orientations}; the steerable filters have one of: {valid}")
 
 
 @documented
@@ -90,4 +79,6 @@ class Options:
     def __post_init__(self) -> None:
         """Check every value."""
         check(self)
-        check_kind(self.pyramid, self.levels, self.orientations)
+        if self.orientations not in ORIENTATIONS:
+            valid = ", ".join(map(str, ORIENTATIONS))
+            raise ValueError(f"orientations is {self.orientations}; the steerable filters have one of: {valid}")
