@@ -358,13 +358,11 @@ def mixtures(making):
     for low, high in ((0, 1), (1, 0)):
         made = making.mix([c, d], 128, low=low, high=high, split=2 if making.part == 1 else 1)
         pictures.append((f"low {'CD'[low]}, high {'CD'[high]}, split 2", made))
-    for blend in ("histograms", "quantiles"):
-        for first, second in ((3, 1), (1, 1), (1, 3)):
-            made = making.mix([a, b], 128, average=[first, second], blend=blend)
-            pictures.append((f"{first} A + {second} B, {blend}", made))
-        if blend == "histograms":
-            made = making.mix([c, d], 128, low=0, high=1, split=3 if making.part == 1 else 0)
-            pictures.append(("low C, high D, split 3", made))
+    for first, second in ((3, 1), (1, 1), (1, 3)):
+        made = making.mix([a, b], 128, average=[first, second])
+        pictures.append((f"{first} A + {second} B", made))
+    made = making.mix([c, d], 128, low=0, high=1, split=3 if making.part == 1 else 0)
+    pictures.append(("low C, high D, split 3", made))
     side = making.small(128)
     start = resize(data.camera()[70:270, 120:320], (side, side), anti_aliasing=True)
     made = simdtex.mix([making.crop(a)], (side, side), start=start, iterations=making.small(5), **making.given(a))[0]

@@ -73,9 +73,6 @@ def test_grey_mixtures_have_the_pixels_of_one_and_the_bands_of_the_other():
     assert wasserstein_distance(made.ravel(), a.ravel()) <= 1, "a grey level, as all channels are rounded"
     unlike, like = distances(a, made), distances(b * (a.std() / b.std()), made)
     assert np.mean(like) < 0.6 * np.mean(unlike)
-    own = mix([a, b], (96, 96), palette=0, pattern=1, pixels="pattern")
-    standard = (own - own.mean()) / own.std()
-    assert wasserstein_distance(standard.ravel(), (b - b.mean()).ravel() / b.std()) <= 0.05
 
 
 def test_one_sample_for_all_is_the_texture_itself():
@@ -87,7 +84,6 @@ def test_one_sample_for_all_is_the_texture_itself():
             ([sample], {"average": [3.0]}),
             ([sample, sample], {}),
             ([sample, sample], {"low": 0, "high": 1}),
-            ([sample, sample], {"blend": "quantiles", "average": [1, 2]}),
         ):
             assert_same_bits(mix(samples, (40, 48), channel_axis=axis, **options), plain)
 
@@ -110,18 +106,15 @@ def test_the_average_of_pixels_is_between_them():
     made = mix([black, white], (20, 20), average=[3, 1])
     assert set(np.unique(made)) == {10, 200}
     assert (made == 10).mean() == pytest.approx(0.75, abs=1 / 256)
-    blended = mix([black, white], (20, 20), average=[3, 1], blend="quantiles")
-    assert abs(blended.astype(float) - 57.5).max() <= 1
 
 
-@pytest.mark.parametrize("blend", ["histograms", "quantiles"])
-def test_an_average_lies_between_its_textures(blend):
+def test_an_average_lies_between_its_textures():
     a, b = GREYS
-    made = mix([a, b], (96, 96), blend=blend)
+    made = mix([a, b], (96, 96))
     whole = distances(a, b.astype(float))
     for sample in (a, b):
         assert np.mean(distances(sample, made)) < np.mean(whole)
-    weighted = mix([a, b], (96, 96), blend=blend, average=[9, 1])
+    weighted = mix([a, b], (96, 96), average=[9, 1])
     assert np.mean(distances(a, weighted)) < np.mean(distances(a, made))
 
 
@@ -210,8 +203,6 @@ def test_a_device_has_the_references_bits(machine, options):
         ({"split": 1}, ValueError, "split parts low from high; give these two, or leave split out"),
         ({"low": 0, "high": 1, "split": 5}, ValueError, "split is 5 and the pyramids have 1 levels"),
         ({"low": 0, "high": 1, "split": -1}, ValueError, "split is -1; give 0 or more"),
-        ({"blend": "pixels"}, ValueError, "unknown blend 'pixels'; choose one of: histograms, quantiles"),
-        ({"pixels": "both"}, ValueError, "unknown pixels 'both'; choose one of: palette, pattern"),
         ({"alpha": 1}, TypeError, "unknown option 'alpha'"),
         ({"levels": 9}, ValueError, "levels=9 is too many for a side of 16 pixels; give at most 4"),
     ],

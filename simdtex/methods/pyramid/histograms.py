@@ -40,8 +40,8 @@ def histograms(machine: Machine, channel: NDArray[np.int32], *pyramids: Transfor
     return Histograms(np.sort(channel.reshape(1, -1)), [np.sort(band.reshape(len(band), -1)) for band in values])
 
 
-def average(parts: Sequence[Sorted], weights: Sequence[float], blend: str) -> Sorted:
-    """Return the average of some histograms, band by band.
+def average(parts: Sequence[Sorted], weights: Sequence[float]) -> Sorted:
+    """Return the average of the counts of each value of some histograms, band by band.
 
     Parameters
     ----------
@@ -49,8 +49,6 @@ def average(parts: Sequence[Sorted], weights: Sequence[float], blend: str) -> So
         Sorted.
     weights : sequence of float
         Shares, not all 0.
-    blend : {"histograms", "quantiles"}
-        Average the counts of each value, as the paper says, or the values at each quantile.
 
     Returns
     -------
@@ -62,11 +60,6 @@ def average(parts: Sequence[Sorted], weights: Sequence[float], blend: str) -> So
         return kept[0][0]
     m = max(part.shape[1] for part, _ in kept)
     total = sum(weight for _, weight in kept)
-    if blend == "quantiles":
-        mean = np.zeros((len(kept[0][0]), m))
-        for part, weight in kept:
-            mean += weight / total * part[:, (2 * np.arange(m) + 1) * part.shape[1] // (2 * m)]
-        return np.rint(mean).astype(np.int32)
     shares = np.concatenate([np.full(part.shape[1], weight / total / part.shape[1]) for part, weight in kept])
     values = np.concatenate([part for part, _ in kept], 1)
     averaged = np.empty((len(values), m), np.int32)
@@ -78,12 +71,12 @@ def average(parts: Sequence[Sorted], weights: Sequence[float], blend: str) -> So
     return averaged
 
 
-def averaged(textures: Sequence[Histograms], weights: Sequence[float], blend: str) -> Histograms:
-    """Two or more textures in one: the average of their histograms, see `average`."""
+def averaged(textures: Sequence[Histograms], weights: Sequence[float]) -> Histograms:
+    """Return two or more textures in one: the average of their histograms, see `average`."""
     subbands = zip(*(texture.subbands for texture in textures), strict=True)
     return Histograms(
-        average([texture.pixels for texture in textures], weights, blend),
-        [average(parts, weights, blend) for parts in subbands],
+        average([texture.pixels for texture in textures], weights),
+        [average(parts, weights) for parts in subbands],
     )
 
 

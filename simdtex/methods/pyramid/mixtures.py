@@ -21,7 +21,7 @@ from simdtex.methods.pyramid.options import Options
 from simdtex.methods.pyramid.palette import decorrelated
 from simdtex.methods.pyramid.palette import palette as colours_of
 from simdtex.model.stretched import Stretched
-from simdtex.options import one_of, real, resolve, whole
+from simdtex.options import real, resolve, whole
 from simdtex.run import Callback, Output
 
 if TYPE_CHECKING:
@@ -43,8 +43,6 @@ def mix(
     low: int | None = ...,
     high: int | None = ...,
     split: int | None = ...,
-    blend: str = ...,
-    pixels: str = ...,
     full_output: Literal[True],
     **options: Unpack[PyramidOptions],
 ) -> tuple[NDArray[Any], Output]: ...
@@ -61,8 +59,6 @@ def mix(
     low: int | None = ...,
     high: int | None = ...,
     split: int | None = ...,
-    blend: str = ...,
-    pixels: str = ...,
     full_output: Literal[False] = ...,
     **options: Unpack[PyramidOptions],
 ) -> NDArray[Any]: ...
@@ -78,8 +74,6 @@ def mix(
     low: int | None = None,
     high: int | None = None,
     split: int | None = None,
-    blend: str = "histograms",
-    pixels: str = "palette",
     channel_axis: int | None = None,
     rng: int | np.random.Generator | None = None,
     device: str | Machine | None = None,
@@ -101,7 +95,7 @@ def mix(
     shape : (int, int)
         Rows and columns of the output.
     palette : int, optional
-        The sample, by number from 0, whose decorrelating transform the output is shown in.
+        The sample, by number from 0, whose decorrelating transform and pixel histogram the output has.
     pattern : int, optional
         The sample whose subband histograms are matched.
     average : sequence of float, optional
@@ -110,10 +104,6 @@ def mix(
         The samples that low and high frequencies are taken from.
     split : int, optional
         With these, how many levels, from the finest on, are high frequencies; by default half of them.
-    blend : {"histograms", "quantiles"}
-        What is averaged: how often each value occurs, as the paper says, or the values at each quantile.
-    pixels : {"palette", "pattern"}
-        Where there is a palette, whose pixels the output's histogram is matched to.
     channel_axis : int, optional
         The axis that holds channels; None for grey samples.
     rng, device, callback, full_output, checkpoint
@@ -145,8 +135,6 @@ def mix(
     >>> simdtex.mix([brick, gravel], (96, 96), average=[1, 2], rng=1).shape
     (96, 96)
     """
-    one_of("blend", blend, ("histograms", "quantiles"))
-    one_of("pixels", pixels, ("palette", "pattern"))
     size = check_shape(shape)
     pictures = _checked(samples, channel_axis)
     weights = _weights(len(pictures), pattern, average, low, high, split)
@@ -154,7 +142,7 @@ def mix(
         _check_number("palette", palette, len(pictures))
     chosen = resolve(Options, "mix", with_channels_last(options, channel_axis))
     sides = None if low is None or high is None else (low, high, split)
-    plan = Mixture(pictures, size, chosen, weights, sides, palette, blend, pixels)
+    plan = Mixture(pictures, size, chosen, weights, sides, palette)
     call = Call(rng, device, callback, full_output, checkpoint)
     return execute("mix", partial(drive, plan), lambda: dict(vars(plan)), channel_axis, call)
 
@@ -174,8 +162,6 @@ class Mixture:
     sides : (int, int, int or None) or None
         Which pictures low and high frequencies are taken from, and the split between them.
     palette : int, optional
-    blend, pixels : str
-        As of `mix`.
     """
 
     pictures: list[NDArray[Any]]
@@ -184,8 +170,6 @@ class Mixture:
     weights: list[float]
     sides: tuple[int, int, int | None] | None
     palette: int | None
-    blend: str
-    pixels: str
 
     def on(self, machine: Machine, seed: int) -> pyramid.Run:
         """Analyse the samples on a machine."""
@@ -198,9 +182,8 @@ class Mixture:
             low, high, split = self.sides
             found = blender.spliced(low, high, _high_subbands(split, levels, self.options.pyramid))
         else:
-            found = blender.averaged(self.blend)
-        texture = blender.texture(found, self.palette if self.pixels == "palette" else None)
-        return pyramid.picture_run(machine, texture, self, levels, seed)
+            found = blender.averaged()
+        return pyramid.picture_run(machine, blender.texture(found), self, levels, seed)
 
 
 class _Blender:
@@ -230,18 +213,18 @@ class _Blender:
             for i, channels in zip(self._used, self._scale.channels, strict=False)
         }
 
-    def averaged(self, blend: str) -> list[Histograms]:
+    def averaged(self) -> list[Histograms]:
         """Return the average of the samples, channel by channel."""
         weights = [self._weights[i] for i in self._used]
-        return [averaged(channel, weights, blend) for channel in zip(*self._found.values(), strict=True)]
+        return [averaged(channel, weights) for channel in zip(*self._found.values(), strict=True)]
 
     def spliced(self, low: int, high: int, finest: int) -> list[Histograms]:
         """Return the finest subbands of `high`, and the others and the pixels of `low`."""
         return [spliced(a, b, finest) for a, b in zip(self._found[low], self._found[high], strict=True)]
 
-    def texture(self, found: list[Histograms], pixels_of: int | None) -> pyramid.Texture:
-        """Return what is to be matched, with the pixels of the palette if it gives them."""
-        if pixels_of is not None:
+    def texture(self, found: list[Histograms]) -> pyramid.Texture:
+        """Return what is to be matched, with the pixels of the palette if there is one."""
+        if len(self._scale.channels) > len(self._used):
             own: list[Sorted] = [np.sort(c.reshape(1, -1)) for c in self._scale.channels[-1]]
             found = [Histograms(pixels, one.subbands) for pixels, one in zip(own, found, strict=True)]
         return pyramid.Texture(found, self._palette, self._scale, self._stretched)
