@@ -2,8 +2,6 @@
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -12,7 +10,6 @@ import pytest
 from cases import texture
 from click.testing import CliRunner
 
-import simdtex
 from simdtex import checkpoint as checkpoints
 from simdtex.checkpoint import Checkpoint, read
 from simdtex.cli import COMMANDS, load, main
@@ -282,28 +279,3 @@ def test_a_second_ctrl_c_stops_at_once(place, monkeypatch):
 def test_every_command_that_keeps_is_known():
     having = {name for name in COMMANDS if any(p.name == "checkpoint" for p in load(name).params)}
     assert set(KEEPING) == having
-
-
-@pytest.mark.slow
-def test_a_command_that_is_killed(place, tmp_path):
-    """Processes of their own, with states as seldom as they are by default."""
-    image.write(place / "sample.png", texture((64, 64)))
-    words = ["synth", "sample.png", "-o", "out.png", "--size", "256x256", "--order", "4", "--seed", "1", "-q"]
-    words += ["--device", "reference", "--checkpoint", "kept"]
-    environment = os.environ | {"PYTHONPATH": str(Path(simdtex.__file__).parent.parent)}
-
-    def process(*words):
-        return subprocess.Popen([sys.executable, "-m", "simdtex", *words], env=environment, cwd=place)
-
-    assert process(*words[:-2]).wait() == 0
-    expected = image.read(place / "out.png").pixels
-    (place / "out.png").unlink()
-    first = process(*words)
-    while not (place / "kept").exists() or read(place / "kept")[1] is None:
-        assert first.poll() is None
-        time.sleep(0.05)
-    first.kill()
-    assert first.wait() == -signal.SIGKILL
-    assert process("resume", "kept").wait() == 0
-    assert np.array_equal(image.read(place / "out.png").pixels, expected)
-    assert not (place / "kept").exists()

@@ -198,14 +198,6 @@ def whole():
     return simdtex.synthesize(SAMPLE, (26, 31), rng=11, order=1, levels=2, xi=-8.0, device=REFERENCE)
 
 
-def test_tiles_come_in_any_order(tmp_path, whole):
-    for seed in range(2):
-        store, where = created(tmp_path, f"{seed}.zarr")
-        go_on(store, shuffled(store, seed))
-        assert_same_bits(store.root["image"][...], whole)
-        assert "work" not in Store(where).root
-
-
 def test_a_run_that_is_stopped_after_any_tile_goes_on_to_the_same_bytes(tmp_path, whole):
     store, where = created(tmp_path)
     stops = 0
@@ -216,24 +208,6 @@ def test_a_run_that_is_stopped_after_any_tile_goes_on_to_the_same_bytes(tmp_path
         except Stop:
             stops += 1
     assert stops > 10
-    assert_same_bits(store.root["image"][...], whole)
-
-
-def test_a_tile_that_is_done_twice_changes_nothing(tmp_path, whole):
-    store, where = created(tmp_path)
-
-    def twice(turn, tiles):
-        for number in tiles:
-            do(where, store.name, REFERENCE, turn, number)
-            before = store.tally(turn, number)
-            store.root[f"work/tally{turn.number}"][number] = 0
-            do(where, store.name, REFERENCE, turn, number)
-            assert_same_bits(
-                [np.asarray(one) for one in store.tally(turn, number)], [np.asarray(one) for one in before]
-            )
-            yield number
-
-    go_on(store, twice)
     assert_same_bits(store.root["image"][...], whole)
 
 
@@ -369,13 +343,6 @@ def test_a_tile_lies_in_its_window(tile, halo, torus, window, where):
     assert tuple(frame.window) == window
     assert (frame.rows.start, frame.cols.start) == where
     assert frame.cut(np.zeros((2, *window[2:]))).shape == (2, tile.rows, tile.cols)
-
-
-@pytest.mark.parametrize("tile", [Tile(0, 0, 4, 4), Tile(3, 2, 5, 1), Tile(1, 1, 1, 1), Tile(5, 0, 1, 3)], ids=str)
-def test_the_sites_above_lie_in_the_tile(tile):
-    (top, count), _ = Grid(8, 8).window(*tile).above
-    rows = [2 * row for row in range(top, top + count)]
-    assert rows == [row for row in range(tile.top, tile.top + tile.rows) if row % 2 == 0]
 
 
 def test_windows_go_on_across_the_seam():

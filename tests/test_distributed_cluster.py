@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -31,64 +30,31 @@ def test_workers_of_this_machine_open_their_own_devices(tmp_path, whole, any_dev
     assert_same_bits(ours.compute(), whole)
 
 
-class Cluster:
-    """A scheduler and workers, each a command of its own."""
-
-    def __init__(self, folder):
-        self.file, self._log = folder / "scheduler.json", (folder / "log").open("wb")
-        self._started = []
-        self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
-
-    def _start(self, kind, *words):
-        command = [sys.executable, "-m", "dask", kind, "--scheduler-file", str(self.file), *words]
-        self._started.append(subprocess.Popen(command, stdout=self._log, stderr=self._log))
-        return self._started[-1]
-
-    def worker(self):
-        words = ["--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0.1"]
-        return self._start("worker", *words, "--local-directory", str(self.file.parent))
-
-    def client(self):
-        for _ in range(300):
-            if self.file.exists():
-                return dask_distributed.Client(scheduler_file=str(self.file), timeout=30)
-            time.sleep(0.1)
-        raise TimeoutError("the scheduler did not begin")
-
-    def end(self):
-        for process in self._started:
-            process.kill()
-            process.wait()
-        self._log.close()
-
-
-@pytest.fixture
-def cluster(tmp_path):
-    found = Cluster(tmp_path)
-    yield found
-    found.end()
-
-
 @pytest.mark.slow
-def test_a_worker_is_killed_and_another_joins_late(tmp_path, cluster, whole):
-    first, _ = cluster.worker(), cluster.worker()
-    seen = {"tiles": 0}
+def test_a_worker_is_killed_and_another_joins_late(tmp_path, whole):
+    seen = []
 
     def callback(progress):
-        seen["tiles"] += 1
-        if seen["tiles"] == 12:
-            os.kill(first.pid, signal.SIGKILL)  # in the middle of a tile, as likely as not
-        if seen["tiles"] == 16:
-            cluster.worker()
+        seen.append(progress.tile)
+        if len(seen) == 12:
+            os.kill(first, signal.SIGKILL)  # in the middle of a tile, as likely as not
+        if len(seen) == 16:
+            cluster.scale(3)
 
-    with cluster.client() as client:
-        client.wait_for_workers(2, timeout=60)
-        path = tmp_path / "out.zarr"
+    with (
+        dask_distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        dask_distributed.Client(cluster) as client,
+    ):
+        first = min(client.run(os.getpid).values())
         ours = distributed.synthesize(
-            SAMPLE, (90, 101), path, tiles=30, workers=client, device="reference", callback=callback, **OPTIONS
+            *(SAMPLE, (90, 101), tmp_path / "out.zarr"),
+            tiles=30,
+            workers=client,
+            device="reference",
+            callback=callback,
+            **OPTIONS,
         )
-    assert seen["tiles"] > 40
-    assert first.wait(10) == -signal.SIGKILL
+    assert len(seen) > 40
     assert_same_bits(ours.compute(), whole)
 
 

@@ -10,14 +10,13 @@ import sys
 import threading
 import time
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
 from volumes import loaded
 
 from simdtex.io import atomic, image, realisations, volume
-from simdtex.io.atomic import Damaged, NotWritten, atomic_folder, atomic_path, read_checked, write_checked
+from simdtex.io.atomic import Damaged, atomic_folder, atomic_path, read_checked, write_checked
 from simdtex.model.source_map import save_source_map
 from simdtex.report.page import Section, write_report
 from simdtex.report.sheet import animation
@@ -143,17 +142,6 @@ def test_every_call_of_the_system_fails_in_turn(tmp_path, monkeypatch, name, fau
     assert failed or not once or fault == "mkdir"
 
 
-def test_a_report_that_is_not_finished_keeps_the_earlier_one(tmp_path):
-    page(tmp_path / "report", 1)
-    before = everything(tmp_path)
-    with full_after(500):
-        refused("report", tmp_path / "report")
-    assert everything(tmp_path) == before
-    with full_after(500):
-        refused("report", tmp_path / "new")
-    assert not (tmp_path / "new").exists()
-
-
 @pytest.fixture
 def tiny(tmp_path):
     """A disk of 64 KiB."""
@@ -269,19 +257,6 @@ def test_a_checked_file_gives_back_what_was_written_or_says_that_it_is_damaged(t
         read_checked(tmp_path / "none")
 
 
-def test_a_checked_file_is_replaced_as_a_whole(tmp_path):
-    path = tmp_path / "state.npz"
-    keep(path, block(1))
-    before = everything(tmp_path)
-    for size in (0, 79, 2000):
-        with full_after(size), pytest.raises(NotWritten, match="could not be written"):
-            keep(path, block(2))
-        assert everything(tmp_path) == before
-    keep(path, block(2))
-    with read_checked(path) as file, np.load(file) as arrays:
-        assert np.array_equal(arrays["array"], block(2))
-
-
 # -- commands -------------------------------------------------------------------------------------------------
 
 
@@ -323,14 +298,3 @@ def test_a_process_that_is_asked_to_end_cleans_up(tmp_path, number):
     assert running.returncode == 128 + number, errors
     assert "Traceback" not in errors and "stopped" in errors and not (tmp_path / "out.png").exists()
     assert not [path for path in tmp_path.rglob("*") if path.name.startswith(".")]
-
-
-def test_signals_are_given_back(tmp_path):
-    from click.testing import CliRunner
-
-    from simdtex.cli import main
-
-    before = signal.getsignal(signal.SIGTERM)
-    assert CliRunner().invoke(main, ["synth", "none.png", "-o", str(tmp_path / "a.png")]).exit_code == 2
-    assert signal.getsignal(signal.SIGTERM) is before
-    assert Path(tmp_path).exists()

@@ -32,13 +32,6 @@ def saved(array, kind, **options):
     return file.getvalue()
 
 
-def frames(kind, count=20, side=30):
-    first, *rest = [PIL.Image.fromarray(np.full((side, side, 3), 9 * k, np.uint8)) for k in range(count)]
-    file = io.BytesIO()
-    first.save(file, kind, save_all=True, append_images=rest)
-    return file.getvalue()
-
-
 def npy(shape, dtype="<f8", data=b""):
     header = f"{{'descr': {dtype!r}, 'fortran_order': False, 'shape': {shape}, }}".encode()
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header) + 1) + header + b"\n" + data
@@ -132,19 +125,6 @@ def test_pictures_of_too_many_pixels_are_not_decoded(tmp_path, kind, monkeypatch
     (tmp_path / "a.png").write_bytes(PICTURES[kind])
     refused(lambda path: image.read(path, max_pixels=PIXELS), tmp_path / "a.png", TOO_LARGE)
     assert not caplog.records and not "".join(capfd.readouterr())
-
-
-@pytest.mark.parametrize("kind", ["PNG", "WEBP", "GIF"])
-def test_animations_within_the_limit_are_read(tmp_path, kind):
-    (tmp_path / "a").write_bytes(frames(kind, count=3))
-    assert image.read(tmp_path / "a").pixels.shape == (30, 30, 3)
-
-
-def test_a_picture_as_large_as_allowed_is_read(tmp_path):
-    for kind, data in {"png": saved(MANY[:100], "PNG"), "tif": tiff(MANY[:100]), "npy": None}.items():
-        path = tmp_path / f"a.{kind}"
-        path.write_bytes(data) if data else np.save(path, MANY[:100])
-        assert image.read(path, max_pixels=PIXELS).pixels.shape == (100, 100)
 
 
 def test_more_than_pillow_allows_is_read_where_it_is_asked_for(tmp_path, monkeypatch):

@@ -15,7 +15,7 @@ from simdtex import cli
 from simdtex.io.image import read_bytes
 from simdtex.live import results
 from simdtex.live import session as sessions
-from simdtex.live.job import Job, Picture
+from simdtex.live.job import Picture
 from simdtex.live.levels import Levels
 from simdtex.live.results import Results
 from simdtex.methods import mrf
@@ -295,6 +295,13 @@ def test_the_last_request_counts(opened):
     assert opened.ask("result", **asked(seed=2))[0]["settings"]["seed"] == 2, "and ends a paused run"
 
 
+def test_another_picture_ends_the_run(opened):
+    begin_and_pause(opened)
+    after = len(opened.got)
+    opened.ask("ended", png(texture(seed=3)), kind="open", name="other.png")
+    assert [kind for kind in opened.kinds(after) if kind in ("picture", "ended")] == ["picture", "ended"]
+
+
 def test_a_page_that_is_loaded_again_gets_everything(opened):
     opened.result()
     opened.result(seed=8)
@@ -445,14 +452,3 @@ def test_no_message_does_harm(kind, message, buffers):
     HARDY.ask("hello", kind="hello")
     assert "this is an error in simdtex itself" not in str(HARDY.got)
     HARDY.got.clear()
-
-
-@given(st.dictionaries(st.sampled_from(FIELDS), JSON, max_size=3), st.sampled_from(["synth", "extend", "fill"]))
-@settings(max_examples=150)
-def test_no_request_does_harm(message, kind):
-    try:
-        found = Job(asked(job=kind) | message, Picture("a.png", texture(), -1), {}, Results().find)
-    except (ValueError, TypeError) as error:
-        assert str(error)
-    else:
-        assert found.kind in ("synth", "extend", "fill") and min(found.shape) >= 1
