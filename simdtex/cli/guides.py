@@ -1,31 +1,38 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The guides of ``--guide``: pictures of labels or numbers, of the samples and of the output."""
+"""Masks, known values and guides: what ``synth`` and ``simulate`` read beside the samples."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.inputs import Material, channels, read_pair
+from simdtex.cli.inputs import Material, channels, read_known, read_masks, read_pair
 
 
-class Guides(NamedTuple):
-    """The guide of each sample, that of the output, and whether both are labels (None: as they look)."""
+def read_data(samples: Material, options: dict[str, Any]) -> dict[str, Any]:
+    """Return the mask, the known values and the guide that options name, as `simdtex.synthesize` takes them.
 
-    samples: list[NDArray[Any]]
-    output: NDArray[Any]
-    labels: bool | None
+    These options are taken out; ``labels`` is set if the guides decide it.
+    """
+    masks = read_masks(options.pop("sample_mask"), samples)
+    file, guide = options.pop("known"), options.pop("guide")
+    found: dict[str, Any] = {
+        "channel_axis": samples.channel_axis,
+        "mask": masks and (masks if samples.several else masks[0]),
+        "known": read_known(file, samples.pixels[0]) if file else None,
+        "guide": None,
+    }
+    if guide is not None:
+        found["guide"], options["labels"] = read_guides(guide, samples, options["labels"])
+    return found
 
-    @property
-    def pair(self) -> tuple[Any, NDArray[Any]]:
-        """As `simdtex.synthesize` takes it."""
-        return (self.samples if len(self.samples) > 1 else self.samples[0]), self.output
 
+def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tuple[Any, NDArray[Any]], bool | None]:
+    """Return the guide of ``SAMPLE-GUIDE=OUTPUT-GUIDE``, and whether it is of labels; None: as it looks.
 
-def read_guides(text: str, samples: Material, labels: bool | None) -> Guides:
-    """Read the pictures of ``SAMPLE-GUIDE=OUTPUT-GUIDE``; of several samples, their guides are parted by commas.
+    The guides of several samples are parted by commas.
 
     Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them; they
     become whole numbers. Where the guide of the output is transparent or NaN, the output is free: it has NaN there.
@@ -54,7 +61,7 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> Guides:
     if free.any():
         wanted = wanted.astype(np.float64)
         wanted[free] = np.nan
-    return Guides(own, wanted, labels)
+    return (own if samples.several else own[0], wanted), labels
 
 
 def _free(pixels: NDArray[Any], count: int) -> tuple[NDArray[Any], NDArray[np.bool_]]:

@@ -12,8 +12,8 @@ import click
 import numpy as np
 
 from simdtex.cli.command import DEVICE_GROUP
-from simdtex.cli.guides import read_guides
-from simdtex.cli.inputs import output_shape, read_known, read_masks, read_material
+from simdtex.cli.guides import read_data
+from simdtex.cli.inputs import output_shape, read_material
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import GUIDE, KNOWN, SAMPLE_MASK, given, option, report_option, size_option
 from simdtex.cli.places import EITHER, READ
@@ -65,26 +65,15 @@ def simulate(
 
     material = read_material(training_image)
     pixels = material.pixels[0]
-    masks = read_masks(options.pop("sample_mask"), material)
-    file, guide = options.pop("known"), options.pop("guide")
-    known = read_known(file, pixels) if file else None
-    guides = read_guides(guide, material, options["labels"]) if guide is not None else None
+    data = read_data(material, options)
+    known = data["known"]
     shape = output_shape(size, pixels, known, pixels)
     check_realisations_path(output)
     writers: list[Any] = [lambda made, run: write_realisations(output, made)]
     if report:
         _check_report(report, material.pixels, shape, getattr(known, "values", known))
         writers.append(lambda made, run: _report(report, pixels, made, None if known is None else _rows(known, shape)))
-    if guides:
-        options["labels"] = guides.labels
-    inputs = {
-        "shape": shape,
-        "known": known,
-        "guide": guides and guides.pair,
-        "mask": masks and (masks if material.several else masks[0]),
-        "channel_axis": material.channel_axis,
-        **given(options),
-    }
+    inputs = data | given(options) | {"shape": shape}
 
     def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
         made = simulate(material.array, number, **inputs, **call)

@@ -9,15 +9,13 @@ from typing import Any
 
 import click
 
-from simdtex.cli.guides import read_guides
+from simdtex.cli.guides import read_data
 from simdtex.cli.inputs import (
     channels,
     check_source_map,
     last_iteration,
     output_shape,
     read_also,
-    read_known,
-    read_masks,
     read_material,
     write_arranged,
 )
@@ -88,34 +86,24 @@ def synth(
         raise ValueError("the method pyramid takes no pixel from the sample; leave --source-map and --also out")
     material = read_material(samples)
     pixels = material.pixels[0]
-    masks = read_masks(options.pop("sample_mask"), material)
-    file, guide = options.pop("known"), options.pop("guide")
-    known = read_known(file, pixels) if file else None
-    guides = read_guides(guide, material, options["labels"]) if guide else None
-    shape = output_shape(size, pixels, known, guides and guides.output)
-    if guides:
-        options["labels"] = guides.labels
-    inputs = {
-        "channel_axis": material.channel_axis,
-        "mask": masks and (masks if material.several else masks[0]),
-        "known": known,
-        "guide": guides and guides.pair,
-        **given(options, without=("tiles", "workers", "dry_run")),
-    }
+    data = read_data(material, options)
+    known, guide = data["known"], data["guide"]
+    shape = output_shape(size, pixels, known, guide and guide[1])
+    inputs = data | given(options, without=("tiles", "workers", "dry_run"))
     if options["tiles"] is not None:
         synthesize_in_tiles(context, material.array, shape, inputs)
         return None
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, material, everywhere=known is None)
     others = read_also(also, material)
-    if others and file:
+    if others and known is not None:
         raise ValueError("known pixels are from no sample, and nothing says what a map has there; leave --also out")
     writers = write_arranged(output, others, source_map)
     if report:
         from simdtex.report.page import check_folder
         from simdtex.report.synthesis import write_synthesis
 
-        if material.several or file or not material.known:
+        if material.several or known is not None or not material.known:
             raise ValueError("--report shows one sample, all of it known, and what is taken from it; leave it out")
         check_folder(report)
         writers.append(lambda made, run: write_synthesis(report, pixels, made, run, command_line()))
