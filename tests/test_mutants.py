@@ -10,6 +10,7 @@ import simdtex
 from simdtex.machine import memory
 from simdtex.methods import mrf
 from simdtex.methods.mrf.level import Active, check_fit, number_of_levels, parts
+from simdtex.methods.mrf.plan import check_guide
 from simdtex.methods.mrf.record import Record, expected_work
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
@@ -45,6 +46,22 @@ def test_a_sample_of_sixteen_different_pixels_is_a_map_of_categories():
         late[0, 0] = (7, 0) if changed == 17 else 0
         assert mrf.Options().resolved(Pictures((late,))).finish == finish
     assert mrf.Options(finish=1.5).resolved(Pictures((late[1:],))).finish == 1.5
+
+
+@pytest.mark.parametrize(
+    ("values", "dtype", "labels"),
+    [(16, np.uint8, True), (17, np.uint8, False), (16, np.uint16, True), (4, np.float32, False), (16, np.int64, True)],
+)
+def test_few_integers_of_a_guide_are_labels(values, dtype, labels):
+    own = np.arange(values, dtype=dtype).reshape(1, -1, 1)
+    assert check_guide(((own,), own[:, :3]), mrf.Options()).labels is labels
+    assert check_guide(((own,), own[:, :3].astype(np.float64)), mrf.Options()).labels is False
+
+
+def test_labels_that_the_sample_lacks_are_named():
+    own = np.arange(0, 24, 2).reshape(1, -1, 1)
+    with pytest.raises(ValueError, match=r"the label 3 .* has 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, \.\.\.; give labels"):
+        check_guide(((own,), own[:, :3] + 3), mrf.Options())
 
 
 # -- levels -------------------------------------------------------------------------------------------------------
@@ -137,6 +154,11 @@ def test_as_many_steps_as_may_be_go_together(most, expected):
     found = list(parts(np.array([[0, 3], [3, 5], [9, 10], [20, 26]]), most))
     assert [(here.tolist(), begun, last) for here, begun, last in found] == expected
     assert all(here.dtype == np.int64 for here, _, _ in found)
+
+
+def test_an_empty_step_is_a_part():
+    [(ranges, begun, last)] = parts(np.array([[3, 3]]), 4)
+    assert (ranges.tolist(), begun, last) == ([[3, 3]], 1, True)
 
 
 def test_a_site_always_cools():
@@ -282,6 +304,15 @@ def test_a_run_is_counted(given):
     assert statistics["options"]["schedule"] == "coloring"
     own = {"device", "seed", "options", "seconds", "device_seconds", "accounting", "levels", "use"}
     assert set(statistics) == own
+
+
+def test_a_callback_sees_the_known_variables_of_a_site():
+    sample, known, seen = texture((16, 16), 3), np.full((12, 12, 3), np.nan), []
+    known[2, 4, 1] = 77
+    options = {"order": 2, "levels": 2, "rng": 1, "device": REFERENCE, "channel_axis": -1}
+    simdtex.synthesize(sample, (12, 12), known=known, callback=lambda p: seen.append((p.level, p.image())), **options)
+    assert {int(image[2 >> level, 4 >> level, 1]) for level, image in seen} == {77}
+    assert {level for level, _ in seen} == {0, 1}
 
 
 # -- the density at a site --------------------------------------------------------------------------------------------
