@@ -80,6 +80,15 @@ def test_one_sentence_for_what_is_wrong(tmp_path):
             distributed.synthesize(SAMPLE, (20, 20), tmp_path / "a.zarr", **given)
 
 
+def test_a_scheduler_that_does_not_answer_leaves_no_client(tmp_path):
+    """A client that failed to connect would else be the default one, on which the next `compute` waits for ever."""
+    with pytest.raises(ValueError, match="no scheduler answers at nonsense://a") as caught:
+        distributed.synthesize(SAMPLE, (20, 20), tmp_path / "a.zarr", workers="nonsense://a", channel_axis=-1)
+    assert caught.value.__cause__ is not None  # which holds the client
+    with pytest.raises(ValueError, match="No clients found"):
+        dask_distributed.default_client()
+
+
 PEAK = """
 import resource, sys
 from simdtex import distributed

@@ -49,7 +49,8 @@ def across(client: Client, store: Store, device: str | Machine | None) -> Execut
                 for number in islice(todo, count)
             ]
 
-        running = distributed.as_completed(begun(AHEAD * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))))
+        first = begun(AHEAD * max(1, len(client.scheduler_info(n_workers=-1)["workers"])))
+        running = distributed.as_completed(first, loop=client.loop)
         try:
             for future in running:
                 for another in begun(1):
@@ -91,7 +92,7 @@ def connected(workers: int | str | Client | None) -> Iterator[Client | None]:
         raise ValueError("distributed is not installed; pip install 'simdtex[distributed]'") from None
     if isinstance(workers, str):
         try:
-            client = distributed.Client(workers, timeout=10)
+            client = distributed.Client(workers, timeout=10, set_as_default=False)
         except (OSError, ValueError) as error:
             raise ValueError(f"no scheduler answers at {workers}; start one with: dask scheduler") from error
         with client:
@@ -109,6 +110,6 @@ def connected(workers: int | str | Client | None) -> Iterator[Client | None]:
             plugins=(Cores(each),),
             silence_logs=50,
         ) as cluster,
-        distributed.Client(cluster) as client,
+        distributed.Client(cluster, set_as_default=False) as client,
     ):
         yield client
