@@ -41,7 +41,7 @@ def near_a_step(parts, weights, m):
 def test_counts_are_averaged(seed, parts):
     rng = np.random.default_rng(seed)
     values, weights = [sorted_values(rng, 2, m, 6) for m, _ in parts], [w for _, w in parts]
-    found = average(values, weights, "histograms")
+    found = average(values, weights)
     m = max(m for m, _ in parts)
     assert found.dtype == np.int32
     assert found.shape == (2, m)
@@ -53,49 +53,30 @@ def test_counts_are_averaged(seed, parts):
         assert set(own) <= set(np.concatenate(separate))
 
 
-@given(st.integers(0, 2**16), st.lists(st.tuples(sizes, st.integers(1, 4)), min_size=2, max_size=3))
-def test_quantiles_are_averaged(seed, parts):
-    rng = np.random.default_rng(seed)
-    values, weights = [sorted_values(rng, 2, m, 1000) for m, _ in parts], [w for _, w in parts]
-    found, m = average(values, weights, "quantiles"), max(m for m, _ in parts)
-    assert found.shape == (2, m)
-    assert (np.diff(found) >= 0).all()
-    for band, k in np.ndindex(2, m):
-        exact = sum(
-            Fraction(w, sum(weights)) * int(v[band, (2 * k + 1) * v.shape[1] // (2 * m)])
-            for v, w in zip(values, weights, strict=True)
-        )
-        assert abs(found[band, k] - exact) <= Fraction(1, 2) + Fraction(1, 10**9)
-
-
-@pytest.mark.parametrize("blend", ["histograms", "quantiles"])
-def test_a_weight_of_zero_leaves_the_others_alone(blend):
+def test_a_weight_of_zero_leaves_the_others_alone():
     rng = np.random.default_rng(1)
     a, b = sorted_values(rng, 3, 40, 2**20), sorted_values(rng, 3, 25, 2**20)
-    assert (average([a, b], [1, 0], blend) == a).all()
-    assert (average([a, b], [0, 0.25], blend) == b).all()
-    assert (average([a, b, a], [0, 7, 0], blend) == b).all()
+    assert (average([a, b], [1, 0]) == a).all()
+    assert (average([a, b], [0, 0.25]) == b).all()
+    assert (average([a, b, a], [0, 7, 0]) == b).all()
 
 
-@pytest.mark.parametrize("blend", ["histograms", "quantiles"])
-def test_the_average_of_equals_is_the_same(blend):
+def test_the_average_of_equals_is_the_same():
     a = sorted_values(np.random.default_rng(2), 2, 33, 2**20)
-    assert (average([a, a, a], [1, 2, 0.3], blend) == a).all()
+    assert (average([a, a, a], [1, 2, 0.3]) == a).all()
 
 
 def test_only_the_ratio_of_weights_counts():
     rng = np.random.default_rng(3)
     a, b = sorted_values(rng, 2, 31, 2**20), sorted_values(rng, 2, 17, 2**20)
-    for blend in ("histograms", "quantiles"):
-        assert (average([a, b], [1, 3], blend) == average([a, b], [2.0, 6.0], blend)).all()
-        assert (average([a, b], [1, 3], blend) == average([b, a], [3, 1], blend)).all()
+    assert (average([a, b], [1, 3]) == average([a, b], [2.0, 6.0])).all()
+    assert (average([a, b], [1, 3]) == average([b, a], [3, 1])).all()
 
 
-def test_two_far_values_stay_two_as_counts_and_meet_as_quantiles():
+def test_two_far_values_stay_two():
     black, white = np.zeros((1, 10), np.int32), np.full((1, 10), 100, np.int32)
-    counts = average([black, white], [3, 2], "histograms")
+    counts = average([black, white], [3, 2])
     assert counts.tolist() == [[0] * 6 + [100] * 4]
-    assert average([black, white], [3, 2], "quantiles").tolist() == [[40] * 10]
 
 
 def test_histograms_of_textures_are_averaged_one_by_one():
@@ -103,11 +84,11 @@ def test_histograms_of_textures_are_averaged_one_by_one():
     a, b = (
         Histograms(sorted_values(rng, 1, m, 99), [sorted_values(rng, f, m // 2, 99) for f in (1, 4)]) for m in (20, 12)
     )
-    found = averaged([a, b], [1, 2], "quantiles")
-    assert (found.pixels == average([a.pixels, b.pixels], [1, 2], "quantiles")).all()
+    found = averaged([a, b], [1, 2])
+    assert (found.pixels == average([a.pixels, b.pixels], [1, 2])).all()
     assert len(found.subbands) == 2
     for own, first, second in zip(found.subbands, a.subbands, b.subbands, strict=True):
-        assert (own == average([first, second], [1, 2], "quantiles")).all()
+        assert (own == average([first, second], [1, 2])).all()
 
 
 @pytest.mark.parametrize("split", [0, 1, 3])
