@@ -193,6 +193,13 @@ def platforms(monkeypatch):
     device._enumerate.cache_clear()
 
 
+def test_a_reason_keeps_the_error_of_a_long_message():
+    name = "clBuildProgram failed: BUILD_PROGRAM_FAILURE"
+    message = f"{name} - {name} - {name}\n\nCompilation started\n1438:3:16: error: a parameter is missing\nfailed\n"
+    assert runtimes.one_line(ValueError(message)) == f"{name} - 1438:3:16: error: a parameter is missing"
+    assert runtimes.one_line(ValueError()) == "ValueError"
+
+
 def test_a_broken_platform_does_not_stop_the_working_one(any_device, platforms):
     working = any_device.handle.platform
     hollow = SimpleNamespace(name=" Hollow\0", get_devices=list)

@@ -221,5 +221,6 @@ def one_line(error: BaseException) -> str:
     """Return the first line of a message, and its first line about an error, as one short line."""
     lines = [clean(line) for line in str(error).splitlines() if line.strip()]
     errors = [line for line in lines[1:] if "error" in line.lower()]
-    text = " - ".join(lines[:1] + errors[:1]) or type(error).__name__
+    parts = " - ".join(lines[:1] + errors[:1]).split(" - ")  # pyopencl repeats the name of its error three times
+    text = " - ".join(dict.fromkeys(parts)) or type(error).__name__
     return textwrap.shorten(text, 160, placeholder=" ...").rstrip(".")
