@@ -19,7 +19,7 @@ import simdtex
 from simdtex import cli
 from simdtex.io.image import write
 
-HEAVY = {"pyopencl", "scipy", "skimage", "matplotlib", "tifffile", "imagecodecs", "jinja2", "nrrd", "emcee", "rich"}
+HEAVY = {"pyopencl", "scipy", "skimage", "matplotlib", "tifffile", "imagecodecs", "jinja2", "nrrd", "rich"}
 HEAVY |= {"xarray", "zarr", "h5netcdf", "pandas"}
 PUBLIC = {
     *(

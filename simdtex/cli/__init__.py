@@ -28,7 +28,7 @@ GROUPS = {
     },
     "Studies": {
         "schedules": "Run the same job under several schedules and compare them in a report.",
-        "ising": "Relax Ising spins by each schedule and compare with the exact energy and magnetisation.",
+        "ising": "Relax Ising spins by each schedule and compare with the exact energy.",
     },
     "This machine": {
         "demo": "Synthesise brick, grass and gravel from scikit-image's own pictures.",

@@ -60,7 +60,7 @@ def ising(
     quiet: bool,
     **options: Any,
 ) -> None:
-    """Relax Ising spins by each schedule and compare with the exact energy and magnetisation."""
+    """Relax Ising spins by each schedule and compare with the exact energy."""
     from simdtex import schedules as known
     from simdtex.experiments.estimates import findings
     from simdtex.experiments.ising import Experiment, ising

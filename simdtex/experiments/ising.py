@@ -93,8 +93,6 @@ class Chains:
         In units of J / k_B.
     energy : (T, R, n) float64 array
         Energy per spin after each sweep, in units of J.
-    lagged : (T, R, n) float64 array
-        The same with one spin of each bond taken before the sweep and the other after it.
     even, odd : (T, R, n) float64 array
         Mean spin of the sublattices whose row + column is even and odd.
     spins : (T, R, H, W) uint8 array
@@ -108,7 +106,6 @@ class Chains:
     independent: bool
     temperatures: NDArray[np.float64]
     energy: NDArray[np.float64]
-    lagged: NDArray[np.float64]
     even: NDArray[np.float64]
     odd: NDArray[np.float64]
     spins: NDArray[np.uint8]
@@ -154,34 +151,29 @@ def ising(
 
     Cost: sweeps x sites x chains draws, and reading back the spins after every sweep that is measured. Steps of one
     site that follow one another cost one launch together. Memory: up to 3 bytes per spin on the device, some 20 on the
-    host, and 32 there per chain and sweep.
+    host, and 24 there per chain and sweep.
     """
     size, sweeps, burn_in = experiment.size, experiment.sweeps, experiment.burn_in
     chains = experiment.seeds * len(experiment.temperatures)
     memory.require(machine, 3 * prod(size) * chains, HOST * prod(size) * chains + MEASURED * sweeps * chains)
     began, launches = time.perf_counter(), machine.launches
     run = _Run(machine, experiment, schedules.get(schedule), seed)
-    measured = np.empty((sweeps, 4, chains))
-    now = run.look()
+    measured = np.empty((sweeps, 3, chains))
     for sweep in range(burn_in + sweeps):
         run.sweep()
-        k = sweep - burn_in
-        if k >= -1:
-            before, now = now, run.look()
-        if k >= 0:
-            measured[k] = _measure(before, now)
+        if sweep >= burn_in:
+            measured[sweep - burn_in] = _measure(run.look())
         if callback:
             callback((sweep + 1) / (burn_in + sweeps))
-    energy, lagged, even, odd = np.moveaxis(measured.reshape(sweeps, 4, -1, experiment.seeds), 0, -1)
+    energy, even, odd = np.moveaxis(measured.reshape(sweeps, 3, -1, experiment.seeds), 0, -1)
     return Chains(
         schedule=run.schedule.name,
         independent=run.schedule.independent(run.grid, run.setting.offsets),
         temperatures=np.array(experiment.temperatures, np.float64),
         energy=energy,
-        lagged=lagged,
         even=even,
         odd=odd,
-        spins=now.reshape(-1, experiment.seeds, *size),
+        spins=run.look().reshape(-1, experiment.seeds, *size),
         steps=run.steps,
         relaxations=run.relaxations,
         launches=machine.launches - launches,
@@ -264,10 +256,10 @@ def _first(experiment: Experiment, seed: int) -> NDArray[np.uint8]:
     return (bits >> np.uint32(31)).astype(np.uint8).reshape(seeds, *size)
 
 
-def _measure(before: NDArray[np.uint8], now: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Return (4, chains): energy, energy across the sweep, and the mean spins of the even and the odd sublattice."""
-    old, new = (2 * spins.astype(np.int8) - 1 for spins in (before, now))
-    parity = np.indices(new.shape[1:]).sum(0) % 2
-    fields = [sum(np.roll(spins, by, axis) for axis in (1, 2) for by in (1, -1)) for spins in (new, old)]
-    energies = [-(new * field).mean((1, 2), dtype=np.float64) / 2 for field in fields]
-    return np.stack([*energies, *(new[:, parity == odd].mean(1, dtype=np.float64) for odd in (0, 1))])
+def _measure(spins: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """Return (3, chains): the energy, and the mean spins of the even and the odd sublattice."""
+    now = 2 * spins.astype(np.int8) - 1
+    parity = np.indices(now.shape[1:]).sum(0) % 2
+    field = sum(np.roll(now, by, axis) for axis in (1, 2) for by in (1, -1))
+    energy = -(now * field).mean((1, 2), dtype=np.float64) / 2
+    return np.stack([energy, *(now[:, parity == odd].mean(1, dtype=np.float64) for odd in (0, 1))])

@@ -52,32 +52,16 @@ def warns(cell: str) -> bool:
 
 
 def print_table(table: Table, width: int | None = None) -> None:
-    """Print a table; if it is too wide, its columns in several parts, each with the first column.
-
-    Parameters
-    ----------
-    table : Table
-    width : int, optional
-        Characters of a line; by default those of the terminal, and 200 if the output is no terminal.
-    """
+    """Print a table on lines of so many characters; None: those of the terminal, or 200 if there is no terminal."""
     console = Console(width=width or (None if sys.stdout.isatty() else 200))
-    header, numeric = table.header, table.numeric
-    widths = [max(map(len, [*name.split(), *(row[name] for row in table.rows)])) for name in header]
-    console.print(table.caption, style="italic", highlight=False)
-    first = 1
-    while first < len(header):
-        last = first + 1
-        while last < len(header) and sum(2 + widths[k] for k in (0, *range(first, last + 1))) <= console.width:
-            last += 1
-        columns = [0, *range(first, last)]
-        shown = rich.table.Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
-        for k in columns:  # headings may wrap, cells may not
-            shown.add_column(header[k], justify="right" if numeric[k] else "left", width=widths[k])
-        for row in table.rows:
-            style = "yellow" if any(map(warns, row.values())) else None
-            shown.add_row(*(row[header[k]] for k in columns), style=style)
-        console.print(shown)
-        first = last
+    shown = rich.table.Table(
+        title=table.caption, title_justify="left", box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold"
+    )
+    for number, (name, numeric) in enumerate(zip(table.header, table.numeric, strict=True)):
+        shown.add_column(name, justify="right" if numeric else "left", overflow="fold", no_wrap=not number)
+    for row in table.rows:
+        shown.add_row(*row.values(), style="yellow" if any(map(warns, row.values())) else None)
+    console.print(shown)
     console.print()
 
 
