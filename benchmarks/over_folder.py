@@ -10,16 +10,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from figures import further
 
 import simdtex
-from simdtex.io.image import read, to_display, write
+from simdtex.io.image import to_display, write
 from simdtex.report.sheet import contact_sheet
 
 QUALITY = tuple(field.name for field in fields(simdtex.quality.Quality))
-FIGURES = (*QUALITY, "repeats_beyond_own", "seconds")
+FIGURES = (*QUALITY, "salt", "contrast", "repeats", "own_repeats", "repeats_beyond_own", "seconds")
 """The columns of the table; `repeats_beyond_own` is what an output repeats beyond what its sample does."""
 
-LESS_IS_WORSE = {"innovation", "effective_share"}
+LESS_IS_WORSE = {"effective_share"}
 ONE_IS_BEST = {"salt", "contrast"}
 AS_PNG = ("uint8", "uint16")
 
@@ -74,7 +75,7 @@ def file_name(name, seed, dtype="uint8"):
 
 def measured(sample, name, setting, seed, picture, source=None, seconds=None):
     """A picture with all of its figures; the seconds are those of its synthesis."""
-    quality = vars(simdtex.quality.measure(sample, picture, source))
+    quality = vars(simdtex.quality.measure(sample, picture, source)) | further(sample, picture)
     figures = {figure: value for figure, value in quality.items() if value is not None}
     if "repeats" in figures:
         figures["repeats_beyond_own"] = figures["repeats"] - figures["own_repeats"]
@@ -98,22 +99,13 @@ def made(sample, name, setting, seed, options, machine):
     return measured(sample, name, setting, seed, picture, output.source, time.perf_counter() - began)
 
 
-def earlier(sample, name, seed, folder):
-    """A picture of an earlier study, None where there is none."""
-    path = folder / file_name(name, seed, sample.dtype.name)
-    return measured(sample, name, "before", seed, read(path).pixels) if path.is_file() else None
-
-
 def rows_of(results, sample, columns):
     """The pictures of one sample for a sheet, a seed a row: label, picture, caption."""
     low, high = float(sample.min()), float(sample.max())
     for seed in dict.fromkeys(result.seed for result in results):
         yield results[0].sample, to_display(sample, (low, high)), ""
         for setting in columns:
-            one = next((r for r in results if (r.setting, r.seed) == (setting, seed)), None)
-            if one is None:
-                yield setting, np.full(sample.shape[:2], 255, np.uint8), "no picture"
-                continue
+            one = next(r for r in results if (r.setting, r.seed) == (setting, seed))
             short = {"cover": "coverage", "repeat": "repeats", "salt": "salt"}
             told = [f"{word} {one.figures[figure]:.2f}" for word, figure in short.items() if figure in one.figures]
             yield f"{setting}, seed {seed}", to_display(one.picture, (low, high)), "  ".join(told)
@@ -130,33 +122,22 @@ def sheet(path, cells, columns):
     )
 
 
-def study(known, out, options, *, seeds=1, before=None, before_dir=None, machine=None):
+def study(known, out, options, *, seeds=1, before=None, machine=None):
     """Make and measure a picture of every sample and seed, and write pictures, sheets and the table.
 
-    `known` are the samples by name, `options` those of the method, `before` other options to compare with, or
-    `before_dir` a folder of earlier pictures, named as this function names them.
+    `known` are the samples by name, `options` those of the method, `before` other options to compare with.
     """
-    if before is not None and before_dir is not None:
-        raise ValueError("there are options and a folder for the pictures before: give one of them")
-    if before_dir is not None and before_dir.resolve() == out.resolve():
-        raise ValueError(f"{out} holds the pictures before, which would be lost: give another folder for the new ones")
-    settings = ["before", "after"] if before is not None or before_dir is not None else ["after"]
+    settings = ["before", "after"] if before is not None else ["after"]
     folders = {"before": out / "before", "after": out}
-    for folder in (out / "sheets", *(folders[setting] for setting in settings if before is not None)):
+    for folder in (out / "sheets", *(folders[setting] for setting in settings)):
         folder.mkdir(parents=True, exist_ok=True)
     results, first_seeds = [], []
     for name, sample in known.items():
         own = []
         for seed in range(1, seeds + 1):
             for setting in settings:
-                if setting == "before" and before_dir is not None:
-                    one = earlier(sample, name, seed, before_dir)
-                else:
-                    one = made(sample, name, setting, seed, before if setting == "before" else options, machine)
-                    write(folders[setting] / file_name(name, seed, sample.dtype.name), one.picture)
-                if one is None:
-                    print(f"{name:16}before  seed {seed}: no picture in {before_dir}")
-                    continue
+                one = made(sample, name, setting, seed, before if setting == "before" else options, machine)
+                write(folders[setting] / file_name(name, seed, sample.dtype.name), one.picture)
                 own.append(one)
                 told = ("plausibility", "coverage", "copying", "repeats", "salt", "contrast", "effective_share")
                 shown = [f"{figure} {one.figures[figure]:.2f}" for figure in told if figure in one.figures]
@@ -199,6 +180,5 @@ def main(options, own):
         own | parsed(options.after),
         seeds=options.seeds or 1,
         before=None if options.before is None else own | parsed(options.before),
-        before_dir=options.before_dir,
         machine=machine,
     )

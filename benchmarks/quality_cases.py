@@ -11,6 +11,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
+from figures import further
 from scipy.ndimage import gaussian_filter
 from skimage import data
 
@@ -20,11 +21,9 @@ FIGURES = {
     "plausibility": "plausibility",
     "coverage": "coverage",
     "copying": "copying",
-    "innovation": "innovation",
     "repeats": "repeats",
     "salt": "salt",
     "contrast": "contrast",
-    "coarse_contrast": "coarse contrast",
     "histogram_distance": "histogram",
     "seam": "seam",
     "effective_share": "effective share",
@@ -61,7 +60,7 @@ def main():
     sample = photograph[:128, :128]
     table = []
     for name, picture, source in cases(photograph, sample, options.device):
-        found = vars(simdtex.quality.measure(sample, picture, source))
+        found = vars(simdtex.quality.measure(sample, picture, source)) | further(sample, picture)
         table.append([name, *("" if found[figure] is None else f"{found[figure]:.2f}" for figure in FIGURES)])
         print(*table[-1], sep="  ", flush=True)
     with open(options.out, "w", newline="", encoding="utf-8") as file:

@@ -10,13 +10,12 @@ The first lines of `multires` and `pyramid` are other methods with their default
 each direction. ``--quick`` takes half of each sample's sides.
 
     python benchmarks/study.py --samples DIR --out DIR [--method mrf] [--after OPTIONS] [--seeds N] [--only '*.png']
-                               [--before OPTIONS | --before-dir DIR]
+                               [--before OPTIONS]
 
 does it for every picture of a folder, with the defaults or with the options ``--after``, and compares with the options
-``--before`` (as ``"search=exact,order=8"``, or ``""`` for the defaults) or with the pictures that an earlier run has
-written. Writes NAME.png for each sample (NAME-seed2.png for the second seed and so on, before/NAME.png for those made
-with ``--before``), sheets/NAME.png with sample, before and after at 1:1, a seed a row, sheets.png with all samples,
-and figures.csv; prints mean and worst of every figure.
+``--before`` (as ``"search=exact,order=8"``, or ``""`` for the defaults). Writes NAME.png for each sample (NAME-seed2.png
+for the second seed and so on, before/NAME.png for those made with ``--before``), sheets/NAME.png with sample, before and
+after at 1:1, a seed a row, sheets.png with all samples, and figures.csv; prints mean and worst of every figure.
 """
 
 import argparse
@@ -29,6 +28,7 @@ from typing import NamedTuple
 import numpy as np
 import over_folder
 import samples
+from figures import further
 from pyramid_figures import png
 
 import simdtex
@@ -208,7 +208,6 @@ def main():
     parser.add_argument("--samples", type=Path, help="folder of pictures, each a sample")
     parser.add_argument("--after", default="", help="options as NAME=VALUE,NAME=VALUE; the defaults unless given")
     parser.add_argument("--before", help="other options, for the pictures to compare with")
-    parser.add_argument("--before-dir", type=Path, help="folder of earlier pictures to compare with")
     options = parser.parse_args()
     if options.samples:
         if options.out is None:
@@ -218,10 +217,8 @@ def main():
         except (ValueError, TypeError) as error:
             parser.error(str(error))
         return
-    if options.before is not None or options.before_dir or options.after:
-        parser.error(
-            "--before, --before-dir and --after are for --samples; leave them out, or give a folder of samples"
-        )
+    if options.before is not None or options.after:
+        parser.error("--before and --after are for --samples; leave them out, or give a folder of samples")
     options.out = options.out or Path(__file__).parent.parent / "docs" / "study"
     study = STUDIES[options.method]
     machine = simdtex.open_machine(options.device)
@@ -252,8 +249,11 @@ def main():
                     **given,
                 )
                 seconds.append(time.perf_counter() - began)
-                wanted = ["tones" if name == "contrast" else name for name in study.figures if name != "repetition"]
-                found = {**asdict(measure(sample, made, figures=wanted)), "repetition": repetition(sample, made)}
+                found = {
+                    **asdict(measure(sample, made)),
+                    **further(sample, made),
+                    "repetition": repetition(sample, made),
+                }
                 figures.append([found[figure] for figure in study.figures])
             mean = np.mean(figures, 0)
             rows.append([name, setting, *(f"{value:.2f}" for value in mean)])

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases import texture
+from test_quality import deviation, half_size, noise
 
 from simdtex.experiments.quality import measure
 from simdtex.io.image import read, write
@@ -21,6 +22,14 @@ def over_folder(monkeypatch):
     import over_folder
 
     return over_folder
+
+
+@pytest.fixture
+def figures(monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    import figures
+
+    return figures
 
 
 @pytest.fixture
@@ -94,29 +103,11 @@ def test_one_command_studies_a_folder(folder, monkeypatch, capsys):
     assert line.split()[1:3] == [f"{np.mean(after):.3f}", f"{max(after):.3f}"]
 
 
-def test_an_earlier_study_is_what_was_before(folder, monkeypatch, capsys):
-    first, second = folder / "first", folder / "second"
-    run(folder, monkeypatch, "--out", first, "--only", "g*")
-    run(folder, monkeypatch, "--out", second, "--before-dir", first)
-    rows = table(second / "figures.csv")
-    assert [(row["sample"], row["setting"]) for row in rows] == [
-        ("grey", "before"),
-        ("grey", "after"),
-        ("red", "after"),
-    ]
-    assert rows[0]["coverage"] == rows[1]["coverage"] and rows[0]["effective_share"] == "" != rows[1]["effective_share"]
-    assert "red" in capsys.readouterr().out
-    assert "before" not in {name.partition("/")[0] for name in names(second)}
-    assert holds(read(second / "sheets" / "grey.png").pixels, read(first / "grey.png").pixels)
-
-
 @pytest.mark.parametrize(
     ("words", "says"),
     [
         (["--out", "in/out", "--before", "order"], "order is no option: give NAME=VALUE"),
         (["--out", "in/out", "--before", "odor=1"], "unknown option 'odor'"),
-        (["--out", "a", "--before-dir", "a"], "would be lost"),
-        (["--out", "a", "--before", "order=1", "--before-dir", "b"], "give one of them"),
         (["--out", "a", "--only", "none"], "there is no picture"),
         ([], "--samples needs --out"),
     ],
@@ -150,11 +141,73 @@ def test_the_worst_is_far_from_what_is_best(over_folder):
 
     found = over_folder.summary(
         [
-            result("a", salt=0.25, coverage=0.1, innovation=0.3, coarse_contrast=-0.3),
-            result("b", salt=3.0, coverage=0.4, innovation=0.2, coarse_contrast=0.1),
+            result("a", salt=0.25, coverage=0.1, effective_share=0.3),
+            result("b", salt=3.0, coverage=0.4, effective_share=0.2),
         ]
     )
     assert {figure: worst[2] for figure, worst in found.items()} == {
-        **{"salt": "a", "coverage": "b", "innovation": "b", "coarse_contrast": "a"},
+        **{"salt": "a", "coverage": "b", "effective_share": "b"},
     }
     assert found["salt"][:2] == (1.625, 0.25)
+
+
+def naive_repeats(picture, scale, step):
+    """The share of patches of 16 x 16 that stand again at half the size."""
+    half = half_size(picture)
+    places = [(i, j) for i in range(half.shape[0] - 15) for j in range(half.shape[1] - 15)]
+    asked = [(i, j) for i, j in places if i % (step // 2) == j % (step // 2) == 0]
+    again = 0
+    for i, j in asked:
+        here = half[i : i + 16, j : j + 16]
+        far = [(k, m) for k, m in places if max(abs(i - k), abs(j - m)) >= 8]
+        again += any(np.sqrt(((here - half[k : k + 16, m : m + 16]) ** 2).mean()) < 0.35 * scale for k, m in far)
+    return again / len(asked)
+
+
+@pytest.mark.parametrize("channels", [(), (3,)])
+def test_repeats_against_loops(figures, channels):
+    sample, output = noise(20, (56, 60, *channels)), noise(21, (64, 80, *channels))
+    output[26:64, :40] = output[:38, 40:]
+    scale = deviation(half_size(sample))
+    expected = naive_repeats(output, scale, 8), naive_repeats(sample, scale, 8)
+    assert 0 < expected[0] < 1
+    assert figures.repeats(sample, output) == pytest.approx(expected)
+
+
+def test_a_repeat_is_as_near_as_035_and_as_far_as_half_a_patch(figures):
+    ground = noise(22, (24, 48), float).repeat(2, 0).repeat(2, 1)  # 48 x 96
+    ground *= 10 / ground.std()
+    sign = np.where(noise(23, (24, 48)) > 100, 1.0, -1.0).repeat(2, 0).repeat(2, 1)
+
+    def share(off, apart):
+        made = noise(24, (24, 48), float).repeat(2, 0).repeat(2, 1)
+        made[:, apart : apart + 32] = (ground + off * 10 * sign)[:, :32]
+        made[:, :32] = ground[:, :32]
+        return figures.repeats(ground, made)[0]
+
+    assert share(0.3, 40) > 0 == share(0.4, 40)
+    for period, expected in ((14, 0), (16, 2 / 3), (28, 0)):  # of three places each way the outer two are 16 apart
+        columns = np.tile(noise(25, (48, period // 2), float).repeat(2, 1), (1, 4))[:, :48]
+        assert figures.repeats(columns, columns)[0] == pytest.approx(expected)
+        assert figures.repeats(columns, columns.T[:48])[0] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("channels", [(), (3,)])
+@pytest.mark.parametrize("levels", [2, 200])
+def test_a_sample_has_its_own_salt(figures, channels, levels):
+    sample = np.random.default_rng(30).integers(0, levels, (40, 50, *channels)).astype(np.uint8)
+    assert figures.salt(sample, sample) == pytest.approx(1.0)
+
+
+def test_salt_counts_odd_pixels(figures):
+    sample = np.zeros((40, 50), np.uint8)
+    sample[5::10, 5::10] = np.arange(100, 120).reshape(4, 5)  # 20 of 2000 are odd: the 10 largest make 0.5 %
+    assert figures.salt(sample, np.zeros_like(sample)) == 0.0
+    output = np.zeros_like(sample)
+    output[3::6, 3::6] = 200  # 7 x 8
+    assert figures.salt(sample, output) == pytest.approx(56 / 2000 / 0.005)
+    output[output > 0] = 105  # less than the threshold of 109
+    assert figures.salt(sample, output) == 0.0
+    in_blue = np.stack([sample * 0, sample * 0, sample], axis=-1)
+    made = np.stack([output * 0, (output > 0) * 200, output * 0], axis=-1)
+    assert figures.salt(in_blue, made) == pytest.approx(56 / 2000 / 0.005)  # of any channel

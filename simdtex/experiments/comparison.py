@@ -410,7 +410,7 @@ class _Call:
         noted, recorder = Noted(schedule), Recorder(self.channel_axis, tell, self.machine.sync)
         image, said = self._synthesize(noted, seed, size, callback=recorder)
         made = image[..., None] if self.channel_axis is None else np.moveaxis(image, self.channel_axis, -1)
-        quality = measure(self.pixels, made, figures=MEASURED)
+        quality = measure(self.pixels, made)
         figures = _figures(said, recorder.sweeps) | {name: getattr(quality, name) for name in MEASURED}
         figures["seconds"] = said["seconds"] - recorder.seconds
         levels, accounting = said["levels"], said["accounting"]
