@@ -13,9 +13,10 @@ each direction. ``--quick`` takes half of each sample's sides.
                                [--before OPTIONS]
 
 does it for every picture of a folder, with the defaults or with the options ``--after``, and compares with the options
-``--before`` (as ``"search=exact,order=8"``, or ``""`` for the defaults). Writes NAME.png for each sample (NAME-seed2.png
-for the second seed and so on, before/NAME.png for those made with ``--before``), sheets/NAME.png with sample, before and
-after at 1:1, a seed a row, sheets.png with all samples, and figures.csv; prints mean and worst of every figure.
+``--before`` (as ``"search=exact,order=8"``, or ``""`` for the defaults). Writes NAME.png for each sample
+(NAME-seed2.png for the second seed and so on, before/NAME.png for those made with ``--before``), sheets/NAME.png with
+sample, before and after at 1:1, a seed a row, sheets.png with all samples, and figures.csv; prints mean and worst of
+every figure.
 """
 
 import argparse
