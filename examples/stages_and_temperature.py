@@ -13,6 +13,8 @@ from pathlib import Path
 from skimage import data
 
 import simdtex
+from simdtex.io.image import read
+from simdtex.report.sheet import contact_sheet
 from simdtex.report.stages import StageWriter
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -34,8 +36,9 @@ def watch(progress: simdtex.Progress) -> None:
 
 sample = data.grass()[: args.size // 2, : args.size // 2]
 texture, output = simdtex.synthesize(sample, (args.size, args.size), order=8, rng=1, callback=watch, full_output=True)
-writer.finish()
 
 for level in output.statistics["levels"]:
     print(f"level {level['level']}: {level['rows']} x {level['cols']} sites, {level['sweeps']} sweeps")
-print(f"sheet.png and animation.gif are in {folder / 'stages'}")
+last = {path.stem.partition("-")[0]: path for path in sorted((folder / "stages").glob("level*.png"))}  # of each level
+contact_sheet([(level, read(path).pixels) for level, path in reversed(last.items())], folder / "sheet.png")
+print(f"sheet.png and stages are in {folder}")

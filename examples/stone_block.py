@@ -37,7 +37,7 @@ pictures = []
 def keep(progress):
     """Keep each iteration's picture."""
     if progress.end_of_iteration:
-        pictures.append((progress.caption, progress.image()))
+        pictures.append((progress.doing, progress.image()))
 
 
 shape = (2 * args.size, 2 * args.size)

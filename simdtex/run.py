@@ -29,8 +29,6 @@ class Progress:
         The present work, in words.
     stage : str or None
         The name of the picture that is complete now: the end of a sweep, of a level that has none, or of an iteration.
-    caption : str
-        The name of the picture on a sheet, which shows the last picture of each name.
     """
 
     level: int
@@ -45,10 +43,6 @@ class Progress:
     @property
     def stage(self) -> str | None:  # noqa: D102
         return None
-
-    @property
-    def caption(self) -> str:  # noqa: D102
-        return f"level {self.level}"
 
     def picture(self) -> NDArray[Any]:
         """Return the picture of the stage: the image."""
@@ -159,10 +153,6 @@ class Iterating(Progress):
     def stage(self) -> str | None:  # noqa: D102
         return f"iteration{self.iteration:02d}" if self.end_of_iteration else None
 
-    @property
-    def caption(self) -> str:  # noqa: D102
-        return f"iteration {self.iteration}"
-
     def picture(self) -> NDArray[Any]:
         """Return the image; of a block the middle x-y slice."""
         image = self.image()
@@ -194,10 +184,6 @@ class Simulating(Progress):
     @property
     def stage(self) -> str | None:  # noqa: D102
         return f"realisation{self.realisation:04d}"
-
-    @property
-    def caption(self) -> str:  # noqa: D102
-        return f"realisation {self.realisation}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -208,7 +208,7 @@ def test_extend_shows_what_it_did(folder):
     args = ["--seamless", "--band", 3, "--stages", folder / "stages", "--report", folder / "report"]
     result = small(folder, "extend", "photo.png", "-o", "out.png", *args)
     assert result.exit_code == 0, result.output
-    assert (folder / "stages" / "sheet.png").is_file()
+    assert (folder / "stages" / "level0-sweep01.png").is_file()
     assert "simdtex extend" in (folder / "report" / "index.html").read_text(encoding="utf-8")
 
 

@@ -49,7 +49,7 @@ def test_everything_at_once(folder):
     source, colour = load_source_map(folder / "s.npz"), texture((16, 12), 3)
     np.testing.assert_array_equal(image.read(folder / "c.png").pixels, colour[source[..., 0], source[..., 1]])
     stages = {f"{kind}level{level}.png" for kind in ("", "candidates-") for level in range(4)}
-    assert set(files(folder / "st")) == stages | {"sheet.png", "animation.gif"}
+    assert set(files(folder / "st")) == stages
     assert "candidates per level, coarse to fine: " in result.output
 
 

@@ -115,7 +115,7 @@ def test_stages_of_synth_replace_those_of_an_earlier_run(folder):
     image.write("st/level3.png", GREY)
     image.write("st/iteration09.png", GREY)
     assert synth("--stages", "st", *QUICK).exit_code == 0
-    assert files(folder / "st") == ["animation.gif", "iteration01.png", "iteration02.png", "sheet.png"]
+    assert files(folder / "st") == ["iteration01.png", "iteration02.png"]
     np.testing.assert_array_equal(np.sort(picture("st/iteration02.png"), None), np.sort(picture(), None))
     (folder / "st" / "mine.txt").write_text("kept")
     again = synth("--stages", "st", *QUICK)
@@ -175,7 +175,7 @@ def test_stages_of_a_solid_are_its_middle_slice(folder):
     (folder / "st").mkdir()
     image.write("st/iteration09.png", GREY)
     assert solid("--size", "5x12x9", "--stages", "st", *QUICK, sample="colour.png").exit_code == 0
-    assert files(folder / "st") == ["animation.gif", "iteration01.png", "iteration02.png", "sheet.png"]
+    assert files(folder / "st") == ["iteration01.png", "iteration02.png"]
     made = loaded("out.npz")
     assert made.shape == (5, 12, 9, 3)
     np.testing.assert_array_equal(picture("st/iteration02.png"), made[2])
@@ -296,7 +296,7 @@ def test_a_path_wins_over_a_number(folder):
 
 def test_stages_of_a_mixture(folder):
     assert mix("--stages", "st", *QUICK).exit_code == 0
-    assert files(folder / "st") == ["animation.gif", "iteration01.png", "iteration02.png", "sheet.png"]
+    assert files(folder / "st") == ["iteration01.png", "iteration02.png"]
     np.testing.assert_array_equal(picture("st/iteration02.png"), picture())
 
 

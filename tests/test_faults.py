@@ -19,7 +19,6 @@ from simdtex.io import atomic, image, realisations, volume
 from simdtex.io.atomic import Damaged, atomic_folder, atomic_path, read_checked, write_checked
 from simdtex.model.source_map import save_source_map
 from simdtex.report.page import Section, write_report
-from simdtex.report.sheet import animation
 from simdtex.report.stages import StageWriter
 
 
@@ -55,7 +54,6 @@ WRITERS = {
         for suffix in (".zarr", ".nc", ".npz")
     },
     "map.npz": lambda path, seed: save_source_map(path, np.random.default_rng(seed).integers(0, 99, (40, 40, 2))),
-    "film.gif": lambda path, seed: animation([picture(seed), picture(seed + 9)], path),
     "report": page,
 }
 

@@ -14,7 +14,6 @@ def written(block, block_vars, gallery_conf):
     """What sphinx-gallery calls after each block of an example."""
     folder = block_vars["example_globals"].get("folder")
     found = sorted(Path(folder).glob("*.png"), key=lambda path: path.stat().st_mtime_ns) if folder else []
-    found = found or (sorted(Path(folder).rglob("sheet.png")) if folder else [])
     shown = []
     for picture, path in zip(found[:MOST], block_vars["image_path_iterator"], strict=False):
         shutil.copyfile(picture, path)

@@ -202,20 +202,15 @@ def watching(
         from simdtex.report.stages import StageWriter
 
         writer = StageWriter(stages, limits=limits, resumed=lambda: bool(checkpoint and checkpoint.resumed))
-    try:
-        with progress_bar(quiet) as show:
+    with progress_bar(quiet) as show:
 
-            def callback(progress: Any) -> None:
-                nonlocal writer
-                show(progress.fraction, progress.doing)
-                if writer:
-                    working, writer = writer, None
-                    with afterwards():  # the picture does not wait for its stages
-                        working(progress)
-                        writer = working
+        def callback(progress: Any) -> None:
+            nonlocal writer
+            show(progress.fraction, progress.doing)
+            if writer:
+                working, writer = writer, None
+                with afterwards():  # the picture does not wait for its stages
+                    working(progress)
+                    writer = working
 
-            yield callback
-    finally:
-        if writer:
-            with afterwards():
-                writer.finish()
+        yield callback

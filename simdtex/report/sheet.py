@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Contact sheets and animations: 8-bit pictures for the eye alone."""
+"""Contact sheets: 8-bit pictures for the eye alone."""
 
 from __future__ import annotations
 
 import io
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from math import ceil
-from typing import Any
 
 import numpy as np
 import PIL.Image
@@ -15,10 +14,9 @@ import PIL.ImageDraw
 import PIL.ImageFont
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.io.atomic import atomic_path
-from simdtex.io.image import check_writable, pillow_bytes, to_display, write
+from simdtex.io.image import check_writable, to_display, write
 
-__all__ = ["animation", "contact_sheet", "encoded", "enlarged", "fitted", "magnified", "reduction"]
+__all__ = ["contact_sheet", "encoded", "fitted", "magnified"]
 
 Picture = NDArray[np.uint8]
 PathLike = str | os.PathLike[str]
@@ -28,8 +26,6 @@ MOST_SIDE = 1024  # a larger picture is reduced on a sheet, pixels
 GAP = 8  # between the cells of a sheet, pixels
 TEXT = 13  # height of a label's letters, pixels
 STRIP = TEXT + 6  # height of a line of text, pixels
-FRAME_SIDE = 512  # longest side of an animation's frames, pixels
-FRAME_MS = 120  # time of one frame, milliseconds
 
 
 def contact_sheet(
@@ -117,75 +113,10 @@ def magnified(picture: Picture, factor: int) -> Picture:
     return picture.repeat(factor, axis=0).repeat(factor, axis=1)
 
 
-def reduction(shape: tuple[int, ...], side: int) -> int:
-    """Return the whole factor by which `fitted` reduces a picture of a shape."""
-    return -(-max(shape[:2]) // side)
-
-
 def fitted(picture: Picture, side: int) -> Picture:
-    """Return the means of square blocks of a picture, so that no side is longer than `side` pixels.
+    """Return the means of square blocks of a picture (rows, cols[, 3]), so that no side is longer than `side` pixels.
 
-    Parameters
-    ----------
-    picture : ndarray of uint8, (rows, cols) or (rows, cols, 3)
-    side : int
-        Pixels.
-
-    Returns
-    -------
-    ndarray of uint8, (rows, cols) or (rows, cols, 3)
-        The picture itself if it fits.
+    A picture that fits is returned itself.
     """
-    factor = reduction(picture.shape, side)
+    factor = -(-max(picture.shape[:2]) // side)
     return picture if factor == 1 else np.array(PIL.Image.fromarray(picture).reduce(factor))
-
-
-def enlarged(picture: Picture, shape: tuple[int, int], step: float) -> Picture:
-    """Return a decimated picture at full size, each of its pixels as a square without smoothing.
-
-    Parameters
-    ----------
-    picture : ndarray of uint8, (rows, cols[, channels])
-        Pixel (i, j) stands for the full picture's sites from (step i, step j) on.
-    shape : (rows, cols)
-        Of the result.
-    step : float
-        Pixels of the result per pixel of `picture`, 1 or more.
-
-    Returns
-    -------
-    ndarray of uint8, (rows, cols[, channels])
-    """
-    rows, cols = (
-        np.minimum((np.arange(length) / step).astype(np.intp), limit - 1)
-        for length, limit in zip(shape, picture.shape[:2], strict=True)
-    )
-    return np.asarray(picture[rows[:, np.newaxis], cols], dtype=np.uint8)
-
-
-def animation(frames: Iterable[ArrayLike], path: PathLike) -> None:
-    """Write frames as a GIF animation that repeats for ever.
-
-    Parameters
-    ----------
-    frames : iterable of (rows, cols[, channels])
-        All of one shape; reduced to at most 512 pixels a side.
-    path : path
-        ``.gif``
-
-    Raises
-    ------
-    ValueError
-        There are no frames, or `path` cannot be written.
-
-    Notes
-    -----
-    Holds all reduced frames, 0.8 MB each for the largest.
-    """
-    check_writable(path, suffixes=(".gif",))
-    pictures = [PIL.Image.fromarray(fitted(rgb(frame), FRAME_SIDE)) for frame in frames]
-    if not pictures:
-        raise ValueError("there are no frames for the animation: give at least one")
-    film: dict[str, Any] = {"save_all": True, "append_images": pictures[1:], "duration": FRAME_MS, "loop": 0}
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(pillow_bytes(pictures[0], "GIF", **film))
