@@ -11,26 +11,11 @@ from simdtex.io.atomic import is_leftover
 
 
 def earlier_files(folder: Path, what: str, own: Callable[[str], bool]) -> list[Path]:
-    """Check before long work that files can be written into a folder, and return the files of an earlier run.
+    """Return the files of an earlier run in a folder, by name; raise before long work unless it can be written.
 
-    Parameters
-    ----------
-    folder : Path
-        It may exist if it is empty or holds files of its own kind only; its parent must exist.
-    what : str
-        What is written there, as messages name it: ``"the report"``.
-    own : callable
-        Returns whether an earlier run may have written the file of a name.
-
-    Returns
-    -------
-    list of Path
-        All files of the folder, by name, except unfinished ones of a killed process, which the atomic writer removes.
-
-    Raises
-    ------
-    ValueError
-        It is a file, holds other files, is not writable, or its parent is missing.
+    The folder may exist if it holds files of its own kind only: ``own(name)`` says whether an earlier run may have
+    written a file. ``what`` names in messages what is written there, as ``"the report"``. Unfinished files of a killed
+    process are left to the atomic writer.
     """
     try:
         if folder.is_dir():

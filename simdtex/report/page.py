@@ -9,7 +9,6 @@ import math
 import os
 import re
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +20,7 @@ from matplotlib.figure import Figure as Plot
 from numpy.typing import NDArray
 
 from simdtex import __version__
-from simdtex.io.atomic import atomic_path
+from simdtex.io.atomic import atomic_folder
 from simdtex.report.folder import earlier_files
 from simdtex.report.plots import figure_png
 from simdtex.report.sheet import encoded
@@ -32,20 +31,13 @@ __all__ = ["Figure", "Part", "Section", "check_folder", "write_report"]
 PathLike = str | os.PathLike[str]
 
 PAGE, RESULTS = "index.html", "results.json"
-_PNG_NAME = re.compile(r"[a-z0-9][a-z0-9_-]*\.png")
 
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """A picture of a report.
+    """A picture of a report: a plot, or (rows, cols[, channels]) uint8; ``file`` is its name beside the page.
 
-    Parameters
-    ----------
-    file : str
-        Its name beside the page, ``"energy.png"``.
-    picture : matplotlib.figure.Figure, or ndarray of uint8, (rows, cols[, channels])
-    caption : str
-        Its first sentence describes the picture to readers who do not see it.
+    The first sentence of the caption describes the picture to readers who do not see it.
     """
 
     file: str
@@ -81,19 +73,17 @@ class Section:
 
 
 def check_folder(path: PathLike) -> None:
-    """Check, before long work, that a report can be written to a folder.
+    """Raise before long work unless a report can be written to a folder.
 
-    Parameters
-    ----------
-    path : path
-        Made when the report is written. It may exist if it is empty or holds an earlier report and nothing else.
-
-    Raises
-    ------
-    ValueError
-        It is a file, holds other files, or its parent is missing or not writable.
+    It may exist if it is empty or holds an earlier report and nothing else.
     """
-    _earlier(Path(path))
+    folder = Path(path)
+    try:
+        listed = {str(name) for name in json.loads((folder / RESULTS).read_bytes())["files"]}
+    except (OSError, ValueError, KeyError, TypeError):
+        listed = set()
+    own = {name for name in listed if name in (PAGE, RESULTS) or name.endswith(".png")}
+    earlier_files(folder, "the report", own.__contains__)
 
 
 def write_report(
@@ -106,69 +96,22 @@ def write_report(
 ) -> None:
     """Write ``index.html``, every figure's PNG and ``results.json``, all of them or none.
 
-    Parameters
-    ----------
-    folder : path
-        See `check_folder`; the files of an earlier report there are replaced.
-    title, lead : str
-        Heading and first paragraphs of the page.
-    sections : sequence of Section
-    results : dict
-        Of numbers, text, lists, dicts and NumPy arrays. Numbers that are not finite become null; keys are sorted.
-        ``files``, the names of all files of the report, and ``version`` are added.
-    command : str, optional
-        The command line, added to the page and to ``results.json``.
-
-    Raises
-    ------
-    ValueError
-        The folder cannot be written, or two figures have one name.
-
-    Notes
-    -----
-    The page contains its pictures and its style, and runs no script. Its size is about 4/3 of the PNGs'.
+    ``results`` becomes JSON with sorted keys and null for numbers that are not finite; the names of all files, the
+    version and the command line are added. The page contains its pictures and its style, and runs no script. The files
+    of an earlier report are replaced; errors are those of `check_folder` and `atomic_folder`.
     """
-    target = Path(folder)
-    earlier = _earlier(target)
+    check_folder(folder)
     if command:
         sections = [*sections, Section("The command", [f"$ {command}"])]
     figures = [part for section in sections for part in section.parts if isinstance(part, Figure)]
-    names = [figure.file for figure in figures]
-    for name in names:
-        if not _PNG_NAME.fullmatch(name) or names.count(name) > 1:
-            raise ValueError(f"{name} cannot name a figure: give each its own name, as energy.png")
-    page = _page(title=title, lead=lead, sections=sections, version=__version__)
-    more = {"files": sorted([PAGE, RESULTS, *names]), "version": __version__} | (
-        {} if command is None else {"command": command}
-    )
-    numbers = json.dumps(_plain({**results, **more}), indent=1, sort_keys=True, allow_nan=False)
     files = {figure.file: figure.png for figure in figures}
-    files |= {PAGE: page.encode(), RESULTS: f"{numbers}\n".encode()}
-    made = not target.exists()
-    try:
-        target.mkdir(exist_ok=True)
-        with ExitStack() as all_or_none:
-            for name, content in files.items():
-                all_or_none.enter_context(atomic_path(target / name)).write_bytes(content)
-    except BaseException as error:
-        if made and target.is_dir() and not any(target.iterdir()):
-            target.rmdir()
-        if isinstance(error, OSError):
-            raise ValueError(f"{target} could not be written ({error.strerror}): choose another folder") from None
-        raise
-    for path in earlier:
-        if path.name not in files:
-            path.unlink(missing_ok=True)
-
-
-def _earlier(folder: Path) -> list[Path]:
-    """Return the files of an earlier report; raise if there are others."""
-    try:
-        listed = [str(name) for name in json.loads((folder / RESULTS).read_bytes())["files"]]
-    except (OSError, ValueError, KeyError, TypeError):
-        listed = []
-    names = {name for name in listed if name in (PAGE, RESULTS) or _PNG_NAME.fullmatch(name)}
-    return earlier_files(folder, "the report", names.__contains__)
+    files[PAGE] = _page(title=title, lead=lead, sections=sections, version=__version__).encode()
+    about = {"files": sorted([*files, RESULTS]), "version": __version__}
+    about |= {} if command is None else {"command": command}
+    numbers = json.dumps(_plain({**results, **about}), indent=1, sort_keys=True, allow_nan=False)
+    with atomic_folder(folder) as temporary:
+        for name, content in {**files, RESULTS: f"{numbers}\n".encode()}.items():
+            (temporary / name).write_bytes(content)
 
 
 def _plain(value: Any) -> Any:
