@@ -76,18 +76,9 @@ NO_STAND_IN = Stand(np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 
 def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
-    """Return the sites of a level's lattice that stand in for off-grid data.
+    """Return the sites of a level's lattice that stand in for off-grid data, in ascending order.
 
-    Parameters
-    ----------
-    known : (H, W) bool array
-    grid : Grid
-        The whole lattice of the level.
-
-    Returns
-    -------
-    Stand
-        A datum moves where none of the four sites around it is given itself; in ascending order of sites.
+    ``known`` (H, W) are the data. A datum moves if none of the four sites around it is given itself.
     """
     step, (height, width) = grid.spacing, known.shape
     if step == 1:

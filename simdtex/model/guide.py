@@ -53,16 +53,9 @@ class AnyGuide(Protocol):
 class Guide:
     """A guide, one picture of it for each of the sample and one for the output.
 
-    Parameters
-    ----------
-    samples : tuple of (rows, cols, G) arrays
-        Of the sizes of the sample's pictures.
-    output : (H, W, G) array
-        Of the output's size; NaN where it says nothing.
-    labels : bool
-        Whether its numbers are names: two differ or they do not.
-    weight : float
-        Its variance in units of the pixels'.
+    ``samples`` (rows, cols, G) have the sizes of the sample's pictures, ``output`` (H, W, G) is NaN where the output is
+    free; ``labels`` says whether its numbers are names: two differ or they do not; ``weight`` is its variance in units
+    of the pixels'.
     """
 
     samples: tuple[NDArray[Any], ...]
@@ -119,16 +112,10 @@ class Guide:
 
 @dataclass(frozen=True, eq=False)
 class Colocated:
-    """Data of some variables where the others are to be found: they guide the choice of those.
+    """Data of some variables at sites whose other variables are unknown: they guide the choice of those.
 
-    Parameters
-    ----------
-    samples : tuple of (rows, cols, C) arrays
-        The sample's pictures.
-    values : (H, W, C) array
-        Of the sample's type.
-    known : (H, W, C) bool array
-        Which of them are given.
+    ``samples`` (rows, cols, C) are the sample's pictures, ``values`` (H, W, C) of the sample's type, and ``known`` (H,
+    W, C) says which of them are given.
     """
 
     samples: tuple[NDArray[Any], ...]

@@ -18,18 +18,10 @@ MOST_ORDER = 4096
 
 
 def neighbourhood_offsets(order: int) -> NDArray[np.int32]:
-    """Return the offsets r - s of the neighbourhood of an order, equation (3).
+    """Return the offsets r - s of the neighbourhood of an order, equation (3): (N, 2) int32, row and column.
 
-    Parameters
-    ----------
-    order : int
-        o, 1 to `MOST_ORDER`: the neighbours are the sites within the distance sqrt(o).
-
-    Returns
-    -------
-    (N, 2) int32 array
-        (row, column) offsets in canonical order: by distance, then row, then column. o = 1 has 4, o = 8
-        has 24, o = 18 has 60.
+    The neighbours are the sites within the distance sqrt(order), 1 to `MOST_ORDER`, in canonical order: by distance,
+    then row, then column. Order 1 has 4, order 8 has 24, order 18 has 60.
     """
     whole("order", order, 1, MOST_ORDER)
     radius = isqrt(order)
@@ -149,17 +141,8 @@ class Grid:
     def window(self, top: int, left: int, rows: int, cols: int) -> Grid:
         """Return a window of this lattice, which lies in a picture of its own, site by site.
 
-        Parameters
-        ----------
-        top, left : int
-            Row and column of its first site. On a torus they may lie anywhere, and the window goes on across the seam.
-        rows, cols : int
-            Sites of the window, no more than the whole has.
-
-        Raises
-        ------
-        ValueError
-            It is larger than the whole or, on an open lattice, reaches beyond it.
+        ``top`` and ``left`` are row and column of its first site; on a torus they may lie anywhere, and the window goes
+        on across the seam. Raises ValueError if it is larger than the whole or, on an open lattice, reaches beyond it.
         """
         whole = self.within
         if not (0 < rows <= whole.rows and 0 < cols <= whole.cols):
@@ -272,19 +255,9 @@ def coloring_sublattice(
 ) -> Sublattice | None:
     """Return the sublattice of fewest cosets whose shortest vector is longer than a neighbourhood reaches.
 
-    Parameters
-    ----------
-    order : int
-        Of the neighbourhood.
-    rows, cols : int, optional
-        A torus that the pattern must fit; without them, the best of the plane.
-    limit : int, optional
-        Most cosets to look at; a square pattern needs no more than the default, (isqrt(order) + 1)**2.
-
-    Returns
-    -------
-    Sublattice or None
-        Index 2 for order 1, 4 for 2, 9 for 8, 20 for 18; None where no torus of this size has one.
+    ``rows`` and ``cols`` are those of a torus that the pattern must fit; without them, it is the best of the plane.
+    ``limit`` is the most cosets to look at; a square pattern needs no more than the default, (isqrt(order) + 1)**2.
+    Index 2 for order 1, 4 for 2, 9 for 8, 20 for 18; None if no torus of this size has one.
     """
     for index in range(1, (limit or (isqrt(order) + 1) ** 2) + 1):
         for c in range(1, index + 1):

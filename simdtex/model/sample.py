@@ -348,19 +348,11 @@ class Sample:
         return np.where(place[..., 0] < 0, -1, found).astype(np.int32)
 
     def picture(self, values: NDArray[Any], source: NDArray[Any]) -> NDArray[Any]:
-        """Return the picture that working levels and sources stand for, in the sample's own type.
+        """Return the picture (rows, cols, C) that working levels and sources stand for, in the sample's own type.
 
-        Parameters
-        ----------
-        values : (C, rows, cols) array
-            Working levels; the structure channel does not show.
-        source : (rows, cols) array
-            Pixel index in the sample.
-
-        Returns
-        -------
-        (rows, cols, C) array
-            The source's pixel, plus what the working level differs from the source's own.
+        ``values`` (C, rows, cols) are working levels, of which the structure channel does not show; ``source`` (rows,
+        cols) are pixel indices in the sample. A pixel is the source's, plus what the working level differs from the
+        source's own.
         """
         source = np.maximum(source, self.margin * (self.cols + 1))  # what is from nowhere differs from the first pixel
         own, usual = self._own(source), self.working[: self.shown, source]
@@ -375,19 +367,10 @@ class Sample:
         return own
 
     def moved(self, source: NDArray[Any], by: NDArray[np.int16]) -> NDArray[Any]:
-        """Return the pixels of some sources, plus the differences from `simdtex.ops.finish`.
+        """Return the pixels (rows, cols, C) of some sources, plus the differences from `simdtex.ops.finish`.
 
-        Parameters
-        ----------
-        source : (rows, cols) array
-            Pixel index in the sample.
-        by : (C, rows, cols) array
-            Working levels of 8-bit samples; `FINE`-ths of a working level of others.
-
-        Returns
-        -------
-        (rows, cols, C) array
-            In the sample's own type.
+        ``source`` (rows, cols) are pixel indices; ``by`` (C, rows, cols) are working levels of 8-bit samples, and
+        `FINE`-ths of a working level of others.
         """
         own, change = self._own(source), np.moveaxis(by, 0, -1)
         if self.pixels.dtype == np.uint8 and self.direct:

@@ -24,20 +24,9 @@ EXACT = 12
 class Scale:
     """How the pixels of a sample become working levels.
 
-    Parameters
-    ----------
-    pictures : Pictures
-    values : int
-        Values to a neighbourhood: channels of working levels times neighbours.
-
-    Attributes
-    ----------
-    top : int
-        The highest working level.
-    unit : float
-        1 of it in the pixels' own unit, where `direct`.
-    direct : bool
-        Whether the channels of working levels are those of the pixels.
+    ``values`` is the number of values to a neighbourhood: channels of working levels times neighbours. ``top`` is the
+    highest working level; ``direct`` says whether the channels of working levels are those of the pixels, and ``unit``
+    is then 1 of them in the pixels' own unit.
     """
 
     def __init__(self, pictures: Pictures, values: int) -> None:

@@ -110,19 +110,9 @@ def opened(level: Level, field: Field) -> State:
 def sweep(level: Level, state: State, watch: Watch = ignore) -> tuple[State, list[schedules.Info]]:
     """Relax about as many sites as are active, step by step of the schedule: 6.2.1 and 6.2.2.
 
-    Parameters
-    ----------
-    level : Level
-    state : State
-        Its arrays are used up. If no site is active, the sweep is a free one, of all sites that are not known.
-    watch : callable
-        Called after every part of the sweep.
-
-    Returns
-    -------
-    state : State
-    chosen : list of simdtex.schedules.Info
-        What the schedule decided.
+    The arrays of the state are used up. If no site is active, the sweep is a free one, of all sites that are not known.
+    ``watch`` is called after every part of the sweep. Returns the state after it, and what the schedule decided at each
+    step.
     """
     free = not state.active
     field, memory, chosen = swept(level, state, free, watch)
@@ -210,19 +200,8 @@ def finished(
 ) -> NDArray[Any]:
     """Return the picture in the sample's type, with the finish (`simdtex.ops.finish`) if the options have one.
 
-    Parameters
-    ----------
-    run : Lattices
-    grid : Grid
-        The finest level, or a window of it.
-    field : Field
-        Of that.
-    known : (H, W) bool array, optional
-        The known sites of that.
-    seen : (rows, cols) int32 array
-        Sources on the host: of all rows, or of some.
-    first : int
-        The first of these rows.
+    ``grid`` is the finest level or a window of it, ``field`` and the known sites ``known`` (H, W) are of that; ``seen``
+    (rows, cols) are the sources on the host, of all rows or of some from row ``first`` on.
     """
     sample = run.sample
     if not run.options.finish:

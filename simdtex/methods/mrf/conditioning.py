@@ -35,12 +35,8 @@ class Held(NamedTuple):
 class Conditions(ABC):
     """Conditioning data and guides of an output: all in memory, or windows out of a store.
 
-    Parameters
-    ----------
-    levels : int
-        M of Algorithm 1.
-    confidences : Confidences
-        Which channels are guides, whether values have confidences of their own, and the weights.
+    ``levels`` is M of Algorithm 1; ``confidences`` says which channels are guides, whether values have confidences of
+    their own, and the weights.
     """
 
     def __init__(self, levels: int, confidences: Confidences) -> None:
@@ -87,17 +83,9 @@ class Conditions(ABC):
 class Conditioning(Conditions):
     """Conditioning data and guides of a whole output, in memory.
 
-    Parameters
-    ----------
-    levels : int
-    guides : (G, H, W) uint16 array
-        Working levels of the output's guides.
-    planes : Planes, optional
-        Known values, their sources and sites. None: no site is known.
-    neighbours : int
-        N of the neighbourhood.
-    data_weight : float
-        How many neighbours a hard datum counts for.
+    ``guides`` (G, H, W) are the working levels of the output's guides; ``planes`` the known values, their sources and
+    sites, None if no site is known; ``neighbours`` is N of the neighbourhood, and ``data_weight`` how many neighbours a
+    hard datum counts for.
     """
 
     def __init__(

@@ -27,33 +27,12 @@ def lcpdf_at(
     bandwidth: float,
     estimator: str,
 ) -> NDArray[np.float64]:
-    """P(x_s | x_r, r in N_s) of some sites.
+    """Return P(x_s | x_r, r in N_s) of some sites, (S, greys) float64; every row adds up to 1.
 
-    Parameters
-    ----------
-    machine : Machine
-    field : Field
-        The image in working grey levels, and its temperatures; nothing is read of its sources.
-    sample : Sample
-        Of one channel.
-    sites : (S,) int32 array
-        Pixel indices.
-    offsets : (N, 2) int32 array
-    grid : Grid
-    bandwidth : float
-        h in units of h_opt, equation (8).
-    estimator : {"parzen", "histogram"}
-        Equations (6) to (8), or counts of exact matches, (4) and (5).
-
-    Returns
-    -------
-    (S, greys) float64 array
-        Every row adds up to 1.
-
-    Raises
-    ------
-    ValueError
-        No neighbourhood of the sample matches that of a site.
+    ``field`` holds the image in working grey levels and its temperatures, nothing is read of its sources; the sample
+    has one channel; ``sites`` are pixel indices, and ``bandwidth`` is h in units of h_opt, equation (8). ``estimator``
+    is ``"parzen"``, equations (6) to (8), or ``"histogram"``, counts of exact matches, (4) and (5). Raises ValueError
+    if no neighbourhood of the sample matches that of a site.
     """
     greys = sample.top + 1
     candidates = sample.candidates(machine, sample.places(offsets, 1))

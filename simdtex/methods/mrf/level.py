@@ -41,23 +41,9 @@ TOGETHER = 2**16
 class Input:
     """What a run is made from, validated, on the host.
 
-    Attributes
-    ----------
-    sample : Sample
-        Y, with its structure channel and guides.
-    shape : (int, int)
-        Rows and columns of X, the output.
-    offsets : (N, 2) int32 array
-        The neighbourhood.
-    options : Options
-        As they are executed.
-    schedule : simdtex.schedules.Schedule
-    levels : int
-        M of Algorithm 1.
-    given : Given, optional
-        Conditioning data: sites of X that keep their values.
-    planes : Planes, optional
-        The same in working levels.
+    ``sample`` is Y with its structure channel and guides, ``shape`` rows and columns of X, the output, ``offsets`` (N,
+    2) the neighbourhood, ``options`` as they are executed, and ``levels`` M of Algorithm 1. ``given`` are conditioning
+    data, sites of X that keep their values, and ``planes`` the same in working levels.
     """
 
     sample: Sample
@@ -75,14 +61,14 @@ class State(NamedTuple):
 
     Attributes
     ----------
-    values : (C, H, W) uint16 array
+    values : (C, H, W) uint16 array of the machine
         Working grey levels x.
-    source : (H, W) int32 array
+    source : (H, W) int32 array of the machine
         The source map: pixel index in the sample, its margin included.
-    temperature : (H, W) uint16 array
+    temperature : (H, W) uint16 array of the machine
         t in 1/1024.
     penalty : (n,) float32 array
-        Penalty of each candidate of the level during the next sweep (`simdtex.ops.use`), on the host.
+        Penalty of each candidate of the level during the next sweep (`simdtex.ops.use`).
     schedule : tuple of arrays and numbers
         The schedule's own state.
     level : int
@@ -92,9 +78,7 @@ class State(NamedTuple):
     active, temperature_sum : int
         Active sites of the level, and the sum of their temperatures in 1/1024.
 
-    Notes
-    -----
-    The first three arrays are those of the machine, and a sweep uses up the arrays of the state before it.
+    A sweep uses up the arrays of the machine.
     """
 
     values: Array
@@ -159,21 +143,9 @@ class Lists:
 class Lattices:
     """A plan on a machine: what stays the same throughout the run, and its levels.
 
-    Parameters
-    ----------
-    plan : Input
-    machine : Machine
-    seed : int
-        Key of every random number.
-    conditions : Conditions, optional
-        Conditioning data and guides. None: those of the plan.
-
-    Attributes
-    ----------
-    planes : array of the machine
-        Working levels of the sample.
-    weighed : (H, W) int32 array of the machine
-        Counts the candidates that each site of the whole has weighed.
+    ``seed`` is the key of every random number; ``conditions`` are conditioning data and guides, None: those of the
+    plan. ``planes`` are the sample's working levels on the machine, and ``weighed`` (H, W) counts the candidates that
+    each site of the whole has weighed.
     """
 
     def __init__(self, plan: Input, machine: Machine, seed: int, conditions: Conditions | None = None) -> None:
@@ -193,13 +165,8 @@ class Lattices:
     def level(self, number: int, window: tuple[int, int, int, int] | None = None) -> Level:
         """Define the lattice, the neighbourhood, the candidates and the bandwidth of a level: (8), (10) and (11).
 
-        Parameters
-        ----------
-        number : int
-            0 is the finest.
-        window : (int, int, int, int), optional
-            Row and column of the first site, rows and columns of a window of the lattice; the state's arrays then hold
-            that alone, site by site. None: the whole lattice, in pictures of the output's size.
+        ``window`` is row and column of the first site, rows and columns of a window of the lattice; the state's arrays
+        then hold that alone, site by site. None: the whole lattice, in pictures of the output's size.
         """
         if self._last is None or self._last.number != number:
             self._last = None  # the arrays of one level are enough to keep
@@ -307,7 +274,6 @@ class Level:
         The lattice, or a window of it with its origin in the whole.
     offsets : (N, 2) int32 array of the machine
         The neighbourhood, equation (11), in sites of the grid.
-    schedule : simdtex.schedules.Schedule
     proposal : Everything or Listed
         Which candidates a site weighs.
     choice : simdtex.ops.lcpdf.Choice
@@ -328,11 +294,8 @@ class Level:
         Whether the sites of a step may be written while others of it are read: none is another's neighbour.
     weighed : (H, W) int32 array of the machine
         Counts the candidates that each site has weighed.
-    lists : Lists
-        The schedule's lists of sites as the machine holds them.
     movable : (H, W) uint16 array of the machine, optional
-        0 at sites whose values are given: free sweeps leave them alone, as all sweeps do that find their temperature 0.
-        None: every site may relax.
+        0 at sites whose values are given, which free sweeps leave alone. None: every site may relax.
     """
 
     number: int
@@ -408,14 +371,10 @@ class Active:
 
 
 def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int64], int, bool]]:
-    """Steps in parts of `most` sites or fewer; how many of the steps have begun with each; and whether it is the last.
+    """Yield steps in parts of ``most`` sites or fewer: ranges, steps that have begun, and whether it is the last part.
 
-    Parameters
-    ----------
-    ranges : (steps, 2) int64 array
-        Where each step's sites begin and end in a list.
-    most : int
-        A step of more sites is cut; several steps of fewer go together.
+    ``ranges`` (steps, 2) say where each step's sites begin and end in a list. A step of more sites is cut; several
+    steps of fewer go together.
     """
     held: list[tuple[int, int]] = []
     sites = begun = 0

@@ -346,11 +346,8 @@ class Options:
 def begins(before: Options, now: Options, levels: int) -> int:
     """Return the first level at which a run with other options differs from an earlier one with the same input.
 
-    Returns
-    -------
-    int
-        ``levels - 1``, the coarsest, if all levels may differ; the next finer one if only the search does; -1 if only
-        the finish does.
+    ``levels - 1``, the coarsest, if all levels may differ; the next finer one if only the search does; -1 if only the
+    finish does.
     """
     old, new = vars(before), vars(now)
     different = {name for name in old if old[name] != new[name]}

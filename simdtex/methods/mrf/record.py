@@ -25,21 +25,9 @@ from simdtex.run import Callback, Output, Relaxing, Stage
 class Record:
     """Sees every part and every end of a sweep, and changes nothing.
 
-    Parameters
-    ----------
-    run : Lattices
-    callback : callable, optional
-        Called with a `simdtex.run.Relaxing` after every part of a sweep.
-
-    Attributes
-    ----------
-    stages : list of Stage
-        Each level's picture at its end.
-    reports : list of dict
-        The counts of each level, see `simdtex.run.Output`.
-    account : Account
-    launches : int
-        Kernels that the machine had launched before the run.
+    ``callback`` is called with a `simdtex.run.Relaxing` after every part of a sweep. ``stages`` holds each level's
+    picture at its end, ``reports`` the counts of each level (`simdtex.run.Output`), and ``launches`` the kernels that
+    the machine had launched before the run.
     """
 
     def __init__(self, run: Lattices, callback: Callback | None) -> None:

@@ -72,14 +72,7 @@ def framed(lattice: Grid, tile: Tile, halo: int) -> Framed:
 def entered(run: Run, number: int, tile: Tile, above: Field | None) -> tuple[Field, Tally]:
     """Return a tile at the beginning of its level: steps 2 and 5 of Algorithm 1, and the sites of the level above.
 
-    Parameters
-    ----------
-    run : Run
-    number : int
-        Of the level.
-    tile : Tile
-    above : Field, optional
-        The sites of the level above that lie in the tile; None at the coarsest level.
+    ``above`` are the sites of the level above that lie in the tile; None at the coarsest level.
     """
     level, field = _entered(run, number, tile, above)
     return _off(run.machine, field), _tally(level, field, level.grid)
@@ -100,22 +93,9 @@ def relaxed(
 ) -> tuple[Field, Tally]:
     """Return a tile after a sweep.
 
-    Parameters
-    ----------
-    run : Run
-    number : int
-        Of the level.
-    tile : Tile
-    frame : Framed
-        Its window, with a halo as deep as the sweep reaches.
-    field : Field
-        The sites of the window before the sweep.
-    penalty : (n,) float32 array
-        Of the candidates, during the sweep.
-    done : int
-        Sweeps of the level before it.
-    free : bool
-        Whether it is a free one.
+    ``frame`` is its window with a halo as deep as the sweep reaches, ``field`` the sites of the window before the
+    sweep, ``penalty`` (n,) that of the candidates during it, ``done`` the sweeps of the level before it, and ``free``
+    whether it is a free one.
     """
     machine, level = run.machine, run.level(number, frame.window)
     if frame.window.rows < run.grid(number).rows:  # else rows wrap around, and none is far away

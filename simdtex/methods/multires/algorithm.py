@@ -93,19 +93,6 @@ class Info(NamedTuple):
 class Run:
     """The second phase of the paper: SynthesizePyramid and CollapsePyramid, level by level.
 
-    Parameters
-    ----------
-    machine : Machine
-    analysis : Analysis
-        Of the sample, made with the same options.
-    shape : (int, int)
-        Rows and columns of the output.
-    options : Options
-    seed : int
-        Key of every random number.
-
-    Notes
-    -----
     No pixel depends on another of its level; a step samples some pixels of a level, or collapses the level. Cost: for
     every four pixels at most the nodes above them, times the features; some thousandths of that at usual thresholds.
     Memory on the device, in bytes per output pixel: 20 + 5.3 channels, beside the analysis; on the host, which includes
@@ -205,11 +192,7 @@ class Run:
 class Record:
     """The stages and reports of a run, and its progress.
 
-    Parameters
-    ----------
-    run : Run
-    callback : callable, optional
-        Called with a `simdtex.run.Sampling` after every launch and at every level's end.
+    ``callback`` is called with a `simdtex.run.Sampling` after every launch and at every level's end.
     """
 
     def __init__(self, run: Run, callback: Callback | None) -> None:
@@ -261,14 +244,8 @@ class Record:
 def tiled(shape: tuple[int, int], sample: tuple[int, int], own: tuple[int, int], spacing: int) -> tuple[int, int]:
     """Return rows and columns of a level of the output: whole tiles and the beginning of one more.
 
-    Parameters
-    ----------
-    shape, sample : (int, int)
-        Rows and columns of the output and of the sample.
-    own : (int, int)
-        Of the sample's level.
-    spacing : int
-        2**level.
+    ``shape`` and ``sample`` are the sides of the output and of the sample, ``own`` those of the sample's level, and
+    ``spacing`` is 2**level.
     """
     rows, cols = (n // m * k + -(-(n % m) // spacing) for n, m, k in zip(shape, sample, own, strict=True))
     return rows, cols

@@ -52,17 +52,8 @@ HOST = 20, 20, 3
 class Texture:
     """What a run is to match: histograms of decorrelated channels, and the colours to show them in.
 
-    Attributes
-    ----------
-    histograms : list of Histograms
-        Of every channel.
-    palette : Palette
-    scale : Decorrelated
-        The unit of the channels.
-    stretched : Stretched
-        What turns values back into pixels.
-    own : (m,) array or None
-        The sample's own pixels in ascending order, where a grey output takes exactly these.
+    ``scale`` is the unit of the channels, ``stretched`` turns values back into pixels, and ``own`` are the sample's
+    pixels in ascending order if a grey output takes exactly these.
     """
 
     histograms: list[Histograms]
@@ -191,25 +182,9 @@ class Info(NamedTuple):
 class Run:
     """Match-texture of the paper, for each of the decorrelated channels; a step is one channel's turn.
 
-    Parameters
-    ----------
-    machine : Machine
-    texture : Texture
-        What is to be matched.
-    shape : (rows, cols) or (depth, rows, cols)
-        Of the output.
-    turn : callable
-        Makes, matches and collapses the pyramid of a picture.
-    options : Options
-    levels : int
-        Of the pyramids.
-    seed : int
-        Key of every random number.
-
-    Notes
-    -----
-    Memory in bytes per pixel: 160 on the device (240 per voxel of a block); on the host, which includes a CPU's device
-    memory, 20 + (20 + 3 n) channels, n the bytes of a value of the sample.
+    ``shape`` is (rows, cols) or (depth, rows, cols) of the output, and ``turn`` makes, matches and collapses the
+    pyramid of a picture. Memory in bytes per pixel: 160 on the device (240 per voxel of a block); on the host, which
+    includes a CPU's device memory, 20 + (20 + 3 n) channels, n the bytes of a value of the sample.
     """
 
     def __init__(
@@ -323,11 +298,7 @@ def _own_channels(image: NDArray[Any]) -> NDArray[np.int32]:
 class Record:
     """The reports of a run's iterations, and its progress.
 
-    Parameters
-    ----------
-    run : Run
-    callback : callable, optional
-        Called with a `simdtex.run.Iterating` after every channel's turn, and after every part of a solid's.
+    ``callback`` is called with a `simdtex.run.Iterating` after every channel's turn, and after every part of a solid's.
     """
 
     def __init__(self, run: Run, callback: Callback | None) -> None:

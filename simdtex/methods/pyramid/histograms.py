@@ -18,14 +18,10 @@ Sorted = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class Histograms:
-    """Those of one channel.
+    """Those of one channel, as sorted values.
 
-    Attributes
-    ----------
-    pixels : (1, m) int32 array
-        Sorted.
-    subbands : list of (bands, m) int32 arrays
-        Sorted, in the order of the pyramid: `simdtex.methods.pyramid.pyramids.Transform.make`.
+    ``pixels`` (1, m) int32; ``subbands`` (bands, m) int32 each, in the order of the pyramid:
+    `simdtex.methods.pyramid.pyramids.Transform.make`.
     """
 
     pixels: Sorted
@@ -43,17 +39,8 @@ def histograms(machine: Machine, channel: NDArray[np.int32], *pyramids: Transfor
 def average(parts: Sequence[Sorted], weights: Sequence[float]) -> Sorted:
     """Return the average of the counts of each value of some histograms, band by band.
 
-    Parameters
-    ----------
-    parts : sequence of (bands, m_i) int32 arrays
-        Sorted.
-    weights : sequence of float
-        Shares, not all 0.
-
-    Returns
-    -------
-    (bands, m) int32 array
-        Sorted; m is the largest m_i.
+    ``parts`` (bands, m_i) int32 are sorted, as is the result (bands, m), m the largest m_i; ``weights`` are shares, not
+    all 0.
     """
     kept = [(part, float(weight)) for part, weight in zip(parts, weights, strict=True) if weight]
     if len(kept) == 1:
@@ -83,10 +70,6 @@ def averaged(textures: Sequence[Histograms], weights: Sequence[float]) -> Histog
 def spliced(low: Histograms, high: Histograms, split: int) -> Histograms:
     """Return the low frequencies of one texture, and its pixels, with the high frequencies of another.
 
-    Parameters
-    ----------
-    low, high : Histograms
-    split : int
-        Subbands that are taken from `high`, from the finest on.
+    ``split`` is the number of subbands that are taken from `high`, from the finest on.
     """
     return Histograms(low.pixels, [*high.subbands[:split], *low.subbands[split:]])
