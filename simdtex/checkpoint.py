@@ -105,31 +105,11 @@ class Checkpoint:
     def opened(
         self, job: str, rng: Any, inputs: Callable[[], dict[str, Any]], device: str
     ) -> Iterator[tuple[int, Any, Callable[..., bool]]]:
-        """Lock the file, and begin a run or resume the run in the file.
+        """Lock the file, and begin a run or resume the run in the file; yield the seed, the state found, and ``offer``.
 
-        Parameters
-        ----------
-        job : str
-            The public function.
-        rng : None, int or numpy.random.Generator
-            As of `simdtex.random.as_seed`; None takes the seed of the run in the file.
-        inputs : callable
-            Returns everything else that determines the result, by name.
-        device : str
-            The device's name.
-
-        Yields
-        ------
-        seed : int
-        found : tree or None
-            The state to go on from.
-        offer : callable
-            ``offer(info, tree)``: write the state ``tree()`` if it is time; return whether it was written.
-
-        Raises
-        ------
-        ValueError
-            The file is of another run, version or format, is damaged or in use, or cannot be written.
+        ``job`` is the public function, ``inputs()`` returns everything that determines the result but the seed, by
+        name; ``rng`` None takes the seed of the run in the file. Raises ValueError if the file is of another run,
+        version or format, is damaged or in use, or cannot be written.
         """
         if self._used:
             raise ValueError("a checkpoint keeps one run; give each call a checkpoint of its own")
@@ -193,10 +173,7 @@ class Checkpoint:
     def offer(self, info: Any, tree: Callable[[], Any], *, now: bool = False) -> bool:
         """Write the state ``tree()`` if it is time, ``now`` is true, or the run is to stop; return whether it was.
 
-        Raises
-        ------
-        KeyboardInterrupt
-            The run is to stop here.
+        Raises KeyboardInterrupt if the run is to stop here.
         """
         stopping = self.stopping
         wrote = (now or stopping or time.perf_counter() >= self._next) and self._save(tree)
@@ -259,10 +236,7 @@ def _nothing(info: Any, tree: Callable[[], Any], *, now: bool = False) -> bool:
 def read(path: Path) -> tuple[dict[str, Any], Any]:
     """Return the description of the run in a checkpoint, and its state.
 
-    Raises
-    ------
-    ValueError
-        The file is no checkpoint, is damaged, or of another format.
+    Raises ValueError if the file is no checkpoint, is damaged, or of another format.
     """
     try:
         with read_checked(path) as file, np.load(file, allow_pickle=False) as found:

@@ -80,12 +80,8 @@ class Plan(Protocol):
 class Keep:
     """Where a run begins, and who is offered its states.
 
-    Attributes
-    ----------
-    found : tree or None
-        The state to go on from; None: the beginning.
-    offer : callable
-        ``offer(info, tree)``, called after every step; ``tree()`` returns the state, to be passed as `found`.
+    ``found`` is the state to go on from, None: the beginning. ``offer(info, tree)`` is called after every step;
+    ``tree()`` returns the state, to be passed as `found`.
     """
 
     found: Tree = None
@@ -166,18 +162,9 @@ def execute(
 ) -> Result:
     """Run a validated call on a device: what every public function does once its input is validated.
 
-    Parameters
-    ----------
-    name : str
-        The public function.
-    run : callable
-        `drive` with its plan, or a function that drives several plans in turn.
-    inputs : callable
-        Returns all that determines the result but the seed, by the names that users give it.
-    channel_axis : int or None
-        The axis of channels in what the function returns.
-    call : Call
-        A `Keep` in place of its checkpoint keeps states in memory.
+    ``name`` is the public function; ``run`` is `drive` with its plan, or a function that drives several plans in turn;
+    ``inputs()`` returns all that determines the result but the seed, by the names that users give it; and
+    ``channel_axis`` is that of the returned picture. A `Keep` in place of the call's checkpoint keeps states in memory.
     """
     machine, checkpoint = open_machine(call.device), call.checkpoint
     machine.profile()  # forget what was before

@@ -114,18 +114,9 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Other:
-    """Any other value.
+    """Any other value: ``examine`` raises if it is not valid, and ``says`` is the type, as in a docstring.
 
-    Parameters
-    ----------
-    examine : callable
-        Raises if a value is not valid.
-    says : str
-        The type, as in a docstring.
-    flag : bool
-        Whether the command line and the live page offer only True and False.
-    valid : tuple of str
-        Values that the shell completes.
+    With ``flag`` the command line and the live page offer only True and False; the shell completes ``valid``.
     """
 
     examine: Callable[[Any], object]
@@ -242,21 +233,9 @@ def preset_values(options: Any, preset: str) -> dict[str, Any]:
 def resolve(options: type[T], job: str, given: Mapping[str, Any]) -> T:
     """Return the options of a job: the method's defaults < the job's < the preset's values < what the user gave.
 
-    Parameters
-    ----------
-    options : type
-        The class of options of a method.
-    job : str
-        The name of its command: ``"synth"``, ``"fill"``, ``"extend"``, ``"simulate"``...
-    given : mapping
-        The values that the user gave, and possibly ``preset``. Lists become tuples.
-
-    Raises
-    ------
-    TypeError
-        A name is unknown; the message lists the valid ones.
-    ValueError, TypeError
-        A value is not valid.
+    ``job`` is the name of its command: ``"synth"``, ``"fill"``, ``"extend"``, ``"simulate"``... Lists become tuples.
+    Raises TypeError if a name is unknown; the message lists the valid ones; ValueError or TypeError if a value is not
+    valid.
     """
     own = table(options)
     known = ["preset", *own]

@@ -21,18 +21,7 @@ _SHIFT = np.uint64(32)
 
 
 def philox(counter: list[NDArray[np.uint32]], key: tuple[int, int]) -> list[NDArray[np.uint32]]:
-    """Philox4x32-10 of Salmon et al. (2011).
-
-    Parameters
-    ----------
-    counter : list of four (n,) uint32 arrays
-    key : two 32-bit integers
-
-    Returns
-    -------
-    list of four (n,) uint32 arrays
-        128 random bits per counter.
-    """
+    """Return 128 random bits for each counter: Philox4x32-10 of Salmon et al. (2011)."""
     c0, c1, c2, c3 = np.asarray(counter, np.uint64)
     k0, k1 = key
     for _ in range(10):
@@ -75,17 +64,9 @@ def below(lo: NDArray[np.uint32], hi: NDArray[np.uint32], n: Any) -> NDArray[np.
 
 
 def as_seed(rng: Any = None) -> int:
-    """Return a 64-bit seed from what scikit-image calls `rng`.
+    """Return a seed, 0 <= seed < 2**64, from what scikit-image calls `rng`.
 
-    Parameters
-    ----------
-    rng : None, int or numpy.random.Generator
-        None takes a fresh seed from the system; an integer is itself; a generator is asked for one.
-
-    Returns
-    -------
-    int
-        0 <= seed < 2**64.
+    None takes a fresh seed from the system; an integer is itself; a generator is asked for one.
     """
     if rng is None:
         return secrets.randbits(64)

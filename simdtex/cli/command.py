@@ -22,15 +22,7 @@ FEW = 14
 
 
 class Command(click.Command):
-    """A command with examples.
-
-    Parameters
-    ----------
-    examples : sequence of (str, str), optional
-        What is used most.
-    **given
-        As of `click.Command`.
-    """
+    """Command with ``examples`` of its use: words after ``simdtex``, and what they do."""
 
     def __init__(self, *args: Any, examples: Examples = (), **given: Any) -> None:
         super().__init__(*args, **given)

@@ -27,20 +27,11 @@ if TYPE_CHECKING:
 class Task(NamedTuple):
     """What a command does once its input is read and checked.
 
-    Attributes
-    ----------
-    make : callable
-        A public function with its own arguments; returns what it made and a `simdtex.run.Output`.
-    summary : callable
-        ``summary(made)``: what was made of what, in words.
-    names : str
-        The files that are written, in words.
-    outputs : sequence of callables
-        ``write(made, output)``, each of one file or folder. If one fails, the others are written all the same.
-    limits : (float, float)
-        Black and white in the pictures of stages.
-    more : callable, optional
-        ``more(statistics)`` prints further lines after the summary.
+    ``make`` is a public function with its own arguments, which returns what it made and a `simdtex.run.Output`.
+    ``summary(made)`` says what was made of what, and ``names`` are the files that are written, in words. ``outputs``
+    are functions ``write(made, output)``, each of one file or folder; if one fails, the others are written all the
+    same. ``limits`` are black and white in the pictures of stages, and ``more(statistics)`` prints further lines after
+    the summary.
     """
 
     make: Callable[..., Any]

@@ -27,16 +27,10 @@ METHODS = {
 
 
 class Option(click.Option):
-    """An option in a group of the help.
+    """An option in a ``group`` of the help.
 
-    Parameters
-    ----------
-    group : str
-        The title of the group.
-    words : iterable of str
-        The values that the shell completes; the metavar, if they are few.
-    kind : simdtex.options.Kind, optional
-        The declared kind of value, if it is an option of a method.
+    The shell completes ``words``, which are the metavar if they are few; ``kind`` is the declared kind of an option of
+    a method.
     """
 
     def __init__(

@@ -203,12 +203,8 @@ def _half(dtype: np.dtype[Any]) -> float:
 def as_array(name: str, values: Any) -> Array:
     """Return array-likes as an ndarray, or as a masked array if that is what they are.
 
-    The arrays of other libraries, such as xarray and dask, are taken whole, their axes by position.
-
-    Raises
-    ------
-    ValueError
-        Rows have unequal lengths.
+    The arrays of other libraries, such as xarray and dask, are taken whole, their axes by position. Raises ValueError
+    if rows have unequal lengths.
     """
     if hasattr(values, "compute"):  # dask, which NumPy would convert without its mask
         values = values.compute()

@@ -53,20 +53,10 @@ class Window(NamedTuple):
 
 
 def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
-    """Return windows that hold the holes of a picture and the neighbourhoods of their sites.
+    """Return windows that hold the holes of a picture and the neighbourhoods of their sites, from top to bottom.
 
-    Parameters
-    ----------
-    hole : (rows, cols) bool array, true somewhere
-    radius : int
-        Of a neighbourhood.
-    levels : int, optional
-        Of the multigrid. None: so many that at the coarsest a site in the middle of its hole sees the rim.
-
-    Returns
-    -------
-    list of Window
-        From top to bottom. Windows that overlap are one.
+    ``hole`` (rows, cols) is true somewhere, ``radius`` is that of a neighbourhood, and ``levels`` the number of them;
+    None: so many that at the coarsest a site in the middle of its hole sees the rim. Windows that overlap are one.
     """
     deepest = ndimage.distance_transform_cdt(np.pad(hole, 1), metric="chessboard")[1:-1, 1:-1]
     wanted = levels or 1 + max(0, ceil(log2(max(1, int(deepest.max())) / radius)))
@@ -352,16 +342,8 @@ class Around(NamedTuple):
 class Filling:
     """The job of `fill`: a sequence of runs, one for each window.
 
-    Attributes
-    ----------
-    pixels : (rows, cols, C) array
-    hole : (rows, cols) bool array
-        The free sites.
-    sample : Pictures or None
-        What the holes are filled with; None: their surroundings.
-    reach : int or None
-        How far around a hole its sample reaches, pixels.
-    options : simdtex.methods.mrf.Options
+    ``hole`` (rows, cols) are the free sites of ``pixels`` (rows, cols, C). They are filled from ``sample``, None: from
+    their surroundings, as far as ``reach`` pixels around a hole.
     """
 
     pixels: NDArray[Any]

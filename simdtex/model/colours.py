@@ -17,17 +17,9 @@ Picture = NDArray[np.uint8]
 
 
 def temperature_colours(temperature: ArrayLike) -> Picture:
-    """Show temperatures as colours from near black (0, cold) to pale yellow (1, hot).
+    """Return temperatures as colours from near black (0, cold) to pale yellow (1, hot), sRGB in a last axis of 3.
 
-    Parameters
-    ----------
-    temperature : array_like
-        Any shape; values outside 0 to 1 are clipped.
-
-    Returns
-    -------
-    ndarray of uint8, temperature.shape + (3,)
-        sRGB. Lightness grows in equal perceptual steps, so the map also reads in grey.
+    Values outside 0 to 1 are clipped. Lightness grows in equal perceptual steps, so the map also reads in grey.
     """
     share = np.clip(np.asarray(temperature, dtype=np.float64), 0.0, 1.0)
     return _temperature_table()[np.round(share * 255.0).astype(np.intp)]
@@ -44,21 +36,10 @@ def _temperature_table() -> Picture:
 
 
 def source_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
-    """Colour each output pixel by the sample position it was taken from.
+    """Return a colour for each output pixel by the sample position it was taken from, (rows, cols, 3) uint8.
 
-    Neighbours in the sample have neighbouring colours of one lightness, so a patch copied whole
-    shows as a smooth area and a seam as an edge.
-
-    Parameters
-    ----------
-    source : array_like of int, (rows, cols, 2)
-        The (row, column) in the sample; a negative one (not set) is black.
-    sample_shape : (rows, cols)
-        Of the sample, pixels.
-
-    Returns
-    -------
-    ndarray of uint8, (rows, cols, 3)
+    ``source`` (rows, cols, 2) are rows and columns in the sample; a negative one is black. Neighbours in the sample
+    have neighbouring colours of one lightness, so a patch copied whole shows as a smooth area and a seam as an edge.
     """
     positions = np.asarray(source)
     extent = np.maximum(np.asarray(sample_shape[:2]) - 1, 1)
@@ -69,25 +50,11 @@ def source_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
 
 
 def use_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
-    """Colour each pixel of the sample by how often it was taken.
+    """Return a colour for each pixel of the sample by how often it was taken, (sample rows, sample cols, 3) uint8.
 
-    Parameters
-    ----------
-    source : array_like of int, (rows, cols, 2)
-        For every output pixel, the (row, column) of the sample that it was taken from.
-    sample_shape : (rows, cols)
-        Of the sample, pixels.
-
-    Returns
-    -------
-    ndarray of uint8, (sample rows, sample cols, 3)
-        The colours of `temperature_colours` for log(1 + u) / log(1 + max u), where u is how often: near black for
-        a pixel that was never taken, pale yellow for the one that was taken most.
-
-    Raises
-    ------
-    ValueError
-        `source` is no source map, or points outside the sample.
+    The colours are those of `temperature_colours` for log(1 + u) / log(1 + max u), where u is how often: near black for
+    a pixel that was never taken, pale yellow for the one that was taken most. Raises ValueError if ``source`` (rows,
+    cols, 2) is no source map, or points outside the sample.
     """
     uses = np.log1p(counts(source, sample_shape))
     return temperature_colours(uses / (uses.max() or 1.0))

@@ -21,21 +21,10 @@ SIDE = 512
 
 
 def as_html(made: NDArray[Any] | None, source: NDArray[np.int32] | None, statistics: dict[str, Any]) -> str:
-    """Return a picture and its source map side by side, with the statistics below them.
+    """Return HTML with a picture and its source map side by side, and the statistics below them.
 
-    Parameters
-    ----------
-    made : (rows, cols, channels) or (depth, rows, cols, channels) array, optional
-        Of a solid the middle slice is shown.
-    source : (rows, cols, 2 or 3) int32 array, optional
-        The source map; of several samples it is not shown.
-    statistics : dict
-        As of `simdtex.run.Output`.
-
-    Returns
-    -------
-    str
-        HTML with the pictures in it.
+    ``made`` is (rows, cols, channels) or (depth, rows, cols, channels); of a solid the middle slice is shown. The
+    source map of several samples is not shown.
     """
     figures = []
     if made is not None:

@@ -44,25 +44,13 @@ class Plan(NamedTuple):
 
 
 def coloring(grid: Grid, order: int, seed: int = 0) -> NDArray[np.int32]:
-    """Return the colours of a level's lattice, or of a window of one.
+    """Return the colours of a level's lattice, or of a window of one: (rows, cols) int32, 0 .. colours - 1.
 
-    The best lattice colouring of the plane where the size of the lattice takes it without a seam. Else either a
-    lattice colouring with more colours that fits, or the best one with its clashes along the seam coloured
-    greedily, whichever has fewer colours; of a vast lattice the former, if there is one.
-
-    Parameters
-    ----------
-    grid : Grid
-        A window's sites have the colours that they have in the whole.
-    order : int
-        Of the neighbourhood.
-    seed : int
-        Of the priorities of the greedy rounds.
-
-    Returns
-    -------
-    (rows, cols) int32 array
-        0 .. colours - 1. Cost: O(rows cols), and once for a whole lattice a few tens of rounds along its seam.
+    The best lattice colouring of the plane if the size of the lattice takes it without a seam. Else either a lattice
+    colouring with more colours that fits, or the best one with its clashes along the seam coloured greedily, whichever
+    has fewer colours; of a vast lattice the former, if there is one. A window's sites have the colours that they have
+    in the whole; ``seed`` sets the priorities of the greedy rounds. Cost: O(rows cols), and once for a whole lattice a
+    few tens of rounds along its seam.
     """
     whole = grid.within
     plan = lattice_plan(whole.rows, whole.cols, grid.torus, order, seed)

@@ -22,20 +22,10 @@ from simdtex.model.lattice import Grid
 
 
 def heat_bath_chances(temperatures: Sequence[float], neighbours: int) -> NDArray[np.uint32]:
-    """Return the probabilities of up, in integers of 2**-32.
+    """Return the probabilities of up, in integers of 2**-32: (temperatures, N + 1, N + 1) uint32.
 
-    Parameters
-    ----------
-    temperatures : sequence of float
-        Above 0, in units of J / k_B.
-    neighbours : int
-        N, of a site within the lattice.
-
-    Returns
-    -------
-    (temperatures, N + 1, N + 1) uint32 array
-        P(up) = 1 / (1 + exp(-2 S / T)), rounded, for a site with n neighbours on the lattice of which u are up,
-        S = 2 u - n. Probabilities that round to 1 are 1 - 2**-32.
+    P(up) = 1 / (1 + exp(-2 S / T)), rounded, for a site with n neighbours on the lattice of which u are up, S = 2 u -
+    n, and temperatures in units of J / k_B. Probabilities that round to 1 are 1 - 2**-32.
     """
     from scipy.special import expit
 

@@ -76,14 +76,8 @@ class Key(NamedTuple):
 def optimal_bandwidth(variance: float, candidates: int, dimensions: int) -> float:
     """Return h_opt of equation (8).
 
-    Parameters
-    ----------
-    variance : float
-        sigma^2, the mean marginal variance.
-    candidates : int
-        n, the number of sample data.
-    dimensions : int
-        d = channels (N + 1).
+    ``variance`` is sigma^2, the mean marginal variance, ``candidates`` n, the number of sample data, and ``dimensions``
+    d = channels (N + 1).
     """
     return sqrt(variance) * pow(4 / (candidates * (2 * dimensions + 1)), 1 / (dimensions + 4))
 

@@ -20,19 +20,11 @@ BINS = 256
 
 
 def inverse_cdf(sorted_values: NDArray[np.int32], bins: int = BINS) -> NDArray[np.int32]:
-    """Return the inverse of a target's cdf, in a table.
+    """Return the inverse of a target's cdf, in a table (bins + 1,) int32.
 
-    Parameters
-    ----------
-    sorted_values : (m,) int32 array
-        The target's values, smallest first.
-    bins : int
-        2 to 4096. The target's histogram has so many equal bins over its range, even within each.
-
-    Returns
-    -------
-    (bins + 1,) int32 array
-        The least value at which the cdf reaches 0, 1 / bins, 2 / bins, ... 1; rounded to the nearest, halves up.
+    The target's values are sorted, smallest first. The table holds the least value at which the cdf reaches 0, 1 /
+    bins, 2 / bins, ... 1, rounded to the nearest, halves up; the target's histogram has 2 to 4096 equal bins over its
+    range, even within each.
     """
     low, high = int(sorted_values[0]), int(sorted_values[-1])
     width, m = high - low, len(sorted_values)

@@ -71,27 +71,13 @@ def use_penalty(
     rate: float,
     before: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
-    """Return the penalty of each candidate during the next sweep, to be added to its distance.
+    """Return the penalty of each candidate during the next sweep, (n,) float32, to be added to its distance.
 
-    Parameters
-    ----------
-    counts : (n,) array of integers
-        From `use`.
-    fair_use : FairUse
-        Of n candidates, or of n places.
-    rate : float
-        lambda N C sigma^2, the sample's variance times neighbours and channels; 0: no candidate costs anything.
-    before : (n or more,) float32 array, optional
-        The penalty during the last sweep.
+    ``counts`` (n,) are from `use`; ``rate`` is lambda N C sigma^2, the sample's variance times neighbours and channels,
+    0: no candidate costs anything; and ``before`` (n or more,) is the penalty during the last sweep. The result is
+    lambda N C sigma^2 min(4, max(0, u - 1)), u the use of the square around a candidate over its fair share, and the
+    mean of that and of `before`, so that penalties settle. It is infinite at a place without a candidate.
 
-    Returns
-    -------
-    (n,) float32 array
-        lambda N C sigma^2 min(4, max(0, u - 1)), u the use of the square around a candidate over its fair share; the
-        mean of that and of `before`, so that penalties settle. Infinity at a place without a candidate.
-
-    Notes
-    -----
     Penalties are the potentials of a transport problem: to give all output sites the nearest candidates while each
     candidate serves as many sites as any other is semi-discrete optimal transport, and its dual raises the penalty of
     candidates that are used too often. Cost: some ten passes over the candidates, on the host.

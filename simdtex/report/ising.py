@@ -62,19 +62,8 @@ def write_ising(
 ) -> None:
     """Write the report.
 
-    Parameters
-    ----------
-    folder : path
-        See `simdtex.report.page.check_folder`.
-    found : sequence of Finding
-        Of `runs`.
-    runs : sequence of Chains
-    pictures : sequence of Chains
-        One chain each, at one temperature, from a random start.
-    settings : dict
-        Of the experiment; written to ``results.json``.
-    command : str
-        The command line.
+    ``found`` are the findings of ``runs``; ``pictures`` have one chain each, at one temperature, from a random start;
+    and the ``settings`` of the experiment are written to ``results.json``.
     """
     sections = [
         Section("Result", ["\n\n".join(conclusion(found)), *tables(found), _energy(found)]),

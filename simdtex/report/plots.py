@@ -34,18 +34,10 @@ _SPARE = [("#882255", "*"), ("#332288", "h"), ("#117733", "p"), ("#AA4499", "d")
 
 
 def styles(schedules: Mapping[str, bool]) -> dict[str, dict[str, Any]]:
-    """Return the keywords of `matplotlib.axes.Axes.plot` for each schedule.
+    """Return the keywords of `matplotlib.axes.Axes.plot` for each schedule, given whether it keeps equation (14).
 
-    Parameters
-    ----------
-    schedules : dict
-        Name -> whether it keeps equation (14).
-
-    Returns
-    -------
-    dict
-        Name -> keywords. A schedule of the package always has the same colour and marker; others take the remaining
-        ones in order. Lines are dashed and markers hollow if it breaks equation (14).
+    A schedule of the package always has the same colour and marker; others take the remaining ones in order. Lines are
+    dashed and markers hollow if it breaks equation (14).
     """
     taken = {_KNOWN[name] for name in schedules if name in _KNOWN}
     spare = cycle([style for style in [*_SPARE, *_KNOWN.values()] if style not in taken])

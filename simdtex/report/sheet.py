@@ -36,31 +36,13 @@ def contact_sheet(
     captions: Sequence[str] | None = None,
     scale: int | None = None,
 ) -> Picture:
-    """Arrange labelled pictures on one sheet, each under its label.
+    """Arrange labelled pictures on one sheet, (rows, cols, 3) uint8, each under its label.
 
-    Parameters
-    ----------
-    pictures : sequence of (label, picture)
-        Pictures are (rows, cols) or (rows, cols, channels) of any size and type; types other than
-        uint8 are stretched over their own range, channels past the third are not shown.
-    path : path, optional
-        Where to write the sheet as well; the suffix names the format.
-    columns : int, optional
-        Pictures in a row; by default as many as make the sheet about square.
-    captions : sequence of str, optional
-        A line below each picture.
-    scale : int, optional
-        The factor by which every picture is enlarged, without smoothing. By default pictures of
-        less than 96 pixels are enlarged to 96 or more, those of more than 1024 are reduced.
-
-    Returns
-    -------
-    ndarray of uint8, (rows, cols, 3)
-
-    Raises
-    ------
-    ValueError
-        There are no pictures, `columns` is less than 1, or `path` cannot be written.
+    Pictures are (rows, cols[, channels]) of any size and type; types other than uint8 are stretched over their own
+    range, channels past the third are not shown. By default as many ``columns`` as make the sheet about square.
+    ``captions`` are a line below each picture. ``scale`` enlarges every picture by a whole factor, without smoothing;
+    by default pictures of less than 96 pixels are enlarged to 96 or more, those of more than 1024 are reduced. The
+    sheet is written to ``path`` as well; the suffix names the format.
     """
     if not pictures:
         raise ValueError("there are no pictures for the sheet: give at least one")

@@ -26,21 +26,10 @@ class StageWriter:
     had more candidates, on a logarithmic scale from 1; of ``pyramid``, ``iteration{k}.png``, of a block its middle
     slice. Pictures are 8-bit previews; each file is written whole or not at all.
 
-    Parameters
-    ----------
-    folder : path
-        Made at the first picture. It may exist if it is empty or holds only the stages of an earlier run; those are
-        removed at the first picture unless the run is resumed.
-    limits : (low, high), optional
-        The values shown as black and white if pixels are not uint8: the sample's smallest and largest. By default
-        those of the first picture.
-    resumed : callable, optional
-        Returns, at the first picture, whether the run continues from a checkpoint.
-
-    Raises
-    ------
-    ValueError
-        `folder` is a file, holds other files, or its parent is missing or not writable.
+    The folder is made at the first picture. It may exist if it is empty or holds only the stages of an earlier run,
+    which are removed at the first picture unless ``resumed()``: the run continues from a checkpoint. ``limits`` are the
+    values shown as black and white if pixels are not uint8, by default those of the first picture. Raises ValueError if
+    the folder cannot be used.
     """
 
     def __init__(

@@ -30,26 +30,8 @@ def write_synthesis(
 ) -> None:
     """Write the report of a run: ``index.html``, PNG pictures, ``results.json``.
 
-    Parameters
-    ----------
-    folder : path
-        See `simdtex.report.page.check_folder`.
-    sample, image : array, (rows, cols) or (rows, cols, channels)
-        The sample and the output.
-    output : Output
-        Of the run.
-    command : str
-        The command line, if there is one.
-
-    Raises
-    ------
-    ValueError
-        The folder cannot be written.
-
-    Notes
-    -----
-    ``picture.png`` shows sample and output. If there is a source map, ``use.png`` shows how often each pixel of the
-    sample was taken, and ``arrangement.png`` from where each pixel of the output was taken.
+    ``picture.png`` shows sample and output, both (rows, cols[, channels]). If there is a source map, ``use.png`` shows
+    how often each pixel of the sample was taken, and ``arrangement.png`` from where each pixel of the output was taken.
     """
     statistics = output.statistics
     limits = float(sample.min()), float(sample.max())

@@ -19,16 +19,10 @@ _NUMBER = re.compile(r"[-+\u2212]?\d.*|[-\u2013]|n/a|inf")
 
 @dataclass(frozen=True)
 class Table:
-    """A table of texts.
+    """A table of texts: rows from heading to cell, all with the same headings; the first cell names the row.
 
-    Parameters
-    ----------
-    caption : str
-    rows : sequence of dict
-        Heading -> cell, one dict for each row, all with the same headings. The first cell names the row. A cell that
-        begins with ``breaks`` or ``differs`` is set as a warning.
-    note : str
-        A remark below the table; shown on pages only.
+    A cell that begins with ``breaks`` or ``differs`` is set as a warning. ``note`` is a remark below the table, on
+    pages only.
     """
 
     caption: str
@@ -68,18 +62,10 @@ def print_table(table: Table, width: int | None = None) -> None:
 def number_text(
     value: float | None, deviation: float | None = None, decimals: int | None = None, unit: str = ""
 ) -> str:
-    """Return a number as text, ``"12.3 ± 0.4"``, with thousands separated by commas.
+    """Return a number as text, ``"12.3 ± 0.4"``, with thousands separated by commas; None is ``"n/a"``.
 
-    Parameters
-    ----------
-    value : float or None
-        None gives ``"n/a"``.
-    deviation : float, optional
-        Written with as many decimals.
-    decimals : int, optional
-        By default as many as make three significant digits, none for a whole number without a deviation.
-    unit : str
-        Appended.
+    By default with as many decimals as make three significant digits, none for a whole number without a deviation. The
+    deviation has as many.
     """
     if value is None:
         return "n/a"

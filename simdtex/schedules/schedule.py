@@ -61,14 +61,7 @@ class Active(Protocol):
 
 
 class Masked:
-    """Sites that are active by a mask, which does not change.
-
-    Parameters
-    ----------
-    grid : Grid
-    mask : (rows, cols) bool array, optional
-        None: all are.
-    """
+    """Sites that are active by a mask (rows, cols), which does not change; None: all are."""
 
     def __init__(self, grid: Grid, mask: NDArray[np.bool_] | None = None) -> None:
         self._grid = grid
@@ -244,14 +237,9 @@ class Trimmed(Watched):
     """A schedule whose every step but the last also relaxes rows around a tile, fewer with every step.
 
     What a site is depends on its neighbours one step earlier. So of a sweep of n steps, the i-th one matters to the
-    tile as far as (n - i) times the neighbourhood's radius beyond it, and no farther.
-
-    Parameters
-    ----------
-    schedule : Schedule
-        One whose sites come row by row within a step, as a `simdtex.schedules.Partition` has them.
-    top, bottom : int
-        The first row of the tile within the window, and the first one below it.
+    tile as far as (n - i) times the neighbourhood's radius beyond it, and no farther. The sites of a step of
+    ``schedule`` come row by row, as a `simdtex.schedules.Partition` has them. ``top`` is the first row of the tile
+    within the window, ``bottom`` the first one below it.
     """
 
     def __init__(self, schedule: Schedule, top: int, bottom: int) -> None:

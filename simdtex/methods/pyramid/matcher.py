@@ -28,12 +28,8 @@ TIES = 2**20
 class Wanted:
     """Histograms that bands are to have, on a machine.
 
-    Attributes
-    ----------
-    table : (bands, m) or (bands, 257) int32 array of the machine
-        Sorted values, or the inverse of their cumulative distribution.
-    deviations : (bands,) float64 array
-        Standard deviations, 1 where there is none.
+    ``table`` is sorted values (bands, m), or the inverse of their cumulative distribution (bands, 257), int32;
+    ``deviations`` (bands,) are standard deviations, 1 where there is none.
     """
 
     table: Array
@@ -43,17 +39,8 @@ class Wanted:
 class Matcher:
     """Match-Histogram with the options of a run; notes how far histograms were from each other.
 
-    Parameters
-    ----------
-    machine : Machine
-    options : Options
-    seed : int
-        Of the order in which equal values come.
-
-    Attributes
-    ----------
-    moved : list of (str, array of the machine, (bands,) array)
-        How far values were moved since `distances` was called last: name of the subband, sums, and their unit.
+    ``seed`` is that of the order in which equal values come. ``moved`` lists how far values were moved since
+    `distances` was called last: name of the subband, sums on the machine, and their unit (bands,).
     """
 
     def __init__(self, machine: Machine, options: Options, seed: int) -> None:

@@ -149,19 +149,10 @@ def mix(
 
 @dataclass(frozen=True)
 class Mixture:
-    """A mixture before it has a machine and a seed.
+    """A mixture of pictures (rows, cols, channels) before it has a machine and a seed.
 
-    Attributes
-    ----------
-    pictures : list of (rows, cols, channels) arrays
-    shape : (int, int)
-        Rows and columns of the output.
-    options : Options
-    weights : list of float
-        Of each picture in the pattern.
-    sides : (int, int, int or None) or None
-        Which pictures low and high frequencies are taken from, and the split between them.
-    palette : int, optional
+    ``weights`` are those of each picture in the pattern; ``sides`` says which pictures low and high frequencies are
+    taken from, and the split between them.
     """
 
     pictures: list[NDArray[Any]]

@@ -70,18 +70,9 @@ class Palette:
 def palette(pictures: Sequence[NDArray[np.int32]], weights: Sequence[float], decorrelate: bool = True) -> Palette:
     """Return the transform that decorrelates some pictures taken together.
 
-    Parameters
-    ----------
-    pictures : sequence of (C, rows, cols) int32 arrays
-        Stretched, on one scale.
-    weights : sequence of float
-        The share that each picture has in mean and covariance.
-    decorrelate : bool
-        Otherwise channels stay as they are, only centred and of unit variance.
-
-    Notes
-    -----
-    The covariance is a matrix of exact sums in integers, divided at the end.
+    ``pictures`` (C, rows, cols) int32 are stretched, on one scale; ``weights`` are the shares that each has in mean and
+    covariance. Without ``decorrelate`` channels stay as they are, only centred and of unit variance. The covariance is
+    a matrix of exact sums in integers, divided at the end.
     """
     shares = [float(weight) / float(sum(weights)) for weight in weights]
     means = [picture.reshape(len(picture), -1).mean(1, dtype=np.float64) for picture in pictures]

@@ -65,15 +65,7 @@ class Options(pyramid.Options):
 
 @dataclass(frozen=True)
 class Plan:
-    """A solid texture before it has a machine and a seed.
-
-    Attributes
-    ----------
-    sample : (rows, cols, channels) array
-    shape : (depth, rows, cols)
-        Of the block.
-    options : Options
-    """
+    """A solid texture, (depth, rows, cols), before it has a machine and a seed."""
 
     sample: NDArray[Any]
     shape: tuple[int, int, int]
