@@ -28,7 +28,7 @@ from simdtex.io.atomic import Damaged, check_target, exclusive, read_checked, wr
 from simdtex.options import real
 from simdtex.random import as_seed
 
-FORMAT = 2
+FORMAT = 3
 """Format of the file; another one is refused."""
 
 FIRST = 1.0
@@ -273,58 +273,36 @@ def _warn(sentence: str) -> None:
     warnings.warn(sentence, stacklevel=2)
 
 
-# ---------------------------------------------------------------- trees of plain arrays and numbers
-
-LEAVES = (str, int, float, bool, type(None))
-
-
-def pack(tree: Any) -> tuple[Any, list[NDArray[Any]]]:
-    """Return a tree in the form of JSON, and the arrays that it refers to by number.
-
-    Raises
-    ------
-    TypeError
-        Something is no array, number, text, dict, list or tuple.
-    """
+def pack(tree: Any) -> tuple[str, list[NDArray[Any]]]:
+    """Return a tree as JSON, and the arrays that it refers to by number; TypeError if it holds anything else."""
     arrays: list[NDArray[Any]] = []
 
-    def packed(node: Any) -> Any:
-        if isinstance(node, (np.ndarray, np.generic)):
-            if node.dtype.hasobject:
-                raise TypeError("an array of objects cannot be kept in a checkpoint; give arrays of numbers")
-            arrays.append(np.asarray(node))
-            return {"array" if isinstance(node, np.ndarray) else "scalar": len(arrays) - 1}
-        if type(node) in LEAVES:
-            return node
-        if isinstance(node, dict) and all(type(key) is str for key in node):
-            return {"dict": {key: packed(value) for key, value in node.items()}}
-        if isinstance(node, (list, tuple)):
-            return {"tuple" if isinstance(node, tuple) else "list": [packed(value) for value in node]}
-        raise TypeError(
-            f"a state holds {type(node).__name__}, which a checkpoint cannot keep; give plain arrays and numbers"
-        )
+    def keep(node: Any) -> dict[str, int]:
+        if not isinstance(node, (np.ndarray, np.generic)) or node.dtype.hasobject:
+            raise TypeError(f"a checkpoint cannot keep {type(node).__name__}; give plain arrays and numbers")
+        arrays.append(np.asarray(node))
+        return {"array" if isinstance(node, np.ndarray) else "scalar": len(arrays) - 1}
 
-    return packed(tree), arrays
+    return json.dumps(tree, default=keep), arrays
 
 
-def unpack(packed: Any, arrays: Sequence[NDArray[Any]]) -> Any:
-    """Return what `pack` was given; tuples with names come back without them (see `like`)."""
-    if not isinstance(packed, dict):
-        return packed
-    ((kind, node),) = packed.items()
-    if kind == "array":
-        return arrays[node]
-    if kind == "scalar":
-        return arrays[node][()]
-    if kind == "dict":
-        return {key: unpack(value, arrays) for key, value in node.items()}
-    found = [unpack(value, arrays) for value in node]
-    return tuple(found) if kind == "tuple" else found
+def unpack(text: str, arrays: Sequence[NDArray[Any]]) -> Any:
+    """Return what `pack` was given; tuples come back as lists (see `like`)."""
+
+    def kept(node: dict[str, Any]) -> Any:
+        match node:
+            case {"array": int(number)}:
+                return arrays[number]
+            case {"scalar": int(number)}:
+                return arrays[number][()]
+        return node
+
+    return json.loads(text, object_hook=kept)
 
 
 def like(template: Any, node: Any) -> Any:
-    """Return a tree whose tuples have the types of those of another tree of the same form."""
-    if not (isinstance(node, tuple) and isinstance(template, tuple) and len(node) == len(template)):
+    """Return a tree with tuples of the types that they have in another tree of the same form."""
+    if not (isinstance(node, (list, tuple)) and isinstance(template, tuple) and len(node) == len(template)):
         return node
     inside = [like(one, value) for one, value in zip(template, node, strict=True)]
     kind: Any = type(template)

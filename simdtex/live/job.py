@@ -58,34 +58,17 @@ class Picture(NamedTuple):
 
 
 class Job:
-    """A run that the page asks for, checked.
+    """A run that the page asks for, checked; raises ValueError or TypeError if the message is wrong.
 
-    Parameters
-    ----------
-    message : dict
-        ``job`` (``synth``, ``extend`` or ``fill``) and ``seed``; ``width``, ``height`` and ``method`` of ``synth``;
-        ``options``; ``part``, the region ``[left, top, width, height]`` of the picture that is the sample; ``guide``,
-        with strokes on the ``sample`` and the ``output``; ``hole``, strokes; ``of``, the number of the result to fill.
-    picture : Picture
-    maps : dict
-        Further maps of the picture, by name; ``pyramid`` cannot carry them.
-    result : callable
-        Returns the result of a number; its ``image`` and ``maps`` are used.
+    The ``message`` has ``job`` (``synth``, ``extend`` or ``fill``) and ``seed``; ``width``, ``height`` and ``method``
+    of ``synth``; ``options``; ``part``, the region ``[left, top, width, height]`` of the picture that is the sample;
+    ``guide``, with strokes on the ``sample`` and the ``output``; ``hole``, strokes; ``of``, the number of the result to
+    fill. ``maps`` are further maps of the picture, by name, which ``pyramid`` cannot carry; ``result(number)`` returns
+    a result.
 
-    Attributes
-    ----------
-    sample, maps
-        The sample of the output and its further maps.
-    shape : (rows, cols)
-        Of the output.
-    options : dict
-        Of the method, those that differ from their defaults.
-    files : dict
-        The pictures that the command line reads, by file name.
-    output, carried : str, dict
-        The files that it writes: the picture, and the further maps by name.
-
-    Raises ValueError or TypeError if the message is wrong; the sentence says how.
+    Of the job, ``options`` are those that differ from their defaults, ``files`` the pictures that the command line
+    reads, by file name, and ``output`` and ``carried`` the files that it writes: the picture, and the further maps by
+    name.
     """
 
     def __init__(self, message: Message, picture: Picture, maps: Maps, result: Callable[[Any], Any]) -> None:

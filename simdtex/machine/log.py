@@ -59,11 +59,8 @@ class Log:
     def take(self) -> dict[str, Any] | None:
         """Return the times of the launches since the last call, None without profiling; the queue must be empty.
 
-        Returns
-        -------
-        dict
-            ``kernels``, a list sorted by time, the longest first: dicts with ``name``, ``calls``, ``seconds`` and
-            ``share`` of the time of all kernels.
+        ``kernels`` is a list, the longest time first: dicts with ``name``, ``calls``, ``seconds`` and ``share`` of the
+        time of all kernels.
         """
         if not self.profile:
             return None

@@ -27,20 +27,10 @@ def shared(machine: Machine) -> bool:
 
 
 def require(machine: Machine, device: int, host: int = 0, remedy: str = SMALLER) -> None:
-    """Raise if a run does not fit the memory that is available.
+    """Raise DeviceError if a run does not fit the memory that is available.
 
-    Parameters
-    ----------
-    machine : Machine
-    device, host : int
-        Bytes that the run takes at most in arrays of the machine, and in other arrays on the host.
-    remedy : str
-        The end of the error message.
-
-    Raises
-    ------
-    simdtex.machine.devices.DeviceError
-        The device has less memory, or the host has less available.
+    ``device`` and ``host`` are the bytes that the run takes at most in arrays of the machine, and in other arrays on
+    the host; ``remedy`` is the end of the error message.
     """
     if device > machine.memory:
         raise DeviceError(

@@ -52,17 +52,8 @@ def kernel_folder() -> Path:
 class DeviceArray:
     """A contiguous array on a device: a buffer, a shape and a type.
 
-    Parameters
-    ----------
-    data : pyopencl.Buffer or pyopencl.tools.PooledBuffer
-    shape : tuple of int
-    dtype : numpy.dtype
-    event : pyopencl.Event, optional
-        Event of the copy that fills the buffer; it keeps the source alive.
-
-    Notes
-    -----
-    Creating a `pyopencl.array.Array` takes tens of microseconds, and a step of ten small kernels creates a dozen.
+    ``event`` is that of the copy that fills the buffer, and keeps the source alive. Creating a `pyopencl.array.Array`
+    takes tens of microseconds, and a step of ten small kernels creates a dozen.
     """
 
     __slots__ = ("data", "dtype", "event", "nbytes", "shape", "size")
