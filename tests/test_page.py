@@ -240,7 +240,7 @@ def test_a_schedule_has_the_same_style_in_every_plot():
         ((0.0, 0.25), "0.00 ± 0.25"),
         ((0.012345,), "0.0123"),
         ((123.45, 1.0), "123 ± 1"),
-        ((12.345, None, 2, " %"), "12.35 %"),
+        ((12.345, None, " %"), "12.3 %"),
     ],
 )
 def test_numbers_have_three_significant_digits(given, text):

@@ -284,7 +284,7 @@ def _spread(values: Floats) -> str:
     known = values[np.isfinite(values)]
     if len(known) == 0:
         return "n/a"
-    return number_text(known.mean(), known.std(ddof=1) if len(known) > 1 else None, 3)
+    return number_text(known.mean(), known.std(ddof=1) if len(known) > 1 else None)
 
 
 # ---------------------------------------------------------------- distances

@@ -29,15 +29,6 @@ SHOWN_SIDE = 256  # smaller pictures are enlarged by a whole factor, pixels
 PERCENT = ("utilisation", "changed_cooling", "oscillation_cooling", "changed_free", "oscillation_free")
 """Figures written in percent."""
 
-DECIMALS = dict.fromkeys(PERCENT, 2) | {
-    "plausibility": 3,
-    "coverage": 3,
-    "histogram_distance": 3,
-    "copying": 3,
-    "seam": 2,
-}
-"""Decimals of figures; the others are written with three significant digits."""
-
 
 class Topic(NamedTuple):
     """A section of the page with a table; `columns` are headings and names of figures of the comparison."""
@@ -182,7 +173,7 @@ def _text(name: str, found: Spread | None) -> str:
         return "n/a"
     factor, unit = (100, " %") if name in PERCENT else (1, "")
     deviation = None if found.deviation is None else factor * found.deviation
-    return number_text(factor * found.mean, deviation, DECIMALS.get(name), unit)
+    return number_text(factor * found.mean, deviation, unit)
 
 
 def _verdict(entry: Entry) -> str:

@@ -12,7 +12,7 @@ from math import floor, log10
 import rich.table
 from rich.console import Console
 
-__all__ = ["Table", "duration_text", "number_text", "print_table", "seconds_text", "three_digits", "warns"]
+__all__ = ["Table", "duration_text", "number_text", "print_table", "seconds_text", "warns"]
 
 _NUMBER = re.compile(r"[-+\u2212]?\d.*|[-\u2013]|n/a|inf")
 
@@ -59,34 +59,24 @@ def print_table(table: Table, width: int | None = None) -> None:
     console.print()
 
 
-def number_text(
-    value: float | None, deviation: float | None = None, decimals: int | None = None, unit: str = ""
-) -> str:
+def number_text(value: float | None, deviation: float | None = None, unit: str = "") -> str:
     """Return a number as text, ``"12.3 ± 0.4"``, with thousands separated by commas; None is ``"n/a"``.
 
-    By default with as many decimals as make three significant digits, none for a whole number without a deviation. The
-    deviation has as many.
+    It has three significant digits or all digits before its point, and no decimals if it is whole and has no deviation;
+    the deviation has as many decimals.
     """
     if value is None:
         return "n/a"
-    if decimals is None:
-        magnitude = floor(log10(abs(value))) if value else 0
-        decimals = 0 if value == int(value) and not deviation else 2 - min(2, max(-2, magnitude))
+    magnitude = floor(log10(abs(value))) if value else 0
+    decimals = 0 if value == int(value) and not deviation else 2 - min(2, max(-2, magnitude))
     spread = "" if deviation is None else f" ± {deviation:,.{decimals}f}"
     return f"{value:,.{decimals}f}{spread}{unit}"
-
-
-def three_digits(value: float | None, unit: str = "") -> str:
-    """Return a number with three digits, or as many as are before its point; ``"-"`` if unknown."""
-    if value is None:
-        return "-"
-    return f"{value:.{0 if value >= 99.95 else 1 if value >= 9.995 else 2}f}{unit}"
 
 
 def seconds_text(seconds: float) -> str:
     """Return a duration with three digits: ``"1.23 s"``, ``"45.6 ms"``, ``"789 us"``."""
     unit, length = next(((u, x) for u, x in ((" s", 1.0), (" ms", 1e-3)) if seconds >= x), (" us", 1e-6))
-    return three_digits(seconds / length, unit)
+    return number_text(seconds / length, unit=unit)
 
 
 def duration_text(seconds: float) -> str:

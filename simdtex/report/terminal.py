@@ -8,7 +8,7 @@ from importlib.metadata import version
 from typing import Any
 
 from simdtex.machine.devices import DeviceError, find
-from simdtex.report.tables import Table, duration_text, print_table, seconds_text, three_digits
+from simdtex.report.tables import Table, duration_text, number_text, print_table, seconds_text
 
 __all__ = [
     "benchmark_table",
@@ -88,7 +88,7 @@ def benchmark_table(entry: dict[str, Any]) -> Table:
             "job": case["name"],
             "time": seconds_text(case["seconds"]),
             "in kernels": f"{case['busy'] / case['seconds']:.0%}",
-            "vs reference": three_digits(case["reference"], " x"),
+            "vs reference": number_text(case["reference"], unit=" x"),
         }
         for case in entry["cases"]
     ]
