@@ -68,56 +68,23 @@ def test_apply_errors():
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["uint8", "float32"]), st.sampled_from([(), (1,), (3,)]))
 def test_several_samples_against_a_loop(seed, dtype, channels):
     rng = np.random.default_rng(seed)
-    source, bare = several(seed)
+    source, _ = several(seed, none=0)
     others = [(rng.random((*shape, *channels)) * 200).astype(dtype) for shape in SAMPLES]
-    fill = (rng.random((7, 9, *channels)) * 200).astype(dtype)
-    carried = apply_source_map(source, others, SAMPLES, fill=fill)
+    carried = apply_source_map(source, others, SAMPLES)
     assert carried.dtype == dtype
     for i, j in np.ndindex(7, 9):
         row, col, sample = source[i, j]
-        np.testing.assert_array_equal(carried[i, j], fill[i, j] if bare[i, j] else others[sample][row, col])
+        np.testing.assert_array_equal(carried[i, j], others[sample][row, col])
 
 
-@pytest.mark.parametrize("channels", [(), (3,)])
-def test_one_sample_with_pixels_that_have_no_source(channels):
-    source = some_map(4)
-    other = np.random.default_rng(4).integers(0, 255, (5, 6, *channels), dtype=np.uint8)
-    whole = apply_source_map(source, other)
-    source[2, 3] = source[5, 0] = -1
-    bare = np.zeros((7, 9), bool)
-    bare[2, 3] = bare[5, 0] = True
-    fill = np.full((7, 9, *channels), 300.5)
-    fill[bare] = 9  # elsewhere nothing is looked at
-    for given_fill, value in ((fill, 9), (7, 7), (np.uint8(255), 255), (np.ma.MaskedArray(fill, fill > 300), 9)):
-        carried = apply_source_map(source, other, (5, 6), fill=given_fill)
-        assert carried.dtype == np.uint8
-        np.testing.assert_array_equal(carried[~bare], whole[~bare])
-        assert (carried[bare] == value).all()
-    assert np.isnan(apply_source_map(source, other.astype(np.float32), fill=np.nan)[bare]).all()
-    np.testing.assert_array_equal(apply_source_map(some_map(4), other, fill=fill), whole)
-    assert (apply_source_map(np.full((2, 2, 2), -1), other, (5, 6), fill=1) == 1).all()
-
-
-def test_no_source_and_nothing_to_take():
+def test_pixels_without_a_source_are_refused():
     source = some_map(5)
     source[1, 4] = -1
-    with pytest.raises(ValueError, match=r"1 pixel has no source, the first at row 1, column 4: .* fill="):
+    with pytest.raises(ValueError, match="1 pixel has no source, the first at row 1, column 4: carry over"):
         apply_source_map(source, np.zeros((5, 6)))
     source[3, 3] = -1
     with pytest.raises(ValueError, match="2 pixels have no source"):
         apply_source_map(source, np.zeros((5, 6)))
-    masked = np.ma.masked_all((7, 9))
-    masked[1, 4] = 3
-    with pytest.raises(ValueError, match="fill is masked"):
-        apply_source_map(source, np.zeros((5, 6)), fill=masked)
-    for fill, dtype in ((0.5, np.uint8), (256, np.uint8), (-1, np.uint16), (np.nan, np.int32), (1e39, np.float32)):
-        with pytest.raises(ValueError, match=f"that {np.dtype(dtype)} cannot hold"):
-            apply_source_map(source, np.zeros((5, 6), dtype), fill=fill)
-    for fill in (np.zeros((7, 8)), np.zeros((7, 9, 3)), np.zeros(9)):
-        with pytest.raises(ValueError, match=r"fill has the shape .* give \(7, 9\), or one value"):
-            apply_source_map(source, np.zeros((5, 6)), fill=fill)
-    with pytest.raises(TypeError, match="give numbers"):
-        apply_source_map(source, np.zeros((5, 6)), fill="black")
 
 
 def test_errors_of_several_samples():

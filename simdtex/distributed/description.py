@@ -17,6 +17,7 @@ from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.model.scale import Scale
+from simdtex.options import resolve
 
 
 @dataclass(frozen=True)
@@ -45,9 +46,10 @@ def described(plan: Plan) -> dict[str, Any]:
 
 def restored(tree: dict[str, Any]) -> Plan:
     """Return the plan that was described, without conditioning data of the output."""
-    options = Options(**tree["options"])
-    pictures = options.of(Pictures(tree["pixels"], tree["unknown"], tree["usable"]))
+    options = resolve(Options, "synth", tree["options"])
+    unknown, usable = ((one and tuple(one)) for one in (tree["unknown"], tree["usable"]))
+    pictures = options.of(Pictures(tuple(tree["pixels"]), unknown, usable))
     guides = [Ready(tree["guides"])] if tree["guides"] else []
     sample = Sample(pictures, **tree["layout"], guides=guides)
     schedule, offsets = schedules.get(options.schedule), neighbourhood_offsets(options.order)
-    return Plan(sample, tree["shape"], offsets, options, schedule, tree["levels"])
+    return Plan(sample, tuple(tree["shape"]), offsets, options, schedule, tree["levels"])

@@ -35,8 +35,6 @@ def apply_source_map(
     source: ArrayLike,
     other_map: ArrayLike | Sequence[ArrayLike],
     sample_shape: tuple[int, ...] | Sequence[tuple[int, ...]] | None = None,
-    *,
-    fill: ArrayLike | None = None,
 ) -> NDArray[Any]:
     """Arrange another map of the material as the sample was arranged, pixel for pixel.
 
@@ -51,9 +49,6 @@ def apply_source_map(
     sample_shape : (rows, cols), optional
         The size of the sample; a list of sizes where `other_map` is a list. Without it, only that every position lies
         within `other_map` is checked.
-    fill : array_like, (rows, cols) or (rows, cols, channels), or scalar; optional
-        What to take where a pixel has no source: values of the size of the output and the channels of `other_map`,
-        which its type can hold. Only these pixels are looked at.
 
     Returns
     -------
@@ -63,35 +58,24 @@ def apply_source_map(
 
     Raises
     ------
-    TypeError
-        `fill` holds no numbers.
     ValueError
-        `other_map` is not as large as the sample, there are not as many maps as samples, a pixel has no source and
-        there is no `fill`, or an argument has another shape.
+        `other_map` is not as large as the sample, there are not as many maps as samples, a pixel has no source, or an
+        argument has another shape.
     """
     positions = checked(source)
     maps, shapes = _maps(positions, other_map, sample_shape)
-    first = maps[0]
-    none = positions[..., 0] < 0
-    of = positions[..., 2] if positions.shape[2] == 3 else np.zeros(none.shape, dtype=np.int32)
-    for k, (values, shape) in enumerate(zip(maps, shapes, strict=True)):
-        named = "the other map" if len(maps) == 1 else f"the other map of sample {k}"
-        _check_size(named, values, positions[(of == k) & ~none], shape)
-    missing = int(np.count_nonzero(none))
-    if len(maps) == 1 and not missing and fill is None:
-        return first[positions[..., 0], positions[..., 1]]
-    carried = np.empty((*none.shape, *first.shape[2:]), dtype=first.dtype)
-    for k, values in enumerate(maps):
-        here = (of == k) & ~none
-        carried[here] = values[positions[here, 0], positions[here, 1]]
-    if fill is not None:
-        carried[none] = _filling(fill, none, carried)
-    elif missing:
-        row, col = (int(n) for n in np.argwhere(none)[0])
+    none = np.argwhere(positions[..., 0] < 0)
+    if len(none):
+        what = f"{len(none)} pixel{'s have' if len(none) > 1 else ' has'} no source"
         raise ValueError(
-            f"{missing} pixel{'s have' if missing > 1 else ' has'} no source, the first at row {row}, column {col}: "
-            "give the values to take there with fill="
+            f"{what}, the first at row {none[0, 0]}, column {none[0, 1]}: carry over maps of a run without known pixels"
         )
+    of = positions[..., 2] if positions.shape[2] == 3 else np.zeros(positions.shape[:2], dtype=np.int32)
+    carried = np.empty((*of.shape, *maps[0].shape[2:]), dtype=maps[0].dtype)
+    for k, (values, shape) in enumerate(zip(maps, shapes, strict=True)):
+        places = positions[of == k]
+        _check_size("the other map" if len(maps) == 1 else f"the other map of sample {k}", values, places, shape)
+        carried[of == k] = values[places[:, 0], places[:, 1]]
     return carried
 
 
@@ -140,25 +124,6 @@ def _check_size(name: str, values: NDArray[Any], places: SourceMap, shape: tuple
             f"{name} is {cols} x {rows} pixels (width x height) and the sample at least "
             f"{last_col + 1} x {last_row + 1}: bring it to the sample's size"
         )
-
-
-def _filling(fill: ArrayLike, none: NDArray[np.bool_], carried: NDArray[Any]) -> NDArray[Any]:
-    """Return the values of pixels without a source, in the map's type."""
-    given: Any = np.ma.asarray(fill)
-    if given.dtype.kind not in "buifc":
-        raise TypeError(f"fill holds {given.dtype} values: give numbers of the other map's type")
-    if given.ndim and given.shape != carried.shape:
-        raise ValueError(f"fill has the shape {given.shape}: give {carried.shape}, or one value")
-    wanted = np.ma.asarray(given[none] if given.ndim else given)
-    if np.ma.getmaskarray(wanted).any():
-        raise ValueError("fill is masked where a pixel has no source: give a value for each of these pixels")
-    values = wanted.data
-    with np.errstate(invalid="ignore", over="ignore"):
-        cast = values.astype(carried.dtype)
-    whole = carried.dtype.kind in "bui"
-    if not (cast == values).all() if whole else (np.isinf(cast) & np.isfinite(values)).any():
-        raise ValueError(f"fill has values that {carried.dtype} cannot hold: give those of the other map's type")
-    return cast
 
 
 def save_source_map(path: PathLike, source: ArrayLike) -> None:
