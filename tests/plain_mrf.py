@@ -188,9 +188,6 @@ def look(level, X, at):
     return x, [0 if value == UNKNOWN else v for value, v in zip(x, u, strict=True)], t, source
 
 
-# -- the levels -----------------------------------------------------------------------------------------------
-
-
 def number_of_levels(samples, shape, o):
     """M: the most at which the sample has enough candidates, and the lattice holds a neighbourhood."""
     radius = isqrt(o.order)
@@ -351,9 +348,6 @@ def of_kinds(level, used):
     return np.array([costs[kind] for kind in kinds], float32)
 
 
-# -- 6.2.2.1: what a site weighs ------------------------------------------------------------------------------
-
-
 def candidates_of(level, X, s, near, turn):
     """The numbers of the candidates that a site weighs; which of them continue a neighbour's source; and the number of
     each that does so, once for every such neighbour, and of each that is a neighbour's source, which counts 4 times.
@@ -406,9 +400,6 @@ def weights(level, d):
     """Equation (7): floor(2^40 exp(-(d_p - min d) / 2h^2))."""
     a = (d - d.min()) * level.scale
     return [int(e * 2.0**40) if b < 28 else 0 for e, b in zip(exponential(-np.minimum(a, 28)), a, strict=True)]
-
-
-# -- 6.2.2.2: what a site becomes -----------------------------------------------------------------------------
 
 
 def drawn(level, d, numbers, s, turn):

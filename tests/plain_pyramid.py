@@ -44,8 +44,6 @@ def join(terms, shape, torus):
     return total
 
 
-# -- pyramids, as dicts of subbands ---------------------------------------------------------------------------
-
 BINOMIAL = np.outer([1, 4, 6, 4, 1], [1, 4, 6, 4, 1]) / 256
 
 
@@ -86,9 +84,6 @@ class Laplacian:
 
 
 PYRAMIDS = {"steerable": Steerable, "laplacian": Laplacian}
-
-
-# -- match-histogram, match-texture ---------------------------------------------------------------------------
 
 
 def quantiles(target, n):

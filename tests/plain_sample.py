@@ -110,9 +110,6 @@ def one_hot(names):
     return 1 if len(names) < 3 else len(names)
 
 
-# -- pixels to grey levels ------------------------------------------------------------------------------------
-
-
 def scale(Y, o):
     """The variable of each channel; what makes pixels planes of grey levels; the highest level; 1 of each in pixels."""
     ends = [(min(values), max(values)) for values in Y.variables]
@@ -229,9 +226,6 @@ def clamped(i, n):
     return min(max(i, 0), n - 1)
 
 
-# -- guides ---------------------------------------------------------------------------------------------------
-
-
 def labelled(guide, o):
     """The guide's pictures (rows, columns, channels), that of the output, and whether their numbers are labels."""
     of_pictures, output = guide
@@ -285,9 +279,6 @@ def guide_planes(guide, o, spread, top):
             mine += [raised(plane) for plane in y]
         told += [np.where(silent, UNKNOWN, raised(plane)) for plane in wanted]
     return planes, told
-
-
-# -- what is given, at coarse levels --------------------------------------------------------------------------
 
 
 def stand_ins(known, spacing, torus):

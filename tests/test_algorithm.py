@@ -198,8 +198,6 @@ def test_the_cases_give_every_option():
     assert given == {"preset", *plain_mrf.DEFAULTS} - ELSEWHERE
 
 
-# -- every option matters -------------------------------------------------------------------------------------
-
 NO_BYTE = {"array": None}
 """Options that change no byte, with their defaults: where a run is accounted for, and what is checked."""
 

@@ -233,8 +233,6 @@ def test_the_cases_give_every_option():
     assert {option for each in CASES.values() for option, _ in each.options} >= ELSEWHERE - {"labels"}
 
 
-# -- every option matters -------------------------------------------------------------------------------------
-
 # For each option: what else is given, and two values of which each gives another output.
 CHANGES = {
     "categorical": [(EXACT, {"kinds": 3}, False, True), (FEW, {"kinds": 3, "channels": 2}, (0,), False)],

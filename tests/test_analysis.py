@@ -44,9 +44,6 @@ def analyses(draw):
     }
 
 
-# -- levels ---------------------------------------------------------------------------------------------------
-
-
 @given(sides, sides)
 @example(1, 1)
 @example(1, 40)
@@ -87,9 +84,6 @@ def test_a_single_level_has_no_nodes():
     assert_same_bits(found.bands, [found.sample.planes])
     assert not found.features.any()
     assert not found.energy.any()
-
-
-# -- features -------------------------------------------------------------------------------------------------
 
 
 @given(analyses())
@@ -183,9 +177,6 @@ def test_no_orientations_leave_the_bands_alone(machine):
         assert_same_bits(bare[-2:], [np.ascontiguousarray(a[:, ::5]) for a in whole[-2:]])
 
 
-# -- what does not matter -------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("boundary", ["torus", "open"])
 def test_contrast_and_a_constant_change_nothing(boundary):
     byte = texture((13, 10), 3)
@@ -215,9 +206,6 @@ def test_on_a_torus_a_shift_of_the_sample_shifts_its_features():
         assert_same_bits(np.roll(u.reshape(rows, cols, -1), (8 >> level, -16 >> level), (0, 1)).reshape(u.shape), v)
 
 
-# -- the warning ----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("shape", "options", "told"),
     [
@@ -237,9 +225,6 @@ def test_it_warns_where_no_level_is_as_large_as_the_filters(caplog, shape, optio
     assert len(said) == told
     if told:
         assert f"{shape[0]} rows x {shape[1]} columns" in said[0]
-
-
-# -- machines -------------------------------------------------------------------------------------------------
 
 
 @given(case=analyses())

@@ -116,9 +116,6 @@ def test_an_unknown_mapping(text):
         parse_array(text)
 
 
-# -- accounting -----------------------------------------------------------------------------------------------
-
-
 def account(array, packed, grid, steps, order=1, candidates=10, channels=1, words=2):
     counted = Account(array, packed)
     counted.begin(grid, neighbourhood_offsets(order), candidates, channels, words)
@@ -164,9 +161,6 @@ def test_the_published_figures():
     assert pytest.approx(1.2e9) == FLOPS * 16384
     assert pytest.approx(23e9) == XNET * 16384
     assert ROUTER == 1.28e9
-
-
-# -- runs -----------------------------------------------------------------------------------------------------
 
 
 def run(device, **options):

@@ -242,8 +242,6 @@ def test_any_seed_has_the_references_bits(cl_device, seed):
     assert_same_bits(ours, simdtex.synthesize(sample, (7, 8), device=REFERENCE, **options))
 
 
-# -- in processes of their own --------------------------------------------------------------------------------
-
 CHILD = """
 import json, sys
 import test_bits
@@ -322,8 +320,6 @@ def test_rusticl_has_the_references_bits(tmp_path, name):
     assert done.returncode == 0, done.stdout
     assert done.stdout.count("same bits") == 1
 
-
-# -- Oclgrind: races and accesses out of bounds ---------------------------------------------------------------
 
 TINY = """
 import sys

@@ -127,9 +127,6 @@ def one_level(p, source, level, match, seed=0, machine=REFERENCE):
     return [a[p.own(level)] for a in host(machine, found[:2])]
 
 
-# -- the paper's loops ----------------------------------------------------------------------------------------
-
-
 class Plain:
     """The pseudo-code SynthesizePyramid, for one pixel, in Python numbers."""
 
@@ -234,9 +231,6 @@ def test_the_reference_is_the_papers_loops_on_lattices_of_every_kind(tile, shape
         check_against_loops(problem(1, tile=tile, shape=shape, levels=levels, kinds=kinds, of=of), match, 2**40 + 5)
 
 
-# -- one result, however it is computed -----------------------------------------------------------------------
-
-
 @phases
 @given(p=problems(features=(1, 9)), seed=seeds)
 @settings(max_examples=40)
@@ -309,9 +303,6 @@ def test_levels_that_are_not_compared_are_counted_all_the_same(machine, closed, 
     assert_same_bits(sampled_on(machine, p, match, 7), theirs)
 
 
-# -- what must hold of the sets -------------------------------------------------------------------------------
-
-
 def test_what_lies_below_a_node_that_fails_is_not_compared(machine):
     """Of the four nodes at the top one passes; all of the level below would."""
     p = problem(6, tile=(8, 8), shape=(8, 8), levels=3, features=1)
@@ -339,9 +330,6 @@ def test_differences_beyond_31_bits_are_compared(machine):
         for m in (REFERENCE, machine):
             _, counts = sampled_on(m, p.with_thresholds(threshold), True, 1)
             assert counts[p.own(0)].tolist() == [[n, 3] for n in numbers for _ in range(2)]
-
-
-# -- the draw, equation (12) ----------------------------------------------------------------------------------
 
 
 def many_tiles(tile, rows, cols, levels, **options):

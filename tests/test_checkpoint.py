@@ -128,9 +128,6 @@ def resumed(job, file, every=0, **how):
             stops += 1
 
 
-# -- the same bytes -------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", JOBS)
 def test_stopped_after_every_checkpoint(name, whole, file, monkeypatch):
     stopping_after(monkeypatch, 1)
@@ -213,9 +210,6 @@ def test_finished_realisations_are_kept(file):
         assert made == [number for number in range(3) if number not in numbers]
         assert_same_bits(found, whole)
         file.write_bytes(kept)
-
-
-# -- what is refused ------------------------------------------------------------------------------------------
 
 
 def stopped(file, job=QUICK, **how):
@@ -320,9 +314,6 @@ def test_bad_input_leaves_nothing(job, file):
     assert not list(file.parent.iterdir())
 
 
-# -- damage, and faults while it writes -----------------------------------------------------------------------
-
-
 def cut(path):
     path.write_bytes(path.read_bytes()[:-7])
 
@@ -401,9 +392,6 @@ def test_a_path_that_cannot_be_written_is_refused_before_the_work(file, monkeypa
         run(QUICK, callback=lambda progress: pytest.fail("the work has begun"), checkpoint=file)
 
 
-# -- how often, and what --------------------------------------------------------------------------------------
-
-
 def test_a_write_waits_75_times_what_the_last_one_took(file, monkeypatch):
     now, writes = [100.0], []
     monkeypatch.setattr(checkpoints.time, "perf_counter", lambda: now[0])
@@ -478,9 +466,6 @@ def test_identities_tell_inputs_apart():
     assert identity((1, None, "a", True)) == [1.0, None, "a", True]
     assert identity(schedules.get("block:3x4")) == "Block block:3x4"
     assert identity(Options(xi=-2))["xi"] == -2 and json.dumps(identity(Options()))
-
-
-# -- killed ---------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are forked")

@@ -69,9 +69,6 @@ def refused(folder, command, args, words):
     assert listing(folder) == before
 
 
-# ---------------------------------------------------------------- fill
-
-
 def test_fill_gives_the_bytes_of_the_function(folder):
     args = ("photo.png", "--mask", "mask.png", "-o", "out.png", "--reach", 6, "--structure", 0.5)
     result = small(folder, "fill", *args)
@@ -154,9 +151,6 @@ BAD_FILL = {
 def test_bad_fills_get_one_sentence_and_write_nothing(folder, case):
     args, words = BAD_FILL[case]
     refused(folder, "fill", args, words)
-
-
-# ---------------------------------------------------------------- extend
 
 
 def test_extend_gives_the_bytes_of_the_function(folder):

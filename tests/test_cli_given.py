@@ -94,9 +94,6 @@ def listing(folder):
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
 
 
-# ---------------------------------------------------------------- samples and their masks
-
-
 def test_several_samples_and_maps_of_them(folder):
     args = ["sample.png", "second.png", "-o", "out.tif", "--size", "18x16", "--shares", "1,2", "--finish", 0]
     also = ["--also", "normal.png,normal2.png=carried.png", "--source-map", "s.npz"]
@@ -135,9 +132,6 @@ def test_a_sample_may_be_unknown_in_parts(folder):
     assert refused.exit_code == 2 and "known everywhere" in refused.output
 
 
-# ---------------------------------------------------------------- known values
-
-
 def test_a_table_is_kept(folder):
     args = ["sample.png", "-o", "out.tif", "--size", "20x14", "--known", "wells.csv"]
     out = made(folder, *args, "--source-map", "s.npz")
@@ -164,9 +158,6 @@ def test_categories_are_never_mixed(folder):
     facies = pixels(folder, "facies.tif")
     assert set(np.unique(out)) <= {0, 3}
     assert np.array_equal(out, simdtex.synthesize(facies, (16, 16), categorical=True, **OPTIONS))
-
-
-# ---------------------------------------------------------------- guides
 
 
 def numbered(picture):
@@ -207,9 +198,6 @@ def test_each_sample_has_its_guide(folder):
     guides = [numbered(pixels(folder, name)) for name in ("labels.png", "labels2.png")]
     guide = guides, numbered(pixels(folder, "wanted.png"))
     assert np.array_equal(out, simdtex.synthesize(samples, (16, 18), guide=guide, **OPTIONS))
-
-
-# ---------------------------------------------------------------- what is wrong
 
 
 OUT = ["-o", "out.tif"]

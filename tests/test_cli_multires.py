@@ -32,9 +32,6 @@ def files(folder):
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
-# ---------------------------------------------------------------- synth
-
-
 def test_everything_at_once(folder):
     args = ["--size", "30x26", "--alpha", "0.6", "--beta", "0.5", "--orientations", 3]
     args += ["--levels", 4, "--boundary", "open", "--preset", "paper"]

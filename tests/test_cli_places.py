@@ -71,9 +71,6 @@ def test_what_writes_is_known_to_write():
             assert option.type.role in READ
 
 
-# -- two names for one file -----------------------------------------------------------------------------------
-
-
 def words(option, text):
     """An option with a value."""
     return [text] if isinstance(option, click.Argument) else [option.opts[-1], text]
@@ -212,9 +209,6 @@ def test_names_that_differ_are_let_be(folder):
     done = CliRunner().invoke(cli.main, ["synth", *args, "--size", "9x9", "--source-map", "stmap.npz"])
     assert done.exit_code == 0, done.output
     assert (folder / "sample.png").read_bytes() == before and (folder / "Sample.png").exists()
-
-
-# -- what is not there ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("pair", parameters(*READ), ids=lambda pair: f"{pair[0]} {pair[1].name}")

@@ -65,8 +65,6 @@ def assert_one_sentence(result, words, folder):
     assert files(folder) == FILES
 
 
-# ---------------------------------------------------------------- synth
-
 OPTIONS = {
     "plain": ([], {}),
     "sharing options": (
@@ -144,9 +142,6 @@ def test_bad_synth_gets_one_sentence_and_writes_nothing(folder, case):
     args, words = BAD_SYNTH[case]
     stages = [] if "--stages" in args else ["--stages", "st"]
     assert_one_sentence(synth(*stages, *args), words, folder)
-
-
-# ---------------------------------------------------------------- solid
 
 
 def test_solid_is_what_python_makes(folder):
@@ -239,8 +234,6 @@ def test_more_memory_than_the_device_has_is_one_sentence(folder, any_device):
         pytest.skip("this device has the memory")
     assert_one_sentence(result, "give a smaller size", folder)
 
-
-# ---------------------------------------------------------------- mix
 
 MIXTURES = {
     "average of all": ([], {}),

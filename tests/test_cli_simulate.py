@@ -106,9 +106,6 @@ def assert_same(ours, theirs):
     assert ours.attrs == theirs.attrs
 
 
-# ---------------------------------------------------------------- what is written
-
-
 @pytest.mark.parametrize("suffix", ["npz", "nc", "zarr"])
 def test_the_bytes_of_the_function_in_every_format(folder, suffix):
     found = made(folder, "grey.png", "-n", 3, "--first", 2, "--size", "14x12", out=f"out.{suffix}")
@@ -160,9 +157,6 @@ def test_a_training_image_may_be_unknown_in_parts(folder):
     assert not np.isnan(found.values).any()
 
 
-# ---------------------------------------------------------------- hard data
-
-
 def test_a_table_of_hard_data(folder):
     found = made(folder, "grey.png", "-n", 2, "--known", "wells.csv", "--size", "14x12")
     assert (found.values[:, 4, 3] == 200).all() and (found.values[:, 7, 10] == 17).all()
@@ -196,9 +190,6 @@ def test_an_existing_file_is_replaced(folder):
     assert made(folder, "grey.png", "--size", "9x8").shape == (1, 8, 9)
 
 
-# ---------------------------------------------------------------- a report
-
-
 def test_a_report_is_a_page_and_numbers(folder):
     pytest.importorskip("gstools")
     args = ("--known", "facies.csv", "--size", "14x12", "--categorical", "--report", "report")
@@ -208,8 +199,6 @@ def test_a_report_is_a_page_and_numbers(folder):
     results = json.loads((folder / "report" / "results.json").read_text(encoding="utf-8"))
     assert results["files"] == sorted(path.name for path in (folder / "report").iterdir())
 
-
-# ---------------------------------------------------------------- what is refused
 
 GREY = ["grey.png", "-o", "out.npz", "--size", "14x12"]
 FACIES = ["facies.png", "-o", "out.npz", "--size", "14x12", "--categorical"]

@@ -70,9 +70,6 @@ def test_only_ends_of_sweeps_are_recorded_and_all_progress_is_passed_on():
     assert len(seen) == 3 and recorder.sweeps == []
 
 
-# ---------------------------------------------------------------- runs
-
-
 SAMPLE = texture((18, 16))
 JOB = {"order": 2, "device": "reference", "levels": 2}
 

@@ -35,9 +35,6 @@ def no_variable(monkeypatch):
     monkeypatch.delenv(device.VARIABLE, raising=False)
 
 
-# Choosing
-
-
 @pytest.mark.parametrize(
     ("text", "index"),
     [
@@ -168,9 +165,6 @@ def test_ensure_accepts_a_simulator_only_by_name(monkeypatch):
     assert device.main() == 1
     monkeypatch.setenv(device.VARIABLE, "oclgrind")
     assert device.main() == 0
-
-
-# Broken platforms
 
 
 class Broken:
@@ -343,9 +337,6 @@ def test_no_folder_is_set_on_windows(intel, monkeypatch):
     monkeypatch.setattr(runtimes.sys, "platform", "win32")
     with runtimes._icd_folder():
         assert "OCL_ICD_VENDORS" not in os.environ
-
-
-# The listing on this machine, and how it is shown
 
 
 def test_every_usable_device_is_in_the_isolated_listing(cl_device):

@@ -158,9 +158,6 @@ def test_a_sample_and_options_of_every_kind_come_back_from_a_store(tmp_path):
     assert json.dumps(store.about)
 
 
-# -- the order of things, and going on -------------------------------------------------------------------------
-
-
 class Stop(Exception):
     pass
 
@@ -250,9 +247,6 @@ def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeyp
     assert_same_bits(store.root["image"][...], whole)
 
 
-# -- progress --------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps nobody off a folder")
 def test_one_process_at_a_time_leads(tmp_path):
     path, said = tmp_path / "out.zarr", []
@@ -285,9 +279,6 @@ def test_progress_tells_every_tile(tmp_path, monkeypatch, most, side):
     assert seen[-1][1] == "writing the picture, tile 4 of 4"
     assert any("sweep 2, tile 3 of 4" in doing for _, doing, _ in seen)
     assert seen[-1][2].shape[:2] == side
-
-
-# -- the plan --------------------------------------------------------------------------------------------------
 
 
 def test_the_plan_says_what_is_needed():
@@ -351,9 +342,6 @@ def test_windows_go_on_across_the_seam():
     for window in (Tile(15, 25, 9, 12), Tile(0, 0, 20, 30), Tile(3, 4, 5, 6)):
         rows, cols = (np.arange(a, a + n) % m for a, n, m in zip(window[:2], window[2:], (20, 30), strict=True))
         assert_same_bits(cut(whole, level, window), whole[:, rows[:, None], cols])
-
-
-# -- bad input -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -95,9 +95,6 @@ def material(tmp_path, monkeypatch):
     return tmp_path
 
 
-# ---------------------------------------------------------------- what is shown runs
-
-
 PYTHON = {
     code: page_id(page)
     for page in PAGES
@@ -229,9 +226,6 @@ def test_command_of_the_tour_runs(any_device, material, line, monkeypatch):
     check_outputs(words, material)
 
 
-# ---------------------------------------------------------------- what is named exists
-
-
 def test_links_of_readme_exist():
     links = re.findall(r"\]\(([^)]+)\)", README)
     inside = [link for link in links if "://" not in link and not link.startswith("#")]
@@ -270,9 +264,6 @@ def test_every_kernel_and_operation_is_in_the_table():
     for kernel in (ROOT / "kernels").glob("*.cl"):
         for name in (f"kernels/{kernel.name}", f"simdtex/ops/{kernel.stem}.py", f"tests/test_{kernel.stem}.py"):
             assert f"``{name}``" in table, name
-
-
-# ---------------------------------------------------------------- the reference is complete
 
 
 @pytest.mark.parametrize("name", sorted(set(cli.main.commands) - {"bench", "devices"}))

@@ -18,9 +18,6 @@ def noise(seed, shape=(6, 40, 50), values=2):
     return np.random.default_rng(seed).integers(0, values, shape).astype(np.uint8)
 
 
-# ---------------------------------------------------------------- categories
-
-
 def test_categories_are_those_of_the_training_image_unless_they_are_named():
     image = np.array([[3, 1], [1, 7]], np.uint8)
     assert ensemble.categories_of(image).tolist() == [1, 3, 7]
@@ -30,9 +27,6 @@ def test_categories_are_those_of_the_training_image_unless_they_are_named():
     assert len(ensemble.categories_of(np.arange(17).reshape(1, 17))) == 0
     assert len(ensemble.categories_of(np.arange(16).reshape(1, 16))) == 16
     assert ensemble.categories_of(image > 2).tolist() == [False, True]
-
-
-# ---------------------------------------------------------------- variograms
 
 
 def test_variogram_of_a_checkerboard():
@@ -65,9 +59,6 @@ def test_without_gstools_one_sentence_says_so(monkeypatch):
         _variogram(np.zeros((5, 5)), 0, 2)
 
 
-# ---------------------------------------------------------------- connectivity
-
-
 def test_connectivity_of_two_bars():
     image = np.zeros((30, 40), int)
     image[5:8] = 4
@@ -97,9 +88,6 @@ def test_pixels_are_connected_by_their_sides():
 def test_connectivity_of_a_missing_category():
     found = ensemble.connectivity(np.zeros((5, 5), int), 1, 3)
     assert np.isnan(found.function).all() and found.components == 0 and np.isnan(found.largest)
-
-
-# ---------------------------------------------------------------- dead ends
 
 
 def lines(*ends, width=8, shape=(100, 120)):
@@ -180,9 +168,6 @@ def test_a_line_that_bends_is_one_arm():
     assert len(ensemble.dead_ends(stairs, 1)) == 2
 
 
-# ---------------------------------------------------------------- distances
-
-
 def test_identical_realisations_have_no_variety():
     image = noise(1)[0]
     found = ensemble.anodi(np.stack([image] * 4), noise(2)[0])
@@ -245,9 +230,6 @@ def test_frequent_values_are_classes_of_their_own(frequent):
     assert ensemble.anodi(constant, training).likeness == pytest.approx(1)
 
 
-# ---------------------------------------------------------------- the summary
-
-
 def test_summary_puts_everything_together():
     training, hidden = (image[:, :64] for image in ensemble.channels())
     images, training = hidden[:192, :56].reshape(4, 48, 56), training[:64]
@@ -279,9 +261,6 @@ def test_summary_of_continuous_values():
     np.testing.assert_allclose(found.open, images.std(0, ddof=1))
 
 
-# ---------------------------------------------------------------- channels
-
-
 @pytest.fixture
 def make_channels(monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).resolve().parent.parent / "benchmarks"))
@@ -297,9 +276,6 @@ def test_the_channels_of_the_package_are_those_that_the_benchmark_draws(make_cha
     assert digest == "5c4f8284690ef1a95bd8b55732f0555e3bf72c474793046a453affd913ba9901"
     with pytest.raises(ValueError, match="the shape is 20 x 99"):
         make_channels((20, 99), 1)
-
-
-# ---------------------------------------------------------------- bad input
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32, np.float64])

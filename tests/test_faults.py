@@ -163,9 +163,6 @@ def test_a_disk_that_is_full(tiny):
         assert os.listdir(tiny) == ["ballast"]
 
 
-# -- leftovers of killed processes ----------------------------------------------------------------------------
-
-
 def leftover(name, days):
     """Make a hidden file that a process left so many days ago."""
     name.touch()
@@ -230,9 +227,6 @@ def test_a_hidden_name_is_not_too_long(tmp_path):
         temporary.write_bytes(b"1")
 
 
-# -- checksums ------------------------------------------------------------------------------------------------
-
-
 def keep(path, array):
     write_checked(path, lambda file: np.savez(file, array=array))
 
@@ -253,9 +247,6 @@ def test_a_checked_file_gives_back_what_was_written_or_says_that_it_is_damaged(t
             read_checked(path)
     with pytest.raises(FileNotFoundError):
         read_checked(tmp_path / "none")
-
-
-# -- commands -------------------------------------------------------------------------------------------------
 
 
 def command(folder, *words):

@@ -179,9 +179,6 @@ def test_texts_beside_the_pixels_are_not_unpacked(tmp_path):
             assert most < 2**24, (kind, bits)
 
 
-# -- source maps, hard data -----------------------------------------------------------------------------------
-
-
 def test_source_maps_and_hard_data(tmp_path):
     files = {
         "map.npz": (load_source_map, zipped(source=npy((50_000, 50_000, 2), "<i4"))),
@@ -205,9 +202,6 @@ def test_lines_that_no_table_has(tmp_path):
     }.items():
         (tmp_path / "a.csv").write_text(text)
         refused(read_hard_data, tmp_path / "a.csv", words, peak=2**24)
-
-
-# -- formats --------------------------------------------------------------------------------------------------
 
 
 def test_only_documented_formats_are_tried(tmp_path, monkeypatch):

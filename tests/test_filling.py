@@ -46,9 +46,6 @@ def with_axis(axis, dtype=np.uint8, shape=SHAPE, seed=0):
     return np.ascontiguousarray(np.moveaxis(texture(shape, 3, dtype, seed), -1, axis))
 
 
-# -- fill: what is kept ---------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("axis", [None, 0, -1])
 @pytest.mark.parametrize("dtype", TYPES)
 def test_outside_the_hole_is_the_image_to_the_bit(dtype, axis):
@@ -129,8 +126,6 @@ def test_one_known_part_fills_all_the_rest():
     assert_same_bits(found[~mask], image[~mask])
     assert np.isin(found, image[~mask]).all()
 
-
-# -- fill: windows --------------------------------------------------------------------------------------------
 
 FAR = hole_at(np.s_[3:6, 3:7], np.s_[20:24, 50:54], np.s_[2:5, 54:58], shape=(30, 60))
 NEAR = hole_at(np.s_[3:6, 3:7], np.s_[3:6, 9:12], shape=(30, 60))
@@ -269,9 +264,6 @@ def test_every_hole_is_in_one_window_with_what_its_sites_look_at(parts, radius, 
     assert len(found) <= FEW
 
 
-# -- fill: where pixels are from ------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("mask", "reach"), [(FAR, None), (FAR, 3), (NEAR, None)], ids=["far", "far, 3", "near"])
 def test_known_pixels_are_from_themselves_and_others_from_what_is_known(mask, reach):
     image = texture(mask.shape)
@@ -328,9 +320,6 @@ def test_categories_are_filled_with_categories():
     image = (texture(SHAPE) > 90).astype(np.uint8) * 3 + (texture(SHAPE) > 170) * np.uint8(4)
     found = fill(image, MIDDLE, categorical=True)
     assert set(np.unique(found[MIDDLE])) <= set(np.unique(image[~MIDDLE]))
-
-
-# -- fill: what is told ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("axis", [None, 0])
@@ -427,9 +416,6 @@ def test_seeds_count():
     assert (extend(image, right=4, rng=3) != extend(image, right=4, rng=4)).any()
 
 
-# -- extend ---------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("axis", [None, 0, -1])
 @pytest.mark.parametrize("dtype", [np.bool_, np.uint8, np.int32, np.float32])
 def test_the_picture_is_in_its_place_to_the_bit(dtype, axis):
@@ -507,8 +493,6 @@ def test_a_tile_along_x_wraps_along_x_alone():
     assert step(found, 1) < 0.55 * step(image, 1)
     assert np.array_equal(found[[0, -1], 5:-5], image[[0, -1], 5:-5])
 
-
-# -- what is refused ------------------------------------------------------------------------------------------
 
 IMAGE = texture(SHAPE)
 FLOAT = texture(SHAPE, dtype=np.float32)

@@ -43,9 +43,6 @@ def levels(draw):
     return picture, band, taps, draw(st.booleans())
 
 
-# -- responses ------------------------------------------------------------------------------------------------
-
-
 @given(levels())
 def test_the_reference_is_the_rule(case):
     picture, band, taps, torus = case
@@ -80,9 +77,6 @@ def test_sums_beyond_32_bits_are_exact(machine):
     for m in (REFERENCE, machine):
         features = run(m, picture, picture, taps, True)
         assert (features == [TOP, 25 * TOP, -25 * TOP]).all()
-
-
-# -- the bank -------------------------------------------------------------------------------------------------
 
 
 def exact(orientations, sigma=0.7, side=3):
@@ -127,9 +121,6 @@ def test_a_bank_of_no_orientations_leaves_the_bands_alone(machine):
     for m in (REFERENCE, machine):
         features = run(m, picture, picture - TOP // 2, taps, True)
         assert_same_bits(features, (picture - TOP // 2).reshape(2, 20).T.astype(np.int32))
-
-
-# -- directions -----------------------------------------------------------------------------------------------
 
 
 def test_angle_0_sees_change_along_columns_only_and_a_right_angle_along_rows_only():

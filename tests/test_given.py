@@ -45,9 +45,6 @@ def keeps(sample, known, **options):
     return image
 
 
-# -- what is given stays --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("search", ["exact", "coherent"])
 @pytest.mark.parametrize("schedule", SCHEDULES)
 def test_known_values_stay_under_every_schedule(schedule, search):
@@ -107,9 +104,6 @@ def test_floats_with_nan_are_a_masked_array():
     assert_same_bits(masked, nan)
 
 
-# -- data between the sites of a level ------------------------------------------------------------------------
-
-
 @given(
     *(st.integers(1, 20), st.integers(1, 20), st.sampled_from([1, 2, 4, 8]), st.booleans()),
     *(st.sampled_from([0.02, 0.1, 0.4, 0.9]), st.integers(0, 2**16)),
@@ -161,9 +155,6 @@ def test_a_datum_between_sites_is_felt_at_a_coarse_level_and_no_longer_after_it(
     assert share[0] < 0.2
 
 
-# -- where data are from ----------------------------------------------------------------------------------------
-
-
 def test_sources_of_known_sites_suggest_how_to_go_on():
     """The left of a picture that the sample holds, with its places: the rest is copied from there."""
     sample = np.random.default_rng(1).integers(0, 256, (20, 24)).astype(np.uint8)
@@ -193,9 +184,6 @@ def test_the_planes_of_what_is_given():
     assert laid.values[:, 0, 1].tolist() == [7, 65535]
     assert laid.values[:, 1, 2].tolist() == sample.levels[:, 4, 5].tolist()
     assert laid.source.tolist() == [[-1, -1, -1], [-1, -1, (4 + 2) * (8 + 4) + 5 + 2]]
-
-
-# -- guides -----------------------------------------------------------------------------------------------------
 
 
 def patchwork(labels=2, size=16):
@@ -240,9 +228,6 @@ def test_a_grey_guide_is_followed():
     alone, _ = run(sample, (24, 24), order=4)
     assert np.corrcoef(image.ravel(), wanted.ravel())[0, 1] > 0.9
     assert np.corrcoef(alone.ravel(), wanted.ravel())[0, 1] < 0.5
-
-
-# -- several samples, masks and gaps ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("search", ["exact", "coherent"])
@@ -293,9 +278,6 @@ def test_what_is_looked_at_from_one_sample_is_no_other():
     image, output = run([*samples], (10, 10), order=1, levels=1, finish=4.0, shares=(1.0, 0.0))
     assert (output.source[..., 2] == 0).all()
     assert image.max() <= 4
-
-
-# -- kinds of variables -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("search", ["exact", "coherent"])

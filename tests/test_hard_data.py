@@ -19,9 +19,6 @@ def table(tmp_path, text, name="wells.csv"):
     return path
 
 
-# ---------------------------------------------------------------- reading
-
-
 SAME = [
     "x,y,facies\n1,2,3\n4.5,-0.25,6e1\n",
     "X, Y, facies\n1, 2, 3\n4.5, -0.25, 60\n",
@@ -121,9 +118,6 @@ def test_files_that_are_no_tables(tmp_path):
         (tmp_path / "b.npy").write_bytes(content)
         with pytest.raises(ValueError, match=r"b\.npy: "):
             read_hard_data(tmp_path / "b.npy")
-
-
-# ---------------------------------------------------------------- placing
 
 
 def plainly(rows, shape, variables):

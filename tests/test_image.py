@@ -80,9 +80,6 @@ def test_grey_webp_reads_as_equal_colours(tmp_path):
     np.testing.assert_array_equal(image.read(tmp_path / "a.webp").pixels, pixels[..., None] + [0] * 3)
 
 
-# ---------------------------------------------------------------- other people's files
-
-
 def test_one_bit_and_palette_and_print_colours(tmp_path):
     rgb = PIL.Image.fromarray(noise((8, 9, 3), np.uint8))
     rgb.convert("1").save(tmp_path / "bit.png")
@@ -179,9 +176,6 @@ def test_format_is_told_by_content(tmp_path):
     np.testing.assert_array_equal(image.read(tmp_path / "a.jpg").pixels, pixels)
 
 
-# ---------------------------------------------------------------- bad files
-
-
 def encoded(suffix, dtype, tmp_path):
     path = tmp_path / f"whole{suffix}"
     image.write(path, noise((40, 30, 3), dtype))
@@ -247,9 +241,6 @@ def test_no_bytes_escape_the_errors(tmp_path_factory, data, start):
     path.write_bytes(start + data)
     with contextlib.suppress(ValueError):
         assert image.read(path).pixels.ndim in (2, 3)
-
-
-# ---------------------------------------------------------------- unknown pixels, alpha, masks
 
 
 def test_unknown_pixels_are_read_and_for_the_function_to_judge(tmp_path):
@@ -335,9 +326,6 @@ def test_a_mask_of_another_size(tmp_path):
         image.read_mask(tmp_path / "mask.npy", (1, 4))
 
 
-# ---------------------------------------------------------------- check_sample, parse_size
-
-
 def test_check_sample_brings_channels_last():
     pixels = noise((3, 5, 4), ">u2")
     checked = image.check_sample(pixels, 0)
@@ -359,9 +347,6 @@ def test_parse_size(width, height):
 def test_parse_size_errors(text):
     with pytest.raises(ValueError, match="WIDTHxHEIGHT"):
         image.parse_size(text)
-
-
-# ---------------------------------------------------------------- writing
 
 
 @pytest.mark.parametrize(

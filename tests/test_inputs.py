@@ -28,9 +28,6 @@ def check(sample=GREY, shape=SHAPE, **rest):
     return check_inputs(sample, shape, **rest)
 
 
-# -- what is taken --------------------------------------------------------------------------------------------
-
-
 def test_a_sample_alone_is_plain():
     found = check()
     assert found.plain and found.given is None and found.guide is None
@@ -204,8 +201,6 @@ def test_forms_of_guides():
     assert one.shape[-1] == 3
 
 
-# -- arrays of other libraries ---------------------------------------------------------------------------------
-
 LIBRARIES = {
     "xarray": lambda array: pytest.importorskip("xarray").DataArray(array),
     "dask": lambda array: pytest.importorskip("dask.array").from_array(array, chunks=4),
@@ -243,8 +238,6 @@ def test_the_mask_of_a_dask_array_is_kept():
     (expected,), (found,) = (check_samples(one, None).known for one in (hidden, dask.from_array(hidden, asarray=False)))
     assert np.array_equal(found, expected) and not found.all()
 
-
-# -- what is refused ------------------------------------------------------------------------------------------
 
 INF = at(SOME, (2, 2), np.inf)
 TWO = {"sample": [GREY, GREY[:5, :4]]}

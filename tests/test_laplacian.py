@@ -67,9 +67,6 @@ def depth(shape):
     return 1 + (max(shape) - 1).bit_length()
 
 
-# -- the formulas ---------------------------------------------------------------------------------------------
-
-
 @given(st.integers(-40, 40), st.integers(1, 9), st.booleans())
 def test_indices_are_brought_within_the_border(i, n, torus):
     assert within(np.array([i]), n, torus) == [plain.within(i, n, torus)]
@@ -113,9 +110,6 @@ def test_a_blend_fades_over_one_pixel_on_either_side_of_a_join():
     assert (made[0] == [0, 0, 0, 4, 12, 16, 16, 16]).all()
 
 
-# -- machines -------------------------------------------------------------------------------------------------
-
-
 @given(g=pictures(), torus=st.booleans())
 @settings(max_examples=25)
 def test_a_device_has_the_references_bits(machine, g, torus):
@@ -155,9 +149,6 @@ def test_nothing_overflows_at_the_limits(machine):
             for how in (laplacian_collapse, laplacian_blend):
                 fine = collapse(machine, band, identity((8, 8)), coarse, True, how)
                 assert (fine == sign * (most + TOP)).all()
-
-
-# -- what a pyramid is for ------------------------------------------------------------------------------------
 
 
 @given(pictures(), st.booleans())

@@ -26,9 +26,6 @@ VARIANTS = [
 ids = {"ids": lambda options: "-".join(f"{k}-{v}" for k, v in options.items())}
 
 
-# -- distances, equation (12) ---------------------------------------------------------------------------------
-
-
 def distances(machine, p):
     found, candidates = p.distances(machine)
     return np.asarray(machine.get(found.distance))[: candidates.size, : found.sites]
@@ -93,9 +90,6 @@ def test_the_shape_of_a_launch_changes_no_bit_of_a_distance(cl_device, options):
     assert_same_bits(distances(opencl(cl_device, **options), p), distances(REFERENCE, p))
 
 
-# -- h_opt and the tables of the kernel, equations (7) and (8) ------------------------------------------------
-
-
 @given(st.integers(0, 100), st.sampled_from([1, 2, 8]), st.sampled_from([1, 3]))
 @settings(max_examples=20)
 def test_the_optimal_bandwidth_is_equation_8(seed, order, channels):
@@ -118,9 +112,6 @@ def test_the_tables_of_a_bandwidth(h):
     cumulative = np.cumsum(steps) / steps.sum()
     np.testing.assert_allclose(win.noise / 2.0**32, cumulative, atol=2.0**-32 * win.noise.size)
     assert (np.diff(win.noise.astype(np.int64)) >= 0).all()
-
-
-# -- simdtex.lcpdf, equations (6) to (8) and (12) -------------------------------------------------------------
 
 
 def formula(image, sample, sites, order, bandwidth=1.0, temperature=None, greys=256, boundary="torus"):
@@ -242,8 +233,6 @@ def test_bad_input_is_one_clear_sentence(change, error, words):
         simdtex.lcpdf(**options)
 
 
-# -- the Gibbs sampler draws from the density -----------------------------------------------------------------
-
 DRAWS = 10_000
 SEEDS = (1, 2**33 + 7, 2**64 - 1)
 
@@ -351,8 +340,6 @@ def test_draws_are_legal_where_half_of_the_kernel_is_not():
             check_chi_square(np.bincount(values[0], minlength=256), steps)
         assert values.max() <= 255
 
-
-# -- a device has the reference's bits ------------------------------------------------------------------------
 
 CHOICES = [(False, False), (True, False), (True, True)]
 """Whether sites draw, and whether from the density."""

@@ -81,9 +81,6 @@ def test_the_parts_of_a_sweep_hold_all_sites_in_order(most):
     assert flat == [n for first, last in ranges.tolist() for n in range(first, last)]
 
 
-# -- the state ------------------------------------------------------------------------------------------------
-
-
 def prepared(machine, shape=(20, 23), sample_shape=(24, 25), **options):
     given = {"order": 2, "levels": 3} | options
     return laid_out(machine, texture(sample_shape, seed=3)[..., None], shape, mrf.Options(**given), 5)
@@ -154,8 +151,6 @@ def test_sites_that_may_not_relax_keep_their_values(any_device, schedule):
         relaxed = np.concatenate([step.sites for chosen in free for step in chosen.apart(machine)])
         assert not given.ravel()[relaxed].any()
 
-
-# -- beside the paper --------------------------------------------------------------------------------------------
 
 STEPS = ("1", "2", "3", "4", "5", "6", "6.1", "6.2", "6.2.1", "6.2.2", "6.2.2.1", "6.2.2.2", "6.2.2.3")
 MARK = re.compile(r"#\s+((?:\d(?:\.\d)*)(?:, \d(?:\.\d)*)*)(?=\s|$)")

@@ -215,9 +215,6 @@ def test_a_message_that_is_too_large_ends_the_connection(monkeypatch):
         assert closed.value.rcvd is None or closed.value.rcvd.code == 1009  # None: it was still being sent
 
 
-# -- the command ------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("number", "token"), [(signal.SIGINT, ""), (signal.SIGTERM, SECRET)])
 def test_the_command_prints_an_address_serves_it_and_ends(number, token, tmp_path):
     (tmp_path / "wall.png").write_bytes(png(texture()))

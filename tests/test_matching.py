@@ -61,9 +61,6 @@ def by_rank(values, targets, seed=0):
     return on(REFERENCE, match_ranks, ordered(values, seed), np.sort(targets, 1))
 
 
-# -- by rank --------------------------------------------------------------------------------------------------
-
-
 @given(pairs())
 def test_the_k_th_smallest_takes_the_value_of_its_rank(case):
     values, targets = case
@@ -101,9 +98,6 @@ def test_pictures_without_ties_are_matched_as_by_scikit_image():
     assert (by_rank(values.reshape(1, -1), target.reshape(1, -1)) == expected.reshape(1, -1)).all()
 
 
-# -- the inverse cdf ------------------------------------------------------------------------------------------
-
-
 def exact_inverse(target, bins):
     """The least x with cdf(x) >= i / bins, by going up through the bins one after another."""
     target = sorted(int(t) for t in target)
@@ -129,9 +123,6 @@ def test_the_table_is_the_inverse_of_the_cdf(m, kind, seed, bins):
     assert table.tolist() == [floor(x + Fraction(1, 2)) for x in exact_inverse(target, bins)]
     assert (np.diff(table.astype(np.int64)) >= 0).all()
     assert (table[0], table[-1]) == (target[0], target[-1])
-
-
-# -- by lookup ------------------------------------------------------------------------------------------------
 
 
 def looked_up(segment, table, down):
@@ -203,9 +194,6 @@ def test_a_constant_segment_takes_the_median(machine, bins):
             assert (abs(found - targets[:, 150:151]) <= np.ptp(targets, 1)[:, None] / bins + 1).all()
 
 
-# -- the distance ---------------------------------------------------------------------------------------------
-
-
 @given(pairs(), seeds)
 def test_the_distance_is_the_sum_of_differences(case, seed):
     before = case[0]
@@ -222,9 +210,6 @@ def test_after_ranks_it_is_the_wasserstein_distance(m):
     found = on(REFERENCE, distance, values, by_rank(values, targets))
     for total, one, other in zip(found, values, targets, strict=True):
         assert abs(total - 300 * wasserstein_distance(one, other)) <= CONTRAST * total
-
-
-# -- machines -------------------------------------------------------------------------------------------------
 
 
 def everything(machine, values, targets, bins=256):

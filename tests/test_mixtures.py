@@ -54,9 +54,6 @@ def distances(sample, made, levels=3):
     ]
 
 
-# -- palette and pattern --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("palette", "pattern"), [(0, 1), (1, 0)])
 def test_a_mixture_has_the_colours_of_its_palette(palette, pattern):
     samples = [WARM, COLD]
@@ -98,9 +95,6 @@ def test_a_weight_of_zero_is_as_if_only_the_pattern_were_there():
         assert_same_bits(two, mix(samples[::-1], (40, 48), average=[1, 0], channel_axis=axis, iterations=2))
 
 
-# -- averages, low and high -----------------------------------------------------------------------------------
-
-
 def test_the_average_of_pixels_is_between_them():
     black, white = np.full((16, 16), 10, np.uint8), np.full((16, 16), 200, np.uint8)
     made = mix([black, white], (20, 20), average=[3, 1])
@@ -136,9 +130,6 @@ def test_a_split_at_either_end_is_all_low_or_nearly_all_high(kind):
     made = [mix(GREYS, (48, 48), split=split, **options) for split in (0, 1, 2)]
     assert len({m.tobytes() for m in made}) == 3
     assert_same_bits(mix(GREYS, (48, 48), **options), made[1])
-
-
-# -- any input ------------------------------------------------------------------------------------------------
 
 
 def test_samples_may_be_more_than_two_and_of_any_size():

@@ -53,9 +53,6 @@ def ancestors(stage, size, level):
     return tuple(i // n * m + (i % n >> up) for i, n, m in zip(indices, own, their, strict=True))
 
 
-# -- alpha = 0: the sample, tiled -----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("size", [(8, 16), (13, 7), (5, 12), (6, 1)], ids=str)
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.int32, np.float32, np.float64, np.bool_])
 def test_alpha_0_tiles_the_sample_to_the_bit(dtype, size):
@@ -101,9 +98,6 @@ def test_alpha_0_tiles_the_sample_on_a_device(any_device):
     assert_same_bits(image, np.tile(sample, (2, 2, 1)))
 
 
-# -- alpha = infinity: every band on its own ------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("size", [(8, 8), (13, 7)], ids=str)
 @pytest.mark.parametrize("beta", [0, 1])
 def test_infinite_alpha_leaves_nothing_out(size, beta):
@@ -136,9 +130,6 @@ def test_infinite_alpha_without_phase_draws_from_every_pixel():
     for stage, (rows, cols) in zip(output.stages[1:], reversed(sizes((7, 5))[:-1]), strict=True):
         drawn = np.bincount((stage.source @ [cols, 1]).ravel(), minlength=rows * cols)
         assert chisquare(drawn).pvalue > SIGNIFICANCE
-
-
-# -- what a picture is made of --------------------------------------------------------------------------------
 
 
 def border(i, n, torus):
@@ -335,9 +326,6 @@ def test_without_phase_is_another_picture():
     assert (match != free).mean() > 0.1
 
 
-# -- alpha, beta and thresholds -------------------------------------------------------------------------------
-
-
 ALPHAS = [0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.3, 2.0, 4.0, INF]
 
 
@@ -370,9 +358,6 @@ def test_thresholds_are_alpha_over_the_number_of_the_level_from_the_top(levels, 
     assert table[-1] == 0.3
 
 
-# -- contrast and constants -----------------------------------------------------------------------------------
-
-
 DARK = texture((13, 12)) // 2
 SCALED = {
     "uint8 + 100": DARK + 100,
@@ -394,9 +379,6 @@ def test_neither_contrast_nor_a_constant_changes_an_arrangement(name):
         assert image.dtype == SCALED[name].dtype
         assert same_places(output, other)
         assert output.statistics["options"]["alpha"] == other.statistics["options"]["alpha"]
-
-
-# -- colour ---------------------------------------------------------------------------------------------------
 
 
 def test_equal_channels_are_as_good_as_one():

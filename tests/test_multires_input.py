@@ -40,9 +40,6 @@ def halved(n, tile, times):
     return whole * tile + rest
 
 
-# -- samples and sizes ----------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("dtype", [np.bool_, np.uint8, np.int8, np.uint16, np.int32, np.int64, np.float16, np.float64])
 @pytest.mark.parametrize("alpha", [0.5, INF])
 def test_the_type_is_the_samples_and_pixels_stay_in_its_range(dtype, alpha):
@@ -119,9 +116,6 @@ def test_integer_pixels_of_any_magnitude(dtype):
     assert synthesize(sample, (18, 10), alpha=INF).dtype == dtype
 
 
-# -- seeds ----------------------------------------------------------------------------------------------------
-
-
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others():
     sample = texture((13, 12))
     first, again, *others = (synthesize(sample, (20, 21), alpha=1.0, rng=s) for s in (5, 5, 6, 5 + 2**32, 5 + 2**63))
@@ -136,9 +130,6 @@ def test_a_generator_is_asked_for_a_seed_and_no_seed_is_a_fresh_one():
     image, output = run(sample, shape, alpha=1.0, rng=None)
     assert_same_bits(synthesize(sample, shape, alpha=1.0, rng=output.statistics["seed"]), image)
     assert (synthesize(sample, shape, alpha=1.0, rng=None) != image).any()
-
-
-# -- levels, stages and statistics ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("shape", [(13, 7), (20, 30), (5, 3)], ids=str)
@@ -206,9 +197,6 @@ def test_the_statistics_count_what_was_done(alpha):
     assert told["seconds"] >= sum(level["seconds"] for level in told["levels"])
 
 
-# -- callbacks ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("axis", [None, 0])
 def test_progress_tells_every_piece_of_every_level(axis, monkeypatch):
     last = texture((13, 7), None if axis is None else 3)
@@ -265,9 +253,6 @@ def test_what_a_callback_raises_gets_through_and_the_next_run_works(error, any_d
     assert_same_bits(synthesize(sample, (26, 14), device=machine), before)
 
 
-# -- memory ---------------------------------------------------------------------------------------------------
-
-
 def noted(monkeypatch, most=INF):
     """Note the bytes of device memory that runs ask for, of which there are so many."""
     sizes = []
@@ -312,9 +297,6 @@ def test_an_output_beyond_32_bits_is_refused_before_any_work(shape, monkeypatch)
     monkeypatch.setattr("simdtex.methods.multires.algorithm.analyse", never)
     with pytest.raises(ValueError, match=f"{shape[0]} rows x {shape[1]} columns is beyond .*; give a smaller size"):
         synthesize(texture((13, 7)), shape)
-
-
-# -- what it refuses ------------------------------------------------------------------------------------------
 
 
 SAMPLE = texture((13, 7))

@@ -47,9 +47,6 @@ def lines(picture, period):
     return np.mean(ratios)
 
 
-# -- the sample -----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", PHOTOGRAPHS)
 def test_a_mended_photograph_wraps_around(name):
     pixels = PHOTOGRAPHS[name]
@@ -141,9 +138,6 @@ def test_the_strip_is_the_one_that_fits_best_and_ends_where_it_differs_least():
     )
     for cut, half in ((first - 1, cost[:, :7]), (last - 8, cost[:, 8:])):
         assert half[rows, cut].sum() == half[rows, _path(half, closed=False)].sum()
-
-
-# -- the texture ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("boundary", ["torus", "open"])

@@ -64,9 +64,6 @@ def test_labels_that_the_sample_lacks_are_named():
         check_guide(((own,), own[:, :3] + 3), mrf.Options())
 
 
-# -- levels -------------------------------------------------------------------------------------------------------
-
-
 def test_a_neighbourhood_that_does_not_fit():
     check_fit((3, 9), 1, 1)
     for sample, radius, order, words in [
@@ -216,9 +213,6 @@ def test_grey_levels_are_as_fine_as_the_channels_and_neighbours_allow():
     assert run.sample.top == Sample(pixels, 3 * neighbours, 8).top == 2047 < Sample(pixels, neighbours, 8).top
 
 
-# -- what is counted ------------------------------------------------------------------------------------------------
-
-
 def test_how_far_a_run_is():
     run = prepared(search="exact", free_sweeps=2)
     record = Record(run, None)
@@ -313,9 +307,6 @@ def test_a_callback_sees_the_known_variables_of_a_site():
     simdtex.synthesize(sample, (12, 12), known=known, callback=lambda p: seen.append((p.level, p.image())), **options)
     assert {int(image[2 >> level, 4 >> level, 1]) for level, image in seen} == {77}
     assert {level for level, _ in seen} == {0, 1}
-
-
-# -- the density at a site --------------------------------------------------------------------------------------------
 
 
 def test_a_site_that_nothing_matches_is_named():

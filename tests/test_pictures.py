@@ -77,9 +77,6 @@ def test_categories_are_those_of_all_pictures_that_are_known():
     assert Pictures((line(3, 4, 5),)).categories(0) is None
 
 
-# -- where the sample has them --------------------------------------------------------------------------------
-
-
 def two(step=2, margin=2, apart=0):
     first, second = np.arange(20).reshape(4, 5, 1), np.arange(100, 121).reshape(7, 3, 1)
     return Sample(Pictures((first.astype(np.uint8), second.astype(np.uint8))), 8, margin, step=step, apart=apart)

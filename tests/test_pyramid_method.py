@@ -29,9 +29,6 @@ def first_noise(shape, seed, channel=0):
     return noise(REFERENCE, 1, prod(shape), seed, channel).reshape(shape).astype(float)
 
 
-# -- match-texture --------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("shape", [(64, 64), (48, 72), (60, 84)], ids=str)
 @pytest.mark.parametrize(("kind", "orientations"), [("steerable", 4), ("steerable", 2), ("laplacian", 4)])
 def test_it_is_match_texture_of_the_paper(kind, orientations, shape):
@@ -62,9 +59,6 @@ def test_noise_is_matched_to_the_pixels_before_the_loop():
     sample = texture((12, 11))
     begun = first_noise((9, 10), 5)
     assert (synthesize(sample, (9, 10), rng=5, iterations=0) == plain.match_histogram(begun, sample)).all()
-
-
-# -- histograms -----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("dtype", TYPES)
@@ -105,9 +99,6 @@ def test_histograms_come_closer_from_iteration_to_iteration(kind, match):
         assert means[4] < means[1]
         names = [*(["high"] if kind == "steerable" else []), "level 0", "level 1", "level 2", "low", "pixels"]
         assert list(reports[0]["distances"]) == names
-
-
-# -- seams, and other properties of the picture ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize("shape", [(96, 96), (97, 74)], ids=str)
@@ -176,9 +167,6 @@ def test_a_wrong_start_is_one_sentence(start, error, words):
     assert "\n" not in str(found.value)
 
 
-# -- colour ---------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32, np.float64])
 def test_grey_stored_as_colour_stays_grey(dtype):
     grey = texture((16, 16), None, dtype)
@@ -218,9 +206,6 @@ def test_any_number_of_channels_keeps_means_and_covariance(channels, color):
     flat, own = made.reshape(-1, channels), sample.reshape(-1, channels)
     assert flat.mean(0) == pytest.approx(own.mean(0), abs=0.02 * own.std())
     assert flat.std(0) == pytest.approx(own.std(0), rel=SPREAD[color])
-
-
-# -- any input ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("scale", [1e300, 1e-300, 5e-324 * 2**30])
@@ -286,9 +271,6 @@ def test_an_output_smaller_than_the_sample_and_no_levels_at_all():
 def test_a_wrong_option_is_one_sentence(options, error, words):
     with pytest.raises(error, match=words):
         synthesize(texture((12, 11)), (8, 9), **options)
-
-
-# -- what a callback sees -------------------------------------------------------------------------------------
 
 
 def test_a_callback_sees_every_channel_of_every_iteration():

@@ -30,9 +30,6 @@ def lost(picture, pyramid):
     return np.sqrt(np.mean((pyramid.collapse(device=REFERENCE)[..., 0] - picture) ** 2)) / picture.std()
 
 
-# -- there and back -------------------------------------------------------------------------------------------
-
-
 @given(
     st.tuples(st.integers(1, 13), st.integers(1, 13)),
     st.sampled_from(["open", "torus"]),
@@ -80,9 +77,6 @@ def test_tiny_pictures_have_a_pyramid_of_every_height(shape, kind, boundary):
         back = pyramid.collapse(device=REFERENCE)
         assert np.isfinite(back).all()
         assert pyramid.subbands[0].shape == (1, 1, *shape)
-
-
-# -- what it is ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("boundary", ["open", "torus"])

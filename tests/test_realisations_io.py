@@ -95,9 +95,6 @@ def test_a_file_is_replaced(tmp_path, suffix):
     assert os.listdir(tmp_path) == [path.name]
 
 
-# ---------------------------------------------------------------- what is wrong
-
-
 def refused(path, words):
     for attempt in (check_realisations_path, lambda path: write_realisations(path, some())):
         with pytest.raises(ValueError, match=words) as said:

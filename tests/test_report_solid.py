@@ -135,9 +135,6 @@ def test_the_sphere_is_out_of_the_repeated_block(shape):
     np.testing.assert_array_equal(*pictures)
 
 
-# -- the sheet ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("size", [96, 250])
 def test_slices_stand_below_in_whole_pixels(size):
     block = noise((6, 5, 8, 3))

@@ -39,9 +39,6 @@ def synth(folder, *args, sample="sample.png"):
     return CliRunner().invoke(main, [str(word) for word in words])
 
 
-# ---------------------------------------------------------------- statistics
-
-
 @pytest.mark.parametrize("method", OPTIONS)
 def test_statistics_tell_the_use(method):
     sample = texture((24, 20))
@@ -71,9 +68,6 @@ def test_a_tiling_uses_all_alike():
     )
     assert output.statistics["use"]["effective_share"] == 1.0
     assert output.statistics["use"]["most_used"]["times_fair_share"] == 1.0
-
-
-# ---------------------------------------------------------------- the map, and words
 
 
 def test_the_map_of_use():
@@ -126,9 +120,6 @@ def test_the_frame_is_around_the_piece():
     expected[8:20, 20:36] = True
     expected[9:19, 21:35] = False
     np.testing.assert_array_equal(framed, expected)
-
-
-# ---------------------------------------------------------------- the page
 
 
 @pytest.mark.parametrize("method", OPTIONS)

@@ -40,9 +40,6 @@ def expected(name, form, shape=(5, 6)):
     return run(name, form, shape)
 
 
-# -- which schedules are the same -----------------------------------------------------------------------------
-
-
 @forms
 @pytest.mark.parametrize(
     ("one", "other"),
@@ -133,9 +130,6 @@ def test_small_scratch_memory_changes_no_bit(name):
     assert_same_bits(run(name, "gibbs", device=Reference(5_000)), expected(name, "gibbs"))
 
 
-# -- on every machine -----------------------------------------------------------------------------------------
-
-
 @every
 @pytest.mark.parametrize("form", ["icm", "colour"])
 def test_a_device_has_the_references_bits(machine, name, form):
@@ -157,9 +151,6 @@ def test_any_size_ends_with_nothing_hot(name, shape):
         assert not temperature.any()
 
 
-# -- the check ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("sites", "words"), [([0, 1], "claims independent sites"), ([4, 4], "twice"), ([4, 99], "not of the level")]
 )
@@ -167,9 +158,6 @@ def test_a_schedule_that_lies_is_stopped(machine, sites, words):
     for m in (REFERENCE, machine):
         with pytest.raises(RuntimeError, match=f"the schedule told .*{words}"):
             run(schedules.Checked(Told(sites)), levels=1, device=m)
-
-
-# -- of one's own ---------------------------------------------------------------------------------------------
 
 
 def test_the_schedule_of_the_page_works(machine):
@@ -184,9 +172,6 @@ def test_the_schedule_of_the_page_works(machine):
     state = wavefront.init(setting(grid))
     _, info = wavefront.step(setting(grid), state, Masked(grid))
     assert len(info.ranges) == 5 * 2 + 8
-
-
-# -- what is counted ------------------------------------------------------------------------------------------
 
 
 class Recorded:

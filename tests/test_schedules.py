@@ -125,9 +125,6 @@ def clash(grid, order, sites):
     return any(near[site] & chosen for site in chosen)
 
 
-# -- every schedule -------------------------------------------------------------------------------------------
-
-
 @every
 @pytest.mark.parametrize("grid", [Grid(5, 6), Grid(9, 7, 2, False)], ids=str)
 def test_a_step_is_a_pure_function_of_the_state(name, grid):
@@ -234,9 +231,6 @@ def test_a_machine_changes_no_choice(machine, name):
             assert plainly(ours) == plainly(walk(get(name), grid, 2, order=order, mask=mask))
 
 
-# -- independence ---------------------------------------------------------------------------------------------
-
-
 @every
 @pytest.mark.parametrize("order", [1, 2, 8])
 def test_independence_is_claimed_where_expected_and_where_claimed_it_holds(name, order):
@@ -282,9 +276,6 @@ def test_neighbours_are_found_as_by_plain_loops():
                     assert set(met) <= set(chosen.tolist())
                     assert met[1] in beside(grid, order)[met[0]]
     assert outcomes == {True, False}
-
-
-# -- what each says of itself ---------------------------------------------------------------------------------
 
 
 def test_a_step_of_luby_is_a_maximal_set():
@@ -359,9 +350,6 @@ def test_groups_of_ones_own_may_have_any_numbers():
     assert (odd.sites.tolist(), even.sites.tolist()) == ([1, 3, 5, 7], [0, 2, 4, 6])
 
 
-# -- the check ------------------------------------------------------------------------------------------------
-
-
 class Told:
     """A schedule that says what it is told to, and then ends the sweep."""
 
@@ -404,9 +392,6 @@ def test_an_honest_schedule_passes_and_is_told_nothing_else(name):
         assert checked.name == get(name).name
         assert checked.independent(grid, neighbourhood_offsets(2)) == CLAIMS[name].independent(grid, 2)
         assert plainly(walk(checked, grid, 2)) == plainly(walk(get(name), grid, 2))
-
-
-# -- names ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -36,9 +36,6 @@ def holed(dtype=np.float32, shape=SHAPE, channels=None):
     return found
 
 
-# -- realisations ---------------------------------------------------------------------------------------------
-
-
 def test_a_realisation_depends_on_its_number_alone():
     four = simulate(n=4)
     assert len({one.tobytes() for one in four.values}) == 4
@@ -116,9 +113,6 @@ def test_several_training_images():
     assert simulate(samples, n=1, shape=None).shape == (1, 12, 12)
 
 
-# -- hard data ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
 def test_data_are_kept_to_the_bit_in_every_realisation(dtype):
     data = holed(dtype)
@@ -175,9 +169,6 @@ def test_a_table_of_several_variables(tmp_path, axis):
     assert (
         simulate(training, n=1, known=np.moveaxis(placed, -1, axis), channel_axis=axis, shape=None).shape[1:3] == SHAPE
     )
-
-
-# -- the array ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("dtype", [np.bool_, np.uint8, np.int32, np.float32, np.float64])
@@ -302,9 +293,6 @@ def test_what_is_unknown_of_the_training_image_is_never_shown():
     training = with_value(FLOATS, np.nan, np.s_[4:7, 5:9])
     found = simulate(training, n=2, finish=0.0)
     assert np.isin(found.values, training[~np.isnan(training)]).all()
-
-
-# -- what is told, and errors ---------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

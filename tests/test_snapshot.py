@@ -25,9 +25,6 @@ def stack(now, old):
     return np.concatenate([now, old], -2)
 
 
-# -- the operation --------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("dtype", TYPES)
 @pytest.mark.parametrize("shape", SHAPES, ids=str)
 def test_both_halves_are_the_picture(machine, shape, dtype):
@@ -72,9 +69,6 @@ def test_a_stack_of_channels_last_is_written_in_place(shape):
     assert np.shares_memory(stacked.reshape(3, -1), stacked)
 
 
-# -- the lattice ----------------------------------------------------------------------------------------------
-
-
 def tiles_of(grid, i, j):
     return i // grid.tile[0], j // grid.tile[1]
 
@@ -111,9 +105,6 @@ def test_a_view_does_not_show_the_older_picture():
         now, old = picture((3, 5, 7), "uint16", 1), picture((3, 5, 7), "uint16", 2)
         grid = Grid(5, 7, spacing, True, (2, 2))
         assert np.array_equal(grid.view(stack(now, old)), now[:, ::spacing, ::spacing])
-
-
-# -- who reads it ---------------------------------------------------------------------------------------------
 
 
 def tiled(seed, tile, **options):

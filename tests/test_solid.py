@@ -80,9 +80,6 @@ def steps(machine, g):
     return host(machine, [coarse, band, solid_collapse(machine, band, coarse)])
 
 
-# -- the formulas ---------------------------------------------------------------------------------------------
-
-
 @given(blocks())
 @settings(max_examples=40)
 def test_the_reference_is_the_rule(g):
@@ -120,9 +117,6 @@ def test_the_mean_is_the_rule(count, limit, seed):
 def test_halves_are_rounded_up_below_zero_too():
     pairs = [np.array(p, np.int32) for p in ([-3, -1, 1, 3], [0, 0, 0, 0])]
     assert solid_mean(REFERENCE, pairs).tolist() == [-1, 0, 1, 2]
-
-
-# -- machines -------------------------------------------------------------------------------------------------
 
 
 @given(g=blocks())

@@ -62,9 +62,6 @@ def test_apply_errors():
         apply_source_map(source - source.min() - 1, np.zeros((5, 6)))
 
 
-# ---------------------------------------------------------------- several samples, and pixels without a source
-
-
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["uint8", "float32"]), st.sampled_from([(), (1,), (3,)]))
 def test_several_samples_against_a_loop(seed, dtype, channels):
     rng = np.random.default_rng(seed)
@@ -153,9 +150,6 @@ def test_a_colour_picture_is_no_source_map(tmp_path):
     write(tmp_path / "colour.png", np.full((4, 4, 3), 7, np.uint8))
     with pytest.raises(ValueError, match=r"colour\.png is a picture of 8 bits and holds no source map"):
         load_source_map(tmp_path / "colour.png")
-
-
-# ---------------------------------------------------------------- files
 
 
 @pytest.mark.parametrize("suffix", [".npz", ".npy", ".png", ".NPZ"])

@@ -76,9 +76,6 @@ def float32_error(terms):
     return HALF + (count + 1) * UNIT32 * total
 
 
-# -- the filters ----------------------------------------------------------------------------------------------
-
-
 @BANKS
 def test_the_filters_are_those_of_pyrtools(orientations):
     theirs = parse_filter(f"sp{orientations - 1}_filters", normalize=False)
@@ -110,9 +107,6 @@ def test_an_orientation_answers_to_waves_along_its_angle(orientations):
     wave = np.exp(1.4j * (np.cos(angle) * col - np.sin(angle) * row))  # counter-clockwise: towards lower rows
     answer = abs(np.einsum("aij,fij->fa", wave, bands))
     assert (answer.argmax(1) == degrees[:: 180 // orientations]).all()
-
-
-# -- the sums -------------------------------------------------------------------------------------------------
 
 
 @st.composite
@@ -174,9 +168,6 @@ def test_on_a_torus_a_join_is_the_transpose_of_a_split(rows, cols, step, seed):
     assert abs(there - back) <= bound
 
 
-# -- machines -------------------------------------------------------------------------------------------------
-
-
 @given(case=splits(counts=(4,)))  # the other banks follow below; each is compiled anew
 @example(case=(noise((1, 1, 1)), any_taps(4, 9, 0), False, 2))
 @example(case=(noise((2, 2, 3)), any_taps(1, 9, 0), True, 2))
@@ -230,9 +221,6 @@ def test_scratch_memory_is_bounded(any_device, scratch, bound):
     padded = [4 * int(np.prod(shape)) for shape, dtype in sizes if dtype == np.float32]
     assert len(padded) == 1
     assert padded[0] <= bound
-
-
-# -- pyramids -------------------------------------------------------------------------------------------------
 
 
 @BORDERS

@@ -49,9 +49,6 @@ def steps(pixels):
     return np.array([round((x - low) * TOP / span) if span else 0 for x in values]).reshape(pixels.shape)
 
 
-# -- there ----------------------------------------------------------------------------------------------------
-
-
 @dtypes
 def test_a_sample_is_stretched_over_the_whole_scale(dtype):
     pixels = extremes(dtype)
@@ -114,9 +111,6 @@ def test_contrast_and_a_constant_change_nothing(dtype):
     assert_same_bits(two.planes, Stretched((byte > 128) * np.uint8(99)).planes)
 
 
-# -- luminance ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("channels", [1, 2, 3, 5])
 def test_the_luminance(channels):
     sample = Stretched(texture((6, 7), channels, np.uint16))
@@ -133,9 +127,6 @@ def test_the_luminance(channels):
 def test_little_contrast_far_from_zero_is_seen(dtype, low):
     grey = texture((6, 7))[..., None]
     assert_same_bits(Stretched(grey.astype(dtype) + dtype(low)).planes, Stretched(grey).planes)
-
-
-# -- and back -------------------------------------------------------------------------------------------------
 
 
 @dtypes

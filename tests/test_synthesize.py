@@ -21,9 +21,6 @@ def quick(sample, shape, **options):
     return simdtex.synthesize(sample, shape, **({"rng": 1} | QUICK | options))
 
 
-# -- what it gives --------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("dtype", TYPES)
 def test_the_type_is_the_samples_and_every_pixel_is_one_of_its_own(dtype):
     sample = texture((9, 10), dtype=dtype)
@@ -118,9 +115,6 @@ def test_a_constant_sample_gives_a_constant():
                 assert (image == 3).all()
 
 
-# -- randomness -----------------------------------------------------------------------------------------------
-
-
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others():
     sample = texture((10, 10))
     first, again, other = (quick(sample, (9, 9), rng=seed) for seed in (5, 5, 6))
@@ -165,9 +159,6 @@ def test_scaling_float_pixels_changes_no_arrangement():
     _, output = quick(sample, (10, 9), full_output=True)
     _, other = quick(sample * 2.0**20, (10, 9), full_output=True)
     assert np.array_equal(output.source, other.source)
-
-
-# -- full output ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("edges", ["whole", "reflect"])
@@ -265,9 +256,6 @@ def test_the_preset_paper_has_no_rule_of_ours():
     assert (paper.coherence, paper.bandwidth, paper.free_sweeps, paper.edges) == (0, 1, 0, "whole")
 
 
-# -- callbacks ------------------------------------------------------------------------------------------------
-
-
 def record(sample, shape, **options):
     seen = []
     image = simdtex.synthesize(sample, shape, callback=seen.append, rng=1, device=REFERENCE, **options)
@@ -349,9 +337,6 @@ def test_an_interrupt_gets_through_and_the_next_run_works(any_device):
         simdtex.synthesize(sample, (9, 9), callback=interrupt, **options)
     assert len(calls) == 3
     assert_same_bits(simdtex.synthesize(sample, (9, 9), **options), before)
-
-
-# -- what it refuses ------------------------------------------------------------------------------------------
 
 
 SAMPLE = texture((9, 10))

@@ -11,7 +11,7 @@ from tolerances import FAVOUR, SLICE_PIXELS, SLICE_SUBBANDS, SOLID_SEAM
 
 import simdtex
 from benchmarks.subbands import decompose
-from simdtex.methods.pyramid.solid import FAMILIES, slices_of
+from simdtex.methods.pyramid.solid import FAMILIES
 
 SIDE = 32
 WAYS = {
@@ -23,6 +23,11 @@ WAYS = {
 
 def solid(sample, shape, **options):
     return simdtex.synthesize_solid(sample, shape, **({"rng": 3, "device": REFERENCE} | options))
+
+
+def slices_of(volume, name):
+    """A family of slices (slice, row, column, ...) of a volume (depth, rows, cols, ...)."""
+    return np.transpose(volume, (*FAMILIES[name][0], *range(3, volume.ndim)))
 
 
 def sample_of(name):
@@ -40,9 +45,6 @@ def blocks():
         return made[name, way]
 
     return block
-
-
-# -- bits, and the simplest rules -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -100,9 +102,6 @@ def test_channels_come_last_whatever_axis_the_sample_has_them_on():
     options = {"iterations": 1}
     theirs = solid(sample, (6, 7, 8), channel_axis=-1, **options)
     assert_same_bits(solid(np.moveaxis(sample, -1, 0), (6, 7, 8), channel_axis=0, **options), theirs)
-
-
-# -- statistics of slices -------------------------------------------------------------------------------------
 
 
 def moved(sample, made):
@@ -199,9 +198,6 @@ def test_families_are_all_slices_and_turn_back():
     assert (slices_of(volume, "y-z")[3] == volume[:, :, 3]).all()
     for axes, back in FAMILIES.values():
         assert (volume.transpose(axes).transpose(back) == volume).all()
-
-
-# -- start, callback, errors ----------------------------------------------------------------------------------
 
 
 def test_a_start_is_followed():

@@ -164,9 +164,6 @@ def test_a_run_uses_the_sample_more_evenly(cl_device):
     assert share[0.5] > share[0.0] + 0.05
 
 
-# ---------------------------------------------------------------- counted on a source map
-
-
 def test_pixels_without_a_source_are_not_counted():
     source = np.array([[[0, 1], [-1, -1], [2, 0]], [[0, 1], [1, 1], [-1, -1]]])
     assert counts(source, (3, 2)).tolist() == [[0, 2], [0, 1], [1, 0]]

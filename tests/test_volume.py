@@ -59,9 +59,6 @@ def test_an_opaque_alpha_channel_is_kept(tmp_path):
         np.testing.assert_array_equal(loaded(tmp_path / name), values, strict=True)
 
 
-# -- other programs -------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("channels", [None, 3])
 def test_in_an_nrrd_x_runs_fastest_after_the_channels(tmp_path, channels):
     values = noise((2, 3, 4) if channels is None else (2, 3, 4, 3), "uint16")
@@ -90,9 +87,6 @@ def test_slices_are_pictures_and_pages(tmp_path):
             np.testing.assert_array_equal(np.asarray(stack), values[z])
             with PIL.Image.open(tmp_path / "a" / f"slice-{z:03}.png") as picture:
                 np.testing.assert_array_equal(np.asarray(picture), values[z])
-
-
-# -- what cannot be -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

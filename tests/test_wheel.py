@@ -57,9 +57,6 @@ def sdist(dist):
     return built
 
 
-# ---------------------------------------------------------------- what is in it
-
-
 def test_the_wheel_carries_the_kernels_and_nothing_else(wheel):
     """Each file of the package, each kernel, and the metadata: no test, no cache, nothing that lay about."""
     names = set(zipfile.ZipFile(wheel).namelist())
@@ -110,9 +107,6 @@ def test_the_package_index_would_take_both(wheel, sdist):
     checker = shutil.which("check-wheel-contents", path=str(Path(sys.executable).parent))
     assert checker, "install the extra release"
     run(checker, wheel, cwd=wheel.parent)
-
-
-# ---------------------------------------------------------------- and it works
 
 
 def test_synthesis_with_what_is_installed(wheel, sdist, tmp_path, any_device):

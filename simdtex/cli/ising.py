@@ -74,7 +74,7 @@ def ising(
 
     if output:
         check_folder(output)
-    chosen = _distinct([known.get(name.strip()) for name in names.split(",")])
+    chosen = list({one.name: one for one in (known.get(name.strip()) for name in names.split(","))}.values())
     temperatures = tuple(dict.fromkeys(temperatures))
     shape = image.parse_size(size)
     whole("--seeds", options["seeds"], 2)  # there is no error bar over one
@@ -109,8 +109,3 @@ def ising(
     if not quiet:
         where = f"{output / 'index.html'}: " if output else ""
         click.echo(f"{where}{time.perf_counter() - began:.0f} s on {machine.name}")
-
-
-def _distinct(chosen: list[Any]) -> list[Any]:
-    """Return the schedules, each once."""
-    return list({schedule.name: schedule for schedule in chosen}.values())

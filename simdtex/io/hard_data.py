@@ -21,8 +21,6 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from simdtex.io.image import cast
 from simdtex.io.limits import BYTES, TooLarge, check_file, max_pixels_or_default, read_npy
 
-__all__ = ["HardData", "place_hard_data", "read_hard_data"]
-
 PathLike = str | os.PathLike[str]
 Floats = NDArray[np.float64]
 

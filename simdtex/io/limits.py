@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from simdtex.options import whole
 
-__all__ = ["BYTES", "PIXELS", "VARIABLE", "TooLarge", "max_pixels_or_default"]
-
 PathLike = str | os.PathLike[str]
 
 VARIABLE = "SIMDTEX_MAX_PIXELS"

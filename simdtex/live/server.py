@@ -29,8 +29,6 @@ from simdtex.live.session import MAX_BYTES, Send, Session
 from simdtex.machine import Machine, open_machine
 from simdtex.synthesis import synthesize
 
-__all__ = ["TOKEN", "Pages", "listen", "serve"]
-
 TOKEN = "SIMDTEX_LIVE_TOKEN"
 """The environment variable with the token of the page's address, so that the address stays the same."""
 

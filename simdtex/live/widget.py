@@ -28,8 +28,6 @@ except ModuleNotFoundError:
             )
 
 
-__all__ = ["Live"]
-
 PAGE = files("simdtex.live") / "page"
 
 

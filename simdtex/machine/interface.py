@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from simdtex.machine.opencl import OpenCL
     from simdtex.machine.reference import Reference
 
-__all__ = ["Array", "Launcher", "Machine", "Operation"]
-
 P = ParamSpec("P")
 R = TypeVar("R")
 

@@ -26,8 +26,6 @@ import numpy as np
 if TYPE_CHECKING:
     import pyopencl as cl
 
-__all__ = ["DeviceError", "build", "check_fork", "clean", "failure", "failures", "one_line", "platforms"]
-
 _INTEL = "libintelocl.so"
 _ICD_VARIABLES = ("OCL_ICD_VENDORS", "OPENCL_VENDOR_PATH")  # each names a folder of .icd files to the loader
 _MARK = "simdtex-probe:"

@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.model.use import counts
 
-__all__ = ["source_colours", "temperature_colours", "use_colours"]
-
 Picture = NDArray[np.uint8]
 
 

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from simdtex.io.image import pillow_bytes, to_display
 from simdtex.model.colours import source_colours
 
-__all__ = ["as_html"]
-
 SIDE = 512
 """The longest side of a picture that is shown, pixels; of larger ones every n-th row and column is."""
 

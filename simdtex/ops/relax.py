@@ -42,9 +42,6 @@ SUGGESTING = 12
 """Nearest neighbours that suggest a candidate each, in a coherent search: as in kernels/relax.cl."""
 
 
-# -- proposers: step 6.2.2.1 --------------------------------------------------------------------------------------
-
-
 class Everything(NamedTuple):
     """The exact search: every candidate of the level is proposed; ``strip`` has their pixels row by row."""
 
@@ -160,9 +157,6 @@ def constants(grid: Grid, **values: Any) -> np.void:
         numbers[name] = value
     struct: np.void = numbers[()]  # type: ignore[assignment]
     return struct
-
-
-# -- the relaxation ---------------------------------------------------------------------------------------------------
 
 
 class Relaxation(NamedTuple):

@@ -21,8 +21,6 @@ from simdtex.report.plots import FAINT, INK, legend, new_figure, tidy
 from simdtex.report.sheet import contact_sheet
 from simdtex.report.tables import Table, number_text
 
-__all__ = ["write_ensemble"]
-
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
 
@@ -144,9 +142,6 @@ def _realisations(images: Array, own: Array, found: Summary) -> Figure:
     )
 
 
-# ---------------------------------------------------------------- maps
-
-
 def _uncertainty(found: Summary) -> list[Part]:
     """Return maps of the mean or of the shares of categories, and of the entropy or the standard deviation."""
     dots = " The dots are the hard data in the colours of the map: one that is kept has the colour of its pixel."
@@ -208,9 +203,6 @@ def _maps(
         axes.scatter(x, y, s=34, c="none", edgecolors="black", linewidths=0.7)
     figure.colorbar(image, ax=list(grid[: len(panels)]), shrink=0.85, pad=0.02)
     return figure
-
-
-# ---------------------------------------------------------------- functions of the lag, and figures of categories
 
 
 def _variograms(found: Summary) -> Figure:
@@ -285,9 +277,6 @@ def _spread(values: Floats) -> str:
     if len(known) == 0:
         return "n/a"
     return number_text(known.mean(), known.std(ddof=1) if len(known) > 1 else None)
-
-
-# ---------------------------------------------------------------- distances
 
 
 def _distances(found: Summary) -> list[Part]:

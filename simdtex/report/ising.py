@@ -17,8 +17,6 @@ from simdtex.report.page import Figure, Section, write_report
 from simdtex.report.plots import INK, new_figure, styles, tidy
 from simdtex.report.tables import Table
 
-__all__ = ["conclusion", "results", "tables", "write_ising"]
-
 ERRORS = (
     "Errors are one standard error of the chains' means. Sigma: deviation from the exact energy in errors. |m|: mean "
     "absolute magnetisation. Neighbours: correlation of neighbouring spins beyond the product of the magnetisations of "
@@ -122,9 +120,6 @@ def _work(runs: Sequence[Chains], settings: dict[str, Any]) -> Table:
     ]
     texts = {k: " and ".join(map(str, v)) if isinstance(v, (list, tuple)) else v for k, v in settings.items()}
     return Table("Work", rows, ", ".join(f"{name.replace('_', ' ')} {text}" for name, text in texts.items()))
-
-
-# ---------------------------------------------------------------- pictures
 
 
 def _energy(found: Sequence[Finding]) -> Figure:

@@ -26,8 +26,6 @@ from simdtex.report.plots import figure_png
 from simdtex.report.sheet import encoded
 from simdtex.report.tables import Table, warns
 
-__all__ = ["Figure", "Part", "Section", "check_folder", "write_report"]
-
 PathLike = str | os.PathLike[str]
 
 PAGE, RESULTS = "index.html", "results.json"

@@ -12,8 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-__all__ = ["figure_png", "legend", "new_figure", "styles", "tidy"]
-
 INK, FAINT, GRID = "#22262b", "#5c6570", "#e4e2dc"
 DPI = 140
 

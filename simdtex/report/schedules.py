@@ -21,8 +21,6 @@ from simdtex.report.plots import legend, new_figure, styles, tidy
 from simdtex.report.sheet import contact_sheet
 from simdtex.report.tables import Table, number_text
 
-__all__ = ["sections", "tables", "write_comparison"]
-
 SHOWN_SIDE = 256  # smaller pictures are enlarged by a whole factor, pixels
 
 
@@ -198,9 +196,6 @@ def _job(comparison: Comparison) -> Table:
         **comparison.options,
     }
     return Table("The same for every schedule", [{"What": k, "Value": str(v)} for k, v in about.items()])
-
-
-# ---------------------------------------------------------------- pictures and plots
 
 
 def _channels_last(comparison: Comparison, image: NDArray[Any]) -> NDArray[Any]:

@@ -16,8 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.image import check_writable, to_display, write
 
-__all__ = ["contact_sheet", "encoded", "fitted", "magnified"]
-
 Picture = NDArray[np.uint8]
 PathLike = str | os.PathLike[str]
 
@@ -46,8 +44,6 @@ def contact_sheet(
     """
     if not pictures:
         raise ValueError("there are no pictures for the sheet: give at least one")
-    if columns is not None and columns < 1:
-        raise ValueError(f"columns is {columns}: give 1 or more")
     if path is not None:
         check_writable(path, np.uint8, 3)
     labels = [label for label, _ in pictures]

@@ -17,8 +17,6 @@ from scipy.ndimage import map_coordinates
 from simdtex.io.image import check_writable, to_display
 from simdtex.report.sheet import LEAST_SIDE, MOST_SIDE, contact_sheet, fitted, magnified, rgb
 
-__all__ = ["view"]
-
 Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 PathLike = str | os.PathLike[str]
@@ -93,9 +91,6 @@ def view(volume: ArrayLike, path: PathLike | None = None, size: int = 360) -> Pi
         small = fitted(rgb(picture), -(-max(picture.shape[:2]) // -(-longest // size)))
         pictures.append((name, magnified(small, max(1, size // longest))))
     return contact_sheet(pictures, path, columns=3, scale=1)
-
-
-# ---------------------------------------------------------------- rays
 
 
 def _rendered(block: Picture, body: Callable[[Floats], Hits], size: int, step: float) -> Picture:

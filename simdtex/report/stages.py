@@ -13,8 +13,6 @@ from simdtex.model.colours import temperature_colours
 from simdtex.report.folder import earlier_files
 from simdtex.run import Progress
 
-__all__ = ["StageWriter"]
-
 _FILE = re.compile(r"((temperature|candidates)-)?(level\d+(-sweep\d+)?|iteration\d+)\.png")
 
 

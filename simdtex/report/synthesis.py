@@ -17,8 +17,6 @@ from simdtex.report.sheet import contact_sheet, magnified
 from simdtex.report.tables import Table
 from simdtex.run import Output
 
-__all__ = ["use_sentences", "write_synthesis"]
-
 Picture = NDArray[np.uint8]
 
 SHOWN_SIDE = 256  # smaller samples are enlarged by a whole factor, pixels

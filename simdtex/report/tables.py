@@ -12,8 +12,6 @@ from math import floor, log10
 import rich.table
 from rich.console import Console
 
-__all__ = ["Table", "duration_text", "number_text", "print_table", "seconds_text", "warns"]
-
 _NUMBER = re.compile(r"[-+\u2212]?\d.*|[-\u2013]|n/a|inf")
 
 

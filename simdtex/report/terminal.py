@@ -10,16 +10,6 @@ from typing import Any
 from simdtex.machine.devices import DeviceError, find
 from simdtex.report.tables import Table, duration_text, number_text, print_table, seconds_text
 
-__all__ = [
-    "benchmark_table",
-    "print_accounting",
-    "print_benchmark",
-    "print_profile",
-    "profile_summary",
-    "profile_table",
-    "version_lines",
-]
-
 
 def print_profile(statistics: dict[str, Any]) -> None:
     """Print the profile in the statistics of a run, see `simdtex.run.Output`."""

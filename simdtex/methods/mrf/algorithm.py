@@ -217,6 +217,3 @@ def finished(
         )
         picture[top : top + rows] = sample.moved(here, by.reshape(-1, *here.shape))
     return picture
-
-
-__all__ = ["Info", "Part", "Run", "Watch", "counted", "finished", "opened", "rule", "sweep", "swept"]

@@ -130,6 +130,3 @@ class Conditioning(Conditions):
             plane[:] = guide
             plane.flat[stand.site] = guide.flat[stand.datum]
         return Held(*(np.ascontiguousarray(grid.view(plane)) for plane in (values, source, kind)))
-
-
-__all__ = ["FREE", "KNOWN", "STANDING", "Conditioning", "Conditions", "Held"]

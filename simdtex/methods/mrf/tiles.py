@@ -127,6 +127,3 @@ def _tally(level: Level, field: Field, grid: Grid) -> Tally:
 
 def _off(machine: Machine, field: Field) -> Field:
     return Field(*(np.array(machine.get(plane)) for plane in field))
-
-
-__all__ = ["Framed", "Tally", "Tile", "entered", "framed", "relaxed", "whole"]

@@ -99,9 +99,6 @@ def analyse(machine: Machine, sample: NDArray[Any], options: Options, *pyramids:
     return Texture(found, colours, scale, stretched, own)
 
 
-# -- match-texture --------------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Plan:
     """A run of the method ``pyramid`` before it has a machine and a seed.

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
 
     from simdtex.methods.typed_options import PyramidOptions
 
-__all__ = ["mix"]
-
 
 @overload
 def mix(

@@ -13,7 +13,6 @@ from itertools import pairwise
 from math import prod
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine import Machine, memory
@@ -125,9 +124,3 @@ def _matched_block(machine: Machine, block: Array, wanted: list[Wanted], matcher
     for band in reversed(fine):
         collapsed = solid_collapse(machine, band, collapsed)
     return collapsed
-
-
-def slices_of(volume: NDArray[Any], name: str) -> NDArray[Any]:
-    """Return a family of slices (slice, row, column, ...) of a volume (depth, rows, cols, ...)."""
-    axes = FAMILIES[name][0]
-    return np.transpose(volume, (*axes, *range(3, volume.ndim)))
