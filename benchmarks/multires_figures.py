@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import samples
+from figures import enlarged
 from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.patches import Patch, Polygon, Rectangle
 from pyramid_figures import png
@@ -27,7 +28,7 @@ from simdtex.model.colours import source_colours, temperature_colours
 from simdtex.model.stretched import TOP, Stretched
 from simdtex.ops.filters import UNIT_BITS, bank, filters
 from simdtex.report.plots import DPI, FAINT, INK, figure_png, new_figure
-from simdtex.report.sheet import contact_sheet, enlarged
+from simdtex.report.sheet import contact_sheet
 
 ALPHAS = {0: (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, inf), 1: (0.1, 0.2, 0.3, 0.4, 0.6, 1, 1.5)}
 OWN, SIMILAR, FAILS, CANDIDATE = "#0072B2", "#8CC9A8", "#E07B4F", "#E69F00"

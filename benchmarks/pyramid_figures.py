@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import PIL.Image
 import samples
+from figures import enlarged
 from scipy.spatial import cKDTree
 from scipy.stats import wasserstein_distance
 from skimage import data
@@ -25,7 +26,7 @@ import simdtex
 from simdtex.experiments.quality import seam
 from simdtex.ops.steerable_filters import ORIENTATIONS, filters
 from simdtex.report.plots import FAINT, INK, figure_png, new_figure, tidy
-from simdtex.report.sheet import contact_sheet, enlarged
+from simdtex.report.sheet import contact_sheet
 
 COLOURS = ("#D55E00", "#0072B2", "#56B4E9", "#009E73", "#8A6D00", "#E69F00", "#CC79A7", "#000000")
 

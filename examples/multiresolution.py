@@ -20,7 +20,7 @@ import simdtex
 from simdtex.io.image import write
 from simdtex.model.colours import source_colours, temperature_colours
 from simdtex.model.source_map import apply_source_map
-from simdtex.report.sheet import contact_sheet, enlarged
+from simdtex.report.sheet import contact_sheet, magnified
 
 parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 parser.add_argument("folder", nargs="?", type=Path, help="where to write; by default a new temporary folder")
@@ -43,7 +43,7 @@ contact_sheet(pictures, folder / "sheet.png", columns=3)
 # The last of them is shown level by level; brightness is the logarithm of the number of candidates.
 most = np.log(max(2, max(stage.candidates.max() for stage in output.stages)))
 maps = [
-    (f"level {stage.level}", enlarged(temperature_colours(np.log(stage.candidates) / most), shape, 2**stage.level))
+    (f"level {stage.level}", magnified(temperature_colours(np.log(stage.candidates) / most), 2**stage.level))
     for stage in output.stages
 ]
 contact_sheet(maps, folder / "candidates.png", columns=4)
