@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import plain_multires as plain
 import pytest
-from cases import REFERENCE, analyse, assert_same_bits, host, opencl, texture
+from cases import REFERENCE, analyse, assert_same_bits, host, texture
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -232,12 +232,3 @@ def test_it_warns_where_no_level_is_as_large_as_the_filters(caplog, shape, optio
 def test_a_device_has_the_references_bits(machine, case):
     pixels, options = case
     assert_same_bits(run(machine, pixels, **options), run(REFERENCE, pixels, **options))
-
-
-@pytest.mark.parametrize("work_group", [3, 16])
-def test_the_shape_of_a_launch_changes_no_bit(cl_device, work_group):
-    machine = opencl(cl_device, work_group=work_group)
-    for boundary in ("torus", "open"):
-        options = {"boundary": boundary}
-        pixels = texture((21, 14), 3)
-        assert_same_bits(run(machine, pixels, **options), run(REFERENCE, pixels, **options))

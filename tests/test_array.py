@@ -11,8 +11,6 @@ from simdtex.maspar.accounting import FLOPS, ROUTER, XNET, Account
 from simdtex.maspar.array import ARRAYS, MAPPINGS, ProcessorArray, parse_array
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 
-# -- geometry -------------------------------------------------------------------------------------------------
-
 
 def test_cut_and_stack_by_hand():
     """5 x 6 pixels on 2 x 4 PEs: three layers down, two across."""

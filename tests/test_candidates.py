@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, host, opencl
+from cases import REFERENCE, assert_same_bits, host
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_multires import as_large
@@ -246,14 +246,6 @@ def test_any_number_of_features_has_the_references_bits(machine, features, match
         source, counts = sampled_on(REFERENCE, p, match, seed)
         assert counts[:, 0].max() > 4, "there is something to choose from"
         assert_same_bits(sampled_on(machine, p, match, seed), [source, counts])
-
-
-@phases
-@pytest.mark.parametrize("work_group", [3, 16])
-def test_the_work_group_changes_no_bit(cl_device, work_group, match):
-    p = problem(3, tile=(9, 11), shape=(20, 25), levels=4)
-    theirs = sampled_on(REFERENCE, p, match, 7)
-    assert_same_bits(sampled_on(opencl(cl_device, work_group=work_group), p, match, 7), theirs)
 
 
 @given(p=problems(), cuts=st.lists(st.floats(0, 1), max_size=4), match=st.booleans())

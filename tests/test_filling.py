@@ -70,15 +70,6 @@ def test_nan_is_a_hole(dtype, axis):
     assert_same_bits(found, fill(holed, MIDDLE, channel_axis=axis))
 
 
-def test_nan_beside_a_mask_is_made_too():
-    image = texture(SHAPE, dtype=np.float32)
-    image[1, 2] = np.nan
-    found = fill(image, MIDDLE)
-    kept = ~MIDDLE & ~np.isnan(image)
-    assert np.isfinite(found).all()
-    assert_same_bits(found[kept], image[kept])
-
-
 def test_nan_in_one_channel_is_a_hole_in_all():
     image = texture(SHAPE, 3, np.float32)
     image[5:9, 6:11, 1] = np.nan
@@ -119,14 +110,6 @@ def test_a_hole_may_be_anywhere(where, boundary):
     assert not output.temperature.any()
 
 
-def test_one_known_part_fills_all_the_rest():
-    image = texture(SHAPE)
-    mask = ~hole_at(np.s_[2:14, 3:17])
-    found = fill(image, mask, finish=0.0)
-    assert_same_bits(found[~mask], image[~mask])
-    assert np.isin(found, image[~mask]).all()
-
-
 FAR = hole_at(np.s_[3:6, 3:7], np.s_[20:24, 50:54], np.s_[2:5, 54:58], shape=(30, 60))
 NEAR = hole_at(np.s_[3:6, 3:7], np.s_[3:6, 9:12], shape=(30, 60))
 
@@ -158,14 +141,6 @@ def test_a_hole_does_not_depend_on_what_is_beyond_its_reach():
     assert (fill(near, mask, reach=6)[mask] != one[mask]).any()
 
 
-def test_a_hole_does_not_depend_on_another_that_is_far():
-    image = texture((30, 60))
-    alone = hole_at(np.s_[20:24, 50:54], shape=(30, 60))
-    both, one = fill(image, FAR, reach=4), fill(image, alone, reach=4)
-    assert (FAR & ~alone).any()
-    assert_same_bits(both[18:26, 46:58], one[18:26, 46:58])
-
-
 @pytest.mark.parametrize("reach", [1, 3, None])
 def test_nothing_is_from_beyond_the_reach(reach):
     image, mask = texture((20, 40)), hole_at(np.s_[8:11, 4:8], shape=(20, 40))
@@ -187,13 +162,6 @@ def test_levels_are_those_that_are_asked_for():
             fill(image, MIDDLE, levels=levels)
 
 
-def test_the_window_of_a_pixel():
-    mask = hole_at(np.s_[10:11, 20:21], shape=(40, 50))
-    assert windows(mask, 1, None) == [(slice(8, 13), slice(18, 23), 1)]
-    assert windows(mask, 3, None) == [(slice(6, 15), slice(16, 25), 1)]
-    assert windows(mask, 1, 2) == [(slice(7, 14), slice(17, 24), 2)]
-
-
 @pytest.mark.parametrize(("side", "radius", "levels"), [(1, 1, 1), (2, 1, 1), (3, 1, 2), (4, 1, 2), (5, 1, 3),
                                                         (9, 1, 4), (9, 2, 3), (9, 4, 2), (9, 5, 1)])  # fmt: skip
 def test_the_middle_of_a_hole_sees_its_rim_at_the_coarsest_level(side, radius, levels):
@@ -204,24 +172,32 @@ def test_the_middle_of_a_hole_sees_its_rim_at_the_coarsest_level(side, radius, l
     assert (rows, cols) == (slice(60 - around, 60 + side + around), slice(50 - around, 50 + side + around))
 
 
-def test_a_window_ends_with_the_picture():
-    mask = hole_at(np.s_[0:1, 49:50], shape=(40, 50))
-    assert windows(mask, 1, None) == [(slice(0, 3), slice(47, 50), 1)]
+WINDOWS = {
+    "a pixel": ((40, 50), [np.s_[10:11, 20:21]], 1, None, [(slice(8, 13), slice(18, 23), 1)]),
+    "two levels": ((40, 50), [np.s_[10:11, 20:21]], 1, 2, [(slice(7, 14), slice(17, 24), 2)]),
+    "a corner": ((40, 50), [np.s_[0:1, 49:50]], 1, None, [(slice(0, 3), slice(47, 50), 1)]),
+    "overlapping, and from top to bottom": (
+        (40, 60),
+        [np.s_[30:31, 40:41], np.s_[10:11, 10:11], np.s_[10:11, 15:16]],
+        1,
+        None,
+        [(slice(8, 13), slice(8, 18), 1), (slice(28, 33), slice(38, 43), 1)],
+    ),
+    "in the bend of another": (
+        (200, 200),
+        [np.s_[10:60, 10:11], np.s_[59:60, 10:60], np.s_[20:21, 50:51]],
+        1,
+        None,
+        [(slice(8, 62), slice(8, 62), 1)],
+    ),
+    "half the picture": ((9, 16), [np.s_[4:5, 4:5], np.s_[4:5, 11:12]], 2, None, [(slice(1, 8), slice(1, 15), 1)]),
+}
 
 
-def test_windows_come_from_top_to_bottom():
-    mask = hole_at(np.s_[30:31, 4:5], np.s_[10:11, 20:21], shape=(40, 50))
-    assert [window.rows.start for window in windows(mask, 1, None)] == [8, 28]
-
-
-def test_windows_that_overlap_are_one():
-    mask = hole_at(np.s_[10:11, 10:11], np.s_[10:11, 15:16], np.s_[30:31, 40:41], shape=(40, 60))
-    assert windows(mask, 1, None) == [(slice(8, 13), slice(8, 18), 1), (slice(28, 33), slice(38, 43), 1)]
-
-
-def test_a_hole_within_the_bend_of_another_is_in_its_window():
-    mask = hole_at(np.s_[10:60, 10:11], np.s_[59:60, 10:60], np.s_[20:21, 50:51], shape=(200, 200))
-    assert windows(mask, 1, None) == [(slice(8, 62), slice(8, 62), 1)]
+@pytest.mark.parametrize("case", WINDOWS)
+def test_windows_of_holes(case):
+    shape, parts, radius, levels, expected = WINDOWS[case]
+    assert windows(hole_at(*parts, shape=shape), radius, levels) == expected
 
 
 def test_many_holes_are_in_one_window():
@@ -231,12 +207,6 @@ def test_many_holes_are_in_one_window():
     assert len(windows(mask, 1, None)) == FEW
     mask[90, 90] = True
     assert windows(mask, 1, None) == [(slice(0, 93), slice(8, 93), 1)]
-
-
-def test_windows_of_more_than_half_the_picture_are_one():
-    mask = hole_at(np.s_[4:5, 4:5], np.s_[4:5, 11:12], shape=(9, 16))
-    assert windows(mask, 1, None) == [(slice(2, 7), slice(2, 7), 1), (slice(2, 7), slice(9, 14), 1)]
-    assert windows(mask, 2, None) == [(slice(1, 8), slice(1, 15), 1)]
 
 
 @given(
@@ -309,11 +279,6 @@ def test_several_samples_are_told_apart():
     assert set(number.tolist()) == {0, 1}
     values = [int(samples[n][i, j]) for i, j, n in zip(row, col, number, strict=True)]
     assert found[MIDDLE].tolist() == values
-
-
-def test_reach_makes_no_difference_to_a_sample():
-    sample = texture((12, 14), seed=4)
-    assert_same_bits(*(fill(texture(SHAPE), MIDDLE, sample=sample, reach=reach) for reach in (None, 1)))
 
 
 def test_categories_are_filled_with_categories():

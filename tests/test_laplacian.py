@@ -3,7 +3,7 @@
 import numpy as np
 import plain_multires as plain
 import pytest
-from cases import REFERENCE, assert_same_bits, host, opencl
+from cases import REFERENCE, assert_same_bits, host
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -121,16 +121,6 @@ def test_a_device_has_the_references_bits(machine, g, torus):
 def test_a_device_collapses_to_the_references_bits(machine, case, torus):
     for how in (laplacian_collapse, laplacian_blend):
         assert_same_bits(collapse(machine, *case, torus, how), collapse(REFERENCE, *case, torus, how))
-
-
-@pytest.mark.parametrize("work_group", [3, 16])
-def test_the_shape_of_a_launch_changes_no_bit(cl_device, work_group):
-    machine = opencl(cl_device, work_group=work_group)
-    g = picture((10, 13), 3)
-    for torus in (True, False):
-        coarse, band = steps(REFERENCE, g, torus)
-        assert_same_bits(steps(machine, g, torus), [coarse, band])
-        assert_same_bits(collapse(machine, band, identity((10, 13)), coarse, torus), g)
 
 
 def test_nothing_overflows_at_the_limits(machine):

@@ -84,12 +84,6 @@ def test_distances_and_the_least_of_what_is_given_have_the_references_bits(machi
     assert_same_bits(first[0], p.candidates(REFERENCE).positions[nearest])
 
 
-@pytest.mark.parametrize("options", VARIANTS, **ids)
-def test_the_shape_of_a_launch_changes_no_bit_of_a_distance(cl_device, options):
-    p = problem(3, order=8, sample_shape=(16, 15), count=37)
-    assert_same_bits(distances(opencl(cl_device, **options), p), distances(REFERENCE, p))
-
-
 @given(st.integers(0, 100), st.sampled_from([1, 2, 8]), st.sampled_from([1, 3]))
 @settings(max_examples=20)
 def test_the_optimal_bandwidth_is_equation_8(seed, order, channels):
@@ -204,27 +198,17 @@ GREY = np.arange(42, dtype=np.uint8).reshape(6, 7)
     ("change", "error", "words"),
     [
         ({"order": 0}, ValueError, "order is 0; give 1"),
-        ({"order": 1.5}, TypeError, "order must be an integer"),
         ({"order": 16}, ValueError, "the largest order that fits is 8"),
         ({"bandwidth": 0}, ValueError, "bandwidth is 0; give a number above 0"),
-        ({"bandwidth": float("nan")}, ValueError, "bandwidth"),
-        ({"bandwidth": "1"}, TypeError, "bandwidth must be a number"),
         ({"greys": 1}, ValueError, "greys is 1; give 2 or more"),
-        ({"greys": 5000}, ValueError, "greys is 5000; give 4096 or fewer"),
         ({"greys": 40}, ValueError, "holds 0 to 41, beyond 0 to 39"),
-        ({"estimator": "kernel"}, ValueError, "choose one of: parzen, histogram"),
         ({"boundary": "mirror"}, ValueError, "choose one of: torus, open"),
         ({"image": GREY.astype(float)}, TypeError, "image must hold integers"),
-        ({"image": -GREY.astype(int)}, ValueError, "image holds -41 to 0"),
-        ({"image": GREY[0]}, ValueError, "image must be a"),
         ({"sample": GREY[:0]}, ValueError, "sample must be a .* not empty"),
         ({"sites": [(0, 0, 0)]}, ValueError, "sites must be an"),
-        ({"sites": [(0.5, 0)]}, ValueError, "sites must be an"),
         ({"sites": [(6, 0)]}, ValueError, "outside the image of 6 rows x 7 columns"),
-        ({"sites": [(0, -1)]}, ValueError, "outside the image of 6 rows x 7 columns"),
         ({"temperature": np.zeros((2, 2))}, ValueError, r"temperature has shape \(2, 2\)"),
         ({"temperature": np.full(GREY.shape, 1.5)}, ValueError, "between 0 and 1"),
-        ({"temperature": np.full(GREY.shape, np.nan)}, ValueError, "between 0 and 1"),
     ],
 )
 def test_bad_input_is_one_clear_sentence(change, error, words):
@@ -361,14 +345,6 @@ def test_a_device_has_the_references_bits(machine, p, bandwidth, strength):
     for choice in CHOICES:
         theirs = relaxed(REFERENCE, p, bandwidth, strength, *choice)
         assert_same_bits(relaxed(machine, p, bandwidth, strength, *choice), theirs)
-
-
-@pytest.mark.parametrize("options", [{"vector": 1}, {"vector": 4}, {"work_group": 3}], **ids)
-def test_the_shape_of_a_launch_changes_no_bit(cl_device, options):
-    p = problem(7, order=5, shape=(9, 10), sample_shape=(17, 16), count=53)
-    for choice in CHOICES:
-        theirs = relaxed(REFERENCE, p, 1.0, 1.0, *choice)
-        assert_same_bits(relaxed(opencl(cl_device, **options), p, 1.0, 1.0, *choice), theirs)
 
 
 def test_draws_near_the_ends_of_the_levels_have_the_references_bits(machine):

@@ -17,8 +17,6 @@ from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.ops.relax import Everything, Listed
 
-# -- options ------------------------------------------------------------------------------------------------------
-
 
 def test_a_density_is_drawn_from():
     words = 'pixel="density" draws grey levels; give relaxation="gibbs" too, or pixel="source"'

@@ -60,13 +60,6 @@ def test_places_that_may_not_be_taken_cost_infinity(machine, masked):
     assert p.sample.inside.ravel()[first[0]].all()
 
 
-@pytest.mark.parametrize("options", FORMS, ids=lambda options: "-".join(f"{k}-{v}" for k, v in options.items()))
-def test_the_form_of_a_launch_changes_no_bit(cl_device, options):
-    for seed, temperatures in enumerate(("mixed", "zero", "one")):
-        p = problem(seed, order=8, sample_shape=(26, 41), shape=(11, 9), temperatures=temperatures, count=37)
-        assert_same_bits(run(opencl(cl_device, **options), p), run(REFERENCE, p))
-
-
 @pytest.mark.parametrize(("channels", "dtype"), [(3, np.uint8), (2, np.uint16), (4, np.float32)])
 def test_vectors_and_large_orders_have_the_references_bits(machine, channels, dtype):
     p = problem(2, order=50, channels=channels, dtype=dtype, sample_shape=(33, 31), shape=(20, 17), count=40)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from cases import REFERENCE, assert_same_bits, host, opencl
+from cases import REFERENCE, assert_same_bits, host
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -92,13 +92,6 @@ def test_pieces_of_whole_segments_change_no_bit(machine, monkeypatch, scratch):
     problem = case(5, 300, 100)
     assert_same_bits(run(machine, problem), run(REFERENCE, problem))
     assert sorted(made)[-1] <= max(MODULE.COUNTERS, 2 * scratch)
-
-
-@pytest.mark.parametrize("work_group", [3, 16])
-def test_the_work_group_changes_no_bit(cl_device, monkeypatch, work_group):
-    monkeypatch.setattr(MODULE, "alone", lambda *_: True)
-    problem = case(5, 300, 100)
-    assert_same_bits(run(opencl(cl_device, work_group=work_group), problem), run(REFERENCE, problem))
 
 
 def test_who_sorts_alone():

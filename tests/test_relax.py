@@ -131,13 +131,6 @@ def test_nothing_is_taken_that_may_not_be(form):
     assert p.sample.inside.ravel()[choice].all()
 
 
-@pytest.mark.parametrize("options", [{"vector": 1}, {"vector": 1, "work_group": 64}, {"work_group": 3}], ids=str)
-@pytest.mark.parametrize("form", [{"gibbs": True}, {"exhaustive": True}, {"exhaustive": True, "gibbs": True}], ids=str)
-def test_the_shape_of_a_launch_changes_no_bit(cl_device, options, form):
-    p = problem(5, order=8, channels=3, shape=(11, 33), count=150, edges="reflect")
-    assert_same_bits(apart(opencl(cl_device, **options), p, **form), apart(REFERENCE, p, **form))
-
-
 def test_a_wide_neighbourhood_takes_more_than_one_vector_a_row(machine):
     p = problem(6, order=66, shape=(19, 40), sample_shape=(20, 21), count=60, edges="reflect")
     assert_same_bits(apart(machine, p, gibbs=True), apart(REFERENCE, p, gibbs=True))

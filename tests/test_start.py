@@ -1,8 +1,7 @@
 """The picture before the first level: pixels of the sample at random, all hot."""
 
 import numpy as np
-import pytest
-from cases import REFERENCE, assert_same_bits, host, opencl, texture
+from cases import REFERENCE, assert_same_bits, host, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chisquare
@@ -49,13 +48,6 @@ def test_the_reference_is_the_rule(case):
 @settings(max_examples=25)
 def test_a_device_has_the_references_bits(machine, case):
     assert_same_bits(run(machine, *case), run(REFERENCE, *case))
-
-
-@pytest.mark.parametrize("work_group", [3, 16])
-def test_the_shape_of_a_launch_changes_no_bit(cl_device, work_group):
-    sample = Sample(texture((9, 7), 3), 8)
-    case = sample, sample.places(np.zeros((1, 2), np.int32), 1).positions, (10, 13), 5
-    assert_same_bits(run(opencl(cl_device, work_group=work_group), *case), run(REFERENCE, *case))
 
 
 def test_every_pixel_is_as_likely():

@@ -199,15 +199,6 @@ def test_a_device_builds_and_collapses_to_the_references_bits(machine, orientati
 SHAPES = [{"work_group": 3, "vector": 4}, {"vector": 1}, {"scratch": 2**14}, {"scratch": 2**12}]
 
 
-@BORDERS
-@pytest.mark.parametrize("options", SHAPES, ids=str)
-def test_the_shape_of_a_launch_changes_no_bit(cl_device, options, torus):
-    machine, picture = opencl(cl_device, **options), noise((4, 37, 41))
-    subbands = build(REFERENCE, picture, 2, 1, torus)
-    assert_same_bits(build(machine, picture, 2, 1, torus), subbands)
-    assert_same_bits(collapse(machine, subbands, 2, torus), collapse(REFERENCE, subbands, 2, torus))
-
-
 @pytest.mark.parametrize(("scratch", "bound"), [(2**12, 2**12), (2**17, 2**17), (1, 10 * 48 * 4)])
 def test_scratch_memory_is_bounded(any_device, scratch, bound):
     """What is laid out at a time fits in it, or is the rows of one work-item; all launches use the same."""

@@ -2,7 +2,7 @@
 
 import plain
 import pytest
-from cases import REFERENCE, assert_same_bits, opencl, problem, problems
+from cases import REFERENCE, assert_same_bits, problem, problems
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -41,12 +41,6 @@ def test_tiny_pictures(machine, shape, torus):
     p = problem(1, order=5, shape=shape, torus=torus)
     check_formula(p, -1)
     assert_same_bits(run(machine, p, -1), run(REFERENCE, p, -1))
-
-
-@pytest.mark.parametrize("work_group", [3, 16])
-def test_the_shape_of_a_launch_changes_no_bit(cl_device, work_group):
-    p = problem(2, order=8, count=37)
-    assert_same_bits(run(opencl(cl_device, work_group=work_group), p, -1024), run(REFERENCE, p, -1024))
 
 
 def test_all_hot_cools_by_the_share_of_xi():
