@@ -218,8 +218,6 @@ def test_a_missing_input_is_named(folder, pair):
     rest = [*required(command, given), "--device", "reference"]
     if name in PICTURES:
         rest = ["out.png" if word == "fresh.npz" else word for word in rest]
-    if given.name == "thresholds":
-        rest += ["--method", "multires"]
     missing = "none.npz" if given.type.role == "enter" else "none.png"
     if name == "fill" and given.name != "mask":
         rest += ["--mask", "map.png"]

@@ -21,12 +21,10 @@ ENDS = (".png", ".tif", ".npy", ".npz", ".nc", ".zarr", ".csv", ".xyz")
 
 @pytest.fixture
 def folder(tmp_path):
-    """Training images of three kinds, tables and pictures of hard data, guides and a mask."""
+    """Training images of three kinds, and tables of hard data."""
     rng = np.random.default_rng(2)
     row, col = np.indices((16, 20))
     grey = np.rint(120 + 80 * np.sin(row * 0.9 + col * 0.5) + rng.uniform(-20, 20, (16, 20))).astype(np.uint8)
-    known, there = grey[:12, :14], rng.random((12, 14)) < 0.1
-    there[3, 4] = True
     facies = (grey > 120).astype(np.uint8) * np.uint8(3)
     holed = grey.astype(np.float32)
     holed[4:6, 7:9] = np.nan
@@ -36,26 +34,12 @@ def folder(tmp_path):
         "facies.png": facies,
         "colour.png": rng.integers(0, 256, (16, 20, 3), dtype=np.uint8),
         "holed.tif": holed,
-        "float.tif": grey.astype(np.float32),
-        "known.png": np.dstack([known, there * np.uint8(255)]),
-        "known.tif": np.where(there, known, np.nan).astype(np.float32),
-        "full.tif": known.astype(np.float32),
-        "mask.png": (col < 14) * np.uint8(255),
-        "black.png": np.zeros((16, 20), np.uint8),
-        "guide.png": (row * 12).astype(np.uint8),
-        "wanted.png": (row[:12, :14] * 12).astype(np.uint8),
     }
     for name, pixels in pictures.items():
         image.write(tmp_path / name, pixels)
     tables = {
         "wells.csv": "x,y,value\n3,4,200\n10.4,7,17\n",
         "facies.csv": "x,y,facies\n3,4,3\n10,7,0\n5,5,3\n",
-        "outside.csv": "x,y,value\n3,4,200\n40,7,17\n",
-        "disagree.csv": "x,y,value\n3,4,200\n3.2,4.1,17\n",
-        "beyond.csv": "x,y,value\n3,4,300\n",
-        "two.csv": "x,y,a,b\n3,4,200,1\n",
-        "strange.csv": "x,y,facies\n3,4,1\n",
-        "words.csv": "x,y,facies\n3,4,sand\n",
     }
     np.save(tmp_path / "huge.npy", np.where(facies, 1e200, 3.0))
     for name, text in tables.items():
@@ -135,48 +119,11 @@ def test_colour_has_variables(folder):
     assert_same(found, simdtex.simulate(pixels(folder, "colour.png"), 1, shape=(12, 14), channel_axis=-1, **OPTIONS))
 
 
-def test_several_training_images(folder):
-    args = ("grey.png", "second.png", "--size", "14x12", "--shares", "1,2")
-    found = made(folder, *args)
-    training = [pixels(folder, "grey.png"), pixels(folder, "second.png")]
-    assert_same(found, simdtex.simulate(training, 1, shape=(12, 14), shares=(1.0, 2.0), **OPTIONS))
-
-
-def test_masks_and_guides(folder):
-    args = ("--sample-mask", "mask.png", "--guide", "guide.png=wanted.png", "--size", "14x12")
-    found = made(folder, "grey.png", *args)
-    guide = pixels(folder, "guide.png"), pixels(folder, "wanted.png")
-    mask = pixels(folder, "mask.png") > 0
-    wanted = simdtex.simulate(pixels(folder, "grey.png"), 1, shape=(12, 14), mask=mask, guide=guide, **OPTIONS)
-    assert_same(found, wanted)
-
-
-def test_a_training_image_may_be_unknown_in_parts(folder):
-    found = made(folder, "holed.tif", "--size", "14x12")
-    assert_same(found, simdtex.simulate(pixels(folder, "holed.tif"), 1, shape=(12, 14), **OPTIONS))
-    assert not np.isnan(found.values).any()
-
-
 def test_a_table_of_hard_data(folder):
     found = made(folder, "grey.png", "-n", 2, "--known", "wells.csv", "--size", "14x12")
     assert (found.values[:, 4, 3] == 200).all() and (found.values[:, 7, 10] == 17).all()
     table = read_hard_data(folder / "wells.csv")
     assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 2, shape=(12, 14), known=table, **OPTIONS))
-
-
-def test_a_table_leaves_the_size_to_the_training_image(folder):
-    assert made(folder, "grey.png", "--known", "wells.csv").shape == (1, 16, 20)
-
-
-@pytest.mark.parametrize("name", ["known.png", "known.tif"])
-def test_a_picture_of_hard_data(folder, name):
-    found = made(folder, "grey.png", "-n", 2, "--known", name)
-    known = pixels(folder, "known.tif")
-    there = ~np.isnan(known)
-    assert found.shape == (2, 12, 14)
-    for one in found.values:
-        assert np.array_equal(one[there], known[there])
-    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 2, known=known, **OPTIONS))
 
 
 def test_categories(folder):
@@ -203,17 +150,9 @@ def test_a_report_is_a_page_and_numbers(folder):
 GREY = ["grey.png", "-o", "out.npz", "--size", "14x12"]
 FACIES = ["facies.png", "-o", "out.npz", "--size", "14x12", "--categorical"]
 BAD = {
-    "data in words": ([*GREY, "--known", "words.csv"], "'sand' in column 3"),
-    "no such data": ([*GREY, "--known", "none.csv"], "does not exist"),
     "an unknown suffix": (["grey.png", "-o", "out.xyz"], "names no format of realisations"),
-    "a picture as output": (["grey.png", "-o", "out.png"], "names no format of realisations"),
-    "the training image overwritten": (["grey.png", "-o", "grey.png"], "grey.png"),
     "proportions in words": ([*FACIES, "--proportions", "half"], "numbers parted by commas"),
     "no realisation": ([*GREY, "-n", 0], "n is 0; give 1 or more"),
-    "no such picture": (["none.png", "-o", "out.npz"], "does not exist"),
-    "a size in words": (["grey.png", "-o", "out.npz", "--size", "large"], "large"),
-    "two masks": ([*GREY, "--sample-mask", "mask.png", "--sample-mask", "mask.png"], "once for each sample"),
-    "half a guide": ([*GREY, "--guide", "guide.png"], "SAMPLE-GUIDE=OUTPUT-GUIDE"),
     "a report of several": (["grey.png", "second.png", "-o", "out.npz", "--report", "report"], "leave it out"),
     "a report of next to nothing": (["grey.png", "-o", "out.npz", "--size", "9x3", "--report", "report"], "4x4 pixels"),
     "a report of colour": (["colour.png", "-o", "out.npz", "--report", "report"], "one variable"),
@@ -234,20 +173,3 @@ def refused(folder, args, words):
 @pytest.mark.parametrize("case", BAD)
 def test_bad_input_gets_one_sentence_and_writes_nothing(folder, case):
     refused(folder, *BAD[case])
-
-
-def test_an_output_that_is_an_input_is_refused(folder):
-    image.write(folder / "grey.npy", pixels(folder, "grey.png"))
-    (folder / "linked.npz").symlink_to(folder / "grey.npy")
-    refused(folder, ["grey.npy", "-o", "linked.npz"], "is an input and would be overwritten")
-
-
-def test_one_place_for_two_outputs_is_refused(folder):
-    refused(folder, ["grey.png", "-o", "report.zarr", "--report", "report.zarr"], "would be written twice")
-
-
-def test_a_folder_of_other_files_is_no_place_for_a_report(folder):
-    pytest.importorskip("gstools")
-    (folder / "report").mkdir()
-    (folder / "report" / "letter.txt").write_text("dear")
-    refused(folder, [*GREY, "--report", "report"], "report")

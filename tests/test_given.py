@@ -10,7 +10,6 @@ from plain_sample import stand_ins as plainly
 import simdtex
 from simdtex.model.given import Given, planes, stand_ins
 from simdtex.model.lattice import Grid
-from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.schedules import SCHEDULES
 
@@ -94,14 +93,6 @@ def test_nothing_is_known_but_one_site(site, search):
     known[site] = 201
     for schedule in ("coloring", "luby", "block:3x4"):
         keeps(texture((9, 10)), known, order=2, levels=3, schedule=schedule, search=search)
-
-
-def test_floats_with_nan_are_a_masked_array():
-    sample, there = texture((10, 9), dtype=np.float32), np.random.default_rng(1).random((8, 9)) < 0.3
-    values = anything((8, 9), np.float32, 2)
-    masked, _ = run(sample, (8, 9), known=np.ma.masked_array(values, ~there), order=2)
-    nan, _ = run(sample, (8, 9), known=np.where(there, values, np.nan), order=2)
-    assert_same_bits(masked, nan)
 
 
 @given(
@@ -328,13 +319,3 @@ def test_a_stage_shows_what_stands_for_data():
     coarse = np.asarray(output.stages[0].image)
     assert coarse.shape == (4, 4)
     assert coarse[1, 1] == pytest.approx(min(2.0, sample.max()), abs=1e-2)
-
-
-def test_pictures_keep_their_gaps_when_their_kinds_are_told():
-    from simdtex.methods.mrf.options import Options
-
-    sample = texture((8, 9), 2, np.float32)
-    sample[2, 3] = np.nan
-    pictures = Options(weights=(1.0, 2.0)).of(Pictures((sample,)))
-    assert pictures.weights == (1.0, 2.0)
-    assert np.argwhere(~pictures.known[0]).tolist() == [[2, 3]]

@@ -13,18 +13,6 @@ import simdtex
 from simdtex.model.lattice import Grid
 from simdtex.ops import lcpdf
 
-VARIANTS = [
-    {"vector": 1},
-    {"vector": 4},
-    {"vector": 8},
-    {"step": 1},
-    {"step": 2},
-    {"step": 8},
-    {"work_group": 3},
-    {"work_group": 16},
-]
-ids = {"ids": lambda options: "-".join(f"{k}-{v}" for k, v in options.items())}
-
 
 def distances(machine, p):
     found, candidates = p.distances(machine)

@@ -145,22 +145,6 @@ def test_several_pictures_are_one_with_each_its_share(seed, weights):
     assert abs(found - np.diag(np.diag(found))).max() <= DECORRELATED * found.max()
 
 
-def test_a_weight_of_zero_and_of_one_leave_one_picture():
-    a, b = planes_of(seed=1), planes_of((7, 9), seed=2)
-    both, alone = palette([a, b], [1.0, 0.0]), palette([a], [3.0])
-    assert (both.mean == alone.mean).all()
-    assert (both.axes == alone.axes).all()
-    assert (both.deviations == alone.deviations).all()
-
-
-def test_the_order_of_pixels_and_their_number_change_nothing():
-    planes = planes_of()
-    turned = np.random.default_rng(3).permutation(planes.reshape(3, -1), axis=1)[:, :, None]
-    ours, theirs = palette([planes], [1.0]), palette([np.tile(turned, (1, 3, 1))], [1.0])
-    assert (ours.axes == theirs.axes).all()
-    assert ours.deviations == pytest.approx(theirs.deviations, rel=1e-12)
-
-
 def test_channels_of_several_pictures_share_a_scale():
     a, b = planes_of(seed=1), planes_of((7, 9), seed=2)
     own = palette([a, b], [1, 1])

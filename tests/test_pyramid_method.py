@@ -152,14 +152,12 @@ def test_a_start_may_be_grey_or_have_the_samples_channels():
     ("start", "error", "words"),
     [
         (np.zeros((3, 3)), ValueError, r"start has shape \(3, 3\); give one of 8 x 9 pixels"),
-        (np.zeros((9, 8)), ValueError, r"start has shape \(9, 8\); give one of 8 x 9 pixels"),
         (np.zeros((8, 9, 2)), ValueError, r"start has shape \(8, 9, 2\); give one of 8 x 9 pixels"),
         ("noise", (TypeError, ValueError), "start"),
         (np.full((8, 9), np.nan), ValueError, "start|finite"),
         (np.zeros((8, 9), complex), TypeError, "start|real"),
-        ([[1, 2], [3]], (TypeError, ValueError), "start"),
     ],
-    ids=["small", "turned", "channels", "text", "nan", "complex", "ragged"],
+    ids=["small", "channels", "text", "nan", "complex"],
 )
 def test_a_wrong_start_is_one_sentence(start, error, words):
     with pytest.raises(error, match=words) as found:
@@ -191,11 +189,6 @@ def test_a_flat_channel_stays_flat(color, dtype):
 @pytest.mark.parametrize("options", [{}, {"match": "lookup"}, {"pyramid": "laplacian"}, {"iterations": 0}], ids=str)
 def test_a_constant_gives_the_constant(sample, options):
     assert_same_bits(synthesize(sample, (5, 6), **options), np.full((5, 6), sample[0, 0]))
-
-
-def test_a_constant_colour_gives_the_colour():
-    made = synthesize(np.full((8, 8, 3), [3, 200, 9], np.uint8), (5, 6), channel_axis=-1)
-    assert (made == np.array([3, 200, 9])).all()
 
 
 @pytest.mark.parametrize("channels", [1, 2, 3, 5])
@@ -248,23 +241,14 @@ def test_an_output_smaller_than_the_sample_and_no_levels_at_all():
     ("options", "error", "words"),
     [
         ({"pyramid": "wavelet"}, ValueError, "unknown pyramid 'wavelet'; choose one of: steerable, laplacian"),
-        ({"levels": -1}, ValueError, "levels is -1; give 0 or more"),
-        ({"levels": 1.5}, TypeError, "levels must be an integer, not 1.5"),
         ({"levels": 4}, ValueError, "levels=4 is too many for a side of 8 pixels; give at most 3"),
         ({"orientations": 3}, ValueError, "orientations is 3; the steerable filters have one of: 1, 2, 4, 6"),
-        ({"orientations": "4"}, TypeError, "orientations must be an integer"),
-        ({"iterations": -1}, ValueError, "iterations is -1; give 0 or more"),
-        ({"iterations": 2.0}, TypeError, "iterations must be an integer"),
-        ({"match": "sort"}, ValueError, "unknown match 'sort'; choose one of: rank, lookup"),
-        ({"edges": "zero"}, ValueError, "unknown edges 'zero'; choose one of: reflect, wrap"),
-        ({"color": "rgb"}, ValueError, "unknown color 'rgb'; choose one of: decorrelate, channels"),
         ({"boundary": "open"}, TypeError, "unknown option 'boundary' of the method 'pyramid'"),
         (
             {"slices": "each"},
             TypeError,
             "unknown option 'slices' of the method 'pyramid'; choose from: preset, pyramid, iterations",
         ),
-        ({"alpha": 1}, TypeError, "unknown option 'alpha'"),
     ],
     ids=lambda value: str(value) if isinstance(value, dict) else "",
 )

@@ -129,41 +129,6 @@ def test_a_constant_is_all_offset(kind):
     assert (pyramid.collapse(device=REFERENCE) == 7.5).all()
 
 
-@pytest.mark.parametrize("scale", [1e300, 1e-300, -3.0, 2.0**-40])
-@KINDS
-def test_a_pyramid_is_in_the_pictures_unit(kind, scale):
-    picture = texture((16, 12), None, np.float64)
-    ours, theirs = made(picture * scale, kind=kind, levels=2), made(picture, kind=kind, levels=2)
-    assert ours.unit == pytest.approx(abs(scale) * theirs.unit, rel=1e-9)
-    for own, band in zip(ours.subbands[:-1], theirs.subbands[:-1], strict=True):
-        assert abs(own / scale - band).max() <= 4 * theirs.unit
-    low = (ours.subbands[-1] + ours.offset) / scale - (theirs.subbands[-1] + theirs.offset)
-    assert abs(low).max() <= 4 * theirs.unit + 1e-3 * abs(theirs.offset), "the low-pass filters keep a mean so well"
-
-
-@KINDS
-def test_channels_are_decomposed_alone_on_one_scale(kind):
-    picture = texture((16, 13), 3, np.float64)
-    whole = made(picture, kind=kind, levels=2, channel_axis=-1)
-    assert_same_bits(whole.subbands, made(np.moveaxis(picture, -1, 0), kind=kind, levels=2, channel_axis=0).subbands)
-    assert [band.shape[1] for band in whole.subbands] == [3] * len(whole.subbands)
-    for c in range(3):
-        alone = made(picture[..., c], kind=kind, levels=2)
-        for own, band in zip(whole.subbands[:-1], alone.subbands[:-1], strict=True):
-            assert abs(own[:, c] - band[:, 0]).max() <= 4 * whole.unit
-    assert whole.collapse(device=REFERENCE).shape == picture.shape
-
-
-def test_subbands_may_be_changed():
-    picture = texture((16, 16), None, np.float64)
-    pyramid = made(picture, kind="laplacian", levels=2)
-    for band in pyramid.subbands[:-1]:
-        band[:] = 0
-    smooth = pyramid.collapse(device=REFERENCE)[..., 0]
-    assert smooth.std() < 0.5 * picture.std()
-    assert smooth.mean() == pytest.approx(picture.mean(), abs=0.1 * picture.std())
-
-
 @KINDS
 @BORDERS
 def test_a_device_has_the_references_bits(machine, kind, boundary):

@@ -10,7 +10,6 @@ from cases import assert_same_bits, texture
 
 import simdtex
 from simdtex.io.hard_data import place_hard_data, read_hard_data
-from simdtex.jobs import simulation
 from simdtex.jobs.simulation import realisation_seed
 
 xarray = pytest.importorskip("xarray")
@@ -99,20 +98,6 @@ def test_the_preset_wins_over_the_defaults_of_a_simulation():
     assert json.loads(found.attrs["options"])["novelty"] == 0
 
 
-def test_an_option_of_ones_own_goes_before_the_defaults():
-    found = simulate(n=1, boundary="torus", novelty=1.0)
-    options = json.loads(found.attrs["options"])
-    assert (options["boundary"], options["novelty"]) == ("torus", 1.0)
-    assert (found.values != simulate(n=1).values).any()
-
-
-def test_several_training_images():
-    samples = [texture((12, 12)) // 2, texture((10, 14), seed=1) // 2 + 128]
-    found = simulate(samples, n=1, finish=0.0)
-    assert np.isin(found.values, np.concatenate([one.ravel() for one in samples])).all()
-    assert simulate(samples, n=1, shape=None).shape == (1, 12, 12)
-
-
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
 def test_data_are_kept_to_the_bit_in_every_realisation(dtype):
     data = holed(dtype)
@@ -138,14 +123,6 @@ def test_all_forms_of_data_give_the_same(tmp_path):
         found = simulate(training, known=hard)
         assert_same_bits(found.values, expected.values)
         assert found.attrs == expected.attrs
-
-
-def test_a_masked_array_of_whole_numbers():
-    known = np.random.default_rng(4).random(SHAPE) < 0.1
-    data = np.ma.MaskedArray(CATEGORIES[: SHAPE[0], : SHAPE[1]], ~known)
-    found = simulate(CATEGORIES, known=data, categorical=True)
-    for one in found.values:
-        assert_same_bits(one[known], data.data[known])
 
 
 def test_the_size_is_that_of_the_data_or_of_the_training_image():
@@ -269,30 +246,11 @@ def test_a_digest_changes_with_its_array_and_with_nothing_else(name, number):
     assert [after[other] for other in kept] == [before[other] for other in kept]
 
 
-def test_a_digest_is_of_the_values_and_not_of_how_they_lie():
-    one = digests()
-    assert digests(training=np.asfortranarray(FLOATS)) == one
-    assert digests(training=FLOATS.astype(">f4")) == one
-    assert digests(training=FLOATS.tolist())["training_image"] != one["training_image"]  # these are of 64 bits
-
-
 def test_an_unknown_pixel_is_not_what_it_is_completed_with():
     holey = with_value(FLOATS, np.nan)
     near = [with_value(FLOATS, FLOATS[i, j]) for i, j in ((1, 3), (3, 3), (2, 2), (2, 4))]
     found = digests(training=holey)["training_image"]
     assert found not in [digests(training=one)["training_image"] for one in near]
-
-
-def test_categories_are_those_of_the_training_image():
-    found = simulate(CATEGORIES, n=3, categorical=True)
-    assert set(np.unique(found)) == {0, 3, 7}
-    assert json.loads(found.attrs["options"])["categorical"] is True
-
-
-def test_what_is_unknown_of_the_training_image_is_never_shown():
-    training = with_value(FLOATS, np.nan, np.s_[4:7, 5:9])
-    found = simulate(training, n=2, finish=0.0)
-    assert np.isin(found.values, training[~np.isnan(training)]).all()
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -326,17 +284,6 @@ def test_an_error_in_one_realisation_ends_all(jobs, error):
     with pytest.raises(error, match="enough"):
         simulate(n=40, jobs=jobs, callback=stop)
     assert len(calls) <= 3 * jobs
-    assert set(threading.enumerate()) <= before
-
-
-def test_an_error_of_the_method_comes_out_and_leaves_no_thread(monkeypatch):
-    def fail(*args):
-        raise MemoryError("too large")
-
-    before = set(threading.enumerate())
-    monkeypatch.setattr(simulation, "drive", fail)
-    with pytest.raises(MemoryError, match="too large"):
-        simulate(n=5, jobs=3)
     assert set(threading.enumerate()) <= before
 
 

@@ -120,21 +120,6 @@ def test_bad_input_gets_one_sentence(folder, monkeypatch, capsys, words, says):
     assert says in capsys.readouterr().err.splitlines()[-1]
 
 
-def test_two_samples_of_one_name_are_refused(folder, monkeypatch, capsys):
-    write(folder / "in" / "grey.jpg", texture((20, 24)))
-    with pytest.raises(SystemExit):
-        run(folder, monkeypatch, "--out", folder / "out")
-    assert "are called grey" in capsys.readouterr().err
-    run(folder, monkeypatch, "--out", folder / "out", "--only", "grey.png")
-    assert "grey.png" in names(folder / "out")
-
-
-def test_options_are_read_as_python_has_them(over_folder):
-    assert over_folder.parsed("") == {}
-    found = over_folder.parsed("order=8, coherence=0.5,preset=paper,levels=None,array=4x4")
-    assert found == {"order": 8, "coherence": 0.5, "preset": "paper", "levels": None, "array": "4x4"}
-
-
 def test_the_worst_is_far_from_what_is_best(over_folder):
     def result(name, **figures):
         return over_folder.Result(name, "after", 1, None, figures)

@@ -12,10 +12,6 @@ LCPDF = 1e-5
 states. Distances and their product with 1 / 2h^2 are float32 (24 bits), so an exponent of up to 28 is off by up to
 28 * 2**-23 or so, and weights below 2**-40 of the largest are 0; sums over up to 4096 levels add little."""
 
-NEAR_TIE = 1e-5
-"""Relative gap between the two highest densities below which ICM may take either mode: its densities carry the float32
-rounding of LCPDF."""
-
 SIGNIFICANCE = 1e-4
 """Of every chi-square test of a draw. Seeds are fixed, so a test that passes keeps passing; over all of them a correct
 sampler would have failed one in a few hundred choices of the seeds."""
