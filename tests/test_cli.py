@@ -168,16 +168,6 @@ def test_bad_outputs(folder, output):
     assert listing(folder) == before
 
 
-def test_two_outputs_never_share_a_file(folder):
-    result = synth(folder, "--also", f"{folder}/normal.png={folder}/out.png")
-    assert result.exit_code == 2 and "written twice" in result.output
-
-
-def test_no_input_is_overwritten(folder):
-    result = run("synth", folder / "sample.png", "-o", folder / "sample.png", "--order", 2)
-    assert result.exit_code == 2 and "overwritten" in result.output
-
-
 def test_a_map_of_another_size_is_refused_before_the_work(folder):
     image.write(folder / "small.png", np.zeros((5, 5), np.uint8))
     result = synth(folder, "--also", f"{folder}/small.png={folder}/small-out.png")

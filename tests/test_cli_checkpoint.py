@@ -188,20 +188,6 @@ def test_a_file_whose_name_looks_like_an_option(place, monkeypatch):
     assert Path("out.png").is_file()
 
 
-def test_another_sample_or_option_is_refused(place, monkeypatch):
-    stopped(place, monkeypatch)
-    refused(
-        place,
-        "another option order (2, not 3); give the same, or a new file",
-        *("synth", "sample.png", "-o", "out.png", "--size", "14x13", "--seed", "5", "--order", "3"),
-        *("--checkpoint", "kept", "--xi", "-2", "--device", "reference", "--no-labels", "--array", "4x4"),
-    )
-    picture = image.read("sample.png").pixels.copy()
-    picture[3, 3] ^= 1
-    image.write("sample.png", picture)
-    refused(place, "is of another sample; give the same, or a new file for this run", "resume", "kept")
-
-
 def test_what_is_no_checkpoint(place):
     refused(place, "nothing does not exist: check the path of the run, or it is finished", "resume", "nothing")
     (place / "other").mkdir()

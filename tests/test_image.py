@@ -74,12 +74,6 @@ def test_bool_becomes_black_and_white(tmp_path):
         np.testing.assert_array_equal(back if back.ndim == 2 else back[..., 0], pixels * 255)
 
 
-def test_grey_webp_reads_as_equal_colours(tmp_path):
-    pixels = noise((5, 7), np.uint8)
-    image.write(tmp_path / "a.webp", pixels)
-    np.testing.assert_array_equal(image.read(tmp_path / "a.webp").pixels, pixels[..., None] + [0] * 3)
-
-
 def test_one_bit_and_palette_and_print_colours(tmp_path):
     rgb = PIL.Image.fromarray(noise((8, 9, 3), np.uint8))
     rgb.convert("1").save(tmp_path / "bit.png")
@@ -117,12 +111,6 @@ def test_alpha_is_dropped_only_where_opaque(tmp_path, dtype, colours, suffix):
     pixels[2, 3, -1] = 0
     image.write(tmp_path / f"b{suffix}", pixels)
     np.testing.assert_array_equal(image.read(tmp_path / f"b{suffix}").pixels, pixels)
-
-
-def test_an_extra_channel_that_is_no_alpha_is_kept(tmp_path):
-    pixels = np.full((6, 5, 5), 255, np.uint8)
-    image.write(tmp_path / "a.tif", pixels)
-    np.testing.assert_array_equal(image.read(tmp_path / "a.tif").pixels, pixels)
 
 
 def test_transparent_colour_becomes_alpha(tmp_path):
@@ -197,14 +185,6 @@ def test_truncated_files(tmp_path, suffix, dtype, share):
     assert "\n" not in str(caught.value)
 
 
-def test_truncated_jpeg_in_tiff(tmp_path):
-    path = tmp_path / "a.tif"
-    tifffile.imwrite(path, noise((64, 64, 3), np.uint8), photometric="rgb", compression="jpeg")
-    path.write_bytes(path.read_bytes()[:-30])
-    with pytest.raises(ValueError, match="ends before its last pixel"):
-        image.read(path)
-
-
 def test_damaged_tiff_says_one_sentence(tmp_path, caplog):
     data = bytearray(encoded(".tif", "uint8", tmp_path))
     data[8:60] = bytes(range(52))
@@ -276,14 +256,6 @@ def test_split_alpha(dtype, alpha, transparent, colours):
     np.testing.assert_array_equal(pixels, picture[..., 0] if colours == 1 else picture[..., :3])
     assert mask.dtype == bool
     assert mask.ravel().tolist() == transparent
-
-
-@pytest.mark.parametrize("channels", [(), (1,), (3,), (5,)])
-def test_pictures_without_alpha(channels):
-    picture = noise((3, 4, *channels), np.uint8)
-    pixels, mask = image.split_alpha(picture)
-    np.testing.assert_array_equal(pixels, picture)
-    assert mask.shape == (3, 4) and not mask.any()
 
 
 @pytest.mark.parametrize(

@@ -74,23 +74,6 @@ def test_the_k_th_smallest_takes_the_value_of_its_rank(case):
             assert found[s, order[s, k]] == targets[s * len(targets) // segments, rank]
 
 
-@given(seeds, st.integers(1, 30), st.integers(1, 4), kinds)
-def test_every_target_value_is_used_equally_often(seed, m, times, kind):
-    values, targets = picture((2, m * times), kind, seed), picture((1, m), "all", seed + 1)
-    found = by_rank(values, targets)
-    assert (np.sort(found, 1) == np.sort(targets, 1).repeat(times, 1)).all()
-
-
-@given(pairs(), seeds)
-def test_the_order_of_values_is_kept(case, seed):
-    values, targets = case
-    for before, after in zip(values, by_rank(values, targets, seed), strict=True):
-        taken = after[np.argsort(before, kind="stable")]
-        starts = np.flatnonzero(np.diff(np.sort(before), prepend=np.int64(LOW) - 1))
-        highest, lowest = np.maximum.reduceat(taken, starts), np.minimum.reduceat(taken, starts)
-        assert (highest[:-1] <= lowest[1:]).all()
-
-
 def test_pictures_without_ties_are_matched_as_by_scikit_image():
     rng = np.random.default_rng(5)
     values, target = (rng.permutation(5000)[:900].astype(np.int32).reshape(30, 30) for _ in range(2))
@@ -158,27 +141,6 @@ def test_a_value_goes_through_the_cdf_and_the_table(case, bins):
         steepest = int(np.diff(table.astype(np.int64)).max())
         for ours, exact in zip(found[s].tolist(), looked_up(own, table, Fraction), strict=True):
             assert abs(ours - exact) <= Fraction(1, 2) + Fraction((bins + 1) * steepest, UNIT)
-
-
-@given(pairs(lengths=(7, 40, 300)), histograms)
-def test_the_histogram_is_the_targets_to_a_bin(case, bins):
-    """Each cdf lies within the other one, moved by a bin of the target's range and 1 for the rounding to integers,
-    and by the mass of a bin of the table and of the fullest bin of the segment.
-    """
-    values, targets = case
-    found = on(REFERENCE, match_lookup, values, tables(targets, bins)).astype(np.int64)
-    for s, own in enumerate(values.astype(np.int64)):
-        if own.min() == own.max():
-            continue
-        target = np.sort(targets[s * len(targets) // len(values)].astype(np.int64))
-        slack = (target[-1] - target[0]) / bins + 1
-        number = np.minimum((own - own.min()) * bins // (own.max() - own.min()), bins - 1)
-        mass = 1 / bins + np.bincount(number).max() / own.size
-        x = np.union1d(found[s], target)
-        ours = np.searchsorted(np.sort(found[s]), x, "right") / own.size
-        above, below = (np.searchsorted(target, x + by, "right") / target.size for by in (slack, -slack))
-        assert (ours <= above + mass + CONTRAST).all()
-        assert (ours >= below - mass - CONTRAST).all()
 
 
 @pytest.mark.parametrize("bins", [2, 3, 255, 256, 4096])

@@ -85,16 +85,6 @@ def test_one_sample_for_all_is_the_texture_itself():
             assert_same_bits(mix(samples, (40, 48), channel_axis=axis, **options), plain)
 
 
-def test_a_weight_of_zero_is_as_if_only_the_pattern_were_there():
-    for samples, axis in ((GREYS, None), ([WARM, COLD], -1)):
-        pattern = mix(samples, (40, 48), pattern=0, channel_axis=axis, iterations=2)
-        assert_same_bits(mix(samples, (40, 48), average=[1, 0], channel_axis=axis, iterations=2), pattern)
-        both = mix(samples, (40, 48), average=[1, 1], channel_axis=axis, iterations=2)
-        assert (both != pattern).any()
-        two = mix(samples, (40, 48), average=[0, 1], channel_axis=axis, iterations=2)
-        assert_same_bits(two, mix(samples[::-1], (40, 48), average=[1, 0], channel_axis=axis, iterations=2))
-
-
 def test_the_average_of_pixels_is_between_them():
     black, white = np.full((16, 16), 10, np.uint8), np.full((16, 16), 200, np.uint8)
     made = mix([black, white], (20, 20), average=[3, 1])
@@ -132,29 +122,12 @@ def test_a_split_at_either_end_is_all_low_or_nearly_all_high(kind):
     assert_same_bits(mix(GREYS, (48, 48), **options), made[1])
 
 
-def test_samples_may_be_more_than_two_and_of_any_size():
-    third = colours((0.1, 2.0, 0.1), 3, (33, 30))
-    made = mix([WARM, COLD, third], (40, 41), average=[1, 2, 0.5], channel_axis=-1, iterations=1)
-    assert made.shape == (40, 41, 3)
-    assert made.dtype == np.uint8
-    assert mix([np.moveaxis(s, -1, 0) for s in (WARM, COLD)], (9, 8), channel_axis=0).shape == (3, 9, 8)
-
-
 def test_grey_goes_with_colour():
     grey = texture((40, 40))
     made = mix([WARM, grey], (40, 44), palette=0, pattern=1, channel_axis=-1)
     assert abs(moments(made)[0] - moments(WARM)[0]).max() <= PALETTE * WARM.std()
     made = mix([WARM, grey], (40, 44), palette=1, pattern=0, channel_axis=-1)
     assert (made == made[..., :1]).all()
-
-
-@pytest.mark.parametrize("flat", [0, 1])
-def test_a_constant_sample_is_no_trouble(flat):
-    samples = [WARM, COLD]
-    samples[flat] = np.full((9, 9, 3), [5, 60, 100], np.uint8)
-    made = mix(samples, (20, 20), palette=flat, pattern=1 - flat, channel_axis=-1)
-    assert (made == np.array([5, 60, 100])).all()
-    assert mix(samples, (20, 20), channel_axis=-1).shape == (20, 20, 3)
 
 
 def test_a_start_and_a_callback_are_those_of_the_method():

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from cases import REFERENCE, analyse, assert_same_bits, opencl, texture
+from cases import REFERENCE, analyse, assert_same_bits, texture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain_multires import as_large
@@ -90,12 +90,6 @@ def test_alpha_0_on_an_open_plane_gives_the_sample_itself(size, channels):
     assert_same_bits(image, sample)
     _, output = run(sample, (20, 17), alpha=0, boundary="open")
     assert np.array_equal(output.source, tiling((20, 17), size))
-
-
-def test_alpha_0_tiles_the_sample_on_a_device(any_device):
-    sample = texture((13, 7), 3)
-    image, _ = run(sample, (26, 14), alpha=0, device=opencl(any_device))
-    assert_same_bits(image, np.tile(sample, (2, 2, 1)))
 
 
 @pytest.mark.parametrize("size", [(8, 8), (13, 7)], ids=str)
@@ -306,18 +300,6 @@ def test_without_orientations_bands_are_compared_alone():
     table = [[0.5]] * 4
     check_candidates(texture((13, 12)), (20, 17), table, alpha=0.5, orientations=0)
     check_candidates(texture((13, 7), 3), (20, 17), table, alpha=0.5, orientations=0)
-
-
-@pytest.mark.parametrize("options", [{}, {"parity": "free", "boundary": "open"}], ids=str)
-def test_a_device_gives_the_same_bits(any_device, options):
-    sample = texture((13, 7), 3)
-    given = {"alpha": 0.6, "beta": 0.5} | options
-    image, output = run(sample, (26, 14), **given)
-    again, other = run(sample, (26, 14), device=opencl(any_device), **given)
-    assert_same_bits(again, image)
-    assert same_places(output, other)
-    for ours, theirs in zip(output.stages, other.stages, strict=True):
-        assert_same_bits(ours.image, theirs.image)
 
 
 ALPHAS = [0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.3, 2.0, 4.0, INF]

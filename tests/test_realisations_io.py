@@ -43,13 +43,6 @@ def test_xarray_reads_what_was_written(tmp_path, suffix, dtype, variables):
     assert os.listdir(tmp_path) == [path.name]
 
 
-@pytest.mark.parametrize("suffix", [".zarr", ".nc"])
-def test_an_array_without_a_name_gets_one(tmp_path, suffix):
-    write_realisations(tmp_path / f"a{suffix}", some(name=None))
-    with xarray.open_dataarray(tmp_path / f"a{suffix}") as found:
-        assert found.name == "realisations" and np.array_equal(found, some())
-
-
 def test_files_are_compressed(tmp_path):
     array = xarray.DataArray(np.zeros((4, 200, 200)), dims=("realisation", "y", "x"))
     for suffix in SUFFIXES:

@@ -312,17 +312,3 @@ def test_the_work_is_counted(cl_device):
         channels = 2  # one of them the structure channel
         assert level["fma"] == round(2 * 24 * channels * level["weighed"] * level["relaxations"])
     assert levels[0]["weighed"] == levels[0]["candidates"], "the coarsest level is exact"
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"search": "fast"}, "search"),
-        ({"chance": 1.5}, "chance"),
-        ({"pixel": "density"}, 'relaxation="gibbs"'),
-    ],
-    ids=str,
-)
-def test_bad_options_are_one_sentence(options, message):
-    with pytest.raises((ValueError, TypeError), match=message):
-        simdtex.synthesize(texture((12, 12)), (12, 12), **{"search": "coherent"} | options)

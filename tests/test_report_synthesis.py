@@ -54,22 +54,6 @@ def test_statistics_tell_the_use(method):
     assert inside.sum() / fair == pytest.approx(most["times_fair_share"])
 
 
-def test_colour_on_the_first_axis_has_its_use_too():
-    sample = np.moveaxis(texture((24, 20), 3), -1, 0)
-    _, output = simdtex.synthesize(
-        sample, (20, 21), channel_axis=0, order=2, rng=1, device="reference", full_output=True
-    )
-    assert output.statistics["use"] == effective_use(output.source, (24, 20)).as_dict()
-
-
-def test_a_tiling_uses_all_alike():
-    _, output = simdtex.synthesize(
-        texture((16, 16)), (32, 32), method="multires", alpha=0.0, edges="keep", device="reference", full_output=True
-    )
-    assert output.statistics["use"]["effective_share"] == 1.0
-    assert output.statistics["use"]["most_used"]["times_fair_share"] == 1.0
-
-
 def test_the_map_of_use():
     source = np.array([[[0, 0], [0, 0], [0, 0]], [[1, 2], [0, 0], [0, 0]], [[0, 0], [0, 0], [0, 1]]])
     expected = np.log1p([[7, 1, 0], [0, 0, 1]]) / np.log(8)
@@ -145,14 +129,3 @@ def test_a_method_without_sources_has_a_report_without_them(folder):
     assert result.exit_code == 0, result.output
     assert sorted(path.name for path in (folder / "r").iterdir()) == ["index.html", "picture.png", "results.json"]
     assert "effective share" not in read_page(folder / "r" / "index.html").text
-
-
-@pytest.mark.parametrize(
-    ("report", "words"),
-    [("sample.png", "overwritten"), ("nowhere/r", "does not exist"), (".", "lies in"), ("out.png", "twice")],
-)
-def test_bad_folders_are_refused_before_the_work(folder, report, words):
-    result = synth(folder, "--order", 2, "--report", folder / report)
-    assert result.exit_code == 2 and words in result.output
-    assert len(result.output.strip().splitlines()) == 1
-    assert not (folder / "out.png").exists()

@@ -100,12 +100,6 @@ def test_sites_that_are_not_independent_may_not(name):
     assert (run(Apart(get(name)), "gibbs")[0] != expected(name, "gibbs")[0]).any()
 
 
-@forms
-def test_a_checkerboard_of_order_1_may_be_relaxed_one_by_one(form):
-    shape = (4, 8)  # whose coarser level is an even torus too
-    assert_same_bits(run(Apart(get("checkerboard")), form, shape, order=1), run("checkerboard", form, shape, order=1))
-
-
 class TileAfterTile(schedules.Block):
     """Tiles on their own, but one after another, one site a step."""
 

@@ -100,13 +100,6 @@ def test_exactly_the_neighbours_in_another_tile_are_read_elsewhere(height, width
     assert np.array_equal(np.where(found >= grid.plane, found - grid.plane, found), bare)
 
 
-def test_a_view_does_not_show_the_older_picture():
-    for spacing in (1, 2):
-        now, old = picture((3, 5, 7), "uint16", 1), picture((3, 5, 7), "uint16", 2)
-        grid = Grid(5, 7, spacing, True, (2, 2))
-        assert np.array_equal(grid.view(stack(now, old)), now[:, ::spacing, ::spacing])
-
-
 def tiled(seed, tile, **options):
     """A problem whose field stands on an older one; and that older field."""
     p, older = problem(seed, **options), problem(seed + 1000, **options).field

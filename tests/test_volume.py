@@ -44,21 +44,6 @@ def test_every_shape_survives(tmp_path, suffix, shape):
     np.testing.assert_array_equal(loaded(tmp_path / f"block{suffix}"), values, strict=True)
 
 
-def test_values_that_are_no_numbers_survive_a_float_format(tmp_path):
-    values = np.array([[[np.nan, np.inf, -np.inf, -0.0, 1e-40]]], np.float32)
-    for suffix in (".npz", ".npy", ".tif", ".nrrd"):
-        volume.write(tmp_path / f"a{suffix}", values)
-        assert loaded(tmp_path / f"a{suffix}").tobytes() == values.tobytes()
-
-
-def test_an_opaque_alpha_channel_is_kept(tmp_path):
-    values = noise((2, 3, 4, 4))
-    values[..., 3] = 255
-    for name in ("a.tif", "a"):
-        volume.write(tmp_path / name, values)
-        np.testing.assert_array_equal(loaded(tmp_path / name), values, strict=True)
-
-
 @pytest.mark.parametrize("channels", [None, 3])
 def test_in_an_nrrd_x_runs_fastest_after_the_channels(tmp_path, channels):
     values = noise((2, 3, 4) if channels is None else (2, 3, 4, 3), "uint16")
