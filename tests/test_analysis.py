@@ -132,14 +132,6 @@ def test_the_energy_of_many_large_features_is_exact():
     assert _energy(features, about_mean=True).tolist() == [energy(column, True) for column in columns]
 
 
-def test_the_energy_has_a_row_for_every_level_and_none_for_the_finest():
-    found = analyse(REFERENCE, texture((16, 16), 1))
-    assert (found.energy.dtype, found.energy.shape) == (np.float64, (5, 9))
-    assert not found.energy[0].any(), "nodes are above it"
-    assert (found.energy[1:4, 0] > 0).all()
-    assert found.energy[-1, 0] == 0, "a single pixel does not vary"
-
-
 @pytest.mark.parametrize("boundary", ["torus", "open"])
 def test_levels_smaller_than_the_filters_have_no_responses_but_a_band(boundary):
     found = analyse(REFERENCE, texture((40, 20), 1), boundary=boundary)
@@ -154,18 +146,6 @@ def test_levels_smaller_than_the_filters_have_no_responses_but_a_band(boundary):
             assert not features[:, 1:].any()
             assert not z[1:].any()
     assert fitting == 3
-
-
-@pytest.mark.parametrize("channels", [1, 2, 3, 5])
-@pytest.mark.parametrize("orientations", [0, 1, 4])
-def test_how_many_features_there_are(channels, orientations):
-    pixels = texture((9, 8), channels)
-    found = analyse(REFERENCE, pixels, orientations=orientations)
-    width = 1 + 2 * orientations
-    nodes = sum(rows * cols for rows, cols in found.shapes[1:])
-    assert found.features.shape == (nodes, width)
-    assert found.energy.shape == (found.levels, width)
-    assert found.bands[0].shape == (channels, 9, 8), "bands have all channels"
 
 
 def test_no_orientations_leave_the_bands_alone(machine):
@@ -188,12 +168,6 @@ def test_contrast_and_a_constant_change_nothing(boundary):
         assert_same_bits(run(REFERENCE, byte * a + b, **options), expected)
     dull = byte // 2 + np.uint8(7)
     assert_same_bits(run(REFERENCE, dull * np.uint16(3), **options), run(REFERENCE, dull, **options))
-
-
-def test_a_constant_sample_has_no_features_and_no_energy():
-    for dtype, value in ((np.uint8, 200), (np.bool_, True), (np.float64, -1e308), (np.int64, -(2**63))):
-        *bands, features, z = run(REFERENCE, np.full((7, 5, 2), value, dtype))
-        assert not any(a.any() for a in (*bands, features, z))
 
 
 def test_on_a_torus_a_shift_of_the_sample_shifts_its_features():

@@ -12,7 +12,6 @@ from scipy.stats import chisquare
 from tolerances import SIGNIFICANCE
 
 from simdtex import random
-from simdtex.ops import candidates as module
 from simdtex.ops.candidates import Sampled, Structure, candidates
 
 ALL = 2**32 - 1
@@ -238,16 +237,6 @@ def test_a_device_has_the_references_bits(machine, match, p, seed):
     assert_same_bits(sampled_on(machine, p, match, seed), sampled_on(REFERENCE, p, match, seed))
 
 
-@phases
-@pytest.mark.parametrize("features", [1, 9, 27])
-def test_any_number_of_features_has_the_references_bits(machine, features, match):
-    for seed, of in ((1, SMALL), (2, EXTREME)):
-        p = problem(seed, tile=(13, 14), shape=(16, 31), levels=5, features=features, of=of)
-        source, counts = sampled_on(REFERENCE, p, match, seed)
-        assert counts[:, 0].max() > 4, "there is something to choose from"
-        assert_same_bits(sampled_on(machine, p, match, seed), [source, counts])
-
-
 @given(p=problems(), cuts=st.lists(st.floats(0, 1), max_size=4), match=st.booleans())
 @settings(max_examples=20)
 def test_any_division_into_ranges_changes_no_bit(machine, p, cuts, match):
@@ -257,15 +246,6 @@ def test_any_division_into_ranges_changes_no_bit(machine, p, cuts, match):
     whole = sampled_on(REFERENCE, p, match, 11)
     for m in (REFERENCE, machine):
         assert_same_bits(sampled_on(m, p, match, 11, ends), whole)
-
-
-@phases
-def test_the_references_own_division_changes_no_bit(monkeypatch, match):
-    p = problem(4)
-    whole = sampled_on(REFERENCE, p, match, 5)
-    for together in (1, 200):
-        monkeypatch.setattr(module, "TOGETHER", together)
-        assert_same_bits(sampled_on(REFERENCE, p, match, 5), whole)
 
 
 def test_nothing_but_the_range_is_written(machine):

@@ -136,13 +136,10 @@ BAD_FILL = {
     "a mask of nothing": (["photo.png", "--mask", "black.png", "-o", "out.png"], "nothing to fill"),
     "a mask of everything": (["photo.png", "--mask", "white.png", "-o", "out.png"], "nothing of the picture is known"),
     "a mask of another size": (["photo.png", "--mask", "small.png", "-o", "out.png"], "32 x 24"),
-    "a missing picture": (["none.png", "-o", "out.png"], "does not exist"),
     "a grey sample": ([*MASKED, "--sample", "grey.png"], "2-dimensional (grey)"),
     "maps beside a sample": ([*MASKED, "--sample", "texture.png", "--also", "normal.png=n.png"], "leave --also out"),
     "a map of another size": ([*MASKED, "--also", "small.png=n.png"], "32x24"),
     "a source map that holds no -1": ([*MASKED, "--sample", "texture.png", "--source-map", "s.png"], ".npz"),
-    "the mask overwritten": (["photo.png", "--mask", "mask.png", "-o", "mask.png"], "would be overwritten"),
-    "one file for two": ([*MASKED, "--also", "normal.png=out.png"], "written twice"),
     "weights in words": ([*MASKED, "--weights", "much"], "numbers parted by commas"),
 }
 
@@ -164,21 +161,12 @@ def test_extend_gives_the_bytes_of_the_function(folder):
     assert np.array_equal(made[1:25, 3:35], photo)
 
 
-def test_a_size_adds_at_the_right_and_at_the_bottom(folder):
-    result = small(folder, "extend", "photo.png", "-o", "out.png", "--size", "38x29")
-    assert result.exit_code == 0, result.output
-    made = pixels(folder, "out.png")
-    assert made.shape == (29, 38, 3)
-    assert np.array_equal(made[:24, :32], pixels(folder, "photo.png"))
-
-
 @pytest.mark.parametrize(
     ("flags", "tile"),
     [
         (["--seamless"], True),
         (["--seamless", "x"], "x"),
         (["--seamless", "y"], "y"),
-        (["--seamless", "both"], True),
     ],
 )
 def test_a_material_becomes_seamless(folder, flags, tile):

@@ -220,11 +220,6 @@ def test_bad_input_gets_one_sentence_and_writes_nothing(folder, case):
     assert listing(folder) == before
 
 
-def test_a_sample_is_asked_for(folder):
-    result = run(folder, "synth", "-o", "out.png")
-    assert result.exit_code == 2 and "SAMPLE" in result.output
-
-
 def test_known_values_of_a_vast_picture_are_not_placed(folder, monkeypatch):
     monkeypatch.setattr("simdtex.machine.memory.available", lambda: 2**30)
     monkeypatch.setattr("simdtex.io.hard_data.place_hard_data", lambda *_: pytest.fail("which takes 4 GiB"))

@@ -16,20 +16,9 @@ COMMANDS = {name: cli.load(name) for name in cli.COMMANDS}
 READ, WRITE = ("read", "enter"), ("write", "folder", "either")
 TEXTS = {
     # options and arguments of text that name no file; those of `mix` repeat the name of a SAMPLE
-    *(
-        "host",
-        "device",
-        "size",
-        "method",
-        "preset",
-        "relaxation",
-        "pixel",
-        "search",
-        "edges",
-        "boundary",
-    ),
-    *("weights", "shares", "proportions", "alpha", "pyramid", "seamless", "workers"),
-    *("color", "schedule", "array", "average", "names", "alphas", "betas", "palette", "pattern", "low", "high"),
+    *("host", "device", "size", "method", "preset", "relaxation", "pixel", "search", "edges", "boundary", "weights"),
+    *("shares", "proportions", "alpha", "pyramid", "seamless", "workers", "color", "schedule", "array", "average"),
+    *("names", "alphas", "betas", "palette", "pattern", "low", "high"),
 }
 PICTURES = ("synth", "fill", "extend", "mix")
 ISING_START = ("ising", "start")  # up or random

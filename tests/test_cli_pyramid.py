@@ -11,7 +11,6 @@ from volumes import loaded
 import simdtex
 from simdtex.cli import main
 from simdtex.cli.inputs import last_iteration
-from simdtex.cli.solid import block_shape
 from simdtex.io import image
 from simdtex.report.solid import view
 
@@ -161,14 +160,6 @@ def test_stages_of_a_solid_are_its_middle_slice(folder):
     np.testing.assert_array_equal(picture("st/iteration02.png"), made[2])
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [("128", (128, 128, 128)), ("4x5x6", (4, 5, 6)), (" 4X5 \u00d7 6 ", (4, 5, 6)), ("1", (1, 1, 1))],
-)
-def test_sizes_of_blocks(text, expected):
-    assert block_shape(text) == expected
-
-
 SOLID_SIZES = ["0", "4x5", "4x5x6x7", "1.5"]
 PICTURES_ONLY = {"size 0", "suffix", "overwritten sample", "stages in the output's place"}
 BAD_SOLID = {name: case for name, case in BAD_PYRAMID.items() if name not in PICTURES_ONLY} | {
@@ -223,12 +214,6 @@ def test_mix_is_what_python_makes(folder, case):
     assert second == last_iteration(run.statistics)
 
 
-def test_mix_of_grey_alone_is_twice_the_first(folder):
-    result = mix(*QUICK, samples=("grey.png", "start.png"))
-    assert result.exit_code == 0, result.output
-    np.testing.assert_array_equal(picture(), simdtex.mix([GREY, START], (64, 56), **EACH, **SAME))
-
-
 def test_a_path_wins_over_a_number(folder):
     image.write("1.png", GREY)
     (folder / "1.png").rename("2")
@@ -272,8 +257,3 @@ def test_samples_that_do_not_mix(folder, samples, words, monkeypatch):
         pictures = {"four.png": texture((20, 20), 4), "colour.png": COLOUR}
         monkeypatch.setattr(image, "read", lambda path: image.Image(pictures[str(path)], -1))
     assert_one_sentence(mix(samples=samples), words, folder)
-
-
-def test_mix_needs_a_sample(folder):
-    assert mix(samples=()).exit_code == 2
-    assert files(folder) == FILES

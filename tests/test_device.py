@@ -333,12 +333,6 @@ def test_a_folder_that_the_user_has_set_is_used(intel, monkeypatch):
         assert os.environ["OCL_ICD_VENDORS"] == "/my/own"
 
 
-def test_no_folder_is_set_on_windows(intel, monkeypatch):
-    monkeypatch.setattr(runtimes.sys, "platform", "win32")
-    with runtimes._icd_folder():
-        assert "OCL_ICD_VENDORS" not in os.environ
-
-
 def test_every_usable_device_is_in_the_isolated_listing(cl_device):
     line = device.devices()[cl_device.index]
     assert replace(line, handle=None) == replace(cl_device, handle=None)
@@ -359,15 +353,3 @@ def test_render(capsys):
     assert "[bold]" in lines[4]
     assert lines[5].split()[1:4] == ["Hollow", "-", "-"]
     assert lines[6] == "Chosen by default: Slow 10 (Acme OpenCL)"
-
-
-@pytest.mark.parametrize(
-    ("named", "last", "stars"),
-    [("pocl", "Chosen by SIMDTEX_DEVICE: pthread-epyc", 1), ("nonesuch", "No device matches", 0)],
-)
-def test_render_names_the_variable(monkeypatch, capsys, named, last, stars):
-    monkeypatch.setenv(device.VARIABLE, named)
-    render(Console(width=200, color_system=None), LISTING)
-    lines = capsys.readouterr().out.splitlines()
-    assert any(line.startswith(last) for line in lines[len(LISTING) + 1 :])
-    assert sum(line.startswith("*") for line in lines) == stars

@@ -10,7 +10,6 @@ from scipy.ndimage import binary_dilation, binary_erosion
 from scipy.special import kl_div
 
 from simdtex.experiments import ensemble
-from simdtex.experiments.ensemble import distance
 from simdtex.experiments.ensemble.summary import MARGIN, _variogram
 
 
@@ -27,12 +26,6 @@ def test_categories_are_those_of_the_training_image_unless_they_are_named():
     assert len(ensemble.categories_of(np.arange(17).reshape(1, 17))) == 0
     assert len(ensemble.categories_of(np.arange(16).reshape(1, 16))) == 16
     assert ensemble.categories_of(image > 2).tolist() == [False, True]
-
-
-def test_variogram_of_a_checkerboard():
-    board = np.indices((20, 31)).sum(axis=0) % 2
-    for axis in (0, 1):
-        np.testing.assert_allclose(_variogram(board == 1, axis, 6), [0, 0.5, 0, 0.5, 0, 0.5, 0])
 
 
 def test_without_gstools_one_sentence_says_so(monkeypatch):
@@ -145,12 +138,6 @@ def test_rough_banks_holes_and_specks_hardly_make_dead_ends(name):
         assert np.mean(found) == pytest.approx(expected, abs=0.1)
 
 
-def test_identical_realisations_have_no_variety():
-    image = noise(1)[0]
-    found = ensemble.anodi(np.stack([image] * 4), noise(2)[0])
-    assert found.variety == 0 and 0 < found.likeness < 1 and found.ratio == 0
-
-
 def test_distances_against_their_definition():
     images, tables = noise(6, (3, 11, 13), 4), []  # four categories: patterns of 2 x 2
     for spread in (1, 2, 4):
@@ -172,13 +159,6 @@ def test_distances_against_their_definition():
     assert found.likeness == pytest.approx((expected[0, 2] + expected[1, 2]) / 2)
     assert found.ratio == pytest.approx(found.variety / found.likeness)
     np.testing.assert_allclose(found.by_level[:, 0], [table[0, 1] for table in tables])
-
-
-def test_blocks_do_not_change_the_distances(monkeypatch):
-    images = noise(7, (7, 20, 20))
-    whole = ensemble.anodi(images[:6], images[6]).distances
-    monkeypatch.setattr(distance, "BLOCK", 1)
-    np.testing.assert_allclose(ensemble.anodi(images[:6], images[6]).distances, whole, rtol=1e-12)
 
 
 def test_continuous_values_are_cut_by_the_quantiles_of_the_training_image():

@@ -317,14 +317,6 @@ def test_a_callback_sees_the_whole_picture_and_a_fraction_that_never_falls(axis,
     assert_same_bits(fill(image, FAR, sample=other, reach=4, channel_axis=axis), found)
 
 
-def test_an_error_of_a_callback_comes_out():
-    def stop(progress):
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        fill(texture(SHAPE), MIDDLE, callback=stop)
-
-
 def test_statistics_are_of_every_window():
     _, output = fill(texture(FAR.shape), FAR, full_output=True, rng=7)
     told = output.statistics
@@ -371,14 +363,6 @@ def test_the_same_bytes_on_every_device(machine):
     )
     assert_same_bits(one[0], two[0])
     assert_same_bits(one[1].source, two[1].source)
-
-
-def test_seeds_count():
-    image = texture(SHAPE)
-    assert_same_bits(fill(image, MIDDLE, rng=3), fill(image, MIDDLE, rng=3))
-    assert (fill(image, MIDDLE, rng=3) != fill(image, MIDDLE, rng=4)).any()
-    assert_same_bits(extend(image, right=4, rng=3), extend(image, right=4, rng=3))
-    assert (extend(image, right=4, rng=3) != extend(image, right=4, rng=4)).any()
 
 
 @pytest.mark.parametrize("axis", [None, 0, -1])
@@ -452,13 +436,6 @@ def test_a_tile_wraps(finish, most):
         assert np.mean([step(tile, axis) for tile in tiles]) < most * np.mean([step(image, axis) for image in images])
 
 
-def test_a_tile_along_x_wraps_along_x_alone():
-    image = texture((32, 40))
-    found = extend(image, seamless="x", band=5)
-    assert step(found, 1) < 0.55 * step(image, 1)
-    assert np.array_equal(found[[0, -1], 5:-5], image[[0, -1], 5:-5])
-
-
 IMAGE = texture(SHAPE)
 FLOAT = texture(SHAPE, dtype=np.float32)
 
@@ -472,17 +449,12 @@ def holding(value):
 BAD_FILL = {
     "nothing to fill": ({"mask": np.zeros(SHAPE, bool)}, ValueError, "nothing to fill; give a mask that is True"),
     "nothing known": ({"mask": np.ones(SHAPE, bool)}, ValueError, "nothing of the picture is known; give a mask"),
-    "NaN everywhere": ({"image": np.full(SHAPE, np.nan), "mask": None}, ValueError, "nothing of the picture is known"),
     "a mask of numbers": ({"mask": MIDDLE.astype(np.uint8)}, TypeError, "mask holds uint8 values; give True and False"),
     "another size": ({"mask": MIDDLE[:-1]}, ValueError, "mask is 15x20 and the picture 16x20 .*; give one size"),
     "no reach": ({"reach": 0}, ValueError, "reach is 0; give 1 or more"),
     "a sample of another type": (
         {"sample": FLOAT}, ValueError, "sample has 1 channels of float32 and the picture 1 of uint8; give both one"),
-    "samples of two types": ({"sample": [IMAGE, FLOAT]}, ValueError, "sample 1 has .*; give samples of one type"),
     "a sample with colour": ({"sample": texture(SHAPE, 3)}, ValueError, "the sample is 3-dimensional"),
-    "more channels": (
-        {"image": texture(SHAPE, 3), "sample": texture(SHAPE, 2), "channel_axis": -1}, ValueError,
-        "2 channels of uint8 and the picture 3 of uint8"),
     "a sample of nothing": (
         {"image": FLOAT, "sample": np.full(SHAPE, np.nan, np.float32)}, ValueError, "no known pixel"),
     "an unknown option": ({"method": "mrf"}, TypeError, "unknown option 'method'"),
@@ -508,7 +480,6 @@ BAD_EXTEND = {
         ValueError,
         "band=8 leaves nothing of a picture of 16x20 .* narrower",
     ),
-    "all a band by default": ({"seamless": "y"}, ValueError, "band=8 leaves nothing"),
     "NaN": ({"image": holding(np.nan), "left": 2}, ValueError, "NaN or infinite, the first at row 3.*: fill them"),
     "a boundary": (
         {"seamless": True, "band": 3, "boundary": "open"},
@@ -525,11 +496,6 @@ def test_bad_input_to_extend_is_refused_with_a_remedy(case):
     with pytest.raises(error, match=words) as caught:
         extend(**({"image": IMAGE} | change))
     assert "\n" not in str(caught.value)
-
-
-def test_a_band_as_wide_as_fits_is_taken():
-    found = extend(IMAGE, seamless=True, band=7)
-    assert_same_bits(found[7:9, 7:13].copy(), IMAGE[7:9, 7:13].copy())
 
 
 def test_of_a_picture_that_is_mostly_unknown_fewer_levels_are_made():

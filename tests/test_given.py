@@ -86,15 +86,6 @@ def test_all_is_known_but_one_site(schedule, search, site):
         assert keeps(sample, known, order=2, levels=3, **options)[site] in sample
 
 
-@pytest.mark.parametrize("search", ["exact", "coherent"])
-@pytest.mark.parametrize("site", [(0, 0), (5, 6), (8, 9)])
-def test_nothing_is_known_but_one_site(site, search):
-    known = np.ma.masked_all((9, 10), np.uint8)
-    known[site] = 201
-    for schedule in ("coloring", "luby", "block:3x4"):
-        keeps(texture((9, 10)), known, order=2, levels=3, schedule=schedule, search=search)
-
-
 @given(
     *(st.integers(1, 20), st.integers(1, 20), st.sampled_from([1, 2, 4, 8]), st.booleans()),
     *(st.sampled_from([0.02, 0.1, 0.4, 0.9]), st.integers(0, 2**16)),
@@ -197,17 +188,6 @@ def test_a_map_of_labels_is_obeyed(labels, search):
         share[weight] = (label[tuple(np.moveaxis(output.source, -1, 0))] == wanted).mean()
     assert share[1.0] > 0.93
     assert share[0.0] < 0.8, "else the guide tells nothing"
-
-
-def test_where_a_guide_says_nothing_others_tell():
-    """Half a map: the known half is obeyed, the rest is as without a guide."""
-    sample, label = patchwork()
-    wanted = np.ones((20, 24))
-    wanted[:, 12:] = np.nan
-    _, output = run(sample, (20, 24), order=4, guide=(label, wanted), labels=True)
-    found = label[tuple(np.moveaxis(output.source, -1, 0))]
-    assert found[:, :12].mean() > 0.95
-    assert found[:, 15:21].mean() < 0.9
 
 
 def test_a_grey_guide_is_followed():

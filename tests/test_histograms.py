@@ -61,24 +61,6 @@ def test_a_weight_of_zero_leaves_the_others_alone():
     assert (average([a, b, a], [0, 7, 0]) == b).all()
 
 
-def test_the_average_of_equals_is_the_same():
-    a = sorted_values(np.random.default_rng(2), 2, 33, 2**20)
-    assert (average([a, a, a], [1, 2, 0.3]) == a).all()
-
-
-def test_only_the_ratio_of_weights_counts():
-    rng = np.random.default_rng(3)
-    a, b = sorted_values(rng, 2, 31, 2**20), sorted_values(rng, 2, 17, 2**20)
-    assert (average([a, b], [1, 3]) == average([a, b], [2.0, 6.0])).all()
-    assert (average([a, b], [1, 3]) == average([b, a], [3, 1])).all()
-
-
-def test_two_far_values_stay_two():
-    black, white = np.zeros((1, 10), np.int32), np.full((1, 10), 100, np.int32)
-    counts = average([black, white], [3, 2])
-    assert counts.tolist() == [[0] * 6 + [100] * 4]
-
-
 def test_histograms_of_textures_are_averaged_one_by_one():
     rng = np.random.default_rng(4)
     a, b = (

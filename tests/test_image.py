@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Pictures go from file to array and back without a value changed, and errors say what to do."""
 
-import contextlib
 import logging
 import os
 import stat
@@ -19,7 +18,6 @@ from hypothesis import strategies as st
 from volumes import noise
 
 from simdtex.io import image
-from simdtex.io.atomic import atomic_folder, atomic_path
 
 ROUND_TRIPS = [
     *[(".png", dtype, c) for dtype in ("uint8", "uint16") for c in (None, 1, 2, 3, 4)],
@@ -215,14 +213,6 @@ def test_files_that_are_no_images(tmp_path):
         image.read("a\0b")
 
 
-@given(st.binary(max_size=200), st.sampled_from([b"", b"\x93NUMPY", b"II*\0", b"BM"]))
-def test_no_bytes_escape_the_errors(tmp_path_factory, data, start):
-    path = tmp_path_factory.getbasetemp() / "any.bin"
-    path.write_bytes(start + data)
-    with contextlib.suppress(ValueError):
-        assert image.read(path).pixels.ndim in (2, 3)
-
-
 def test_unknown_pixels_are_read_and_for_the_function_to_judge(tmp_path):
     pixels = noise((5, 4, 3), np.float32)
     pixels[1, 2, 0] = np.nan
@@ -360,31 +350,6 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "access", lambda *_: False)  # root may write anywhere
     with pytest.raises(ValueError, match="not writable"):
         image.check_writable(tmp_path / "a.png")
-
-
-def test_what_is_interrupted_leaves_the_old_file(tmp_path):
-    path = tmp_path / "a.png"
-    path.write_bytes(b"old")
-    for error in (KeyboardInterrupt, RuntimeError):
-        with pytest.raises(error), atomic_path(path) as temporary:
-            assert (temporary.parent, temporary.suffix) == (tmp_path, ".png")
-            temporary.write_bytes(b"half")
-            raise error
-    assert path.read_bytes() == b"old" and os.listdir(tmp_path) == ["a.png"]
-
-
-def test_a_folder_is_replaced_whole_or_left_alone(tmp_path):
-    path = tmp_path / "some.kind"
-    for content in ("first", "second"):
-        with atomic_folder(path) as temporary:
-            assert (temporary.parent, temporary.suffix) == (tmp_path, ".kind")
-            (temporary / content).touch()
-        assert os.listdir(path) == [content]
-    with pytest.raises(KeyboardInterrupt), atomic_folder(path) as temporary:
-        (temporary / "third").touch()
-        raise KeyboardInterrupt
-    assert os.listdir(path) == ["second"]
-    assert os.listdir(tmp_path) == ["some.kind"]
 
 
 def test_written_file_has_the_usual_permissions_and_follows_links(tmp_path):

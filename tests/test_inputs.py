@@ -28,13 +28,6 @@ def check(sample=GREY, shape=SHAPE, **rest):
     return check_inputs(sample, shape, **rest)
 
 
-def test_a_sample_alone_is_plain():
-    found = check()
-    assert found.plain and found.given is None and found.guide is None
-    assert_same_bits(found.pictures.pixels[0], GREY[..., None])
-    assert found.pictures.known is None and found.pictures.usable is None
-
-
 @pytest.mark.parametrize(
     "more",
     [
@@ -168,20 +161,11 @@ def test_a_source_map_is_of_whole_numbers(dtype):
     assert (found[~THERE] == -1).all()
 
 
-def test_where_nothing_is_known_a_source_map_may_say_anything():
-    found = check(known=SOME, known_source=at(NOWHERE, (0, 0), 99)).given.place
-    assert (found == -1).all()
-
-
 def test_a_source_map_of_several_samples():
     place = np.full((*SHAPE, 3), -1)
     place[1, 2] = 4, 3, 1
     found = check([GREY, GREY[:5, :4]], known=SOME, known_source=place).given.place
     assert found[1, 2].tolist() == [4, 3, 1] and found[5, 6].tolist() == [-1, -1, -1]
-
-
-def test_a_source_map_without_known_values_says_nothing():
-    assert check(known_source=NOWHERE).given is None
 
 
 def test_forms_of_guides():

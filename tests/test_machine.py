@@ -17,13 +17,7 @@ from simdtex.machine import runtimes
 from simdtex.machine.devices import DeviceError
 from simdtex.machine.interface import Operation
 from simdtex.machine.opencl import OpenCL
-from simdtex.machine.reference import Reference
 from simdtex.model.sample import BLOCK
-
-
-def test_an_open_machine_is_returned_as_it_is():
-    machine = Reference()
-    assert simdtex.open_machine(machine) is machine
 
 
 @given(st.integers(1, 200_000), st.integers(1, 300), st.integers(1, 4))

@@ -114,22 +114,6 @@ def test_low_and_high_frequencies_come_from_where_they_should():
     assert np.mean(distances(a, one)[2:]) < np.mean(distances(a, other)[2:])
 
 
-@pytest.mark.parametrize("kind", ["steerable", "laplacian"])
-def test_a_split_at_either_end_is_all_low_or_nearly_all_high(kind):
-    options = {"levels": 2, "pyramid": kind, "low": 0, "high": 1, "iterations": 1}
-    made = [mix(GREYS, (48, 48), split=split, **options) for split in (0, 1, 2)]
-    assert len({m.tobytes() for m in made}) == 3
-    assert_same_bits(mix(GREYS, (48, 48), **options), made[1])
-
-
-def test_grey_goes_with_colour():
-    grey = texture((40, 40))
-    made = mix([WARM, grey], (40, 44), palette=0, pattern=1, channel_axis=-1)
-    assert abs(moments(made)[0] - moments(WARM)[0]).max() <= PALETTE * WARM.std()
-    made = mix([WARM, grey], (40, 44), palette=1, pattern=0, channel_axis=-1)
-    assert (made == made[..., :1]).all()
-
-
 def test_a_start_and_a_callback_are_those_of_the_method():
     seen = []
     start = np.indices((40, 40))[0] // 10 % 2

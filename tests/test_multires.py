@@ -119,13 +119,6 @@ def test_infinite_alpha_draws_each_band_evenly_and_on_its_own():
     assert chisquare(np.bincount(pairs.ravel(), minlength=256)).pvalue > SIGNIFICANCE
 
 
-def test_infinite_alpha_without_phase_draws_from_every_pixel():
-    _, output = run(texture((7, 5)), (35, 40), alpha=INF, parity="free")
-    for stage, (rows, cols) in zip(output.stages[1:], reversed(sizes((7, 5))[:-1]), strict=True):
-        drawn = np.bincount((stage.source @ [cols, 1]).ravel(), minlength=rows * cols)
-        assert chisquare(drawn).pvalue > SIGNIFICANCE
-
-
 def border(i, n, torus):
     """Index i brought to 0 .. n-1."""
     while not 0 <= i < n:
@@ -296,12 +289,6 @@ def test_candidates_are_those_of_the_equations(size, shape, channels, alpha, bet
     check_candidates(texture(size, channels), shape, table, alpha=alpha, beta=beta, **options)
 
 
-def test_without_orientations_bands_are_compared_alone():
-    table = [[0.5]] * 4
-    check_candidates(texture((13, 12)), (20, 17), table, alpha=0.5, orientations=0)
-    check_candidates(texture((13, 7), 3), (20, 17), table, alpha=0.5, orientations=0)
-
-
 ALPHAS = [0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8, 1.3, 2.0, 4.0, INF]
 
 
@@ -364,11 +351,3 @@ def test_equal_channels_are_as_good_as_one():
         many, other = run(np.repeat(grey[..., None], count, -1), (20, 22), alpha=0.6)
         assert same_places(output, other)
         assert_same_bits(many, np.ascontiguousarray(np.repeat(image[..., None], count, -1)))
-
-
-def test_luminance_sees_nothing_of_a_texture_of_equal_luminance():
-    t = np.random.default_rng(2).integers(0, 23, (16, 16))
-    red, green = 46871 * t, 13933 * (22 - t)  # 0.2126 R + 0.7152 G is the same everywhere
-    sample = np.stack([red, green, np.full((16, 16), 2**20)], -1).astype(np.int32)
-    _, blind = run(sample, (32, 32), alpha=0, edges="keep")
-    assert (blind.stages[-1].candidates == 64).all(), "all there are"

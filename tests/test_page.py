@@ -12,7 +12,7 @@ import pytest
 
 import simdtex
 from simdtex.report.page import Figure, Section, check_folder, write_report
-from simdtex.report.plots import figure_png, new_figure, styles, tidy
+from simdtex.report.plots import figure_png, new_figure, tidy
 from simdtex.report.tables import Table, duration_text, number_text, print_table
 
 
@@ -194,12 +194,6 @@ def test_folders_that_cannot_be_written(tmp_path):
     assert os.listdir(tmp_path) == ["file"]
 
 
-def test_a_folder_without_permission(tmp_path, monkeypatch):
-    monkeypatch.setattr(os, "access", lambda *args: False)
-    with pytest.raises(ValueError, match="not writable"):
-        check_folder(tmp_path / "r")
-
-
 def test_nothing_is_left_of_a_report_that_fails(tmp_path, monkeypatch):
     def full(*args):
         raise OSError(28, "No space left on device")
@@ -220,14 +214,6 @@ def test_plots_have_the_same_bytes_every_time():
 
     assert drawn() == drawn()
     assert PIL.Image.open(io.BytesIO(drawn())).info.keys() == {"dpi"}
-
-
-def test_a_schedule_has_the_same_style_in_every_plot():
-    few, many = styles({"luby": True}), styles({"own": True, "block:8x8": False, "coloring": True, "luby": True})
-    assert few["luby"] == many["luby"]
-    assert len({(style["color"], style["marker"]) for style in many.values()}) == 4
-    assert [style["linestyle"] for style in many.values()] == ["-", "--", "-", "-"]
-    assert [style["markerfacecolor"] == "white" for style in many.values()] == [False, True, False, False]
 
 
 @pytest.mark.parametrize(

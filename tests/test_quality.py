@@ -127,19 +127,6 @@ def place_map(rows, cols, shape):
     return np.stack([row % rows, col % cols], axis=-1)
 
 
-def test_effective_use_is_the_share_that_would_do():
-    every = place_map(32, 48, (64, 96))
-    assert quality.effective_use(every, (32, 48)) == (1.0, (1.0, 0, 0, 8, 8))
-    half = quality.effective_use(place_map(32, 24, (64, 96)), (32, 48))
-    assert half == (pytest.approx(0.5), (pytest.approx(2.0), 0, 0, 8, 8))
-    one = np.broadcast_to(np.array([17, 42]), (30, 30, 2))
-    assert quality.effective_use(one, (32, 48)) == (pytest.approx(1 / 24), (pytest.approx(24.0), 16, 40, 8, 8))
-    assert quality.effective_use(one, (32, 48), piece=16) == (
-        pytest.approx(1 / 6),
-        (pytest.approx(6.0), 16, 32, 16, 16),
-    )
-
-
 def test_effective_use_against_its_equation():
     rng = np.random.default_rng(38)
     source = rng.integers(0, (20, 13), (25, 31, 2)) ** 2 // (20, 13)

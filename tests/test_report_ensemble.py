@@ -68,9 +68,3 @@ def test_nothing_is_written_where_the_input_is_bad(tmp_path):
     assert not (tmp_path / "r").exists()
     with pytest.raises(ValueError, match="does not exist"):
         write_ensemble(tmp_path / "no" / "r", image, image[np.newaxis])
-
-
-def test_the_two_most_common_categories_are_drawn(monkeypatch):
-    monkeypatch.setattr(report, "MOST_PANELS", 2)
-    image = np.repeat([0, 1, 2, 3], [4, 1, 3, 8]).reshape(4, 4)
-    assert report._drawn(ensemble.summary(image[np.newaxis], image)) == [0, 3]

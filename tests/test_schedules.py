@@ -421,19 +421,6 @@ def test_a_bad_name_is_refused_with_a_remedy(name, words):
     assert any(repr(part) in str(caught.value) for part in (name, name.partition(":")[2]))
 
 
-@pytest.mark.parametrize(
-    ("make", "arguments", "error", "words"),
-    [
-        (schedules.RandomSubset, (0,), ValueError, "give one from 0.001 to 1"),
-        (schedules.Block, (0, 3), ValueError, "rows of a tile is 0; give 1 or more"),
-        (schedules.Block, (2.5, 3), TypeError, "rows of a tile must be an integer"),
-    ],
-)
-def test_bad_parameters_are_refused_with_a_remedy(make, arguments, error, words):
-    with pytest.raises(error, match=words):
-        make(*arguments)
-
-
 def test_a_package_brings_schedules_as_entry_points(monkeypatch):
     brought = {
         "mine": "simdtex.schedules:Raster",

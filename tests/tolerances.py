@@ -42,10 +42,6 @@ PARSEVAL = {1: 0.001, 2: 0.003, 4: 0.002, 6: 0.007}
 """Relative error of the sum of squares of a steerable pyramid of white noise, by orientations, for the same reason:
 0.0005, 0.0026, 0.0013 and 0.0058 are the most of the same pictures."""
 
-ODD_TORUS = 0.1
-"""As RECONSTRUCTION, for a torus of 65 x 97 pixels: at the seam, even rows and columns meet even ones where they are
-halved. 0.0873 is the most of four pictures, 1 to 3 levels and every bank."""
-
 DECORRELATED = 1e-4
 """Of the variances of decorrelated channels against 1; and of their covariances against 0, times the lesser of the two
 deviations over the largest. Coefficients of axes are whole multiples of 2**-14, off by 3e-5: 6.7e-5 is the most."""
