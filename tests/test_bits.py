@@ -28,6 +28,13 @@ RUNS = {
     "exact": ((30, 31), None, np.uint8, (12, 14), {"order": 8, "search": "exact"}),
     "paper": ((14, 13), None, np.uint8, (9, 11), {"preset": "paper", "order": 2}),
     "gibbs-source": ((12, 12), None, np.uint8, (15, 7), {"order": 5, "relaxation": "gibbs", "boundary": "open"}),
+    "gibbs-density": (
+        (12, 12),
+        None,
+        np.uint8,
+        (9, 9),
+        {"order": 2, "relaxation": "gibbs", "pixel": "density", "bandwidth": 0.5, "coherence": 0},
+    ),
     "colour-icm": ((12, 11), 3, np.uint8, (10, 13), {"order": 2, "boundary": "open"}),
     "colour-gibbs-density": (
         (11, 12),
@@ -38,6 +45,14 @@ RUNS = {
     ),
     "16-bit-two-channels": ((12, 12), 2, np.uint16, (9, 8), {"order": 8, "relaxation": "gibbs"}),
     "float32": ((12, 13), None, np.float32, (13, 7), {"order": 5}),
+    "float64-density": (
+        (12, 13),
+        None,
+        np.float64,
+        (7, 9),
+        {"order": 2, "relaxation": "gibbs", "pixel": "density", "bandwidth": 0.6},
+    ),
+    "bool": ((12, 12), None, np.bool_, (9, 9), {"order": 2}),
     "smaller-than-the-sample": ((17, 19), None, np.uint8, (5, 3), {"order": 2}),
     "larger-than-the-sample": ((9, 8), None, np.uint8, (23, 18), {"order": 2, "levels": 2}),
     "a-row": ((9, 8), None, np.uint8, (1, 17), {"order": 2}),
@@ -60,6 +75,7 @@ RUNS = {
     ),
     "coherent-luby": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "schedule": "luby"}),
     "coherent-block": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "schedule": "block:5x4"}),
+    "coherent-array": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "array": "4x8"}),
     "multires": ((13, 11), None, np.uint8, (15, 18), MULTIRES),
     "multires-luminance": ((9, 10), 3, np.uint8, (13, 8), MULTIRES | {"alpha": 3, "beta": 1, "levels": 4}),
     "multires-open-free": (
@@ -69,8 +85,11 @@ RUNS = {
         (10, 13),
         MULTIRES | {"boundary": "open", "parity": "free", "alpha": 0.5},
     ),
+    "multires-16-bit": ((12, 12), None, np.uint16, (9, 16), MULTIRES | {"boundary": "open", "alpha": 1}),
     "multires-float64-two-channels": ((10, 13), 2, np.float64, (14, 7), MULTIRES | {"parity": "free", "beta": 0.5}),
+    "multires-bool": ((12, 11), None, np.bool_, (13, 13), MULTIRES | {"alpha": 1.5}),
     "multires-mended": ((17, 20), 3, np.uint8, (21, 23), MULTIRES | {"alpha": 0.4}),
+    "multires-keep-cut": ((17, 20), 3, np.uint8, (21, 23), MULTIRES | {"edges": "keep", "seams": "cut"}),
     "multires-larger-than-the-sample": ((7, 6), None, np.uint8, (33, 29), MULTIRES | {"alpha": 1.5}),
     "multires-smaller-than-the-sample": ((23, 26), None, np.uint8, (5, 4), MULTIRES | {"orientations": 0}),
     "multires-a-row": ((9, 8), None, np.uint8, (1, 17), MULTIRES),
@@ -89,6 +108,7 @@ RUNS = {
         PYRAMID | {"pyramid": "laplacian", "match": "lookup", "levels": 3},
     ),
     "pyramid-a-row": ((9, 8), None, np.uint8, (1, 17), PYRAMID | {"orientations": 2}),
+    "pyramid-no-levels": ((9, 8), None, np.uint8, (8, 9), PYRAMID | {"levels": 0, "orientations": 2}),
     "solid": ((17, 20), None, np.uint8, (10, 8, 9), {"iterations": 1, "levels": 1, "orientations": 2}),
     "solid-average": (
         (17, 20),
@@ -100,7 +120,7 @@ RUNS = {
     "mix": ((17, 20), 3, np.uint8, (16, 18), {"palette": 0, "average": [1, 2], "iterations": 1}),
 }
 SOME = ("defaults", "colour-gibbs-density")
-LONG = ("pyramid-six", "pyramid-laplacian-lookup", "pyramid-a-row", "solid-average")
+LONG = ("pyramid-six", "pyramid-laplacian-lookup", "pyramid-a-row", "pyramid-no-levels", "solid-average")
 """Not that they compute long: their kernels are to be compiled for sizes that no other has."""
 
 # Forms of a launch: work-group size, vector width, candidates in registers, bytes of scratch memory.

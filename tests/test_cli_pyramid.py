@@ -91,15 +91,6 @@ def test_synth_is_what_python_makes(folder, case):
     assert files(folder) == sorted([*FILES, "out.png"])
 
 
-def test_the_last_distance_is_that_of_the_subbands():
-    reports = [{"distances": {"high": 9.0, "pixels": 9.0}}, {"distances": {"high": 0.1, "low": 0.3, "pixels": 5.0}}]
-    line = last_iteration({"options": {"levels": 3}, "iterations": reports})
-    assert line == "levels 3, iterations 2, mean distance of the subbands in the last: 0.200 standard deviations"
-    assert last_iteration({"options": {"levels": 3}, "iterations": []}) == "levels 3, iterations 0"
-    flat = last_iteration({"options": {"levels": 3}, "iterations": [{"distances": {}}]})
-    assert flat == "levels 3, iterations 1"
-
-
 def test_stages_of_synth_replace_those_of_an_earlier_run(folder):
     (folder / "st").mkdir()
     image.write("st/level3.png", GREY)

@@ -222,11 +222,6 @@ def test_an_error_is_that_of_the_means_of_chains():
     assert one.sigmas == pytest.approx((one.energy - one.exact) / one.error)
 
 
-def test_frozen_chains_have_the_error_of_one_spin():
-    (one,) = findings([chains(np.full((3, 10), -2.0))])
-    assert one.error == 8 / 16 / 30
-
-
 @pytest.mark.parametrize("runs", [1, 10])
 def test_a_deviation_counts_by_students_t_over_all_comparisons(runs):
     noise = np.random.default_rng(3).normal(0, 1, 20)
