@@ -14,7 +14,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from importlib.metadata import version
 from numbers import Integral, Real
 from pathlib import Path
@@ -39,6 +39,18 @@ SHARE = 75
 
 NAMES = {"job": "call", "shape": "shape of the output"}
 """Names of inputs in messages, if they differ from the input's own."""
+
+
+@dataclass(frozen=True)
+class Checkpointing:
+    """The state that a run goes on from, and the function that is offered every later one.
+
+    ``found`` is None if the run begins at its beginning. ``offer(info, tree)`` is called after every step; ``tree()``
+    returns the state, to be passed as `found`, and ``now=True`` asks for it to be written in any case.
+    """
+
+    found: Any = None
+    offer: Callable[..., Any] = lambda info, tree, *, now=False: None
 
 
 class Checkpoint:
@@ -104,8 +116,8 @@ class Checkpoint:
     @contextmanager
     def opened(
         self, job: str, rng: Any, inputs: Callable[[], dict[str, Any]], device: str
-    ) -> Iterator[tuple[int, Any, Callable[..., bool]]]:
-        """Lock the file, and begin a run or resume the run in the file; yield the seed, the state found, and ``offer``.
+    ) -> Iterator[tuple[int, Checkpointing]]:
+        """Lock the file, and begin a run or resume the run in the file; yield its seed and its checkpointing.
 
         ``job`` is the public function, ``inputs()`` returns everything that determines the result but the seed, by
         name; ``rng`` None takes the seed of the run in the file. Raises ValueError if the file is of another run,
@@ -118,7 +130,7 @@ class Checkpoint:
             seed, found = self._open(job, rng, inputs(), device)
             self.running, self.resumed = True, found is not None
             try:
-                yield seed, found, self.offer
+                yield seed, Checkpointing(found, self.offer)
             except (ValueError, TypeError):  # the input, which a plan finds out; a checkpoint of it is of no use
                 if not self._saved and found is None:
                     self.remove()
@@ -210,15 +222,15 @@ class Checkpoint:
 
 @contextmanager
 def opened(
-    checkpoint: str | os.PathLike[str] | Checkpoint | None,
+    checkpoint: str | os.PathLike[str] | Checkpoint | Checkpointing | None,
     job: str,
     rng: Any,
     inputs: Callable[[], dict[str, Any]],
     device: str,
-) -> Iterator[tuple[int, Any, Callable[..., bool]]]:
-    """Open the checkpoint that a public function was given; see `Checkpoint.opened`."""
-    if checkpoint is None:
-        yield as_seed(rng), None, _nothing
+) -> Iterator[tuple[int, Checkpointing]]:
+    """Open the checkpoint that a public function was given, see `Checkpoint.opened`; use a `Checkpointing` as it is."""
+    if checkpoint is None or isinstance(checkpoint, Checkpointing):
+        yield as_seed(rng), checkpoint or Checkpointing()
         return
     own = not isinstance(checkpoint, Checkpoint)
     kept = checkpoint if isinstance(checkpoint, Checkpoint) else Checkpoint(checkpoint)
@@ -226,11 +238,6 @@ def opened(
         yield run
     if own:
         kept.remove()
-
-
-def _nothing(info: Any, tree: Callable[[], Any], *, now: bool = False) -> bool:
-    """Keep no state."""
-    return False
 
 
 def read(path: Path) -> tuple[dict[str, Any], Any]:

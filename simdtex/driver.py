@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from math import inf
 from typing import Any, NamedTuple, Protocol
@@ -18,10 +18,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.checkpoint import Checkpoint, opened
+from simdtex.checkpoint import Checkpoint, Checkpointing, opened
 from simdtex.machine import Machine, open_machine
 from simdtex.options import real_array, whole
-from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
 Tree = Any
@@ -76,24 +75,12 @@ class Plan(Protocol):
         """Lay the plan out on a machine; ``seed`` is the key of every random number."""
 
 
-@dataclass(frozen=True)
-class Keep:
-    """Where a run begins, and who is offered its states.
-
-    ``found`` is the state to go on from, None: the beginning. ``offer(info, tree)`` is called after every step;
-    ``tree()`` returns the state, to be passed as `found`.
-    """
-
-    found: Tree = None
-    offer: Callable[[Any, Callable[[], Tree]], Any] = lambda info, tree: None
-
-
-NOTHING = Keep()
-"""Begins at the beginning, and keeps nothing."""
-
-
 def drive(
-    plan: Plan, machine: Machine, seed: int, callback: Callback | None = None, keep: Keep = NOTHING
+    plan: Plan,
+    machine: Machine,
+    seed: int,
+    callback: Callback | None = None,
+    checkpointing: Checkpointing | None = None,
 ) -> tuple[NDArray[Any], Output]:
     """Run a plan to its end.
 
@@ -104,8 +91,8 @@ def drive(
     seed : int
     callback : callable, optional
         Called with a `simdtex.run.Progress` after every part of a step.
-    keep : Keep
-        Where to begin, and who is offered every state.
+    checkpointing : Checkpointing, optional
+        The state to go on from, and the function that is offered every later one.
 
     Returns
     -------
@@ -116,15 +103,16 @@ def drive(
     began, worked = time.perf_counter(), machine.seconds
     run = plan.on(machine, seed)
     observer = run.observer(callback)
-    if keep.found is None:
+    checkpointing = checkpointing or Checkpointing()
+    if checkpointing.found is None:
         state = run.begin()
     else:
-        state = run.load(keep.found["state"])
-        observer.load(keep.found["observer"])
+        state = run.load(checkpointing.found["state"])
+        observer.load(checkpointing.found["observer"])
     while not run.ended(state):
         state, info = run.step(state, observer.part)
         observer.step(state, info)
-        keep.offer(info, partial(_saved, run, state, observer))
+        checkpointing.offer(info, partial(_saved, run, state, observer))
     image, output = run.result(state, observer)
     output.statistics.update(
         device=machine.name,
@@ -146,7 +134,7 @@ class Call(NamedTuple):
     device: str | Machine | None
     callback: Callback | None
     full_output: bool
-    checkpoint: str | os.PathLike[str] | Checkpoint | Keep | None
+    checkpoint: str | os.PathLike[str] | Checkpoint | Checkpointing | None
 
 
 Result = NDArray[Any] | tuple[NDArray[Any], Output]
@@ -155,7 +143,7 @@ Result = NDArray[Any] | tuple[NDArray[Any], Output]
 
 def execute(
     name: str,
-    run: Callable[[Machine, int, Callback | None, Keep], tuple[NDArray[Any], Output]],
+    run: Callable[[Machine, int, Callback | None, Checkpointing], tuple[NDArray[Any], Output]],
     inputs: Callable[[], dict[str, Any]],
     channel_axis: int | None,
     call: Call,
@@ -164,16 +152,14 @@ def execute(
 
     ``name`` is the public function; ``run`` is `drive` with its plan, or a function that drives several plans in turn;
     ``inputs()`` returns all that determines the result but the seed, by the names that users give it; and
-    ``channel_axis`` is that of the returned picture. A `Keep` in place of the call's checkpoint keeps states in memory.
+    ``channel_axis`` is that of the returned picture. A `Checkpointing` in place of the call's checkpoint keeps
+    states in memory.
     """
-    machine, checkpoint = open_machine(call.device), call.checkpoint
+    machine = open_machine(call.device)
     machine.profile()  # forget what was before
     callback = seeing(call.callback, channel_axis)
-    if isinstance(checkpoint, Keep):
-        image, output = run(machine, as_seed(call.rng), callback, checkpoint)
-    else:
-        with opened(checkpoint, name, call.rng, inputs, machine.name) as (seed, found, offer):
-            image, output = run(machine, seed, callback, Keep(found, offer))
+    with opened(call.checkpoint, name, call.rng, inputs, machine.name) as (seed, checkpointing):
+        image, output = run(machine, seed, callback, checkpointing)
     output.statistics.update(machine.profile() or {})
     picture = restored(image, channel_axis)
     if not call.full_output:

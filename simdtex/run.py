@@ -272,13 +272,13 @@ class Output:
     A level of ``mrf`` has ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation (12)), ``skipped`` (those of
     them that a bound made needless; docs/concepts/skipping.rst), and ``equilibrium``: the
     ``sweeps``, ``steps`` and ``relaxations`` until no temperature was left, free sweeps not counted. Its statistics
-    also have ``accounting``, what the run costs on a processor array, or, where none was given, packed on a full MP-1:
+    also have ``accounting`` if the option ``array`` is given, what the run costs on that processor array:
     ``array``, ``mapping``; ``layers``, virtual layers; ``shifts``, X-Net shifts of a word that bring
     every pixel of the finest level all its neighbours, for either mapping; ``steps``; ``passes``, SIMD steps: one for
     each virtual layer of a step that has an active site; ``active``, the mean number of active PEs per pass;
-    ``utilisation``, that over all PEs; ``sites``, relaxations; ``moved``, words that each PE shifted; ``routed``,
-    words through the router; ``flop``, 32-bit operations in the distances; ``model_seconds``, the time of a MasPar
-    MP-1 by the model of `simdtex.maspar.accounting.Account`; and ``launches``, kernels enqueued on the device.
+    ``utilisation``, that over all PEs; ``sites``, relaxations; ``moved``, words that each PE shifted; ``flop``,
+    32-bit operations in the distances; ``model_seconds``, the time of a MasPar MP-1 by the model of
+    `simdtex.maspar.accounting.Account`; and ``launches``, kernels enqueued on the device.
 
     A level of ``multires`` has the mean number of ``candidates`` of a pixel and ``most`` of them; ``nodes``, pixels of
     the levels above in the sample's pyramid, and ``compared``, the mean number of them that a pixel was compared with

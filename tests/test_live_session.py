@@ -174,17 +174,17 @@ def test_states_are_kept_apart_from_the_runs_that_use_them():
     before = Levels(("key",), mrf.Options())
     state = {"state": np.zeros(4), "observer": [1]}
     for ended, level in ((True, 1), (False, 0)):
-        before.keep.offer(SimpleNamespace(ended=ended, level=level), lambda: state)
+        before.checkpointing.offer(SimpleNamespace(ended=ended, level=level), lambda: state)
     state["observer"].append(2)
     state["state"][:] = 1
     assert before.level == 1, "states within a level are not kept"
-    found = Levels(("key",), mrf.Options(finish=0.5), before).keep.found
+    found = Levels(("key",), mrf.Options(finish=0.5), before).checkpointing.found
     assert found["observer"] == [1] and not found["state"].any()
     found["observer"].append(3)
-    assert before.keep.found["observer"] == [1]
+    assert before.checkpointing.found["observer"] == [1]
     for other in (Levels(("other",), mrf.Options(), before), Levels(None, mrf.Options(), before)):
-        assert other.keep.found is None
-    other.keep.offer(SimpleNamespace(ended=True, level=1), lambda: state)
+        assert other.checkpointing.found is None
+    other.checkpointing.offer(SimpleNamespace(ended=True, level=1), lambda: state)
     assert other.level is None, "without a key no state is kept"
 
 

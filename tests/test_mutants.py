@@ -291,11 +291,10 @@ def test_a_run_is_counted(given):
         few = given.get("search") != "exact" and number < 2
         assert (0 < report["weighed"] <= 13) if few else report["weighed"] == 600
         assert report["fma"] == round(report["weighed"] * report["relaxations"]) * 16 * 2
-    assert sum(report["relaxations"] for report in statistics["levels"]) == statistics["accounting"]["sites"]
     assert statistics["options"]["levels"] == 3
     assert statistics["options"]["schedule"] == "coloring"
-    own = {"device", "seed", "options", "seconds", "device_seconds", "accounting", "levels", "use"}
-    assert set(statistics) == own
+    own = {"device", "seed", "options", "seconds", "device_seconds", "levels", "use"}
+    assert set(statistics) == own | ({"accounting"} if "array" in given else set())
 
 
 def test_a_callback_sees_the_known_variables_of_a_site():

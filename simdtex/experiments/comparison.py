@@ -371,6 +371,8 @@ def compare(
     if "schedule" in options:
         raise TypeError("schedule is no option here; give schedules, a sequence of them")
     settings = vars(resolve(Options, "schedules", options))
+    if settings["array"] is None:
+        raise ValueError("array is None, but a comparison counts the passes of one; leave array out for a full MP-1")
     pixels = check_sample(sample, channel_axis)
     size = _check_sides(as_planes(pixels).shape[:2], shape)
     machine = open_machine(device, profile=True)

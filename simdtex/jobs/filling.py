@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
-from simdtex.checkpoint import Checkpoint
-from simdtex.driver import Call, Keep, drive, execute
+from simdtex.checkpoint import Checkpoint, Checkpointing
+from simdtex.driver import Call, drive, execute
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_mask, check_picture, check_samples
 from simdtex.machine import Machine, memory
@@ -358,7 +358,9 @@ class Filling:
         sample = self.sample and (self.sample.pixels, self.sample.known)
         return {"options": self.options, "image": known, "mask": self.hole, "sample": sample, "reach": self.reach}
 
-    def run(self, machine: Machine, seed: int, callback: Callback | None, keep: Keep) -> tuple[NDArray[Any], Output]:
+    def run(
+        self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
+    ) -> tuple[NDArray[Any], Output]:
         """Fill one window after the other; the state is the results of finished ones, and the present run's state."""
         shape, options = self.hole.shape, self.options
         several = self.sample is not None and len(self.sample.pixels) > 1
@@ -368,17 +370,17 @@ class Filling:
         radius = int(neighbourhood_offsets(options.order).max())
         everything = [Window(slice(0, shape[0]), slice(0, shape[1]), 0)]
         parts = everything if options.boundary == "torus" else windows(self.hole, radius, options.levels)
-        done, inside = keep.found or ([], None)
+        done, inside = checkpointing.found or ([], None)
         finished = [Made(*made) for made in done]
         for number, window in enumerate(parts):
             at = (window.rows, window.cols)
             if number == len(finished):
                 around = _around(self, window)
                 seen = callback and _pasting(callback, whole, at, self.hole[at], around.corner, number, len(parts))
-                now = Keep(inside, lambda info, tree: keep.offer(info, lambda: (finished, tree())))
+                now = Checkpointing(inside, lambda info, tree: checkpointing.offer(info, lambda: (finished, tree())))
                 finished.append(self._window(machine, window, around, seed, seen, now))
                 inside = None
-                keep.offer(None, lambda: (finished, None))
+                checkpointing.offer(None, lambda: (finished, None))
             found = finished[number]
             hole = self.hole[at]
             whole.image[at][hole], whole.temperature[at][hole] = found.values, found.temperature
@@ -393,7 +395,13 @@ class Filling:
         return whole.image, Output(whole.source, whole.temperature, [], statistics)
 
     def _window(
-        self, machine: Machine, window: Window, around: Around, seed: int, callback: Callback | None, keep: Keep
+        self,
+        machine: Machine,
+        window: Window,
+        around: Around,
+        seed: int,
+        callback: Callback | None,
+        checkpointing: Checkpointing,
     ) -> Made:
         """Fill one window."""
         at, options = (window.rows, window.cols), self.options
@@ -407,7 +415,7 @@ class Filling:
             Given(values, known, around.place, suggests=False),
             most=window.levels or None,
         )
-        made, output = drive(plan, machine, seed, callback, keep)
+        made, output = drive(plan, machine, seed, callback, checkpointing)
         assert output.source is not None and output.temperature is not None
         statistics = output.statistics | {"window": [side for part in at for side in (part.start, part.stop)]}
         return Made(around.corner, made[hole], output.temperature[hole], output.source[hole], statistics)

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from simdtex.checkpoint import Checkpoint, digest, opened
-from simdtex.driver import Keep, check_shape, drive, restored
+from simdtex.checkpoint import Checkpoint, Checkpointing, digest, opened
+from simdtex.driver import check_shape, drive, restored
 from simdtex.io.hard_data import HardData
 from simdtex.jobs.inputs import Inputs, as_known, check_inputs, check_samples
 from simdtex.machine import Machine, memory, open_machine
@@ -138,23 +138,23 @@ def simulate(
     def state() -> dict[str, Any]:
         return {"numbers": list(finished), "pictures": made[finished]}
 
-    with opened(checkpoint, "simulate", rng, identity, machines[0].name) as (seed, found, offer):
+    with opened(checkpoint, "simulate", rng, identity, machines[0].name) as (seed, checkpointing):
         seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
-        if found is not None:
-            finished += found["numbers"]
-            made[finished] = found["pictures"]
+        if checkpointing.found is not None:
+            finished += checkpointing.found["numbers"]
+            made[finished] = checkpointing.found["pictures"]
 
-        def keep(info: Any, tree: Callable[[], Any]) -> None:
+        def offer_finished(info: Any, tree: Callable[[], Any]) -> None:
             if isinstance(checkpoint, Checkpoint) and checkpoint.stopping:  # a realisation has no state of its own
                 with lock:
-                    offer(info, state)
+                    checkpointing.offer(info, state)
 
         def one(number: int, machine: Machine) -> None:
-            picture, _ = drive(plan, machine, int(seeds[number]), None, Keep(None, keep))
+            picture, _ = drive(plan, machine, int(seeds[number]), None, Checkpointing(None, offer_finished))
             with lock:
                 made[number] = picture
                 finished.append(number)
-                offer(None, state)
+                checkpointing.offer(None, state)
                 if callback:
                     shown = restored(picture, None if channel_axis is None else -1)
                     done = {"realisation": first + number, "finished": len(finished), "realisations": n}
@@ -163,7 +163,7 @@ def simulate(
         try:
             _in_turn(one, [number for number in range(n) if number not in finished], machines)
         except BaseException:
-            offer(None, state, now=True)  # those that wait for their turn
+            checkpointing.offer(None, state, now=True)  # those that wait for their turn
             raise
     dims, arrays = ["realisation", "y", "x", "variable"], made
     if channel_axis is None:

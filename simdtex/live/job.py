@@ -14,7 +14,7 @@ import PIL.Image
 import PIL.ImageDraw
 from numpy.typing import NDArray
 
-from simdtex.driver import Keep
+from simdtex.checkpoint import Checkpointing
 from simdtex.io.image import suitable_suffix
 from simdtex.jobs.filling import extend, fill
 from simdtex.live.words import controls
@@ -103,10 +103,12 @@ class Job:
         for name, value in self.options.items():
             self._add(name, value, f"--{name.replace('_', '-')}", *([] if value is True else [str(value)]))
 
-    def run(self, machine: Machine, callback: Callable[[Any], None], keep: Keep) -> tuple[Array, Output]:
-        """Make the output on a machine; the run starts from the state of `keep`, which is offered every other one."""
-        keywords = {**self._keywords, "device": machine, "callback": callback, "full_output": True, "checkpoint": keep}
-        made: tuple[Array, Output] = FUNCTIONS[self.kind](self.sample, **keywords)
+    def run(
+        self, machine: Machine, callback: Callable[[Any], None], checkpointing: Checkpointing
+    ) -> tuple[Array, Output]:
+        """Return the output, made on a machine; `checkpointing` has the state to go on from, if any."""
+        keywords = {**self._keywords, "device": machine, "callback": callback, "full_output": True}
+        made: tuple[Array, Output] = FUNCTIONS[self.kind](self.sample, checkpoint=checkpointing, **keywords)
         return made
 
     @property

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from copy import deepcopy
 from typing import Any
 
-from simdtex.checkpoint import pack
-from simdtex.driver import Keep
+from simdtex.checkpoint import Checkpointing, pack
 from simdtex.methods import mrf
 
 MAX_BYTES = 2**27
@@ -34,10 +33,10 @@ class Levels:
         return min(self._states, default=None)
 
     @property
-    def keep(self) -> Keep:
+    def checkpointing(self) -> Checkpointing:
         """The state that the run starts from, and what takes its states."""
         found = None if self.level is None else deepcopy(self._states[self.level])
-        return Keep(found, self._offer)
+        return Checkpointing(found, self._offer)
 
     def _offer(self, info: Any, tree: Callable[[], Any]) -> None:
         """Keep the state at the end of a level."""

@@ -287,7 +287,7 @@ class Session:
                 job = Job(message, self._picture, self._maps, self.results.find)
                 levels = self._begin(job)
                 began = time.perf_counter()
-                image, output = job.run(self._machine, partial(self._watch, job), levels.keep)
+                image, output = job.run(self._machine, partial(self._watch, job), levels.checkpointing)
                 result = self.results.add(job, image, output, time.perf_counter() - began)
                 self._begun = None
                 self._send_result(result)

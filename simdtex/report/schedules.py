@@ -141,8 +141,8 @@ def sections(comparison: Comparison) -> list[Section]:
 def tables(comparison: Comparison) -> list[Table]:
     """Return four tables with a row for each schedule: equilibrium, time, movement and likeness."""
     array = comparison.entries[0].runs[0].accounting
-    how = "active sites packed" if array["mapping"] == "packed" else array["mapping"]
-    model = f"Whole runs, on {comparison.device} and by a model of {array['array']} PEs of a MasPar MP-1, {how}"
+    pes = f"{array['array']} PEs of a MasPar MP-1, {array['mapping']}"
+    model = f"Whole runs, on {comparison.device} and by a model of {pes}"
     seeds = f" Mean ± standard deviation over {len(comparison.seeds)} seeds." if len(comparison.seeds) > 1 else ""
 
     def table(topic: Topic, caption: str, remark: str = "") -> Table:

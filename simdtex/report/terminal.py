@@ -40,16 +40,15 @@ def profile_summary(statistics: dict[str, Any]) -> str:
 
 def print_accounting(accounting: dict[str, Any]) -> None:
     """Print the cost of a run on a processor array, ``accounting`` of `simdtex.run.Output.statistics`."""
-    shifts = accounting["shifts"] if accounting["mapping"] != "packed" else {}
+    shifts = {name: f"{count:,}" for name, count in accounting["shifts"].items()}
     rows = {
         "steps: sites that relax together": f"{accounting['steps']:,}",
         "SIMD steps: passes over a virtual layer": f"{accounting['passes']:,}",
         "virtual layers": f"{accounting['layers']:,}",
         "active PEs per SIMD step, mean": f"{accounting['active']:,.0f}",
         "utilisation of the array": f"{accounting['utilisation']:.1%}",
-        **{f"X-Net shifts for all neighbourhoods, {name}": f"{count:,}" for name, count in shifts.items()},
+        **{f"X-Net shifts for all neighbourhoods, {name}": count for name, count in shifts.items()},
         "words shifted by the X-Net, per PE": f"{accounting['moved']:,}",
-        "words through the router": f"{accounting['routed']:,}",
         "floating-point operations": f"{accounting['flop']:.3g}",
         "launches on this device": f"{accounting['launches']:,}",
         "MasPar MP-1 of this size, by the model": duration_text(accounting["model_seconds"]),

@@ -248,7 +248,7 @@ class Options:
         Other(parse_array, "str", valid=tuple(ARRAYS)),
         "Account for the run on this processor array: ROWSxCOLS or maspar-mp1-1k to -16k, and maybe :hierarchical",
         more="No byte of the result depends on it.",
-        none="packed active sites on a full MP-1",
+        none="no account",
         jobs={"schedules": "maspar-mp1-16k"},
         shown=("synth", "schedules"),
     )

@@ -34,8 +34,10 @@ class Record:
         options = run.options
         self.stages: list[Stage] = []
         self.reports: list[dict[str, Any]] = []
-        array = parse_array(options.array or "maspar-mp1-16k")
-        self.account = Account(array, packed=options.array is None)
+        self.account: Account | None = None
+        if options.array:
+            words = run.sample.channels + 1 + bool(options.coherence)  # of a neighbour: pixel, temperature, source
+            self.account = Account(parse_array(options.array), run.offsets, run.sample.channels, words)
         self.launches = run.machine.launches
         self._run, self._callback = run, callback
         self._expected = expected_work(run)
@@ -94,10 +96,8 @@ class Record:
     def step(self, state: State, info: Info) -> None:
         """Count what a sweep would cost on an array; at a level's end, keep its picture."""
         machine = self._run.machine
-        for chosen in info.chosen:
-            if self.account.packed:
-                self.account.packed_steps(np.diff(chosen.ranges)[:, 0])
-            else:
+        if self.account:
+            for chosen in info.chosen:
                 for step in chosen.apart(machine):
                     self.account.step(step.sites)
         if info.ended:
@@ -126,19 +126,14 @@ class Record:
         counts = {"sweeps": 0, "steps": 0, "relaxations": 0}
         work = {"fma": 0, "weighed": float(candidates), "skipped": 0, "seconds": 0.0}
         self.reports.append({**sizes, **counts, "equilibrium": dict(counts), **work})
-        self.account.begin(*self._costs(level.number))
-
-    def _costs(self, number: int) -> tuple[Grid, NDArray[np.int32], int, int, int]:
-        """Return what the account needs to know of a level."""
-        channels, coherence = self._run.sample.channels, bool(self._run.options.coherence)
-        words = channels + 1 + coherence  # of a neighbour: pixel, temperature, source
-        return self._run.grid(number), self._run.offsets, self._slots, channels, words
+        if self.account:
+            self.account.begin(grid, self._slots)
 
     def save(self) -> dict[str, Any]:
         """Return all that was seen, as plain arrays and numbers."""
         return {
             "stages": [(stage.level, stage.image) for stage in self.stages],
-            **{"reports": self.reports, "account": self.account.total, "fraction": self._fraction},
+            **{"reports": self.reports, "account": self.account and self.account.total, "fraction": self._fraction},
             **{"slots": self._slots, "listed": self._listed, "first_left": self._first_left},
             **{"weighed": self._total() - self._weighed, "skipped": self._run.machine.spared - self._skipped},
             "seconds": time.perf_counter() - self._began,
@@ -151,21 +146,22 @@ class Record:
         self._slots, self._listed = saved["slots"], saved["listed"]
         self._skipped, self._weighed = self._run.machine.spared - saved["skipped"], -saved["weighed"]
         self._began = time.perf_counter() - saved["seconds"]
-        if self.reports:
-            self.account.begin(*self._costs(self.reports[-1]["level"]))
-        self.account.total.update(saved["account"])
+        if self.account and self.reports:
+            self.account.begin(self._run.grid(self.reports[-1]["level"]), self._slots)
+            self.account.total.update(saved["account"])
 
 
 def output(run: Lattices, state: State, source: NDArray[np.int32], record: Record) -> Output:
     """Return the source map, temperatures, stages and statistics of a run that has ended."""
     place, t = run.sample.place(source), run.grid(0).view(run.machine.get(state.temperature))
-    launches = run.machine.launches - record.launches
     statistics = {
         "options": vars(run.options) | {"levels": run.levels, "schedule": run.plan.schedule.name},
-        "accounting": record.account.report() | {"launches": launches},
         "levels": record.reports,
         "use": None,
     }
+    if record.account:
+        launches = run.machine.launches - record.launches
+        statistics["accounting"] = record.account.report() | {"launches": launches}
     taken = place[..., 0] >= 0
     if place.shape[-1] == 2 and taken.any():
         statistics["use"] = effective_use(place[taken][None], run.sample.pictures.pixels[0].shape).as_dict()
