@@ -143,8 +143,6 @@ class Store:
         layout = planned(plan, seed, about["tile"])
         return Work(plan, seed, layout, confidences, about["held"], about["given"])
 
-    # -- turns ----------------------------------------------------------------------------------------------------
-
     @property
     def turn(self) -> Turn:
         """The present turn, as the store has it."""
@@ -217,8 +215,6 @@ class Store:
         some = max(1, TOGETHER // tally.shape[1])
         for first in range(0, count, some):
             yield tally[first : first + some]
-
-    # -- arrays over sites ----------------------------------------------------------------------------------------
 
     def read(self, level: LevelLayout, which: int, window: Tile) -> Field:
         """Return the state of a level's sites in a window, which may cross the seam."""

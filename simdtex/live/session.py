@@ -93,7 +93,7 @@ class Session:
         self._selected: int | None = None  # the result that the page shows; None for the run or the sample
         self._window = frames.Window()
         self._wanted: Message | None = None  # the job that is asked for, until it is finished
-        self._begun: Message | None = None  # what the page was told of the present run
+        self._begun: Message | None = None  # the message that announced the present run
         self._paused = self._closed = False
         self._stale = False  # whether the page waits for another frame
         self._unseen = 0  # frames that the page has not shown yet
@@ -104,7 +104,7 @@ class Session:
         self._thread.start()
 
     def receive(self, message: Any, buffers: Sequence[Any] = ()) -> None:
-        """Have a message of the page handled; the page is told in a sentence what is wrong with it."""
+        """Handle a message of the page later; an error is sent back as one sentence."""
         self._messages.put((message, buffers))
 
     def close(self, wait: float = 0.0) -> None:
@@ -112,8 +112,6 @@ class Session:
         self._closed = True
         self.receive({"kind": "cancel"})
         self._thread.join(wait)
-
-    # -- the thread -----------------------------------------------------------------------------------------------
 
     def _work(self) -> None:
         while not self._closed:
@@ -151,8 +149,6 @@ class Session:
             log.exception("a request of the live page failed")
             sentence = "this is an error in simdtex itself; the terminal says more"
         self.send({"kind": "error", "text": sentence}, [])
-
-    # -- messages -------------------------------------------------------------------------------------------------
 
     def _on_hello(self, message: Message, buffers: Sequence[Any]) -> None:
         """Send everything that the page shows: it may have been loaded again during a run."""
@@ -232,8 +228,6 @@ class Session:
         result, name = self.results.find(message.get("result")), str(message.get("name"))
         self.send({"kind": "file", "name": name, "result": result.number}, [result.file(name)])
 
-    # -- what the page is told -------------------------------------------------------------------------------------
-
     def _send_picture(self, *, new: bool) -> None:
         assert self._picture is not None
         pixels = self._picture.pixels
@@ -241,9 +235,9 @@ class Session:
         preview = frames.thumbnail(frames.picture(pixels, pixels), PREVIEW)
         width, height = min(cols, LARGE), min(rows, LARGE)
         part = [(cols - width) // 2, (rows - height) // 2, width, height] if max(rows, cols) > LARGE else None
-        told = {"name": self._picture.name, "width": cols, "height": rows, "values": str(pixels.dtype), "part": part}
-        told |= {"new": new, "preview": [preview.width, preview.height], "maps": list(self._maps)}
-        self.send({"kind": "picture", **told}, [preview.pixels])
+        fields = {"name": self._picture.name, "width": cols, "height": rows, "values": str(pixels.dtype), "part": part}
+        fields |= {"new": new, "preview": [preview.width, preview.height], "maps": list(self._maps)}
+        self.send({"kind": "picture", **fields}, [preview.pixels])
 
     def _send_result(self, result: Result) -> None:
         dropped = self.results.dropped
@@ -265,10 +259,10 @@ class Session:
             layer = layers[name]()
         frame = frames.render(layer, self._window, smooth=smooth)._asdict()
         pixels = frame.pop("pixels")
-        told = {"layer": name, "rows": layer.shape[0], "cols": layer.shape[1], "step": self._window.step, "of": of}
+        fields = {"layer": name, "rows": layer.shape[0], "cols": layer.shape[1], "step": self._window.step, "of": of}
         self._stale = False
         self._unseen += 1
-        self.send({"kind": "frame", **told, **frame}, [pixels])
+        self.send({"kind": "frame", **fields, **frame}, [pixels])
 
     def _show_selected(self) -> None:
         """Send a frame of the selected result, or of the sample."""
@@ -276,8 +270,6 @@ class Session:
             self._send_frame(result.layers, result.number)
         elif self._picture:
             self._send_frame({}, "sample")
-
-    # -- runs -----------------------------------------------------------------------------------------------------
 
     def _run(self, message: Message) -> None:
         """Make what a message asks for, unless something else is asked for meanwhile."""
@@ -328,8 +320,8 @@ class Session:
 
     def _show_run(self, job: Job, progress: Any) -> None:
         """Send how far the run is, and a frame of it or of the selected result."""
-        told = {"fraction": progress.fraction, "doing": progress.doing, "level": progress.level}
-        self.send({"kind": "progress", **told, "paused": self._paused}, [])
+        fields = {"fraction": progress.fraction, "doing": progress.doing, "level": progress.level}
+        self.send({"kind": "progress", **fields, "paused": self._paused}, [])
         if self._selected is None:
             self._machine.sync()  # the time of the run's kernels is not the frame's
         began = time.perf_counter()

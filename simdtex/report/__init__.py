@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Pictures about a synthesis: contact sheets, animations, heat maps, stages."""
+"""Pictures and pages about a synthesis: stages, contact sheets, maps in colour, plots, reports."""

@@ -45,8 +45,6 @@ MEMORY = 160
 HOST = 20, 20, 3
 """Bytes for each pixel on the host: at all, for each channel, and for each byte of these (benchmarks/memory.py)."""
 
-# -- what is to be matched ------------------------------------------------------------------------------------
-
 
 @dataclass(frozen=True)
 class Texture:
