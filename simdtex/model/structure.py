@@ -75,7 +75,7 @@ def _signed(edge: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 def distance(marked: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return the squared distance of each pixel from the nearest marked one, at most REACH**2; (rows, cols)."""
-    along = np.where(marked, 0, REACH).astype(np.int64)
+    along = np.where(marked, 0, REACH).astype(np.int64)  # by hand: importing SciPy's takes as long as a default run
     for _ in range(REACH):  # along columns first, then every row looks up to REACH to either side
         along[1:] = np.minimum(along[1:], along[:-1] + 1)
         along[:-1] = np.minimum(along[:-1], along[1:] + 1)
