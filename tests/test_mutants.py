@@ -1,5 +1,6 @@
 """What the method ``mrf`` counts, asks for and says, which no picture shows: survivors of mutation had it changed."""
 
+from copy import deepcopy
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,6 +8,8 @@ import pytest
 from cases import REFERENCE, laid_out, sweeps, texture
 
 import simdtex
+from simdtex.checkpoint import Checkpointing
+from simdtex.driver import drive
 from simdtex.machine import memory
 from simdtex.methods import mrf
 from simdtex.methods.mrf.level import Active, check_fit, number_of_levels, parts
@@ -211,6 +214,21 @@ def test_grey_levels_are_as_fine_as_the_channels_and_neighbours_allow():
     run = laid_out(REFERENCE, pixels, (20, 23), mrf.Options(order=64, levels=1), 5)
     neighbours = len(neighbourhood_offsets(64))
     assert run.sample.top == Sample(pixels, 3 * neighbours, 8).top == 2047 < Sample(pixels, neighbours, 8).top
+
+
+def test_a_run_and_what_is_counted_of_it_go_on_from_any_step():
+    plan, kept = prepared(search="coherent", schedule="luby", array="8x8").plan, []
+
+    def driven(found, keep=lambda info, tree, now=False: None):
+        image, output = drive(plan, REFERENCE, 5, checkpointing=Checkpointing(found, keep))
+        levels = [report | {"seconds": None} for report in output.statistics["levels"]]
+        counts = output.statistics["accounting"] | {"launches": None}
+        return image.tolist(), [stage.level for stage in output.stages], levels, counts
+
+    whole = driven(None, lambda info, tree, now=False: kept.append((info, deepcopy(tree()))))
+    assert [info.level for info, _ in kept if not info.sweep] == [1, 0]  # the steps that enter a level
+    assert [report["skipped"] for report in whole[2]] == [0, 0, 0]
+    assert all(driven(found) == whole for _, found in kept[::5])
 
 
 def test_how_far_a_run_is():
