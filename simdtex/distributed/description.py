@@ -15,6 +15,7 @@ from simdtex.methods.mrf.plan import Plan
 from simdtex.model.guide import Planes
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
+from simdtex.model.regularity import Lattice, Phases
 from simdtex.model.sample import Sample
 from simdtex.model.scale import Scale
 from simdtex.options import resolve
@@ -40,7 +41,7 @@ def described(plan: Plan) -> dict[str, Any]:
     """Return what `restored` needs, for `simdtex.checkpoint.pack`; conditioning data of the output are not in it."""
     pictures = plan.sample.pictures
     arrays = {"pixels": pictures.pixels, "unknown": pictures.unknown, "usable": pictures.usable}
-    sample = {"layout": plan.sample.layout, "guides": list(plan.sample.guided)}
+    sample = {"layout": plan.sample.layout, "guides": list(plan.sample.guided), "phases": plan.sample.phases}
     return {"shape": plan.shape, "levels": plan.levels, "options": asdict(plan.options), **arrays, **sample}
 
 
@@ -50,6 +51,7 @@ def restored(tree: dict[str, Any]) -> Plan:
     unknown, usable = ((one and tuple(one)) for one in (tree["unknown"], tree["usable"]))
     pictures = options.of(Pictures(tuple(tree["pixels"]), unknown, usable))
     guides = [Ready(tree["guides"])] if tree["guides"] else []
-    sample = Sample(pictures, **tree["layout"], guides=guides)
+    phases = tree["phases"] and Phases(tuple(Lattice(*one) for one in tree["phases"][0]), Lattice(*tree["phases"][1]))
+    sample = Sample(pictures, **tree["layout"], guides=guides, phases=phases)
     schedule, offsets = schedules.get(options.schedule), neighbourhood_offsets(options.order)
     return Plan(sample, tuple(tree["shape"]), offsets, options, schedule, tree["levels"])

@@ -99,7 +99,7 @@ class Store:
         for number, array in enumerate(arrays):
             work.create_array(f"input/{number}", data=np.ascontiguousarray(array))
         options, given = plan.options, plan.given
-        conditions = Conditioning(plan.levels, plan.sample.guides, plan.planes, len(plan.offsets), options.data_weight)
+        conditions = Conditioning(plan)
         store, held = Store(where), False
         for level in layout.levels:
             grid = Grid(*plan.shape, 2**level.number, options.boundary == "torus")
@@ -274,11 +274,11 @@ class Stored(Conditions):
     """Conditioning data and guides of an output, window by window out of a store."""
 
     def __init__(self, store: Store, work: Work) -> None:
-        super().__init__(len(work.layout.levels), work.confidences)
+        super().__init__(len(work.layout.levels), work.confidences, work.plan.sample.waves)
         self._store, self._work = store, work
 
     def at(self, number: int, grid: Grid) -> Held | None:
-        """Return the data and guides of a level's sites in a window; None if there are none."""
+        """Return the data and guides of a level's sites in a window, without the phases; None if there are none."""
         if not self._work.held or grid.part is None:
             return None
         window = Tile(*grid.within[:2], grid.rows, grid.cols)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from simdtex.model.guide import AnyGuide
 from simdtex.model.pictures import Pictures
+from simdtex.model.regularity import WAVES, Phases
 from simdtex.model.scale import Scale, highest
 from simdtex.model.structure import structure
 
@@ -103,10 +104,12 @@ class Sample:
     step : int
         Pixels from site to site at the coarsest level; every picture begins at a multiple.
     guides : sequence of AnyGuide
-        Their channels come last.
+        Their channels come after those.
     apart : int
         Pixels between two pictures at least, where more than their margins: what looks so far from a pixel of one sees
         no other.
+    phases : Phases, optional
+        The guide by the sample's own lattice, whose channels come last.
 
     Attributes
     ----------
@@ -115,7 +118,11 @@ class Sample:
     channels : int
         Channels that are matched: those, and the structure channel.
     guides : (G, H, W) uint16 array
-        Working levels of the output's guides.
+        Working levels of the output's guides, without the phases.
+    waves : Waves or None
+        The phases in working levels.
+    guiding : int
+        Channels that are guides, the phases among them.
     guided : list of (G, rows, cols) uint16 arrays
         Those of each picture's; empty without guides.
     boxes : list of (int, int, int)
@@ -137,6 +144,7 @@ class Sample:
         step: int = 1,
         guides: Sequence[AnyGuide] = (),
         apart: int = 0,
+        phases: Phases | None = None,
     ) -> None:
         self.pictures = pixels if isinstance(pixels, Pictures) else Pictures((pixels,))
         self.layout = {
@@ -146,6 +154,7 @@ class Sample:
             "step": step,
             "apart": apart,
         }
+        self.phases = phases
         self.scale = Scale(self.pictures, values)
         self.top, self.unit, self.direct = self.scale.top, self.scale.unit, self.scale.direct
         levels = [self.scale.levels(picture) for picture in self.pictures.pixels]
@@ -159,6 +168,11 @@ class Sample:
         for guide in guiding:
             levels = [np.concatenate(pair) for pair in zip(levels, guide.samples, strict=True)]
         self.guides = np.concatenate([guide.output for guide in guiding]) if guiding else np.zeros((0, 1, 1), np.uint16)
+        self.waves = phases and phases.waves(spread * self.shown, highest(values))
+        if self.waves:
+            planes = [self.waves.sample(number, *one.shape[1:]) for number, one in enumerate(levels)]
+            levels = [np.concatenate(pair) for pair in zip(levels, planes, strict=True)]
+        self.guiding = len(self.guides) + (WAVES if phases else 0)
         self._lay(levels, margin, step, apart)
         self.channels = channels
         self.pixels = self._stacked(list(self.pictures.pixels), self.pictures.pixels[0].flat[0])
@@ -169,7 +183,7 @@ class Sample:
         sample = cls.__new__(cls)
         sample.pixels, sample.shown, sample.pictures = levels[..., None], 1, Pictures((levels[..., None],))
         sample.top, sample.unit, sample.direct = count - 1, 1.0, True
-        sample.guides = np.zeros((0, 1, 1), np.uint16)
+        sample.guides, sample.guiding = np.zeros((0, 1, 1), np.uint16), 0
         sample._lay([levels[None].astype(np.uint16)], 0)
         return sample
 
@@ -320,11 +334,11 @@ class Sample:
             self.planes(machine) if planes is None else planes,
             machine.put(np.concatenate([positions, padding])),
             positions.size,
-            machine.put(np.pad(places.reach, (0, bool(len(self.guides))))),  # a guide's site itself
+            machine.put(np.pad(places.reach, (0, bool(self.guiding)))),  # a guide's site itself
             machine.put(index_of),
             self.rows,
             self.cols,
-            len(self.guides),
+            self.guiding,
         )
 
     def place(self, source: NDArray[np.int32]) -> NDArray[np.int32]:

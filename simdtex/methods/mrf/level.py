@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from simdtex import schedules
 from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions
+from simdtex.methods.mrf.input import Input
 from simdtex.methods.mrf.options import Options
-from simdtex.model.given import Given, Planes
 from simdtex.model.lattice import Grid
-from simdtex.model.sample import Candidates, Places, Sample
+from simdtex.model.sample import Candidates, Places
 from simdtex.ops import active, lcpdf
 from simdtex.ops.lcpdf import Choice
 from simdtex.ops.nearest import strip_of
@@ -35,25 +35,6 @@ STRICT = 2.0
 
 TOGETHER = 2**16
 """Sites that one kernel relaxes between two looks at the clock."""
-
-
-@dataclass(frozen=True)
-class Input:
-    """What a run is made from, validated, on the host.
-
-    ``sample`` is Y with its structure channel and guides, ``shape`` rows and columns of X, the output, ``offsets`` (N,
-    2) the neighbourhood, ``options`` as they are executed, and ``levels`` M of Algorithm 1. ``given`` are conditioning
-    data, sites of X that keep their values, and ``planes`` the same in working levels.
-    """
-
-    sample: Sample
-    shape: tuple[int, int]
-    offsets: NDArray[np.int32] = field(repr=False)
-    options: Options
-    schedule: schedules.Schedule
-    levels: int
-    given: Given | None = None
-    planes: Planes | None = None
 
 
 class State(NamedTuple):
@@ -153,9 +134,7 @@ class Lattices:
         self.sample, self.options, self.offsets = plan.sample, plan.options, plan.offsets
         self.planes = plan.sample.planes(machine)
         self.weighed = machine.put(np.zeros(plan.shape if conditions is None else (1, 1), np.int32))
-        self.conditions = conditions or Conditioning(
-            plan.levels, plan.sample.guides, plan.planes, len(plan.offsets), plan.options.data_weight
-        )
+        self.conditions = conditions or Conditioning(plan)
         self._last: Level | None = None
 
     def grid(self, number: int) -> Grid:

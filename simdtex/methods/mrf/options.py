@@ -15,6 +15,7 @@ from simdtex import schedules
 from simdtex.maspar.array import ARRAYS, parse_array
 from simdtex.model.lattice import MOST_ORDER
 from simdtex.model.pictures import Pictures
+from simdtex.model.regularity import LATTICES, parse_lattice
 from simdtex.options import (
     Choice,
     Number,
@@ -85,11 +86,22 @@ class Options:
         2.0,
         Number(0),
         "Follow the sample's outlines: more keeps joints and contours whole",
-        more="It is the weight of a channel that holds the distance from the sample's edges, is matched like the "
-        "others and is not shown: its standard deviation in units of the sample's, or less if grey levels would not "
-        'hold it. With 0, and with ``pixel="density"``, there is no such channel.',
+        more="It is the weight of a channel that holds the distance from the border between the sample's bright and "
+        "dark parts, is matched like the others and is not shown: its standard deviation in units of the sample's, or "
+        'less if grey levels would not hold it. With 0, and with ``pixel="density"``, there is no such channel.',
         paper=0.0,
         slider=(0, 6, 0.25),
+    )
+    lattice: str | tuple[tuple[float, float], tuple[float, float]] = option(
+        "auto",
+        Other(parse_lattice, "str or ((float, float), (float, float))", valid=LATTICES),
+        "Repeat regular textures on this lattice: auto, none, or two vectors as DY,DX,DY,DX in pixels of the sample",
+        more="``auto`` finds the lattice of a sample of 32 or more rows and columns, if it has one. A pixel's place "
+        "within a cell is then a guide, as in `guide`, of weight 1. On a torus the lattice is deformed to fit, by 15 % "
+        'at most. Categories, and ``pixel="density"``, have none.',
+        paper="none",
+        group="Appearance",
+        shown=DATA,
     )
     coherence: float = appearance(
         0.5,
@@ -287,7 +299,7 @@ class Options:
         shown=("fill", "extend", "simulate"),
     )
     guide_weight: float = data(
-        1.0,
+        10.0,
         Number(0),
         "Give the guide this variance, in units of the sample's; more follows it more closely",
         shown=("synth", "simulate"),
@@ -331,7 +343,7 @@ class Options:
     def resolved(self, pictures: Pictures) -> Options:
         """Return the options as they are executed: what ``search="auto"`` and ``finish=None`` mean for a sample.
 
-        Grey levels of a density have no source, so their distance from an edge is unknown: no structure channel.
+        Grey levels of a density have no source, so their distance from an edge is unknown: no structure channel, no phases.
         """
         usual = "coherent" if self.relaxation == "icm" else "exact"
         search = usual if self.search == "auto" else self.search
@@ -340,7 +352,9 @@ class Options:
             categories = (pictures.categorical and any(pictures.categorical)) or few(pictures.pixels)
             finish = 0.0 if self.pixel == "density" or categories else FINISH
         structure = 0.0 if self.pixel == "density" else self.structure
-        return replace(self, search=search, finish=finish, structure=structure)
+        named = pictures.categorical and any(pictures.categorical)
+        lattice = "none" if self.pixel == "density" or named else self.lattice
+        return replace(self, search=search, finish=finish, structure=structure, lattice=lattice)
 
 
 def begins(before: Options, now: Options, levels: int) -> int:

@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 from simdtex import schedules
 from simdtex.machine import Machine, memory
 from simdtex.methods.mrf.algorithm import Run
-from simdtex.methods.mrf.level import Input, number_of_levels
+from simdtex.methods.mrf.input import Input
+from simdtex.methods.mrf.level import number_of_levels
 from simdtex.methods.mrf.options import CATEGORIES as MOST
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given, planes
 from simdtex.model.guide import AnyGuide, Guide, GuidePair
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
+from simdtex.model.regularity import WAVES, Phases, parse_lattice, phases
 from simdtex.model.sample import NothingUsable, Sample
 from simdtex.ops.finish import around
 from simdtex.options import SMALLER, within_32_bits
@@ -89,12 +91,17 @@ def plan(
         if options.pixel == "density":
             raise ValueError('sites that are known in part choose among pixels of the sample; give pixel="source"')
         guides.append(given.colocated(pictures.pixels))
+    known = (given.values, given.whole, given.place) if given and given.whole.any() else None
+    lattice = parse_lattice(options.lattice)
+    regular = lattice and phases(pictures, shape, options.boundary == "torus", lattice, known)
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in guides)
-    heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or guides else 1.0  # in sums of squares
-    values = round(heavy * (channels * len(offsets) + len(guides)))
-    levels, sample = sampled(pictures, levels, offsets, values, options, guides)
-    known = planes(given, sample) if given and given.whole.any() else None
-    return Plan(sample, shape, offsets, options, schedules.get(options.schedule), levels, given, known)
+    channels += WAVES if regular else 0
+    guided = len(guides) + bool(regular)
+    heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or guided else 1.0  # in sums of squares
+    values = round(heavy * (channels * len(offsets) + guided))
+    levels, sample = sampled(pictures, levels, offsets, values, options, guides, regular)
+    held = planes(given, sample) if given and known else None
+    return Plan(sample, shape, offsets, options, schedules.get(options.schedule), levels, given, held)
 
 
 def sampled(
@@ -104,13 +111,14 @@ def sampled(
     values: int,
     options: Options,
     guides: Sequence[AnyGuide],
+    regular: Phases | None,
 ) -> tuple[int, Sample]:
     """Return the number of levels and the sample: fewer levels if one has no candidate and their number is open."""
     far = int(around(options.finish)[0].max()) if options.finish else 0
     for fewer in range(levels, 0, -1):
         step = 2 ** (fewer - 1)
         margin = int(offsets.max()) * step
-        sample = Sample(pictures, values, margin, options.structure, step, guides, far)
+        sample = Sample(pictures, values, margin, options.structure, step, guides, far, regular)
         try:
             for number in range(fewer):
                 sample.places(offsets, 2**number, options.phases, options.edges)

@@ -34,7 +34,7 @@ class Options:
         Number(0),
         "Be stricter at high frequencies, by alpha / k^beta; k counts levels from the lowest frequency upward",
         symbol="beta of equation (13)",
-        slider=(0, 3, 0.1),
+        shown=(),
     )
     seams: str = appearance(
         "blend",

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a run of the method ``mrf`` is made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex import schedules
+from simdtex.methods.mrf.options import Options
+from simdtex.model.given import Given, Planes
+from simdtex.model.sample import Sample
+
+
+@dataclass(frozen=True)
+class Input:
+    """What a run is made from, validated, on the host.
+
+    ``sample`` is Y with its structure channel and guides, ``shape`` rows and columns of X, the output, ``offsets`` (N,
+    2) the neighbourhood, ``options`` as they are executed, and ``levels`` M of Algorithm 1. ``given`` are conditioning
+    data, sites of X that keep their values, and ``planes`` the same in working levels.
+    """
+
+    sample: Sample
+    shape: tuple[int, int]
+    offsets: NDArray[np.int32] = field(repr=False)
+    options: Options
+    schedule: schedules.Schedule
+    levels: int
+    given: Given | None = None
+    planes: Planes | None = None

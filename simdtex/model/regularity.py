@@ -1,0 +1,479 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The lattice that a regular texture repeats on, and the phases that guide an output by it.
+
+A near-regular texture (Liu, Collins and Tsin 2004) looks alike at all points of a lattice, a i + b j. Every pixel of the
+sample and of the output has two phases on that lattice; their cosines and sines are a guide, so that a candidate comes
+from the same place within a cell. The lattice is found in whole numbers, and the guide's levels are rounded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from math import sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.model.lattice import Grid
+from simdtex.model.pictures import Pictures
+from simdtex.model.scale import stretch
+from simdtex.model.structure import principal
+from simdtex.options import shown
+
+LEAST_SIDE = 32
+"""Rows and columns that a picture needs for its lattice to be looked for."""
+
+SEEN = 0.55
+"""Share of the rows, and of the columns, by which a picture is compared with itself, at most."""
+
+LEAST_PEAK, APART, MOST_PEAKS = 0.08, 4, 80
+"""Of a peak of the autocorrelation: its least height, its pixels from lag 0 at least, and how many are looked at."""
+
+LEAST_CELL, MOST_BASES = 30, 48
+"""Pixels of a cell at least, and how many lattices are followed through the autocorrelation."""
+
+RISE, INSIDE = 0.12, (0.35, 0.5, 0.65)
+"""By how much the autocorrelation at the end of a basis vector exceeds that within it, and where: not along stripes."""
+
+ALIKE = 0.8
+"""Share of the greatest strength from which on the smallest cell is taken."""
+
+LEAST_STRENGTH, SIGNIFICANT = 0.15, 4.5
+"""Mean autocorrelation over the nodes of a lattice at least, and how many standard errors that must be."""
+
+MOST_STRAIN = 0.15
+"""How much a lattice is deformed to fit a torus at most."""
+
+HARMONICS = ((0, 1), (1, 0), (1, 1), (1, -1))
+"""Waves of a lattice by which the phases of two pictures are compared."""
+
+STEPS = 64
+"""Phases to a period that are tried."""
+
+WAVES = 4
+"""Channels of the guide: cosine and sine of each of two phases."""
+
+ROUND = 2.0**20
+"""Cosines are rounded to 1 / ROUND, which is more than they differ by from one mathematical library to another."""
+
+
+SMALLEST = 4
+"""Pixels of a cell that is given, at least."""
+
+LATTICES = ("auto", "none")
+"""The names of the option ``lattice``."""
+
+
+class Lattice(NamedTuple):
+    """A lattice of the plane: the points ``origin`` + i ``first`` + j ``second``, (row, column) in pixels."""
+
+    first: tuple[float, float]
+    second: tuple[float, float]
+    origin: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def basis(self) -> NDArray[np.float64]:
+        """Its vectors as the rows of a matrix (2, 2)."""
+        return np.array([self.first, self.second])
+
+    @property
+    def cell(self) -> float:
+        """Pixels of a cell."""
+        return abs(self.first[0] * self.second[1] - self.first[1] * self.second[0])
+
+    def phases(self, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.float64]:
+        """Return both coordinates of pixels on the lattice, (2, ...): whole numbers at its points."""
+        (a, b), (c, d) = self.first, self.second
+        y, x, area = row - self.origin[0], col - self.origin[1], a * d - b * c
+        return np.stack([(y * d - x * c) / area, (x * a - y * b) / area])
+
+    def moved(self, phases: NDArray[np.float64]) -> Lattice:
+        """Return the lattice with its origin moved by (2,) phases."""
+        by = phases @ self.basis
+        return self._replace(origin=(self.origin[0] + float(by[0]), self.origin[1] + float(by[1])))
+
+    def fitted(self, shape: tuple[int, int]) -> Lattice | None:
+        """Return the lattice deformed so that a torus of ``shape`` pixels holds it; None beyond `MOST_STRAIN`."""
+        size, basis = np.diag(shape).astype(np.float64), self.basis
+        exact = size @ _inverse(basis)
+        found, least = None, MOST_STRAIN
+        for more in product((-1, 0, 1), repeat=4):
+            count = np.rint(exact) + np.array(more, np.float64).reshape(2, 2)
+            if not round(float(_determinant(count))):
+                continue
+            deformed = _inverse(count) @ size
+            strain = sqrt(float(((_inverse(basis) @ deformed - np.eye(2)) ** 2).sum()))
+            if strain < least:
+                found, least = deformed, strain
+        return None if found is None else _lattice(found)._replace(origin=self.origin)
+
+
+class Phases(NamedTuple):
+    """The phases of a sample's pictures and of the output as a guide: ``pictures`` and ``output`` are their lattices.
+
+    ``weight`` is the variance of the guide in units of the sample's.
+    """
+
+    pictures: tuple[Lattice, ...]
+    output: Lattice
+    weight: float = 1.0
+
+    def waves(self, spread: float, top: int) -> Waves:
+        """Return the guide in working levels 0..top; ``spread`` is the variance of the pixels', summed over channels.
+
+        A cosine has the variance 1/2, and the guide has `WAVES` of them.
+        """
+        return Waves(*self, min(sqrt(2 * self.weight * spread / WAVES), top / 2))
+
+
+class Waves(NamedTuple):
+    """The working levels of `Phases`: each wave is ``height`` (1 + cosine), rounded."""
+
+    pictures: tuple[Lattice, ...]
+    output: Lattice
+    weight: float
+    height: float
+
+    def sample(self, number: int, rows: int, cols: int) -> NDArray[np.uint16]:
+        """Return the guide (4, rows, cols) of one of the sample's pictures."""
+        return self._levels(self.pictures[number], np.arange(rows), np.arange(cols))
+
+    def at(self, grid: Grid) -> NDArray[np.uint16]:
+        """Return the guide (4, rows, cols) of the output at the sites of a lattice, or of a window of it."""
+        whole = grid.within
+        row = (whole.top + np.arange(grid.rows)) % whole.rows * whole.step
+        return self._levels(self.output, row, (whole.left + np.arange(grid.cols)) % whole.cols * whole.step)
+
+    def _levels(self, lattice: Lattice, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.uint16]:
+        angles = 2 * np.pi * lattice.phases(row[:, None], col[None, :])
+        waves = np.stack([wave(angle) for angle in angles for wave in (np.cos, np.sin)])
+        found: NDArray[np.uint16] = np.rint((1 + np.rint(waves * ROUND) / ROUND) * self.height).astype(np.uint16)
+        return found
+
+
+def parse_lattice(value: Any) -> Lattice | str | None:
+    """Return the lattice that two vectors or a text of four numbers give, ``"auto"``, or None for ``"none"``."""
+    if isinstance(value, str) and value in LATTICES:
+        return None if value == "none" else value
+    remedy = 'give "auto", "none", or two vectors in pixels: ((dy, dx), (dy, dx)), or the text "DY,DX,DY,DX"'
+    parts: list[Any] = value.split(",") if isinstance(value, str) else []
+    if isinstance(value, (tuple, list)):
+        parts = [number for one in value for number in (one if isinstance(one, (tuple, list)) else (one,))]
+    elif not isinstance(value, str):
+        raise TypeError(f"lattice must be a text or two vectors, not {shown(value)}; {remedy}")
+    try:
+        a, b, c, d = (float(number) for number in parts)
+    except (TypeError, ValueError):
+        raise ValueError(f"lattice is {shown(value)}; {remedy}") from None
+    found = Lattice((a, b), (c, d))
+    if not (np.isfinite([a, b, c, d]).all() and found.cell >= SMALLEST):
+        raise ValueError(f"the cell of the lattice {shown(value)} has {found.cell:g} pixels; give {SMALLEST} or more")
+    return found
+
+
+def phases(
+    pictures: Pictures,
+    shape: tuple[int, int],
+    torus: bool,
+    lattice: str | Lattice,
+    known: tuple[NDArray[Any], NDArray[np.bool_], NDArray[np.int32] | None] | None = None,
+) -> Phases | None:
+    """Return the phases that guide an output; None if its sample has no lattice, or the output cannot hold it.
+
+    Parameters
+    ----------
+    pictures : Pictures
+        The sample.
+    shape : (int, int)
+        Rows and columns of the output.
+    torus : bool
+        Whether the output wraps around: then its lattice is deformed to fit.
+    lattice : "auto" or Lattice
+        The lattice of the largest picture; ``auto``: the one that it has by its autocorrelation.
+    known : tuple, optional
+        Values (H, W, C) of the output, where they are known (H, W), and where in the sample they are from (H, W, 2 or
+        3), -1 or None if nowhere: they fix the phases of the output.
+    """
+    planes, masks = plain(pictures)
+    largest = max(range(len(planes)), key=lambda number: (planes[number].size, -number))
+    found = regular(planes[largest], masks[largest]) if isinstance(lattice, str) else lattice
+    if found is None:
+        return None
+    reference = harmonics(planes[largest], masks[largest], found)
+    own = [
+        found if number == largest else aligned(found, reference, harmonics(plane, mask, found))
+        for number, (plane, mask) in enumerate(zip(planes, masks, strict=True))
+    ]
+    output = found.fitted(shape) if torus else found
+    if output is None:
+        return None
+    if known is not None:
+        values, where, place = known
+        from_sample = None if place is None else where & (place[..., 0] >= 0)
+        if place is not None and from_sample is not None and from_sample.any():
+            output = _continued(output, own, place, from_sample)
+        else:
+            theirs, _ = plain(Pictures((values,), weights=pictures.weights), like=pictures)
+            output = aligned(output, reference, harmonics(theirs[0], where, output))
+    return Phases(tuple(own), output)
+
+
+def plain(pictures: Pictures, like: Pictures | None = None) -> tuple[list[NDArray[np.int64]], list[NDArray[np.bool_]]]:
+    """Return pictures in one channel of integers, 0 to about 255, and where they are known.
+
+    The channel is the first principal component. ``like``: pictures that give the scale and the component.
+    """
+    scale = like or pictures
+    variables = [[p[..., v] for p in scale.pixels] for v in range(scale.pixels[0].shape[-1])]
+    ends = [(min(p.min() for p in those), max(p.max() for p in those)) for those in variables]
+    if not scale.weights:
+        ends = [(min(low for low, _ in ends), max(high for _, high in ends))] * len(ends)
+
+    def levels(picture: NDArray[Any]) -> NDArray[np.int64]:
+        return np.stack(
+            [stretch(np.clip(picture[..., v], *end), 255, end)[0] for v, end in enumerate(ends)]
+        )
+
+    theirs = [levels(p) for p in scale.pixels]
+    by = principal(theirs)
+    total = max(1, int(np.abs(by).sum()))
+    found = theirs if like is None else [levels(p) for p in pictures.pixels]
+    masks = list(pictures.known or [np.ones(p.shape[:2], bool) for p in pictures.pixels])
+    return [np.tensordot(by, one, 1) // total for one in found], masks
+
+
+def regular(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Lattice | None:
+    """Return the lattice of a picture (rows, cols) of integers, known in part; None if it has none.
+
+    Of all pairs of peaks of the autocorrelation, reduced to the shortest vectors of their lattice, the one of the
+    smallest cell among those over whose nodes the mean autocorrelation is nearly the greatest.
+    """
+    if min(picture.shape) < LEAST_SIDE or not known.any():
+        return None
+    correlation = autocorrelation(picture, known)
+    best: list[tuple[float, Lattice, float]] = []
+    for pair in candidates(correlation):
+        found = followed(correlation, pair)
+        if found is not None:
+            best.append(found)
+    if not best:
+        return None
+    most = max(strength for strength, *_ in best)
+    good = [one for one in best if one[0] >= ALIKE * most]
+    strength, lattice, error = min(good, key=lambda one: (round(one[1].cell, 6), -one[0]))
+    return lattice if strength >= max(LEAST_STRENGTH, SIGNIFICANT * error) else None
+
+
+class Correlation(NamedTuple):
+    """The autocorrelation of a picture.
+
+    ``values`` (2 m + 1, 2 n + 1), the lag (0, 0) in the middle; ``around`` the greatest of 3x3 lags; ``pixels`` that
+    are known.
+    """
+
+    values: NDArray[np.float64]
+    around: NDArray[np.float64]
+    pixels: int
+
+    @property
+    def reach(self) -> tuple[int, int]:
+        """The largest lags, m and n."""
+        return self.values.shape[0] // 2, self.values.shape[1] // 2
+
+
+def autocorrelation(picture: NDArray[np.int64], known: NDArray[np.bool_]) -> Correlation:
+    """Return the autocorrelation of the known pixels of a picture (rows, cols), normalised by the overlap at each lag.
+
+    The sums are whole numbers below 2**50, which the Fourier transform misses by far less than one half: rounded, they
+    are exact on every machine.
+    """
+    pixels = int(known.sum())
+    mean = round(int(picture[known].sum()) / pixels)
+    centred = np.where(known, picture - mean, 0)
+    reach = tuple(int(SEEN * n) for n in picture.shape)
+    size = tuple(n + m for n, m in zip(picture.shape, reach, strict=True))
+
+    def sums(plane: NDArray[Any]) -> NDArray[np.float64]:
+        power = np.abs(np.fft.rfft2(plane.astype(np.float64), size)) ** 2
+        whole = np.rint(np.fft.irfft2(power, size))
+        return np.roll(whole, reach, (0, 1))[: 2 * reach[0] + 1, : 2 * reach[1] + 1]
+
+    products, overlap = sums(centred), sums(known)
+    variance = products[reach] / overlap[reach]
+    values = np.where(overlap > 0.2 * pixels, products / np.maximum(overlap, 1) / (variance or 1), 0.0)
+    return Correlation(values, _greatest(values, 1), pixels)
+
+
+def _greatest(values: NDArray[np.float64], radius: int) -> NDArray[np.float64]:
+    """Return the greatest of the values around each, within a square."""
+    for axis in (0, 1):
+        padded = np.pad(values, [(radius, radius) if a == axis else (0, 0) for a in (0, 1)], constant_values=-np.inf)
+        n = values.shape[axis]
+        values = np.maximum.reduce([np.take(padded, np.arange(k, k + n), axis) for k in range(2 * radius + 1)])
+    return values
+
+
+def candidates(correlation: Correlation) -> NDArray[np.int64]:
+    """Return the bases (n, 2, 2) that pairs of peaks make, reduced, each once: those that rise towards both ends."""
+    values, (m, n) = correlation.values, correlation.reach
+    peak = (values == _greatest(values, 2)) & (values > LEAST_PEAK)
+    peak[:2] = peak[-2:] = peak[:, :2] = peak[:, -2:] = False  # which are cut
+    y, x = np.nonzero(peak)
+    height, y, x = values[peak], y - m, x - n
+    use = ((y > 0) | ((y == 0) & (x > 0))) & (y * y + x * x >= APART**2)
+    order = np.lexsort((x[use], y[use], -height[use]))[:MOST_PEAKS]
+    vectors = np.stack([y[use], x[use]], 1)[order]
+    one, other = np.triu_indices(len(vectors), 1)
+    pairs = reduced(np.stack([vectors[one], vectors[other]], 1))
+    if not len(pairs):
+        return pairs
+    cell = np.abs(pairs[:, 0, 0] * pairs[:, 1, 1] - pairs[:, 0, 1] * pairs[:, 1, 0])
+    pairs = pairs[cell >= LEAST_CELL]
+    inside = (np.abs(pairs) <= np.array([m, n])).all((1, 2))
+    pairs = pairs[inside]
+    ends = correlation.around[pairs[..., 0] + m, pairs[..., 1] + n]
+    within = [values[tuple(np.moveaxis(np.rint(pairs * part).astype(int) + (m, n), -1, 0))] for part in INSIDE]
+    rising = (ends - np.maximum.reduce(within) >= RISE).all(1)
+    best = np.argsort(-ends[rising].sum(1), kind="stable")
+    return apart(pairs[rising][best])
+
+
+def reduced(pairs: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return pairs of vectors (n, 2, 2) reduced by Gauss's algorithm, in one half of the plane, each pair once."""
+    first, second = pairs[:, 0].copy(), pairs[:, 1].copy()
+    while True:
+        swap = (second**2).sum(1) < (first**2).sum(1)
+        first[swap], second[swap] = second[swap], first[swap].copy()
+        square = (first**2).sum(1)
+        times = (2 * (first * second).sum(1) + square) // np.maximum(2 * square, 1)  # the nearest whole number
+        times[2 * np.abs((first * second).sum(1)) <= square] = 0
+        if not times.any():
+            break
+        second -= times[:, None] * first
+    found = np.stack([first, second], 1)
+    found = found[(found**2).sum(2).all(1)]
+    flip = (found[..., 0] < 0) | ((found[..., 0] == 0) & (found[..., 1] < 0))
+    found[flip] *= -1
+    unique: NDArray[np.int64] = np.unique(found.reshape(-1, 4), axis=0).reshape(-1, 2, 2)
+    return unique
+
+
+def apart(pairs: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the first `MOST_BASES` of some bases (n, 2, 2) that differ from all before by two pixels or more."""
+    kept: list[NDArray[np.int64]] = []
+    for pair in pairs:
+        if not kept or (np.abs(np.array(kept) - pair).max((1, 2)) >= 2).all():
+            kept.append(pair)
+        if len(kept) == MOST_BASES:
+            break
+    return np.array(kept, np.int64).reshape(-1, 2, 2)
+
+
+def followed(correlation: Correlation, pair: NDArray[np.int64]) -> tuple[float, Lattice, float] | None:
+    """Return the strength of a lattice, its vectors fitted to the peaks near its nodes, and the strength's error.
+
+    The strength is the mean autocorrelation over all nodes but the origin.
+    """
+    basis, reach, away = pair.astype(np.float64), np.array(correlation.reach), 1
+    while True:  # farther and farther, as the vectors become exact
+        nodes, lags = _nodes(basis, reach, away)
+        every = away > 2 * np.abs(nodes).max(initial=0)
+        fitted = _least_squares(nodes, summits(correlation.values, lags))
+        if fitted is None or abs(_determinant(fitted)) < LEAST_CELL:
+            return None
+        basis, away = fitted, 2 * away
+        if every:
+            break
+    _, lags = _nodes(basis, reach, away)
+    at = np.rint(lags).astype(int) + reach
+    strength = float(correlation.around[at[:, 0], at[:, 1]].mean())
+    half = (basis**2).sum(1).min() / 4
+    near = (np.indices(correlation.values.shape) - reach[:, None, None]).astype(np.float64)
+    core = correlation.values[(near**2).sum(0) <= half]
+    error = sqrt(float((core**2).sum()) / correlation.pixels)
+    return strength, _lattice(basis), error
+
+
+def _nodes(
+    basis: NDArray[np.float64], reach: NDArray[np.int64], away: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the nodes (n, 2) of a lattice but the origin, up to ``away`` steps from it, and their lags (n, 2)."""
+    limit = np.minimum(away, np.ceil(np.abs(_inverse(basis)).T @ reach)).astype(int)  # of the window's corners
+    i, j = np.mgrid[-limit[0] : limit[0] + 1, -limit[1] : limit[1] + 1].reshape(2, -1)
+    nodes = np.stack([i, j], 1)[(i != 0) | (j != 0)].astype(np.float64)
+    lags = nodes @ basis
+    inside = (np.abs(lags) <= reach - 2).all(1)
+    return nodes[inside], lags[inside]
+
+
+def summits(values: NDArray[np.float64], lags: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the peaks (n, 2) nearest to lags (n, 2), within two pixels, to a fraction of a pixel."""
+    m, n = values.shape[0] // 2, values.shape[1] // 2
+    at = np.rint(lags).astype(int) + (m, n)
+    for _ in range(2):
+        around = np.stack([values[at[:, 0] + i, at[:, 1] + j] for i, j in product((-1, 0, 1), repeat=2)])
+        best = around.argmax(0)
+        at = np.clip(at + np.stack([best // 3 - 1, best % 3 - 1], 1), 1, (2 * m - 1, 2 * n - 1))
+    y, x = at.T
+    middle, found = values[y, x], at.astype(np.float64)
+    for axis, (low, high) in enumerate(((values[y - 1, x], values[y + 1, x]), (values[y, x - 1], values[y, x + 1]))):
+        bend = low - 2 * middle + high
+        found[:, axis] += np.where(bend < 0, np.clip((low - high) / np.where(bend < 0, 2 * bend, 1), -0.5, 0.5), 0)
+    return found - (m, n)
+
+
+def _least_squares(nodes: NDArray[np.float64], peaks: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Return the basis (2, 2) for which ``nodes @ basis`` is nearest to ``peaks``; None if it is not determined."""
+    square = nodes.T @ nodes
+    return None if abs(_determinant(square)) < 1e-9 else _inverse(square) @ (nodes.T @ peaks)
+
+
+def harmonics(picture: NDArray[np.int64], known: NDArray[np.bool_], lattice: Lattice) -> NDArray[np.complex128]:
+    """Return the amplitudes of `HARMONICS` of a lattice in the known pixels of a picture, (4,)."""
+    row, col = np.nonzero(known)
+    values = picture[known].astype(np.float64)
+    y, x = lattice.phases(row, col)
+    return np.array([(np.exp(-2j * np.pi * (k * y + m * x)) * (values - values.mean())).sum() for k, m in HARMONICS])
+
+
+def aligned(lattice: Lattice, wanted: NDArray[np.complex128], own: NDArray[np.complex128]) -> Lattice:
+    """Return the lattice moved so that a picture with the harmonics ``own`` has the phases of one with ``wanted``."""
+    y, x = np.mgrid[:STEPS, :STEPS] / STEPS
+    likeness = sum(
+        (np.exp(2j * np.pi * (k * y + m * x)) * one * np.conj(other)).real
+        for (k, m), one, other in zip(HARMONICS, own, wanted, strict=True)
+    )
+    best = int(np.argmax(np.rint(likeness / (np.abs(likeness).max() or 1) * ROUND)))
+    return lattice.moved(np.array(divmod(best, STEPS)) / STEPS)
+
+
+def _continued(
+    lattice: Lattice, pictures: Sequence[Lattice], place: NDArray[np.int32], known: NDArray[np.bool_]
+) -> Lattice:
+    """Return the lattice of an output moved so that its known sites have the phases of where they are from."""
+    row, col = np.nonzero(known)
+    source = place[known].astype(np.float64)
+    number = source[:, 2].astype(int) if source.shape[1] > 2 else np.zeros(len(source), int)
+    apart = lattice.phases(row, col)
+    for n, picture in enumerate(pictures):
+        apart[:, number == n] -= picture.phases(source[number == n, 0], source[number == n, 1])
+    turn = np.exp(2j * np.pi * apart).sum(1)
+    return lattice.moved(np.rint(np.angle(turn) / (2 * np.pi) * 2**16) / 2**16)
+
+
+def _determinant(matrix: NDArray[np.float64]) -> Any:
+    return matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0]
+
+
+def _inverse(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the inverse of a matrix (2, 2), by Cramer's rule."""
+    turned = np.array([[matrix[1, 1], -matrix[0, 1]], [-matrix[1, 0], matrix[0, 0]]])
+    found: NDArray[np.float64] = turned / _determinant(matrix)
+    return found
+
+
+def _lattice(basis: NDArray[np.float64]) -> Lattice:
+    (a, b), (c, d) = basis.tolist()
+    return Lattice((a, b), (c, d))
