@@ -1,10 +1,10 @@
 """Algorithm 1 of Paget and Longstaff (1998) as plain loops, to the byte: what whole runs of the engine must give.
 
-Nothing here shares code with the package but the random words, whose generator is tested against published vectors. A
-picture is indexed [channel][row, column], a site is (row, column), and a place in the sample is (number of the picture,
-row, column), (-1, -1, -1) for nowhere. Grey levels are integers, temperatures whole 1/1024. An array without a
-picture's shape runs over candidates p; ``float32`` stands where a result is rounded to it. The numbers in the comments
-are the algorithm's own.
+Nothing here shares code with the package but the random words, whose generator is tested against published vectors,
+and the search for a sample's lattice (test_regularity.py). A picture is indexed [channel][row, column], a site is (row,
+column), and a place in the sample is (number of the picture, row, column), (-1, -1, -1) for nowhere. Grey levels are
+integers, temperatures whole 1/1024. An array without a picture's shape runs over candidates p; ``float32`` stands where
+a result is rounded to it. The numbers in the comments are the algorithm's own.
 """
 
 from copy import deepcopy
@@ -35,15 +35,16 @@ SUGGESTING = 12  # nearest neighbours that suggest a candidate
 DEFAULTS = {
     **{"order": 18, "levels": None, "overview": 128, "relaxation": "icm", "bandwidth": 0.15, "coherence": 0.5},
     **{"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": None, "xi": -1.0},
+    **{"lattice": "auto"},
     **{"free_sweeps": 2, "pixel": "source", "phases": "decimated", "edges": "auto"},
     **{"schedule": "coloring", "boundary": "torus", "search": "auto", "chance": 4},
     **{"categorical": False, "weights": None, "shares": None, "proportions": None},
-    **{"data_weight": 16.0, "guide_weight": 1.0, "labels": None},
+    **{"data_weight": 16.0, "guide_weight": 10.0, "labels": None},
 }
 PAPER = {
     **{"relaxation": "gibbs", "bandwidth": 1.0, "coherence": 0.0, "free_sweeps": 0, "pixel": "density"},
     **{"edges": "whole", "search": "exact", "overview": 64},
-    **{"balance": 0.0, "structure": 0.0, "novelty": 0.0, "finish": 0.0},
+    **{"balance": 0.0, "structure": 0.0, "novelty": 0.0, "finish": 0.0, "lattice": "none"},
 }
 
 
@@ -70,7 +71,7 @@ def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, 
     one = isinstance(pictures, np.ndarray)
     pictures = [pictures] if one else pictures
     o = options(pictures, **given)
-    Y = material(pictures, o, mask, known, known_source, guide)
+    Y = material(pictures, o, shape, mask, known, known_source, guide)
     levels = number_of_levels([y.shape[:2] for y in pictures], shape, o)  # 1.
     lay(Y, levels, o)
     X, level = at_random(Y, shape, seed), None  # 2., 5.

@@ -6,19 +6,24 @@ A place is (number of the picture, row, column), and nowhere is (-1, -1, -1). Pl
 
 from fractions import Fraction
 from itertools import product
-from math import isqrt, log2, sqrt
+from math import cos, floor, isqrt, log2, pi, sin, sqrt
+from operator import mul
 from types import SimpleNamespace
 
 import numpy as np
 import plain
 from scipy import ndimage
 
+from simdtex.model.pictures import Pictures
+from simdtex.model.regularity import parse_lattice
+from simdtex.model.regularity import phases as engine_phases
+
 NOWHERE = (-1, -1, -1)
 UNKNOWN = -1
 COLOCATED = 16  # channels that a variable known where others are not may have, for all that room is made
 
 
-def material(pictures, o, mask=None, known=None, known_source=None, guide=None):
+def material(pictures, o, shape, mask=None, known=None, known_source=None, guide=None):
     """Y: the pictures, whole where they have gaps, and everything that is matched, as grey levels."""
     gaps = [np.isnan(y).any(-1) if y.dtype.kind == "f" else np.zeros(y.shape[:2], bool) for y in pictures]
     Y = SimpleNamespace(gaps=gaps, pictures=[completed(*pair) for pair in zip(pictures, gaps, strict=True)])
@@ -37,8 +42,10 @@ def material(pictures, o, mask=None, known=None, known_source=None, guide=None):
     beside = ([] if guide is None else [labelled(guide, o)]) + [None] * colocated
     N, channels = len(plain.offsets(o.order)), sum(1 if c is None else one_hot(c) for c in Y.categories)
     channels += bool(o.structure) + sum(COLOCATED * len(Y.variables) if g is None else channels_of(g) for g in beside)
-    heavy = max(1, o.data_weight, N / 4) if known is not None or beside else 1
-    values = round(heavy * (channels * N + len(beside)))
+    lattices = repeated(pictures, o, shape, known, known_source)
+    channels, guided = channels + 4 * bool(lattices), len(beside) + bool(lattices)
+    heavy = max(1, o.data_weight, N / 4) if known is not None or guided else 1
+    values = round(heavy * (channels * N + guided))
     Y.height = 2 ** min(12, int((33 - log2(values)) / 2)) - 1  # so that every distance is exact in float64
 
     Y.direct = not o.weights and not any(Y.categories)  # the channels of grey levels are those of the pixels
@@ -59,6 +66,10 @@ def material(pictures, o, mask=None, known=None, known_source=None, guide=None):
         levels = Y.levels_of(np.ma.getdata(known).astype(pictures[0].dtype))
         Y.guides += [np.where(partly[..., owner[c]], levels[c], UNKNOWN) for c in those]
         planes = [[*y, *(y[c] for c in those)] for y in planes]
+    if lattices:
+        raised = min(sqrt(2 * spread / 4), Y.height / 2)
+        planes = [[*y, *phases(one, raised, *y[0].shape)] for y, one in zip(planes, lattices[0], strict=True)]
+        Y.guides += phases(lattices[1], raised, *shape)
     Y.planes = planes
 
     Y.given = {}  # of sites that are known: grey levels of the matched channels, and where they are from
@@ -185,17 +196,17 @@ def variance(planes):
 
 
 def structure(pictures, weight, most):
-    """The signed distance to the edges of the sample, from 0 up, with this weight where that leaves 0..most alone."""
-    slopes = [slope_of(y) for y in pictures]
-    every = sorted(v for slope in slopes for v in slope.ravel().tolist())
-    signed = []
-    for slope in slopes:
-        edge = slope > every[int(0.85 * (len(every) - 1))]
-        signed.append(np.zeros(slope.shape, int))  # in 1/256 of a pixel
-        for i, j in np.ndindex(*slope.shape):
-            others = np.argwhere(edge != edge[i, j])
+    """The signed distance to the border of bright and dark, from 0 up, with this weight where 0..most holds it."""
+    smooth = [[smoothed(plane) for plane in y] for y in pictures]
+    by, signed = principal(smooth), []
+    for y in smooth:
+        tone = sum(w * plane for w, plane in zip(by, y, strict=True))
+        bright = tone * 19 * 19 * 21**4 > surroundings(tone)
+        signed.append(np.zeros(bright.shape, int))  # in 1/256 of a pixel
+        for i, j in np.ndindex(*bright.shape):
+            others = np.argwhere(bright != bright[i, j])
             nearest = min([256, *((others - (i, j)) ** 2).sum(1).tolist()])  # 16 pixels at most
-            signed[-1][i, j] = round(sqrt(nearest) * 256) * (-1 if edge[i, j] else 1)
+            signed[-1][i, j] = (round(sqrt(nearest) * 256) - 128) * (1 if bright[i, j] else -1)
     least = min(int(one.min()) for one in signed)
     signed = [one - least for one in signed]
     spread = sqrt(variance([[one] for one in signed]))
@@ -205,20 +216,64 @@ def structure(pictures, weight, most):
     return [np.array([[round(v * by) for v in row] for row in one.tolist()]) for one in signed]
 
 
-def slope_of(y):
-    """The squared gradient of a picture that is smoothed before, summed over channels."""
-    rows, cols = y[0].shape
-    slope = np.zeros((rows, cols), int)
-    for plane in y:
-        smooth = np.zeros((rows, cols), int)
-        for i, j, a, b in product(range(rows), range(cols), range(-2, 3), range(-2, 3)):
-            weights = (1, 4, 6, 4, 1)[a + 2] * (1, 4, 6, 4, 1)[b + 2]
-            smooth[i, j] += weights * plane[clamped(i + a, rows), clamped(j + b, cols)]
-        for i, j in product(range(rows), range(cols)):
-            down = smooth[clamped(i + 1, rows), j] - smooth[clamped(i - 1, rows), j]
-            right = smooth[i, clamped(j + 1, cols)] - smooth[i, clamped(j - 1, cols)]
-            slope[i, j] += down**2 + right**2
-    return slope
+def smoothed(plane):
+    """256 times a plane that is smoothed by (1 4 6 4 1)/16 along rows and columns."""
+    found = np.zeros(plane.shape, int)
+    for i, j, a, b in product(*map(range, plane.shape), range(-2, 3), range(-2, 3)):
+        weights = (1, 4, 6, 4, 1)[a + 2] * (1, 4, 6, 4, 1)[b + 2]
+        found[i, j] += weights * plane[clamped(i + a, len(plane)), clamped(j + b, plane.shape[1])]
+    return found
+
+
+def surroundings(tone):
+    """Sums over running means of 19, 21 and 21 pixels, along columns and rows; mirrored beyond the borders."""
+    weights = np.convolve(np.convolve([1] * 19, [1] * 21), [1] * 21).tolist()
+    for _ in range(2):
+        n, found = len(tone), np.zeros(tone.shape, int)
+        for i, k in product(range(n), range(59)):
+            at = (i + k - 29) % (2 * n)
+            found[i] += weights[k] * tone[min(at, 2 * n - 1 - at)]
+        tone = found.T
+    return tone
+
+
+def principal(pictures):
+    """The first principal component of planes, in whole numbers up to 127: the 4096th power of their covariance."""
+    flat = [[v for y in pictures for v in y[c].ravel().tolist()] for c in range(len(pictures[0]))]
+    n, each = len(flat[0]), range(len(flat))
+    power = [[n * sum(map(mul, flat[a], flat[b])) - sum(flat[a]) * sum(flat[b]) for b in each] for a in each]
+    for _ in range(12):
+        power = [[sum(power[a][c] * power[c][b] for c in each) for b in each] for a in each]
+    longest = max(power, key=lambda row: max(map(abs, row)))
+    most = max(map(abs, longest))
+    if not most:
+        return [1 for _ in each]
+    whole = [floor(Fraction(127 * v, most) + Fraction(1, 2)) for v in longest]
+    negative = sum(whole) < 0 or (sum(whole) == 0 and next(v for v in whole if v) < 0)
+    return [-v if negative else v for v in whole]
+
+
+def repeated(pictures, o, shape, known, known_source):
+    """The lattices of the pictures and of the output, as the engine finds them; None without."""
+    vectors = parse_lattice(o.lattice)
+    if vectors is None or o.categorical or o.pixel == "density":
+        return None
+    whole = None if known is None else ~np.ma.getmaskarray(known).any(-1)
+    told = None if known is None or not whole.any() else (np.ma.getdata(known), whole, known_source)
+    found = engine_phases(Pictures(tuple(pictures), weights=o.weights), shape, o.boundary == "torus", vectors, told)
+    return found and found[:2]
+
+
+def phases(lattice, raised, rows, cols):
+    """Cosine and sine of both phases of every pixel on a lattice, as grey levels."""
+    (a, b), (c, d), (top, left) = lattice
+    planes = [np.zeros((rows, cols), int) for _ in range(4)]
+    for i, j in np.ndindex(rows, cols):
+        y, x = i - top, j - left
+        for k, along in enumerate(((y * d - x * c) / (a * d - b * c), (x * a - y * b) / (a * d - b * c))):
+            for plane, wave in zip(planes[2 * k : 2 * k + 2], (cos, sin), strict=True):
+                plane[i, j] = round((1 + round(wave(2 * pi * along) * 2**20) / 2**20) * raised)
+    return planes
 
 
 def clamped(i, n):

@@ -99,6 +99,9 @@ CASES = {
     "finish-float32": ((12, 11), None, np.float32, (3, 7), FEW | {"finish": 1.1, "levels": 1, "edges": "reflect"}),
     "finish-nobody-else": ((12, 11), None, np.uint8, (8, 7), FEW | {"finish": 0.3}),
     "finish-density": ((9, 10), None, np.uint8, (6, 7), DENSITY | {"finish": 1.0}),
+    "lattice-exact": ((12, 11), None, np.uint8, (9, 10), EXACT | {"lattice": ((4.4, 0.3), (-0.2, 5))}),
+    "lattice-colour": ((12, 11), 3, np.uint8, (8, 7), FEW | {"lattice": ((3, 0), (1, 4)), "boundary": "open"}),
+    "lattice-structure": ((12, 11), None, np.uint16, (9, 8), MORE | {"lattice": "4,0,0,3.9"}),
     "more": ((14, 13), None, np.uint8, (9, 10), MORE),
     "more-three-levels": ((24, 25), None, np.uint8, (12, 11), MORE | {"levels": 3}),
     "more-colour": ((13, 14), 3, np.uint8, (9, 8), MORE | {"boundary": "open"}),
@@ -115,7 +118,7 @@ CASES = {
 
 ON_A_DEVICE = (
     *("exact-colour", "paper", "few-suggest", "few-gibbs-density"),
-    *("more-colour", "more-density", "exact-of-many"),
+    *("more-colour", "more-density", "exact-of-many", "lattice-colour"),
 )
 
 
@@ -220,6 +223,7 @@ CHANGES = {
     "overview": [({"order": 2}, 128, 90), ({"order": 2, "search": "exact"}, 91, 90)],
     "balance": [(EXACT, 0.0, 0.5), (FEW, 0.0, 0.5), (MORE, 0.5, 0.6), (DENSITY, 0.0, 0.5)],
     "structure": [(EXACT, 0.0, 0.5), (FEW, 0.0, 2.0), (MORE, 2.0, 1.5)],
+    "lattice": [(EXACT, "auto", "3,0,0,3"), (FEW, ((3, 0), (0, 3)), ((3, 0), (1, 3))), (MORE, "none", "3,0,0,5")],
     "novelty": [(EXACT, 0.0, 1.0), (FEW, 0.0, 1.0), (MORE, 1.0, 0.5), (DENSITY, 0.0, 1.0)],
     "finish": [(EXACT, 0.0, None), (FEW, 0.0, 0.8), (MORE, None, 1.4), (DENSITY, None, 1.5)],
     "xi": [(EXACT, -1.0, -4.0), (FEW, -1.0, -4.0), (FEW, -1.0, -1.1)],

@@ -1,13 +1,12 @@
-"""The structure channel: signed distance to a sample's edges."""
-
-from math import hypot
+"""The structure channel: signed distance to the border between the bright and the dark parts of a sample."""
 
 import numpy as np
+import plain_sample
 import pytest
 from cases import texture
 
 from simdtex.model.sample import STEPS, Sample, variance
-from simdtex.model.structure import REACH, distance, structure
+from simdtex.model.structure import REACH, distance, principal, structure
 
 
 @pytest.mark.parametrize("shape", [(40, 37), (1, 30), (30, 1), (6, 5)])
@@ -31,16 +30,34 @@ def step(side=60, at=30):
     return np.where(np.arange(side) < at, 40, 200)[None, None] * np.ones((1, side, 1), int)
 
 
-def test_it_falls_towards_an_edge_from_either_side():
+@pytest.mark.parametrize("turned", [False, True])
+def test_it_rises_across_a_border_from_the_dark_to_the_bright(turned):
     levels = step().astype(np.uint16)
-    found = structure([levels], 1.0, variance(levels), STEPS)[0]
-    assert (found == found[0]).all(), "the edge is a column"
-    line = found[0].astype(int)
-    assert (line == line[::-1]).all()
-    middle = line[28:32]
-    assert middle.min() == 0
-    assert (np.diff(line[30:47]) >= 0).all()
-    assert line[59] == line[50] == line.max(), "beyond 16 pixels all are alike"
+    found = structure([np.swapaxes(levels, 1, 2) if turned else levels], 1.0, variance(levels), STEPS)[0]
+    found = found.T if turned else found
+    assert (found == found[0]).all(), "the border is a column"
+    line = np.diff(found[0].astype(int))
+    near = line[30 - 16 : 30 + 15]
+    assert near.min() > 0
+    assert near.max() - near.min() <= 1, "a pixel farther inside is as much more everywhere"
+    assert (line[:8] <= 0).all(), "what is far from anything darker is no longer bright"
+
+
+def test_a_bright_stripe_and_a_dark_one_differ():
+    stripes = np.where(np.arange(60) // 6 % 2, 40, 200)[None, None] * np.ones((1, 20, 1), int)
+    found = structure([stripes.astype(np.uint16)], 1.0, 6400.0, STEPS)[0][10].astype(int)
+    assert (found[(stripes[0, 0] == 200)].min()) > found[stripes[0, 0] == 40].max()
+
+
+def test_the_principal_component_is_that_of_greatest_variance():
+    rng = np.random.default_rng(3)
+    base = rng.integers(0, 100, (12, 30))
+    levels = np.stack([4 * base, -base, rng.integers(0, 9, base.shape)])
+    assert principal([levels[:, :5], levels[:, 5:]])[:2].tolist() == [127, -32]
+    assert principal([-levels]).tolist()[:2] == [127, -32], "its weights add up to more than 0"
+    assert principal([np.stack([base, -base])]).tolist() == [127, -127]
+    assert principal([np.stack([base // 2, -base])]).tolist()[1] == 127
+    assert principal([np.zeros((2, 3, 3), int)]).tolist() == [1, 1]
 
 
 @pytest.mark.parametrize("weight", [0.5, 1.0, 2.0])
@@ -61,40 +78,14 @@ def test_a_sample_without_an_edge_has_none(levels):
     assert not structure([levels.astype(np.uint16)], 1.0, 1.0, 255)[0].any()
 
 
-def plainly(levels):
-    """The sign and size of the distance, in pixels, in Python numbers."""
-    rows, cols = levels.shape[1:]
-
-    def at(a, i, j):
-        return a[min(max(i, 0), rows - 1)][min(max(j, 0), cols - 1)]
-
-    kernel, gradient = (1, 4, 6, 4, 1), [[0] * cols for _ in range(rows)]
-    for channel in levels.tolist():
-        down = [
-            [sum(w * at(channel, i + k - 2, j) for k, w in enumerate(kernel)) for j in range(cols)] for i in range(rows)
-        ]
-        both = [
-            [sum(w * at(down, i, j + k - 2) for k, w in enumerate(kernel)) for j in range(cols)] for i in range(rows)
-        ]
-        for i, j in np.ndindex(rows, cols):
-            a = at(both, i + 1, j) - at(both, i - 1, j)
-            b = at(both, i, j + 1) - at(both, i, j - 1)
-            gradient[i][j] += a * a + b * b
-    limit = sorted(g for row in gradient for g in row)[int(0.85 * (rows * cols - 1))]
-    edge = [[g > limit for g in row] for row in gradient]
-    found = np.zeros((rows, cols))
-    for i, j in np.ndindex(rows, cols):
-        gaps = [hypot(i - k, j - m) for k, m in np.ndindex(rows, cols) if edge[k][m] != edge[i][j]]
-        found[i, j] = min([16.0, *gaps]) * (-1 if edge[i][j] else 1)
-    return found
-
-
-def test_it_is_the_signed_distance():
-    levels = np.moveaxis(texture((13, 15), 2, seed=4), -1, 0).astype(np.uint16)
-    expected = plainly(levels)
-    expected -= expected.min()
-    scale = variance(levels) ** 0.5 / expected.std()
-    assert np.abs(structure([levels], 1.0, variance(levels), STEPS)[0] - expected * scale).max() <= 1
+@pytest.mark.parametrize("channels", [1, 3])
+def test_it_is_what_plain_loops_find(channels):
+    pictures = [np.moveaxis(texture(shape, channels, seed=4), -1, 0).astype(np.uint16) for shape in ((13, 15), (9, 40))]
+    expected = plain_sample.structure([[*one.astype(int)] for one in pictures], 1.0, STEPS)
+    found = structure(pictures, 1.0, variance(*pictures), STEPS)
+    for one, other in zip(found, expected, strict=True):
+        assert (one == other).all()
+        assert one.any()
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])

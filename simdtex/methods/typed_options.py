@@ -34,6 +34,7 @@ class MrfOptions(Common, total=False):
     preset: str
     order: int
     structure: float
+    lattice: str | ((float, float), (float, float))
     coherence: float
     balance: float
     novelty: float

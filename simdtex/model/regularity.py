@@ -109,6 +109,20 @@ class Lattice(NamedTuple):
                 found, least = deformed, strain
         return None if found is None else _lattice(found)._replace(origin=self.origin)
 
+    def fitting(self, shape: tuple[int, int]) -> tuple[int, int]:
+        """Return rows and columns near ``shape`` of a torus that holds the lattice almost undeformed.
+
+        Of the sizes within a quarter of ``shape``: deformed by 1 % counts as much as larger or smaller by 20 %.
+        """
+        best = []
+        for axis, wanted in enumerate(shape):
+            sizes = np.arange(max(1, wanted - wanted // 4), wanted + wanted // 4 + 1)
+            nodes = (sizes[:, None] * np.eye(2)[axis]) @ _inverse(self.basis)
+            missed = np.sqrt((((np.rint(nodes) - nodes) @ self.basis) ** 2).sum(1))
+            cost = missed / sizes + 0.05 * abs(sizes - wanted) / wanted
+            best.append(int(sizes[np.argmin(np.where((np.rint(nodes) == 0).all(1), np.inf, cost))]))
+        return best[0], best[1]
+
 
 class Phases(NamedTuple):
     """The phases of a sample's pictures and of the output as a guide: ``pictures`` and ``output`` are their lattices.
@@ -180,7 +194,7 @@ def phases(
     lattice: str | Lattice,
     known: tuple[NDArray[Any], NDArray[np.bool_], NDArray[np.int32] | None] | None = None,
 ) -> Phases | None:
-    """Return the phases that guide an output; None if its sample has no lattice, or the output cannot hold it.
+    """Return the phases that guide an output; None if its sample has no lattice, or ``auto`` finds none that fits.
 
     Parameters
     ----------
@@ -207,6 +221,12 @@ def phases(
         for number, (plane, mask) in enumerate(zip(planes, masks, strict=True))
     ]
     output = found.fitted(shape) if torus else found
+    if output is None and not isinstance(lattice, str):
+        rows, cols = found.fitting(shape)
+        raise ValueError(
+            f"the lattice fits a torus of {shape[0]}x{shape[1]} (rows x columns) only if deformed by more than "
+            f'{MOST_STRAIN:.0%}; give the shape {rows}x{cols}, or boundary="open"'
+        )
     if output is None:
         return None
     if known is not None:
@@ -232,9 +252,7 @@ def plain(pictures: Pictures, like: Pictures | None = None) -> tuple[list[NDArra
         ends = [(min(low for low, _ in ends), max(high for _, high in ends))] * len(ends)
 
     def levels(picture: NDArray[Any]) -> NDArray[np.int64]:
-        return np.stack(
-            [stretch(np.clip(picture[..., v], *end), 255, end)[0] for v, end in enumerate(ends)]
-        )
+        return np.stack([stretch(np.clip(picture[..., v], *end), 255, end)[0] for v, end in enumerate(ends)])
 
     theirs = [levels(p) for p in scale.pixels]
     by = principal(theirs)
@@ -330,14 +348,15 @@ def candidates(correlation: Correlation) -> NDArray[np.int64]:
     if not len(pairs):
         return pairs
     cell = np.abs(pairs[:, 0, 0] * pairs[:, 1, 1] - pairs[:, 0, 1] * pairs[:, 1, 0])
-    pairs = pairs[cell >= LEAST_CELL]
-    inside = (np.abs(pairs) <= np.array([m, n])).all((1, 2))
-    pairs = pairs[inside]
+    inside = (np.abs(pairs) <= np.array([m, n])).all((1, 2)) & (cell >= LEAST_CELL)
+    pairs, cell = pairs[inside], cell[inside]
     ends = correlation.around[pairs[..., 0] + m, pairs[..., 1] + n]
+    near = ends.mean(1)
     within = [values[tuple(np.moveaxis(np.rint(pairs * part).astype(int) + (m, n), -1, 0))] for part in INSIDE]
     rising = (ends - np.maximum.reduce(within) >= RISE).all(1)
-    best = np.argsort(-ends[rising].sum(1), kind="stable")
-    return apart(pairs[rising][best])
+    pairs, cell, near = pairs[rising], cell[rising], near[rising]
+    best = near >= ALIKE * near.max(initial=0)
+    return apart(pairs[best][np.argsort(cell[best], kind="stable")])
 
 
 def reduced(pairs: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -361,7 +380,7 @@ def reduced(pairs: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def apart(pairs: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the first `MOST_BASES` of some bases (n, 2, 2) that differ from all before by two pixels or more."""
+    """Return the first `MOST_BASES` of bases (n, 2, 2) that differ from all before by two pixels or more."""
     kept: list[NDArray[np.int64]] = []
     for pair in pairs:
         if not kept or (np.abs(np.array(kept) - pair).max((1, 2)) >= 2).all():

@@ -95,7 +95,7 @@ class Options:
     lattice: str | tuple[tuple[float, float], tuple[float, float]] = option(
         "auto",
         Other(parse_lattice, "str or ((float, float), (float, float))", valid=LATTICES),
-        "Repeat regular textures on this lattice: auto, none, or two vectors as DY,DX,DY,DX in pixels of the sample",
+        "Keep regular textures on a lattice: the sample's own (auto), none, or two vectors DY,DX,DY,DX in pixels",
         more="``auto`` finds the lattice of a sample of 32 or more rows and columns, if it has one. A pixel's place "
         "within a cell is then a guide, as in `guide`, of weight 1. On a torus the lattice is deformed to fit, by 15 % "
         'at most. Categories, and ``pixel="density"``, have none.',

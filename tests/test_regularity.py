@@ -1,0 +1,294 @@
+"""The lattice of a regular sample, how it fits a torus, and the phases that guide an output."""
+
+import numpy as np
+import pytest
+from cases import REFERENCE, texture
+from numpy.testing import assert_allclose
+from scipy import ndimage
+
+import simdtex
+from simdtex.model import regularity
+from simdtex.model.lattice import Grid
+from simdtex.model.pictures import Pictures
+from simdtex.model.regularity import Lattice, Phases, aligned, harmonics, parse_lattice, phases, plain, regular
+from simdtex.options import resolve
+
+BASES = {
+    "square": ((12, 0), (0, 12)),
+    "tall": ((17, 0), (0, 7)),
+    "brick": ((11.5, -16), (11.5, 16)),
+    "hexagons": ((16.7, 34.2), (36.2, -0.8)),
+    "oblique": ((9.3, 4.1), (-3.2, 11.9)),
+    "weave": ((6.5, 6.2), (6.4, -6.1)),
+}
+
+
+def spots(basis, shape=(96, 110), origin=(0.0, 0.0), noise=20, channels=1, seed=1):
+    """A picture of a bright spot and a dark one in every cell of a lattice."""
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    at = Lattice(*basis, origin).phases(y, x)
+    near = [
+        np.exp(-40 * ((np.mod(at + 0.5 - np.reshape(c, (2, 1, 1)), 1) - 0.5) ** 2).sum(0)) for c in ((0, 0), (0.3, 0.4))
+    ]
+    picture = 120 + 100 * near[0] - 60 * near[1]
+    rng = np.random.default_rng(seed)
+    grey = np.clip(picture[..., None] + rng.normal(0, noise, (*shape, channels)), 0, 255)
+    return grey.astype(np.uint8)
+
+
+def found_in(picture, known=None):
+    """The lattice of one picture (rows, cols, channels)."""
+    pictures = Pictures((picture,), None if known is None else (~known,))
+    (plane,), (mask,) = plain(pictures)
+    return regular(plane, mask)
+
+
+def same_lattice(one, other, within):
+    """Whether the vectors of each lattice are whole combinations of the other's, but for pixels."""
+    there = np.asarray(one) @ np.linalg.inv(np.asarray(other))
+    return abs(round(np.linalg.det(there))) == 1 and np.abs((there - np.rint(there)) @ np.asarray(other)).max() < within
+
+
+@pytest.mark.parametrize("name", BASES)
+def test_the_lattice_of_a_regular_picture_is_found(name):
+    found = found_in(spots(BASES[name]))
+    assert same_lattice(found.basis, BASES[name], 0.5 if name == "hexagons" else 0.25), found
+
+
+@pytest.mark.parametrize("how", ["colour", "float", "gaps", "noisy"])
+def test_it_is_found_in_pictures_of_every_kind(how):
+    picture = spots(BASES["oblique"], channels=3 if how == "colour" else 1, noise=40 if how == "noisy" else 20)
+    known = None
+    if how == "float":
+        picture = picture / np.float32(255) - 3
+    if how == "gaps":
+        known = np.ones(picture.shape[:2], bool)
+        known[30:60, 20:70] = False
+        picture = np.where(known[..., None], picture, 0).astype(np.uint8)
+    assert same_lattice(found_in(picture, known).basis, BASES["oblique"], 0.25)
+
+
+@pytest.mark.parametrize("smooth", [0, 1, 2, 4])
+def test_an_irregular_picture_has_none(smooth):
+    for seed in range(4):
+        noise = ndimage.gaussian_filter(np.random.default_rng(seed).random((80, 80)), smooth)
+        assert found_in((noise / noise.max() * 255).astype(np.uint8)[..., None]) is None
+
+
+@pytest.mark.parametrize("picture", [np.full((40, 40, 1), 7), spots(BASES["weave"])[:31], np.zeros((1, 50, 2))])
+def test_a_flat_or_a_small_picture_has_none(picture):
+    assert found_in(picture.astype(np.uint8)) is None
+
+
+def test_the_lattice_of_stripes_has_their_period():
+    y, x = np.mgrid[:90, :96]
+    stripes = 120 + 100 * np.sin(2 * np.pi * (y + 0.5 * x) / 9) + np.random.default_rng(1).normal(0, 20, y.shape)
+    along = found_in(stripes.clip(0, 255).astype(np.uint8)[..., None]).basis @ (1 / 9, 0.5 / 9)
+    assert_allclose(along, np.rint(along), atol=0.03)
+    assert along.any()
+
+
+def test_the_autocorrelation_is_exact():
+    rng = np.random.default_rng(2)
+    picture, known = rng.integers(0, 256, (11, 14)), rng.random((11, 14)) < 0.8
+    found = regularity.autocorrelation(picture, known)
+    centred = picture - round(int(picture[known].sum()) / int(known.sum()))
+
+    def mean(dy, dx):
+        pairs = [
+            centred[i, j] * centred[i + dy, j + dx]
+            for i in range(11)
+            for j in range(14)
+            if 0 <= i + dy < 11 and 0 <= j + dx < 14 and known[i, j] and known[i + dy, j + dx]
+        ]
+        return sum(map(int, pairs)) / len(pairs)
+
+    m, n = found.reach
+    assert (m, n) == (6, 7)
+    for dy, dx in ((0, 0), (1, 0), (3, -2), (-6, 3)):
+        assert found.values[m + dy, n + dx] == mean(dy, dx) / mean(0, 0)
+
+
+def test_pairs_are_reduced_to_the_shortest_vectors_of_their_lattice():
+    rng = np.random.default_rng(4)
+    for pair in rng.integers(-20, 20, (40, 2, 2)):
+        area = abs(round(np.linalg.det(pair)))
+        if not area:
+            continue
+        (one, other), *more = regularity.reduced(pair[None])
+        assert not more and abs(one[0] * other[1] - one[1] * other[0]) == area
+        vectors = [i * pair[0] + j * pair[1] for i in range(-30, 31) for j in range(-30, 31) if (i, j) != (0, 0)]
+        assert (one**2).sum() == min((vector**2).sum() for vector in vectors)
+        assert 2 * abs(one @ other) <= (one**2).sum() <= (other**2).sum()
+
+
+@pytest.mark.parametrize("name", BASES)
+@pytest.mark.parametrize("shape", [(256, 256), (101, 140)])
+def test_a_torus_holds_the_fitted_lattice(name, shape):
+    lattice = Lattice(*BASES[name])
+    fitted = lattice.fitted(shape)
+    assert fitted is not None
+    nodes = np.diag(shape) @ np.linalg.inv(fitted.basis)
+    assert_allclose(nodes, np.rint(nodes), atol=1e-9)
+    assert np.linalg.norm(np.linalg.inv(lattice.basis) @ fitted.basis - np.eye(2)) <= regularity.MOST_STRAIN
+    wanted = lattice.fitting(shape)
+    better = lattice.fitted(wanted)
+    assert all(0.7 * side <= other <= 1.3 * side for side, other in zip(shape, wanted, strict=True))
+    strains = [np.linalg.norm(np.linalg.inv(lattice.basis) @ one.basis - np.eye(2)) for one in (better, fitted)]
+    assert strains[0] <= max(0.03, strains[1])
+
+
+def test_whole_cells_need_no_other_size():
+    assert Lattice((11.5, -16), (11.5, 16)).fitting((230, 256)) == (230, 256)
+
+
+def test_what_does_not_fit_is_left_alone_or_refused():
+    lattice = Lattice((20, 0), (0, 20))
+    assert lattice.fitted((30, 200)) is None
+    pictures = Pictures((spots(((20, 0), (0, 20))),))
+    assert phases(pictures, (30, 200), True, "auto") is None
+    assert phases(pictures, (30, 200), False, "auto") is not None
+    with pytest.raises(ValueError, match=r'^the lattice fits a torus of 30x200 .* shape \d+x200, or boundary="open"$'):
+        phases(pictures, (30, 200), True, lattice)
+
+
+def guide_of(lattice, height=100.0, shape=(24, 30)):
+    """The levels of a guide whose sample and output have one lattice, and its lattice."""
+    return regularity.Waves((lattice,), lattice, 1.0, height), Grid(*shape, torus=False)
+
+
+def test_pixels_a_lattice_vector_apart_have_one_phase():
+    waves, grid = guide_of(Lattice((6, 3), (-2, 8), (0.7, 1.9)))
+    levels = waves.at(grid)
+    assert (levels[:, 6:, 3:] == levels[:, :-6, :-3]).all()
+    assert (levels[:, 2:, :-8] == levels[:, :-2, 8:]).all()
+    assert (levels == waves.sample(0, 24, 30)).all()
+    assert len(np.unique(levels.reshape(4, -1), axis=1).T) == 54, "and pixels of one cell all differ"
+
+
+def test_a_window_and_a_coarse_level_have_the_phases_of_the_whole():
+    waves, grid = guide_of(Lattice((6.3, 3), (-2, 8.2)))
+    levels = waves.at(grid)
+    assert (waves.at(Grid(24, 30, 4, False)) == levels[:, ::4, ::4]).all()
+    torus = Grid(24, 30, 2)
+    window = torus.window(9, 13, 6, 4)
+    rows, cols = np.arange(9, 15) % 12 * 2, np.arange(13, 17) % 15 * 2
+    assert (waves.at(window) == levels[:, rows[:, None], cols]).all()
+
+
+@pytest.mark.parametrize(("spread", "top", "height"), [(800.0, 4095, 20.0), (800.0, 30, 15.0)])
+def test_the_guide_has_the_variance_of_the_pixels(spread, top, height):
+    lattice = Lattice((8, 0), (0, 8))
+    waves = Phases((lattice,), lattice).waves(spread, top)
+    assert waves.height == height
+    total = waves.sample(0, 64, 64).reshape(4, -1).var(1).sum()
+    assert total == pytest.approx(2 * height**2, rel=0.05)
+
+
+@pytest.mark.parametrize("moved", [(0, 0), (3.3, 0), (5.2, 9.1), (-4.1, 2.2)])
+def test_pictures_are_brought_into_phase(moved):
+    lattice = Lattice((11, 2), (-3, 13))
+    one, other = (plain(Pictures((spots(lattice[:2], origin=o),)))[0][0] for o in ((0, 0), moved))
+    known = np.ones(one.shape, bool)
+    found = aligned(lattice, harmonics(one, known, lattice), harmonics(other, known, lattice))
+    apart = Lattice(*lattice[:2], tuple(map(float, moved))).phases(*np.array(found.origin))
+    assert_allclose(apart, np.rint(apart), atol=1 / 64 + 0.01)
+
+
+def test_every_picture_of_a_sample_has_its_own_phase_and_the_largest_gives_the_lattice():
+    basis, moved = ((11.2, 1.8), (-3.1, 12.7)), (5.2, 7.1)
+    pictures = Pictures((spots(basis, (60, 64), moved), spots(basis)))
+    found = phases(pictures, (50, 70), False, "auto")
+    assert same_lattice(found.output.basis, basis, 0.25)
+    small, large = found.pictures
+    assert large == found.output
+    apart = large.phases(np.array(small.origin[0]), np.array(small.origin[1])) - Lattice(*large[:2]).phases(
+        *map(np.array, moved)
+    )
+    assert_allclose(apart, np.rint(apart), atol=0.06)
+
+
+@pytest.mark.parametrize("from_sample", [False, True])
+def test_known_pixels_fix_the_phase_of_the_output(from_sample):
+    basis, corner = ((11.2, 1.8), (-3.1, 12.7)), (5, 8)
+    whole = spots(basis, (120, 130))
+    sample = whole[corner[0] : 100, corner[1] : 110]
+    known = np.zeros((40, 50), bool)
+    known[:15, :30] = True
+    place = np.full((40, 50, 2), -1)
+    place[known] = np.argwhere(known) - corner + (22, 8)  # two lattice vectors less a little
+    values = whole[22 : 22 + 40, 8 : 8 + 50] if from_sample else whole[:40, :50]
+    found = phases(Pictures((sample,)), (40, 50), False, "auto", (values, known, place if from_sample else None))
+    (own,) = found.pictures
+    by = np.subtract(corner, (22, 8)) if from_sample else corner
+    apart = own.phases(*(np.array(o) for o in np.subtract(found.output.origin, by)))
+    assert_allclose(apart, np.rint(apart), atol=1e-4 if from_sample else 0.06)
+
+
+@pytest.mark.parametrize(
+    "value", ["12,0.5,-1,15", " 12, 0.5 ,-1,15", (12, 0.5, -1, 15), ((12, 0.5), (-1, 15)), [[12, 0.5], [-1, 15]]]
+)
+def test_vectors_are_given_in_several_forms(value):
+    assert parse_lattice(value) == Lattice((12, 0.5), (-1, 15))
+    resolve(simdtex.methods.mrf.Options, "synth", {"lattice": value})
+
+
+def test_names_are_those_of_the_option():
+    assert (parse_lattice("auto"), parse_lattice("none")) == ("auto", None)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "match"),
+    [
+        ("square", ValueError, '^lattice is .square.; give "auto", "none", or two vectors in pixels'),
+        ("1,2,3", ValueError, "^lattice is '1,2,3'; give"),
+        (((1, 2), (3, "x")), ValueError, "; give"),
+        ((1, None, 2, 3), ValueError, "; give"),
+        (7, TypeError, "^lattice must be a text or two vectors, not 7; give"),
+        (np.eye(2), TypeError, "^lattice must be a text or two vectors"),
+        ("8,8,4,4", ValueError, r"^the cell of the lattice '8,8,4,4' has 0 pixels; give 4 or more$"),
+        ("8,inf,4,4", ValueError, "; give 4 or more$"),
+    ],
+)
+def test_what_is_no_lattice_is_refused(value, error, match):
+    with pytest.raises(error, match=match):
+        parse_lattice(value)
+
+
+BRICK = spots(((8, -6), (8, 6)), (48, 44), noise=30)
+
+
+def in_phase(source, site, lattice, fitted, within):
+    """The share of sites (2, n) that are from their own place in a cell, within a part of it."""
+    apart = lattice.phases(*np.moveaxis(source, -1, 0).reshape(2, -1)) - fitted.phases(*site)
+    return (np.abs(apart - np.rint(apart)) <= within).all(0).mean()
+
+
+def test_a_regular_sample_is_repeated_without_a_fault():
+    shape, lattice = (48, 54), found_in(BRICK)
+    share = {}
+    for how in ("auto", "none"):
+        _, output = simdtex.synthesize(
+            BRICK[..., 0], shape, rng=3, lattice=how, order=8, device=REFERENCE, full_output=True
+        )
+        sites = np.indices(shape).reshape(2, -1)
+        share[how] = in_phase(output.source, sites, lattice, lattice.fitted(shape), 0.125)
+    assert share["auto"] > 0.95 > 0.5 > share["none"]
+
+
+def test_a_hole_is_filled_in_phase():
+    hole = np.zeros(BRICK.shape[:2], bool)
+    hole[16:32, 12:30] = True
+    lattice, share = found_in(BRICK, ~hole), {}
+    for how in ("auto", "none"):
+        _, output = simdtex.fill(BRICK[..., 0], hole, rng=2, lattice=how, order=8, device=REFERENCE, full_output=True)
+        share[how] = in_phase(output.source[hole], np.nonzero(hole), lattice, lattice, 0.2)
+    assert share["auto"] > 0.98 > 0.95 > share["none"]
+
+
+def test_categories_and_densities_have_none():
+    options = simdtex.methods.mrf.Options
+    pictures = Pictures((texture((12, 12), 1),))
+    for given in ({"categorical": True}, {"pixel": "density", "relaxation": "gibbs"}):
+        chosen = options(lattice="4,0,0,4", **given)
+        assert chosen.resolved(chosen.of(pictures)).lattice == "none"
