@@ -180,6 +180,12 @@ KINDS = {
         {"categorical": (0,)},
         {"kinds": 3, "known": 0.3, "partly": True, "channels": 2, "labels": 2},
     ),
+    "lattice-known": ({"lattice": ((4.8, 0.3), (-0.2, 5.8))}, {"known": 0.2, "channels": 3}),
+    "lattice-placed": (
+        OPEN | {"lattice": "4,0,1,5", "structure": 1.0},
+        TWO | {"known": 0.2, "placed": 0.5, "labels": 2},
+    ),
+    "lattice-two": ({"lattice": "4,0,1,5"} | OPEN, TWO | {"gaps": 0.1, "dtype": np.float32, "known": 0.1}),
     "everything": (
         {"shares": (1.0, 2.0), "schedule": "luby"},
         TWO

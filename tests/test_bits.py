@@ -74,6 +74,7 @@ RUNS = {
         COHERENT | {"order": 2, "relaxation": "gibbs", "pixel": "density", "boundary": "open", "chance": 0},
     ),
     "coherent-luby": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "schedule": "luby"}),
+    "coherent-lattice": ((14, 13), 3, np.uint8, (12, 13), COHERENT | {"order": 2, "lattice": "4,1,-1,4"}),
     "coherent-block": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "schedule": "block:5x4"}),
     "coherent-array": ((14, 13), None, np.uint8, (12, 13), COHERENT | {"order": 2, "array": "4x8"}),
     "multires": ((13, 11), None, np.uint8, (15, 18), MULTIRES),

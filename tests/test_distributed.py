@@ -64,10 +64,11 @@ VARIANTS = {
     "no free sweep, no finish": {"order": 2, "free_sweeps": 0, "finish": 0.0},
     "all phases": {"order": 1, "phases": "all", "levels": 2},
     "wide finish": {"order": 1, "finish": 3.0},
+    "lattice": {"order": 2, "lattice": "4.8,0,1,5.5"},
 }
 
 
-QUICK = ("coherent", "draws", "checkerboard", "one level, no penalty")
+QUICK = ("coherent", "draws", "checkerboard", "one level, no penalty", "lattice")
 
 
 @pytest.mark.parametrize("name", [name if name in QUICK else pytest.param(name, marks=slow) for name in VARIANTS])
@@ -127,7 +128,8 @@ def test_guides(tmp_path, gaps):
     shape, rng = (27, 30), np.random.default_rng(4)
     guide = rng.random(shape).astype(np.float32)
     guide[rng.random(shape) < 0.6 * gaps] = np.nan
-    assert_same(tmp_path, SAMPLE, shape, 14, order=1, guide=(SAMPLE.astype(np.float32) / 255, guide))
+    both = {"guide": (SAMPLE.astype(np.float32) / 255, guide), "lattice": "4.5,0,0,5"}
+    assert_same(tmp_path, SAMPLE, shape, 14, order=1, **both)
 
 
 def test_several_samples_with_masks_and_gaps(tmp_path):

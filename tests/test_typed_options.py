@@ -63,6 +63,7 @@ def type_of(one):
         found = "float"
     elif isinstance(one.kind, Other):
         says = one.kind.says.replace("simdtex.schedules.", "").replace("tuple of int", "tuple[int, ...]")
+        says = says.replace("two vectors", "tuple[tuple[float, float], tuple[float, float]]")
         found = says.replace("array", "ArrayLike").replace(" or ", " | ")
     else:
         found = kinds[type(one.kind)]

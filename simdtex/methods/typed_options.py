@@ -34,7 +34,7 @@ class MrfOptions(Common, total=False):
     preset: str
     order: int
     structure: float
-    lattice: str | ((float, float), (float, float))
+    lattice: str | tuple[tuple[float, float], tuple[float, float]]
     coherence: float
     balance: float
     novelty: float

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The lattice that a regular texture repeats on, and the phases that guide an output by it.
 
-A near-regular texture (Liu, Collins and Tsin 2004) looks alike at all points of a lattice, a i + b j. Every pixel of the
-sample and of the output has two phases on that lattice; their cosines and sines are a guide, so that a candidate comes
-from the same place within a cell. The lattice is found in whole numbers, and the guide's levels are rounded.
+A near-regular texture (Liu, Collins and Tsin 2004) looks alike at all points of a lattice. Every pixel of the sample
+and of the output has two phases on that lattice; their cosines and sines are a guide, so that a candidate comes from
+the same place within a cell. The lattice is found from whole numbers, and the guide's levels are rounded.
 """
 
 from __future__ import annotations
@@ -352,7 +352,9 @@ def candidates(correlation: Correlation) -> NDArray[np.int64]:
     pairs, cell = pairs[inside], cell[inside]
     ends = correlation.around[pairs[..., 0] + m, pairs[..., 1] + n]
     near = ends.mean(1)
-    within = [values[tuple(np.moveaxis(np.rint(pairs * part).astype(int) + (m, n), -1, 0))] for part in INSIDE]
+    within = [
+        values[tuple(np.moveaxis(np.rint(pairs * part).astype(int) + np.array([m, n]), -1, 0))] for part in INSIDE
+    ]
     rising = (ends - np.maximum.reduce(within) >= RISE).all(1)
     pairs, cell, near = pairs[rising], cell[rising], near[rising]
     best = near >= ALIKE * near.max(initial=0)
@@ -430,7 +432,7 @@ def _nodes(
 def summits(values: NDArray[np.float64], lags: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the peaks (n, 2) nearest to lags (n, 2), within two pixels, to a fraction of a pixel."""
     m, n = values.shape[0] // 2, values.shape[1] // 2
-    at = np.rint(lags).astype(int) + (m, n)
+    at = np.rint(lags).astype(int) + np.array([m, n])
     for _ in range(2):
         around = np.stack([values[at[:, 0] + i, at[:, 1] + j] for i, j in product((-1, 0, 1), repeat=2)])
         best = around.argmax(0)
@@ -440,7 +442,8 @@ def summits(values: NDArray[np.float64], lags: NDArray[np.float64]) -> NDArray[n
     for axis, (low, high) in enumerate(((values[y - 1, x], values[y + 1, x]), (values[y, x - 1], values[y, x + 1]))):
         bend = low - 2 * middle + high
         found[:, axis] += np.where(bend < 0, np.clip((low - high) / np.where(bend < 0, 2 * bend, 1), -0.5, 0.5), 0)
-    return found - (m, n)
+    shifted: NDArray[np.float64] = found - np.array([m, n])
+    return shifted
 
 
 def _least_squares(nodes: NDArray[np.float64], peaks: NDArray[np.float64]) -> NDArray[np.float64] | None:

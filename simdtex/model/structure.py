@@ -45,8 +45,8 @@ def structure(
     Returns
     -------
     list of (rows, cols) uint16 arrays
-        One for each picture, on one scale: 0 in the middle of the widest dark part; all alike where no pixel is brighter
-        than its surroundings, or every one.
+        One for each picture, on one scale: 0 in the middle of the widest dark part; all alike if no pixel is brighter
+        than its surroundings.
 
     Notes
     -----
@@ -108,7 +108,9 @@ def smoothed(channel: NDArray[np.integer]) -> NDArray[np.int64]:
     for axis in (0, 1):
         around = np.pad(found, [(2, 2) if a == axis else (0, 0) for a in (0, 1)], mode="edge")
         n = found.shape[axis]
-        found = sum(w * np.take(around, np.arange(k, k + n), axis) for k, w in enumerate(BINOMIAL))
+        found = np.zeros_like(found)
+        for k, weight in enumerate(BINOMIAL):
+            found += weight * np.take(around, np.arange(k, k + n), axis)
     return found
 
 
@@ -132,7 +134,8 @@ def _signed(bright: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return the distance to the border between bright and dark, below 0 in the dark, in 1/256 of a pixel."""
     squared = np.where(bright, distance(~bright), distance(bright))
     apart = np.rint(np.sqrt(squared.astype(np.float64)) * 256).astype(np.int64) - 128
-    return np.where(bright, apart, -apart)
+    found: NDArray[np.int64] = np.where(bright, apart, -apart)
+    return found
 
 
 def distance(marked: NDArray[np.bool_]) -> NDArray[np.int64]:

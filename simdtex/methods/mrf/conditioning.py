@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf.input import Input
-from simdtex.model.given import NO_STAND_IN, Planes, Stand, stand_ins
+from simdtex.model.given import NO_STAND_IN, Stand, stand_ins
 from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import Grid
 from simdtex.model.regularity import WAVES, Waves

@@ -94,7 +94,7 @@ class Options:
     )
     lattice: str | tuple[tuple[float, float], tuple[float, float]] = option(
         "auto",
-        Other(parse_lattice, "str or ((float, float), (float, float))", valid=LATTICES),
+        Other(parse_lattice, "str or two vectors", valid=LATTICES),
         "Keep regular textures on a lattice: the sample's own (auto), none, or two vectors DY,DX,DY,DX in pixels",
         more="``auto`` finds the lattice of a sample of 32 or more rows and columns, if it has one. A pixel's place "
         "within a cell is then a guide, as in `guide`, of weight 1. On a torus the lattice is deformed to fit, by 15 % "
@@ -343,7 +343,7 @@ class Options:
     def resolved(self, pictures: Pictures) -> Options:
         """Return the options as they are executed: what ``search="auto"`` and ``finish=None`` mean for a sample.
 
-        Grey levels of a density have no source, so their distance from an edge is unknown: no structure channel, no phases.
+        Grey levels of a density have no source: no structure channel and no lattice.
         """
         usual = "coherent" if self.relaxation == "icm" else "exact"
         search = usual if self.search == "auto" else self.search

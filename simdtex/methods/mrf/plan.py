@@ -93,7 +93,7 @@ def plan(
         guides.append(given.colocated(pictures.pixels))
     known = (given.values, given.whole, given.place) if given and given.whole.any() else None
     lattice = parse_lattice(options.lattice)
-    regular = lattice and phases(pictures, shape, options.boundary == "torus", lattice, known)
+    regular = None if lattice is None else phases(pictures, shape, options.boundary == "torus", lattice, known)
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in guides)
     channels += WAVES if regular else 0
     guided = len(guides) + bool(regular)
