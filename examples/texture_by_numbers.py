@@ -39,7 +39,7 @@ sample = np.where(pond, pebbles, grass).clip(0, 255).astype(np.uint8)
 # The output: where the river is to be.
 row, col = np.indices(shape) / args.size
 river = (abs(col - 0.5 - 0.25 * np.sin(2 * np.pi * row)) < 0.12 + 0.03 * np.cos(9 * row)).astype(np.uint8)
-picture = simdtex.synthesize(sample, shape, guide=(pond, river), guide_weight=1, boundary="open", rng=1)
+picture = simdtex.synthesize(sample, shape, guide=(pond, river), boundary="open", rng=1)
 write(folder / "river.png", picture)
 contact_sheet(
     [("sample", sample), ("its labels", pond * 255), ("labels wanted", river * 255), ("river", picture)],
@@ -51,7 +51,7 @@ gravel = data.gravel()[: args.size, : args.size]
 tone = gaussian_filter(gravel.astype(float), 2)
 photograph = resize(data.camera(), shape, anti_aliasing=True)
 wanted = np.interp(photograph, np.quantile(photograph, np.linspace(0, 1, 65)), np.quantile(tone, np.linspace(0, 1, 65)))
-portrait = simdtex.synthesize(gravel, shape, guide=(tone, wanted), guide_weight=4, boundary="open", rng=1)
+portrait = simdtex.synthesize(gravel, shape, guide=(tone, wanted), boundary="open", rng=1)
 write(folder / "portrait.png", portrait)
 contact_sheet(
     [("gravel", gravel), ("its tones", tone), ("tones wanted", wanted), ("portrait", portrait)],
