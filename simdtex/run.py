@@ -263,7 +263,9 @@ class Output:
         particular to the method. If there is a source map, ``use`` says how
         evenly the sample is used, as in `simdtex.model.use.effective_use`: ``effective_share``, above 0, to 1, and
         ``most_used``, the piece of the sample of which most is taken: ``times_fair_share``, its first pixel
-        (``row``, ``col``) and its size (``rows``, ``cols``), pixels.
+        (``row``, ``col``) and its size (``rows``, ``cols``), pixels. ``lattice`` of ``mrf`` is None unless the sample
+        repeats: the two ``vectors`` of the output's lattice, (row, column) in pixels, the ``deformation`` that fits the
+        sample's to the output, 0 if it is none, and ``fitting``, the rows and columns of an output that needs less.
     made : (rows, cols, channels) or (depth, rows, cols, channels) array or None
         The result, channels last whatever axes the sample has; notebooks show it.
 

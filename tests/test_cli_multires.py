@@ -33,13 +33,13 @@ def files(folder):
 
 
 def test_everything_at_once(folder):
-    args = ["--size", "30x26", "--alpha", "0.6", "--beta", "0.5", "--orientations", 3]
+    args = ["--size", "30x26", "--alpha", "0.6", "--orientations", 3]
     args += ["--levels", 4, "--boundary", "open", "--preset", "paper"]
     args += ["--stages", folder / "st"]
     result = synth(folder, *args, "--source-map", folder / "s.npz", "--also", f"{folder}/colour.png={folder}/c.png")
     assert result.exit_code == 0, result.output
     made = image.read(folder / "out.png").pixels
-    options = {"alpha": 0.6, "beta": 0.5, "orientations": 3, "levels": 4, "boundary": "open", "preset": "paper"}
+    options = {"alpha": 0.6, "orientations": 3, "levels": 4, "boundary": "open", "preset": "paper"}
     options |= {"rng": 5, "device": "reference"}
     expected = simdtex.synthesize(texture((16, 12)), (26, 30), method="multires", **options)
     np.testing.assert_array_equal(made, expected)

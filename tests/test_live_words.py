@@ -36,8 +36,16 @@ def test_controls_are_what_options_may_be_and_the_command_line_has_them(name):
 
 
 def test_the_controls_of_a_texture():
-    assert {one["name"] for one in controls("mrf")} >= {"order", "finish", "boundary", "categorical", "levels"}
-    assert not {"schedule", "array", "weights", "labels"} & {one["name"] for one in controls("mrf")}
+    assert {one["name"] for one in controls("mrf")} >= {
+        "order",
+        "finish",
+        "boundary",
+        "categorical",
+        "levels",
+        "lattice",
+        "schedule",
+    }
+    assert not {"array", "weights", "labels"} & {one["name"] for one in controls("mrf")}
     assert controls("mrf")[0]["group"] == "Appearance"
 
 

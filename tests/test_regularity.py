@@ -276,6 +276,34 @@ def test_a_regular_sample_is_repeated_without_a_fault():
     assert share["auto"] > 0.95 > 0.5 > share["none"]
 
 
+def test_a_run_says_how_much_its_lattice_is_deformed_and_what_fits():
+    given = {
+        "rng": 3,
+        "order": 2,
+        "xi": -20.0,
+        "free_sweeps": 0,
+        "device": REFERENCE,
+        "full_output": True,
+        "lattice": "8,-6,8,6",
+    }
+    lattices = [
+        simdtex.synthesize(BRICK[..., 0], shape, **given | more)[1].statistics["lattice"]
+        for shape, more in (
+            ((34, 48), {}),
+            ((32, 48), {}),
+            ((34, 48), {"boundary": "open"}),
+            ((34, 48), {"lattice": "none"}),
+        )
+    ]
+    assert lattices[0]["vectors"] == [[8.5, -6], [8.5, 6]]
+    assert lattices[0]["deformation"] == pytest.approx(0.0625)
+    assert [one and one["fitting"] for one in lattices] == [[32, 48]] * 3 + [None]
+    assert [regularity.lattice_sentence(one) for one in lattices] == [
+        "The sample's pattern is deformed by 6% to fit this size; 48x32 pixels fit it better.",
+        *[""] * 3,
+    ]
+
+
 def test_a_hole_is_filled_in_phase():
     hole = np.zeros(BRICK.shape[:2], bool)
     hole[16:32, 12:30] = True

@@ -14,12 +14,13 @@ import simdtex
 from simdtex.cli import main
 from simdtex.io import image
 from simdtex.model.colours import source_colours, temperature_colours, use_colours
+from simdtex.model.regularity import lattice_sentence
 from simdtex.model.use import counts, effective_use
 from simdtex.report.page import Figure
 from simdtex.report.synthesis import FRAME, _frame, _use, use_sentences
 from simdtex.run import Output
 
-OPTIONS = {"mrf": {"order": 2}, "multires": {"alpha": 0.5}}
+OPTIONS = {"mrf": {"order": 2, "lattice": "9,0,0,9"}, "multires": {"alpha": 0.5}}
 
 
 def colours(part):
@@ -118,6 +119,8 @@ def test_a_report(folder, method):
     results = json.loads((folder / "r" / "results.json").read_text(encoding="utf-8"))
     assert results["shape"] == [48, 40] and results["sample_shape"] == [24, 20, 3]
     assert use_sentences(results["statistics"]["use"]) in page.text
+    note = lattice_sentence(results["statistics"].get("lattice"))
+    assert (note != "") == (method == "mrf") and note in page.text and note in result.output
     assert results["command"] in page.text and f"--method {method}" in results["command"]
     assert results["statistics"]["seed"] == 5
     again = synth(folder, "--method", method, *options, "--report", folder / "r", "-q", sample="deep.png")

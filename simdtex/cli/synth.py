@@ -114,6 +114,11 @@ def synth(
             click.echo(f"candidates per level, coarse to fine: {counts}")
         elif method == "pyramid":
             click.echo(last_iteration(statistics))
+        else:
+            from simdtex.model.regularity import lattice_sentence
+
+            if note := lattice_sentence(statistics["lattice"]):
+                click.echo(note)
         if options["array"]:
             from simdtex.report.terminal import print_accounting
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from simdtex.io.image import write
 from simdtex.live import frames
 from simdtex.live.job import Job
+from simdtex.model.regularity import lattice_sentence
 from simdtex.model.source_map import apply_source_map, save_source_map
 from simdtex.options import one_of, whole
 from simdtex.run import Output
@@ -37,7 +38,7 @@ class Result:
     def __init__(self, number: int, job: Job, image: NDArray[Any], output: Output, seconds: float) -> None:
         self.number, self.job, self.image, self.seconds = number, job, image, seconds
         self.source, self.temperature = output.source, output.temperature
-        self.device = output.statistics["device"]
+        self.device, self.note = output.statistics["device"], lattice_sentence(output.statistics.get("lattice"))
         complete = self.source is not None and bool((self.source[..., 0] >= 0).all())  # every pixel has a source
         source: Any = self.source if complete else None
         self.maps = {name: apply_source_map(source, one) for name, one in job.maps.items() if complete}
@@ -62,6 +63,7 @@ class Result:
         return {
             **{"result": self.number, "width": self.job.shape[1], "height": self.job.shape[0]},
             **{"seconds": self.seconds, "device": self.device, "settings": self.job.message},
+            "note": self.note,
             **{"layers": ["sample", *self.layers], "files": self.files},
             **{"command": self.job.command, "thumbnail": [self.thumbnail.width, self.thumbnail.height]},
         }

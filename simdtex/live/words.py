@@ -7,7 +7,7 @@ from math import isfinite
 from typing import Any
 
 from simdtex.methods import mrf, multires, pyramid
-from simdtex.options import Choice, Number, Option, Whole, is_flag, table
+from simdtex.options import Choice, Number, Option, Other, Whole, is_flag, table
 
 METHODS = {
     "mrf": "Markov random field: any texture",
@@ -45,7 +45,7 @@ def _control(name: str, one: Option, default: Any) -> dict[str, Any]:
     label = one.label or name.replace("_", " ").capitalize()
     control = {"name": name, "group": one.group, "label": label, "hint": hint, "default": default}
     kind = one.kind
-    if isinstance(kind, Choice):
+    if isinstance(kind, Choice) or (isinstance(kind, Other) and default in kind.valid):
         return control | {"kind": "words", "valid": [[word, word] for word in kind.valid]}
     if is_flag(kind) and default is not None:
         return control | {"kind": "switch"}

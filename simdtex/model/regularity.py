@@ -46,6 +46,9 @@ LEAST_STRENGTH, SIGNIFICANT = 0.15, 4.5
 MOST_STRAIN = 0.15
 """How much a lattice is deformed to fit a torus at most."""
 
+NOTICED = 0.01
+"""Deformation from which on a size that fits better is named."""
+
 HARMONICS = ((0, 1), (1, 0), (1, 1), (1, -1))
 """Waves of a lattice by which the phases of two pictures are compared."""
 
@@ -104,10 +107,13 @@ class Lattice(NamedTuple):
             if not round(float(_determinant(count))):
                 continue
             deformed = _inverse(count) @ size
-            strain = sqrt(float(((_inverse(basis) @ deformed - np.eye(2)) ** 2).sum()))
-            if strain < least:
+            if (strain := self.deformation(deformed)) < least:
                 found, least = deformed, strain
         return None if found is None else _lattice(found)._replace(origin=self.origin)
+
+    def deformation(self, basis: NDArray[np.float64]) -> float:
+        """Return the norm of what another basis (2, 2) of the same nodes adds to the plane, as a share of it."""
+        return sqrt(float(((_inverse(self.basis) @ basis - np.eye(2)) ** 2).sum()))
 
     def fitting(self, shape: tuple[int, int]) -> tuple[int, int]:
         """Return rows and columns near ``shape`` of a torus that holds the lattice almost undeformed.
@@ -140,6 +146,13 @@ class Phases(NamedTuple):
         A cosine has the variance 1/2, and the guide has `WAVES` of them.
         """
         return Waves(*self, min(sqrt(2 * self.weight * spread / WAVES), top / 2))
+
+    def statistics(self, shape: tuple[int, int]) -> dict[str, Any]:
+        """Return the vectors of the output's lattice, the deformation of the sample's, and a size that needs less."""
+        sample = self.pictures[0]
+        vectors = [list(self.output.first), list(self.output.second)]
+        deformation = sample.deformation(self.output.basis)
+        return {"vectors": vectors, "deformation": deformation, "fitting": list(sample.fitting(shape))}
 
 
 class Waves(NamedTuple):
@@ -238,6 +251,20 @@ def phases(
             theirs, _ = plain(Pictures((values,), weights=pictures.weights), like=pictures)
             output = aligned(output, reference, harmonics(theirs[0], where, output))
     return Phases(tuple(own), output)
+
+
+def lattice_sentence(lattice: dict[str, Any] | None) -> str:
+    """Return how much a regular sample is deformed to fit its output, and what size fits; "" if by 1 % or less.
+
+    ``lattice`` is the entry of `simdtex.run.Output.statistics`.
+    """
+    if not lattice or lattice["deformation"] <= NOTICED:
+        return ""
+    rows, cols = lattice["fitting"]
+    return (
+        f"The sample's pattern is deformed by {lattice['deformation']:.0%} to fit this size; "
+        f"{cols}x{rows} pixels fit it better."
+    )
 
 
 def plain(pictures: Pictures, like: Pictures | None = None) -> tuple[list[NDArray[np.int64]], list[NDArray[np.bool_]]]:

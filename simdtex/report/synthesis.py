@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from simdtex.io.image import to_display
 from simdtex.model.colours import source_colours, use_colours
+from simdtex.model.regularity import lattice_sentence
 from simdtex.model.use import counts
 from simdtex.report.page import Figure, Part, Section, write_report
 from simdtex.report.sheet import contact_sheet, magnified
@@ -37,7 +38,8 @@ def write_synthesis(
     (height, width), (rows, cols) = image.shape[:2], sample.shape[:2]
     lead = f"{width} x {height} pixels from a sample of {cols} x {rows}, on {statistics['device']}."
     pair = contact_sheet([("the sample", shown), ("the output", made)], columns=2)
-    sections = [Section("The picture", [Figure("picture.png", pair, "The sample and the output.")])]
+    caption = f"The sample and the output. {lattice_sentence(statistics.get('lattice'))}".strip()
+    sections = [Section("The picture", [Figure("picture.png", pair, caption)])]
     if output.source is not None:
         sections.append(Section("Use of the sample", _use(shown, made, output)))
     job = {"seed": statistics["seed"], "seconds": f"{statistics['seconds']:.2f}", **statistics["options"]}

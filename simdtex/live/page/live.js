@@ -698,11 +698,11 @@ class Page {
     message.item = make("li", {}, message.button);
     this.currentItem.before(message.item);
     this.strip.scrollLeft = this.strip.scrollWidth;
-    this.say(`Result ${result} is ready: ${this.summary(message)}.`);
+    this.say(`Result ${result} is ready: ${this.summary(message)}`);
   }
 
-  summary({ width, height, seconds, device, settings }) {
-    return `${width} × ${height} in ${seconds.toFixed(2)} s on ${device}, seed ${settings.seed}`;
+  summary({ width, height, seconds, device, settings, note }) {
+    return `${width} × ${height} in ${seconds.toFixed(2)} s on ${device}, seed ${settings.seed}${note && `. ${note}`}`.replace(/\.?$/, ".");
   }
 
   on_selected({ result, restore }) {
@@ -712,7 +712,7 @@ class Page {
     if (restore) this.restore(found.settings);
     else if (found.settings.job === "fill") this.hole = [];
     this.doing.textContent = this.summary(found);
-    this.view.canvas.setAttribute("aria-label", `Result ${result}: ${this.summary(found)}. Arrow keys move, plus and minus zoom, 0 fits.`);
+    this.view.canvas.setAttribute("aria-label", `Result ${result}: ${this.summary(found)} Arrow keys move, plus and minus zoom, 0 fits.`);
     this.command.textContent = found.command;
     const download = (name) => button(name, () => this.send({ kind: "download", result, name }), { "data-file": name });
     this.files.replaceChildren(...found.files.map(download));
