@@ -165,7 +165,7 @@ def test_measure_gathers_all():
         use.most_used.times_fair_share,
     )
     assert found.pop("seam") == quality.seam(output)
-    assert found == {name: getattr(quality, name)(sample, output) for name in found} and len(found) == 4
+    assert found == {name: getattr(quality, name)(sample, output) for name in found} and len(found) == 6
     assert quality.measure(sample, output).effective_share is None
 
 

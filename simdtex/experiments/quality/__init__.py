@@ -22,17 +22,29 @@ from simdtex.experiments.quality.figures import (
     plausibility,
     seam,
 )
+from simdtex.experiments.quality.regular import (
+    Ends,
+    cut_end_places,
+    cut_ends,
+    lattice_fault_map,
+    lattice_faults,
+)
 from simdtex.model.use import MostUsed, Use, effective_use
 
 __all__ = [
     "COPIED_PATCH",
+    "Ends",
     "MostUsed",
     "Quality",
     "Use",
     "copying",
     "coverage",
+    "cut_end_places",
+    "cut_ends",
     "effective_use",
     "histogram_distance",
+    "lattice_fault_map",
+    "lattice_faults",
     "measure",
     "plausibility",
     "seam",
@@ -51,6 +63,10 @@ class Quality:
         Share of the output's patches, 0 to 1.
     seam : float
         Ratio; 1 is a seam that does not show.
+    lattice_faults : float or None
+        Share of the output, 0 to 1, that is out of place on the sample's lattice; None if it has no lattice.
+    cut_ends : float
+        Ends of stripes in 10,000 pixels, less those of the sample; below 0 if the sample has more.
     effective_share, most_used : float or None
         `effective_use`: a share above 0, to 1, and how many times its fair share the most used piece is taken; None
         if no source map was given.
@@ -61,6 +77,8 @@ class Quality:
     copying: float
     histogram_distance: float
     seam: float
+    lattice_faults: float | None
+    cut_ends: float
     effective_share: float | None = None
     most_used: float | None = None
 
@@ -95,6 +113,8 @@ def measure(sample: ArrayLike, output: ArrayLike, source: ArrayLike | None = Non
         coverage=coverage(sample, output),
         histogram_distance=histogram_distance(sample, output),
         seam=seam(output),
+        lattice_faults=lattice_faults(sample, output),
+        cut_ends=cut_ends(sample, output),
     )
     if source is None:
         return found
