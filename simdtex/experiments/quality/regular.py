@@ -149,7 +149,7 @@ def cut_ends(sample: ArrayLike, output: ArrayLike) -> float:
 def _rate(sample: NDArray[Any], output: NDArray[Any]) -> float:
     rows, cols = (max(1, side - 2 * BORDER) for side in output.shape[:2])
     bright, dark = cut_end_places(sample, output)
-    return AREA * (len(bright) + len(dark)) / (rows * cols)
+    return float(AREA * (len(bright) + len(dark)) / (rows * cols))
 
 
 def cut_end_places(sample: ArrayLike, output: ArrayLike) -> Ends:
