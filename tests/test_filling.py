@@ -338,6 +338,27 @@ def test_an_option_of_ones_own_goes_before_that_of_holes():
     assert (output.statistics["options"]["chance"], output.statistics["options"]["boundary"]) == (3, "torus")
 
 
+def shaded(rows, cols):
+    """Fine grain on a shade from black at the left to white at the right."""
+    return (np.arange(cols) * 200 / cols + np.random.default_rng(8).integers(0, 40, (rows, cols))).astype(np.uint8)
+
+
+def test_a_hole_takes_the_colours_of_its_rim():
+    picture, hole = shaded(60, 90), np.zeros((60, 90), bool)
+    hole[15:45, 30:60] = True
+    made = simdtex.fill(picture, hole, rng=1, order=4, device=REFERENCE)
+    error = np.abs(made[15:45, 30:60].mean(0) - picture[15:45, 30:60].mean(0))
+    assert error.mean() < 6
+
+
+def test_rows_go_on_as_rows_and_columns_as_columns():
+    picture = shaded(48, 60)
+    below = simdtex.extend(picture, bottom=24, rng=1, order=4, device=REFERENCE)[48:]
+    beside = simdtex.extend(picture.T, right=24, rng=1, order=4, device=REFERENCE)[:, 48:]
+    for made in (below.mean(0), beside.mean(1)):
+        assert np.abs(made - picture.mean(0)).mean() < 14
+
+
 def test_on_a_torus_a_hole_at_an_edge_sees_the_other_side():
     image, mask = texture(SHAPE), hole_at(EDGES["left"])
     other = image.copy()

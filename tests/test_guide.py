@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from simdtex.model.guide import UNKNOWN, Colocated, Guide
+from simdtex.model.guide import UNKNOWN, Colocated, Guide, Surroundings, smooth
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.model.scale import Scale
@@ -118,3 +118,34 @@ def test_a_sample_has_its_guide_last_and_does_not_vary_with_it():
     assert guided.levels[:2].tolist() == plain.levels.tolist()
     assert (guided.channels, guided.shown, guided.variance) == (2, 1, plain.variance)
     assert guided.guides.shape == (4, 2, 9)
+
+
+def test_colours_go_on_into_a_hole_from_the_known_pixels_near_its_rim():
+    rng = np.random.default_rng(5)
+    levels, known = rng.integers(0, 200, (2, 23, 31)).astype(np.uint16), np.ones((23, 31), bool)
+    known[4:19, 6:25] = False
+    found = smooth(levels, known)
+    for i, j in np.ndindex(*known.shape):
+        nearest = min(max(abs(i - k), abs(j - m)) for k, m in np.argwhere(known))
+        reach = next(side for side in (4, 6, 9, 13) if side >= nearest + 4)
+        square = slice(max(0, i - reach), i + reach + 1), slice(max(0, j - reach), j + reach + 1)
+        inside = levels[:, *square][:, known[square]].astype(int)
+        assert found[:, i, j].tolist() == (inside.sum(1) // inside.shape[1]).tolist()
+
+
+def test_surroundings_are_colours_and_places():
+    sample = np.random.default_rng(6).integers(0, 256, (40, 700, 2)).astype(np.uint8)
+    known = np.random.default_rng(7).random((40, 700)) < 0.9
+    scale = Scale(Pictures((sample,)), 100)
+    guide = Surroundings(sample, known, sample[10:20, 50:], known[10:20, 50:], (10, 50))
+    found = guide.planes(scale, 300_000.0, 4095)
+    (own,), output = found
+    assert len(own) == len(output) == guide.channels == 4
+    assert (own[:2] == smooth(np.moveaxis(sample, -1, 0).astype(np.uint16), known)).all()
+    assert (output[2:] == own[2:, 10:20, 50:]).all(), "a place is the same in both"
+    step = own[3, 0].astype(int)
+    assert step[600] - step[300] == round(0.3**0.5 * 300_000**0.5) and not np.diff(own[3], axis=0).any()
+    assert (np.diff(own[2, :, 0].astype(int)) >= 0).all() and own[2, -1, 0] == round(39 * (0.3 * 3e5) ** 0.5 / 300)
+    rows_alone = Surroundings(sample, known, sample[10:20], known[10:20], (10, np.nan)).planes(scale, 300_000.0, 4095)
+    assert not rows_alone.output[3].any() and not rows_alone.samples[0][3].any()
+    assert (rows_alone.output[2] == own[2, 10:20]).all()

@@ -19,8 +19,9 @@ from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_mask, check_picture, check_samples
 from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
-from simdtex.methods.mrf.options import Options
+from simdtex.methods.mrf.options import Options, few
 from simdtex.model.given import Given
+from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Mask, Pictures
 from simdtex.options import resolve, whole, within_32_bits
@@ -39,6 +40,9 @@ LEAST = 16
 
 GIVEN = 100
 """Bytes on the host for each pixel of what is extended, with what is known of it, at least."""
+
+MANY = 2**17
+"""Candidates at the coarsest level of a hole at most, all of which a site weighs."""
 
 FEW = 16
 """Windows that are made one by one; where holes are in more places, one window holds them all."""
@@ -151,8 +155,10 @@ def fill(
     -----
     Known pixels are sites of temperature 0 that nothing relaxes: Algorithm 1 does the rest. Each hole, with as much
     around it as its sites look at, is a lattice of its own, unless the picture wraps around
-    (``boundary="torus"``) or holes are many. Cost: that of `simdtex.synthesize` for the holes' pixels, and of a sample
-    of the surroundings' size.
+    (``boundary="torus"``) or holes are many. The smooth colours around a hole, continued into it, and the place in the
+    picture are a guide (`simdtex.model.guide.Surroundings`), so that nothing foreign comes in; not with a `sample`,
+    with categories or with 16 different pixels or fewer. Cost: that of `simdtex.synthesize` for the holes' pixels, and
+    of a sample of the surroundings' size.
 
     Examples
     --------
@@ -243,8 +249,7 @@ def extend(
     channel_axis : int, optional
         The axis of the image that holds channels; None for a grey one.
     rng, device, callback, full_output, checkpoint, **options
-        As in `fill`; but ``balance`` and ``novelty`` are those of a texture, and ``boundary`` follows from
-        ``seamless``.
+        As in `fill`; but ``boundary`` follows from ``seamless``.
 
     Returns
     -------
@@ -298,7 +303,11 @@ def extend(
     place[hole] = -1
     given = Given(canvas, np.repeat(~hole[..., None], canvas.shape[2], -1), place, suggests=bool(seamless))
 
-    plan = mrf.plan(Pictures((pixels,)), canvas.shape[:2], chosen, given)
+    guide, pictures = None, Pictures((pixels,))
+    if not seamless and _has_tones(chosen, pictures):
+        corner = (np.nan if top or bottom else 0, np.nan if left or right else 0)  # rows for rows, columns for columns
+        guide = Surroundings(pixels, np.ones((rows, cols), bool), canvas, ~hole, corner)
+    plan = mrf.plan(pictures, canvas.shape[:2], chosen, given, guide)
     call = Call(rng, device, callback, full_output, checkpoint)
     return execute(
         "extend", partial(drive, plan), lambda: {"options": chosen, "image": pixels, **sides}, channel_axis, call
@@ -394,6 +403,16 @@ class Filling:
         }
         return whole.image, Output(whole.source, whole.temperature, [], statistics)
 
+    def _guide(self, window: Window, around: Around, values: NDArray[Any]) -> Surroundings | None:
+        """Return the colours around a window's hole as its guide; None with a sample of its own, or of categories."""
+        pictures = around.pictures
+        if self.sample is not None or not _has_tones(self.options, pictures):
+            return None
+        known = pictures.known[0] if pictures.known else np.ones(pictures.pixels[0].shape[:2], bool)
+        top, left = around.corner
+        corner = (window.rows.start - top, window.cols.start - left)
+        return Surroundings(pictures.pixels[0], known, values, ~self.hole[window.rows, window.cols], corner)
+
     def _window(
         self,
         machine: Machine,
@@ -413,12 +432,23 @@ class Filling:
             hole.shape,
             replace(options, overview=LEAST) if least else options,
             Given(values, known, around.place, suggests=False),
-            most=window.levels or None,
+            self._guide(window, around, values),
+            most=max(window.levels, _fewest_levels(around.pictures)) if window.levels else None,
         )
         made, output = drive(plan, machine, seed, callback, checkpointing)
         assert output.source is not None and output.temperature is not None
         statistics = output.statistics | {"window": [side for part in at for side in (part.start, part.stop)]}
         return Made(around.corner, made[hole], output.temperature[hole], output.source[hole], statistics)
+
+
+def _has_tones(options: Options, pictures: Pictures) -> bool:
+    """Return whether means of pixels are pixels: not of categories, and not for grey levels of a density."""
+    return not (options.categorical or options.pixel == "density" or few(pictures.pixels))
+
+
+def _fewest_levels(pictures: Pictures) -> int:
+    """Return the number of levels of which the coarsest has `MANY` candidates or fewer."""
+    return 1 + max(0, ceil(log2(prod(pictures.pixels[0].shape[:2]) / MANY) / 2))
 
 
 def _around(job: Filling, window: Window) -> Around:

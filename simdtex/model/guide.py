@@ -137,6 +137,82 @@ class Colocated:
         return Planes([scale.levels(sample)[those] for sample in self.samples], output)
 
 
+AROUND = 4
+"""Pixels to each side over which known colours are averaged, and by which unknown pixels look into what is known."""
+
+NEARNESS, FAR = 0.3, 300
+"""Variance of the place in a picture in units of the colours', for places so many pixels apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """The smooth colours of a picture, and the places in it: a guide for its holes.
+
+    ``sample`` (rows, cols, C) is the picture, and ``known`` where it is known. ``values`` (H, W, C)
+    is the output, known where ``given``; ``corner`` is its first row and its first column in the sample, NaN if rows or
+    columns tell nothing.
+    """
+
+    sample: NDArray[Any]
+    known: NDArray[np.bool_]
+    values: NDArray[Any]
+    given: NDArray[np.bool_]
+    corner: tuple[float, float]
+
+    @property
+    def channels(self) -> int:
+        """Those of the colours, the row and the column."""
+        return int(self.sample.shape[-1]) + 2
+
+    def planes(self, scale: Scale, spread: float, top: int) -> Planes:
+        """Return the means of the known colours around each pixel, its row and its column."""
+        step = sqrt(NEARNESS * spread) / FAR
+        sample, output = (
+            np.concatenate([smooth(scale.levels(picture), where), _places(where.shape, corner, step, top)])
+            for picture, where, corner in (
+                (self.sample, self.known, tuple(0 * side for side in self.corner)),
+                (self.values, self.given, self.corner),
+            )
+        )
+        return Planes([sample], output)
+
+
+def smooth(levels: NDArray[np.uint16], known: NDArray[np.bool_]) -> NDArray[np.uint16]:
+    """Return the mean of the known pixels in a square around each pixel of a picture (C, rows, cols).
+
+    The square of a pixel among known ones has 9 x 9 pixels; that of another reaches `AROUND` pixels beyond the nearest
+    known one, or up to half as far again. Cost: some twelve passes over the picture for each size of square.
+    """
+    from scipy.ndimage import distance_transform_cdt  # where something is unknown: it takes long to load
+
+    needed = distance_transform_cdt(~known, metric="chessboard") + AROUND
+    found, before, reach = np.zeros_like(levels), 0, AROUND
+    while before < needed.max():
+        here = (needed > before) & (needed <= reach)
+        total, count = _sums(np.where(known, levels, 0), reach), _sums(known, reach)
+        found[:, here] = total[:, here] // count[here]
+        before, reach = reach, reach * 3 // 2
+    return found
+
+
+def _sums(planes: NDArray[Any], reach: int) -> NDArray[np.int64]:
+    """Return the sums over squares (2 reach + 1) to a side around each pixel of planes (..., rows, cols)."""
+    found: NDArray[np.int64] = planes.astype(np.int64)
+    for axis in (-2, -1):
+        n = found.shape[axis]
+        running = np.concatenate([np.zeros_like(found.take([0], axis)), found.cumsum(axis)], axis)
+        at = np.arange(n)
+        found = running.take(np.minimum(at + reach + 1, n), axis) - running.take(np.maximum(at - reach, 0), axis)
+    return found
+
+
+def _places(shape: tuple[int, ...], corner: tuple[float, ...], step: float, top: int) -> NDArray[np.uint16]:
+    """Return row and column of each pixel as levels (2, rows, cols), rounded; 0 if the corner is NaN."""
+    places = np.indices(shape) + np.array(corner)[:, None, None]
+    found: NDArray[np.uint16] = np.rint(np.clip(np.nan_to_num(places) * step, 0, top)).astype(np.uint16)
+    return found
+
+
 def _scaled(unit: NDArray[Any], height: float, most: int) -> NDArray[np.uint16]:
     found: NDArray[np.uint16] = np.rint(unit * (height / most)).astype(np.uint16)
     return found

@@ -118,7 +118,7 @@ class Options:
         more="A candidate whose surroundings serve more sites than their share costs lambda N C sigma^2 "
         "min(4, u - 1): lambda is the balance, u the use over the fair share.",
         paper=0.0,
-        jobs={"fill": 0.0},
+        jobs={"fill": 0.0, "extend": 0.0},
         slider=(0, 4, 0.1),
     )
     novelty: float = appearance(
@@ -129,7 +129,7 @@ class Options:
         "source it continues, and four times that for each whose source it is: mu is the novelty. This holds if sites "
         "take pixels of the sample and n is 1024 or less.",
         paper=0.0,
-        jobs={"fill": 0.0, "simulate": 0.25},
+        jobs={"fill": 0.0, "extend": 0.0, "simulate": 0.25},
         slider=(0, 4, 0.25),
     )
     finish: float | None = appearance(

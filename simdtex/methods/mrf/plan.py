@@ -17,7 +17,7 @@ from simdtex.methods.mrf.level import number_of_levels
 from simdtex.methods.mrf.options import CATEGORIES as MOST
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given, planes
-from simdtex.model.guide import AnyGuide, Guide, GuidePair
+from simdtex.model.guide import AnyGuide, Guide, GuidePair, Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import WAVES, Phases, parse_lattice, phases
@@ -61,7 +61,7 @@ def plan(
     shape: tuple[int, int],
     options: Options,
     given: Given | None = None,
-    guide: GuidePair | None = None,
+    guide: GuidePair | Surroundings | None = None,
     most: int | None = None,
 ) -> Plan:
     """Validate the input of a run, and lay its sample out.
@@ -75,8 +75,8 @@ def plan(
     options : Options
     given : Given, optional
         Conditioning data of X.
-    guide : GuidePair, optional
-        Which label or number belongs where in Y and in X.
+    guide : GuidePair or Surroundings, optional
+        Which label, number or colour belongs where in Y and in X.
     most : int, optional
         The most levels, if the options leave their number open.
     """
@@ -86,7 +86,9 @@ def plan(
     offsets = neighbourhood_offsets(options.order)
     levels = number_of_levels([picture.shape[:2] for picture in pictures.pixels], offsets, shape, options)  # 1
     levels = levels if most is None or options.levels is not None else min(levels, most)
-    guides: list[AnyGuide] = [check_guide(guide, options)] if guide else []
+    guides: list[AnyGuide] = []
+    if guide:
+        guides.append(guide if isinstance(guide, Surroundings) else check_guide(guide, options))
     if given and given.partly:
         if options.pixel == "density":
             raise ValueError('sites that are known in part choose among pixels of the sample; give pixel="source"')
