@@ -27,9 +27,9 @@ import PIL.ImageFont
 from skimage import data, filters
 
 import simdtex
+from simdtex.io.examples import example
 from simdtex.io.image import write
 from simdtex.model.source_map import apply_source_map
-from simdtex.report.sheet import fitted
 
 SIDE = 156  # of a sample, pixels
 SEED = 1  # of every picture
@@ -62,12 +62,11 @@ def scribble(side):
 
 
 def samples(side):
-    """Gravel, tissue and brick; the brick at half its size, so that the sample holds several courses."""
-    brick = fitted(data.brick(), 256)
+    """Gravel, tissue and brick, seen from the front."""
     return {
         "gravel": data.gravel()[200 : 200 + side, 200 : 200 + side],
         "tissue": data.immunohistochemistry()[300 : 300 + side, 290 - side + 128 : 418],
-        "brick": brick[256 - side :, 40 : 40 + side],
+        "brick": example("brick")[:side, :side],
     }
 
 

@@ -8,6 +8,7 @@ import pytest
 from skimage import data
 
 import simdtex
+from simdtex.io.examples import example
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -57,3 +58,11 @@ def test_the_picture_has_samples_results_and_the_hole(front, any_device):
 def test_the_picture_of_the_readme_is_light():
     (name,) = re.findall(r"\]\((docs/_static/front\.\w+)\)", (ROOT / "README.md").read_text(encoding="utf-8"))
     assert (ROOT / name).stat().st_size < 700_000
+
+
+def test_the_wall_of_bricks_is_seen_from_the_front():
+    wall = example("brick")
+    assert wall.shape == (264, 216) and wall.dtype == np.uint8
+    joints = np.argsort(wall.mean(0))[::-1][:24]  # the lightest columns are whole joints
+    assert (wall[:, joints].mean(0) > wall.mean() + 10).all()
+    assert example("gravel").shape == (512, 512)

@@ -25,9 +25,8 @@ from simdtex.cli.places import FOLDER
 @DEVICE
 def demo(output: Path, size: str, seed: int, device: str | None) -> None:
     """Synthesise brick, grass and gravel from scikit-image's own pictures."""
-    from skimage import data
-
     from simdtex.io import image
+    from simdtex.io.examples import EXAMPLES, example
     from simdtex.machine import open_machine
     from simdtex.report.sheet import contact_sheet
     from simdtex.synthesis import synthesize
@@ -39,8 +38,8 @@ def demo(output: Path, size: str, seed: int, device: str | None) -> None:
     click.echo(f"device: {machine.name}")
     output.mkdir(parents=True, exist_ok=True)
     pictures = []
-    for name in ("brick", "grass", "gravel"):
-        sample = getattr(data, name)()[:128, :128]
+    for name in EXAMPLES:
+        sample = example(name)[:128, :128]
         began = time.perf_counter()
         with progress_bar(quiet=False) as show:
             made = synthesize(sample, shape, rng=seed, device=machine, callback=lambda p: show(p.fraction, p.doing, ""))

@@ -20,6 +20,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from simdtex.io.examples import EXAMPLES, example
 from simdtex.io.image import read_bytes
 from simdtex.live import frames
 from simdtex.live.job import Job, Message, Picture, file_stem
@@ -57,9 +58,6 @@ MAX_RATE = 30
 
 MAX_UNSEEN = 2
 """Frames that are sent before the page has shown one, at most."""
-
-EXAMPLES = ("brick", "grass", "gravel")
-"""Pictures of scikit-image that the page offers."""
 
 log = logging.getLogger(__name__)
 
@@ -172,10 +170,8 @@ class Session:
         self._open(_read(message, buffers))
 
     def _on_example(self, message: Message, buffers: Sequence[Any]) -> None:
-        from skimage import data
-
         one_of("example", message.get("name"), EXAMPLES)
-        self._open(Picture(f"{message['name']}.png", getattr(data, message["name"])()[:192, :192], None))
+        self._open(Picture(f"{message['name']}.png", example(message["name"])[:192, :192], None))
 
     def _open(self, picture: Picture) -> None:
         self._picture, self._maps, self._levels = picture, {}, None
