@@ -58,9 +58,8 @@ STEPS = 64
 WAVES = 4
 """Channels of the guide: cosine and sine of each of two phases."""
 
-ROUND = 2.0**20
-"""Cosines are rounded to 1 / ROUND, which is more than they differ by from one mathematical library to another."""
-
+ROUND, FINE = 2.0**20, 2.0**16
+"""Cosines are rounded to 1 / ROUND, vectors to 1 / FINE of a pixel: libraries differ in their last bits by less."""
 
 SMALLEST = 4
 """Pixels of a cell that is given, at least."""
@@ -94,8 +93,9 @@ class Lattice(NamedTuple):
 
     def moved(self, phases: NDArray[np.float64]) -> Lattice:
         """Return the lattice with its origin moved by (2,) phases."""
-        by = phases @ self.basis
-        return self._replace(origin=(self.origin[0] + float(by[0]), self.origin[1] + float(by[1])))
+        (i, j), (top, left) = phases.tolist(), self.origin
+        (a, b), (c, d) = self.first, self.second
+        return self._replace(origin=(top + i * a + j * c, left + i * b + j * d))
 
     def fitted(self, shape: tuple[int, int]) -> Lattice | None:
         """Return the lattice deformed so that a torus of ``shape`` pixels holds it; None beyond `MOST_STRAIN`."""
@@ -441,7 +441,7 @@ def followed(correlation: Correlation, pair: NDArray[np.int64]) -> tuple[float, 
     near = (np.indices(correlation.values.shape) - reach[:, None, None]).astype(np.float64)
     core = correlation.values[(near**2).sum(0) <= half]
     error = sqrt(float((core**2).sum()) / correlation.pixels)
-    return strength, _lattice(basis), error
+    return strength, _lattice(np.rint(basis * FINE) / FINE), error
 
 
 def _nodes(
