@@ -189,16 +189,17 @@ def smooth(levels: NDArray[np.uint16], known: NDArray[np.bool_]) -> NDArray[np.u
     found, before, reach = np.zeros_like(levels), 0, AROUND
     while before < needed.max():
         here = (needed > before) & (needed <= reach)
-        total, count = _sums(np.where(known, levels, 0), reach), _sums(known, reach)
-        found[:, here] = total[:, here] // count[here]
+        count = _sums(known, reach)[here]
+        for plane, smoothed in zip(levels, found, strict=True):  # one by one, for the sake of memory
+            smoothed[here] = _sums(np.where(known, plane, 0), reach)[here] // count
         before, reach = reach, reach * 3 // 2
     return found
 
 
-def _sums(planes: NDArray[Any], reach: int) -> NDArray[np.int64]:
-    """Return the sums over squares (2 reach + 1) to a side around each pixel of planes (..., rows, cols)."""
-    found: NDArray[np.int64] = planes.astype(np.int64)
-    for axis in (-2, -1):
+def _sums(plane: NDArray[Any], reach: int) -> NDArray[np.int64]:
+    """Return the sums over squares of 2 reach + 1 pixels to a side around each pixel of a plane (rows, cols)."""
+    found: NDArray[np.int64] = plane.astype(np.int64)
+    for axis in (0, 1):
         n = found.shape[axis]
         running = np.concatenate([np.zeros_like(found.take([0], axis)), found.cumsum(axis)], axis)
         at = np.arange(n)
