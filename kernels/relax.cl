@@ -203,9 +203,13 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
                          __global ushort *restrict new_values,
                          __global int *restrict new_source, __global ushort *restrict new_temperature)
 {
+#ifdef APART
+    const int s = min((int)get_global_id(0), S - 1); // an idle work-item would read at wild indices on Intel's runtime
+#else
     const int s = get_global_id(0);
     if (s >= S)
         return;
+#endif
     const Lattice h = g.lattice;
     const int site = sites[s], line = site / h.width, i = line / h.spacing, j = (site - line * h.width) / h.spacing;
     const ulong place = place_of(h, i, j);
@@ -311,6 +315,10 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
 #define NUMBER(k) list[k]
 #define PIXEL(k) at[list[k]]
     CHOOSE(chosen, g, d, m, levels, g.plane, noise, turn, place)
+#ifdef APART
+    if (get_global_id(0) >= S)
+        return;
+#endif
     const int out = PLACE(s, site), step = STRIDE(S, g);
     for (int c = 0; c < MADE; ++c)
         NEW(values)[c * step + out] = (ushort)grey_level(g, (int)levels[c * g.plane + PIXEL(chosen)], c, noise, turn, place);
