@@ -2,15 +2,16 @@
 // ICM over sample positions without keeping a distance: for each site the candidate of the least squared distance of
 // equation (12), divided where it continues a neighbour's source, and of several the first.
 //
-//   d_p = sum_r ((x_r - y_r)(1 - t_r))^2,   d'_p = discount d_p + penalty_p, discount = 1 unless p is coherent
+//   d_p = sum_r ((x_r - y_r)(1 - t_r))^2,   d'_p = discount d_p + penalty_p + apart_p, discount = 1 unless p is coherent
 //
 // Whoever is proved to lie beyond the best so far is skipped. Three facts make that exact: partial sums never fall, no
-// penalty is below 0, and a sum in another order differs by less than SLACK. What survives is weighed again in the
+// penalty and no difference of phase (common/phases.h) is below 0, and a sum in another order differs by less than SLACK. What survives is weighed again in the
 // canonical order.
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/distance.h"
 #include "common/coherence.h"
 #include "common/lattice.h"
+#include "common/phases.h"
 #include "common/vector.h"
 
 #ifndef C
@@ -78,7 +79,7 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
               __global const int *restrict index_of, const int plane,
               __global const float *restrict sample, __global const int *restrict positions,
               __global const int *restrict reach, __global const int *restrict strip_reach,
-              __global const int *restrict spread, const float discount, __global const float *restrict penalty,
+              __global const int *restrict spread, const float discount, __global const float *restrict penalty, PHASES,
               __global const float *restrict axes, const float middle, __global float *restrict near,
               __global int *restrict terms, __global int *restrict count,
               __global float *restrict features, __global float *restrict least,
@@ -119,7 +120,8 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
     float best = INFINITY;
     int at = 0x7fffffff;
     if (own >= 0) {
-        best = canonical(here, sample + positions[own], plane, reach, N, INFINITY) + penalty[own];
+        best = canonical(here, sample + positions[own], plane, reach, N, INFINITY) + penalty[own] +
+               APART_IN_PHASE(own, sites[s]);
         at = own;
     }
     int last = -1, before = -1;
@@ -129,7 +131,8 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
             continue;
         before = last;
         last = p;
-        const float d = canonical(here, sample + positions[p], plane, reach, N, INFINITY) * discount + penalty[p];
+        const float d = canonical(here, sample + positions[p], plane, reach, N, INFINITY) * discount + penalty[p] +
+                        APART_IN_PHASE(p, sites[s]);
         if (d < best || (d == best && p < at)) {
             best = d;
             at = p;
@@ -172,13 +175,13 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
 // found, at, work (split, S)       out: as of nearest_scan
 // open   (split, S)                out: whether nearest_scan has to search the site after all
 __kernel __attribute__((vec_type_hint(vec))) void
-nearest_leaves(const int S, const int N, __global const float *restrict near, __global const float *restrict features,
+nearest_leaves(__global const int *restrict sites, const int S, const int N, __global const float *restrict near, __global const float *restrict features,
                __global const float *restrict least, __global const int *restrict where,
                __global const float *restrict certain, __global const float *restrict box,
                __global const float *restrict rows, __global const int *restrict order, const int leaves,
                const float blur, __global const float *restrict sample, const int plane,
                __global const int *restrict positions, __global const int *restrict reach,
-               __global const float *restrict penalty, const int split, __global float *restrict found, __global int *restrict at, __global ulong *restrict work,
+               __global const float *restrict penalty, PHASES, const int split, __global float *restrict found, __global int *restrict at, __global ulong *restrict work,
                __global int *restrict open)
 {
     const int s = get_global_id(0) / split, turn = get_global_id(0) % split;
@@ -232,7 +235,8 @@ nearest_leaves(const int S, const int N, __global const float *restrict near, __
                         if (one[w] > radius || (best == 0.0f && p >= best_at))
                             continue;
                         __global const float *y = sample + positions[p];
-                        const float d_p = canonical(near + s * (N * (1 + C)), y, plane, reach, N, best) + penalty[p];
+                        const float d_p = canonical(near + s * (N * (1 + C)), y, plane, reach, N, best) + penalty[p] +
+                                          APART_IN_PHASE(p, sites[s]);
                         ++weighed;
                         if (d_p < best || (d_p == best && p < best_at)) {
                             best = d_p;
@@ -263,11 +267,11 @@ nearest_leaves(const int S, const int N, __global const float *restrict near, __
 // work       (.., S)      out, likewise: fma done
 // `split` work-items to a site, side by side, take its blocks in turn.
 __kernel __attribute__((vec_type_hint(vec))) void
-nearest_scan(const int S, const int N, __global const int *restrict terms, __global const int *restrict count,
+nearest_scan(__global const int *restrict sites, const int S, const int N, __global const int *restrict terms, __global const int *restrict count,
              __global const float *restrict near, __global const float *restrict least,
              __global const int *restrict where, __global const float *restrict strip, const int size,
              const int first, const int pitch, const int rows, const int cols,
-             __global const int *restrict strip_reach, __global const float *restrict penalty, const float slack,
+             __global const int *restrict strip_reach, __global const float *restrict penalty, PHASES, const float slack,
              const int split,
              const int all, __global const int *restrict open, const int row,
              __global float *restrict found, __global int *restrict at,
@@ -325,7 +329,8 @@ nearest_scan(const int S, const int N, __global const int *restrict terms, __glo
                 if (col >= cols || as_int(one[v]) >= limit)
                     continue;
                 const float exact =
-                    canonical(near + s * (N * (1 + C)), y + q * V + v, size, strip_reach, N, best) + penalty[p];
+                    canonical(near + s * (N * (1 + C)), y + q * V + v, size, strip_reach, N, best) + penalty[p] +
+                    APART_IN_PHASE(p, sites[s]);
                 if (exact < best || (exact == best && p < best_at)) {
                     best = exact;
                     best_at = p;

@@ -17,6 +17,7 @@ from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
 from simdtex.ops.nearest import strip_of
 from simdtex.ops.neighbourhood import Confidences, Field, neighbourhood
+from simdtex.ops.phases import Phased
 from simdtex.ops.square import square_of
 from simdtex.schedules import Setting
 
@@ -63,6 +64,7 @@ class Problem(NamedTuple):
     edges: str
     phases: str
     nowhere: float = 0.0
+    regular: bool = False
 
     @property
     def confidences(self):
@@ -98,6 +100,15 @@ class Problem(NamedTuple):
         if every and allowed is not None:
             penalty[: candidates.size][~allowed] = np.inf
         return penalty.astype(np.float32)
+
+    def phased(self, machine, every=False):
+        """Phases of each candidate, or place, and of each site, a quarter of them equal; None without."""
+        if not self.regular:
+            return None
+        rng, candidates = np.random.default_rng(7), self.candidates(REFERENCE, every).positions.size
+        waves = rng.choice([0, 0, 40, 97], (4, candidates)).astype(np.float32)
+        here = rng.choice([0, 40], (4, *self.field.source.shape)).astype(np.uint16)
+        return Phased(machine.put(waves), machine.put(here), np.float32(3))
 
     def on(self, machine):
         """Sites, field and offsets as arrays of a machine."""
@@ -163,11 +174,13 @@ def problem(
     guides=0,
     nowhere=0.0,
     masked=0.0,
+    regular=False,
 ):
     """A problem from a seed. A third of its sites stand beside what their neighbours were taken from.
 
     ``guides`` channels of a guide, unknown at a quarter of the sites; ``nowhere`` share of the sites that are hard
-    data, whose structure is unknown; ``masked`` share of the sample's pixels that may not be used.
+    data, whose structure is unknown; ``masked`` share of the sample's pixels that may not be used;
+    ``regular`` whether candidates and sites have phases.
     """
     rng = np.random.default_rng(seed)
     offsets = neighbourhood_offsets(order)
@@ -206,7 +219,7 @@ def problem(
         if weight:
             values[channels, hard] = UNKNOWN
     field = Field(values, source, t.astype(np.uint16))
-    return Problem(sample, order, grid, field, sites, edges, phases, nowhere)
+    return Problem(sample, order, grid, field, sites, edges, phases, nowhere, regular)
 
 
 @st.composite
@@ -231,6 +244,7 @@ def problems(draw, max_order=9, channels=(1, 2, 3)):
         edges=edges,
         phases="all",
         count=draw(st.sampled_from([1, 7, 24, 37])),  # PoCL compiles anew for each
+        regular=draw(st.booleans()),
     )
 
 

@@ -163,6 +163,8 @@ def relaxed(level, X, old, s, turn):
     d = distances(level, near + itself, numbers, level.lanes)
     d = np.where(favoured, d * float32(1 / (1 + level.o.coherence)), d)
     d = d + level.penalty[numbers]
+    if level.Y.waves:
+        d = d + apart_in_phase(level, s, numbers)
     for p, times in charged if level.novelty else []:  # neighbour by neighbour; the numbers are all candidates
         d[p] += float32(times) * level.novelty
 
@@ -395,6 +397,18 @@ def distances(level, near, numbers, lanes):
     while len(d) > 1:
         d = d[: len(d) // 2] + d[len(d) // 2 :]
     return d[0]
+
+
+def apart_in_phase(level, s, numbers):
+    """What each candidate costs for its place on the sample's lattice, rounded after each term."""
+    of_pictures, of_output, certain = level.Y.waves
+    d = np.zeros(len(numbers), float32)
+    for c, plane in enumerate(of_output):
+        for k, p in enumerate(numbers):
+            n, i, j = level.places[p]
+            e = (int(plane[level.pixel(s)]) - int(of_pictures[n][c][i, j])) * certain
+            d[k] = float32(e * e + float(d[k]))  # the double is exact
+    return d
 
 
 def weights(level, d):

@@ -43,9 +43,8 @@ def material(pictures, o, shape, mask=None, known=None, known_source=None, guide
     N, channels = len(plain.offsets(o.order)), sum(1 if c is None else one_hot(c) for c in Y.categories)
     channels += bool(o.structure) + sum(COLOCATED * len(Y.variables) if g is None else channels_of(g) for g in beside)
     lattices = repeated(pictures, o, shape, known, known_source)
-    channels, guided = channels + 4 * bool(lattices), len(beside) + bool(lattices)
-    heavy = max(1, o.data_weight, N / 4) if known is not None or guided else 1
-    values = round(heavy * (channels * N + guided))
+    heavy = max(1, o.data_weight, N / 4) if known is not None or beside else 1
+    values = round(heavy * (channels * N + len(beside)))
     Y.height = 2 ** min(12, int((33 - log2(values)) / 2)) - 1  # so that every distance is exact in float64
 
     Y.direct = not o.weights and not any(Y.categories)  # the channels of grey levels are those of the pixels
@@ -66,10 +65,11 @@ def material(pictures, o, shape, mask=None, known=None, known_source=None, guide
         levels = Y.levels_of(np.ma.getdata(known).astype(pictures[0].dtype))
         Y.guides += [np.where(partly[..., owner[c]], levels[c], UNKNOWN) for c in those]
         planes = [[*y, *(y[c] for c in those)] for y in planes]
+    Y.waves = None  # of the pictures and of the output
     if lattices:
         raised = min(sqrt(2 * spread / 4), Y.height / 2)
-        planes = [[*y, *phases(one, raised, *y[0].shape)] for y, one in zip(planes, lattices[0], strict=True)]
-        Y.guides += phases(lattices[1], raised, *shape)
+        own = [phases(one, raised, *y[0].shape) for y, one in zip(planes, lattices[0], strict=True)]
+        Y.waves = own, phases(lattices[1], raised, *shape), round(sqrt(5 / 4 * N))
     Y.planes = planes
 
     Y.given = {}  # of sites that are known: grey levels of the matched channels, and where they are from

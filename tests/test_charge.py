@@ -13,9 +13,11 @@ from simdtex.ops.charge import charge
 def test_each_candidate_has_its_penalty(machine, p, strength):
     found, candidates = p.distances(REFERENCE, strength)
     expected = found.distance + p.penalty()[: candidates.size, None]
+    if p.regular:
+        expected = expected + p.phased(REFERENCE).apart(np.arange(candidates.size)[:, None], p.sites)
     for m in (REFERENCE, machine):
         distances, candidates = p.distances(m, strength)
-        charged = charge(m, distances, candidates, m.put(p.penalty()))
+        charged = charge(m, distances, candidates, m.put(p.penalty()), m.put(p.sites), p.phased(m))
         distance = np.asarray(m.get(charged.distance))[: candidates.size, : charged.sites]
         assert_same_bits(distance, expected)
         if charged.nearest is not None:  # the least of each block of candidates

@@ -162,7 +162,7 @@ def test_pixels_a_lattice_vector_apart_have_one_phase():
     levels = waves.at(grid)
     assert (levels[:, 6:, 3:] == levels[:, :-6, :-3]).all()
     assert (levels[:, 2:, :-8] == levels[:, :-2, 8:]).all()
-    assert (levels == waves.sample(0, 24, 30)).all()
+    assert (levels == waves.sample(0, *np.indices((24, 30)))).all()
     assert len(np.unique(levels.reshape(4, -1), axis=1).T) == 54, "and pixels of one cell all differ"
 
 
@@ -181,7 +181,7 @@ def test_the_guide_has_the_variance_of_the_pixels(spread, top, height):
     lattice = Lattice((8, 0), (0, 8))
     waves = Phases((lattice,), lattice).waves(spread, top)
     assert waves.height == height
-    total = waves.sample(0, 64, 64).reshape(4, -1).var(1).sum()
+    total = waves.sample(0, *np.indices((64, 64))).reshape(4, -1).var(1).sum()
     assert total == pytest.approx(2 * height**2, rel=0.05)
 
 

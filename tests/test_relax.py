@@ -30,7 +30,18 @@ def relaxation(machine, p, gibbs=False, noisy=False, coherence=1.0, level=0, dea
     penalty = machine.put(p.penalty(dear, options.get("exhaustive", False)))
     terms = (discount, np.float32(novelty * p.sample.variance), penalty)
     proposed = proposal(machine, p, **options)
-    return Relaxation(p.grid, machine.put(p.offsets), proposed, *terms, choice, -1024, 2**33 + 5, level, p.confidences)
+    return Relaxation(
+        p.grid,
+        machine.put(p.offsets),
+        proposed,
+        *terms,
+        choice,
+        -1024,
+        2**33 + 5,
+        level,
+        p.confidences,
+        p.phased(machine, options.get("exhaustive", False)),
+    )
 
 
 def counter(machine, p):

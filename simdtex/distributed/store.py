@@ -274,11 +274,11 @@ class Stored(Conditions):
     """Conditioning data and guides of an output, window by window out of a store."""
 
     def __init__(self, store: Store, work: Work) -> None:
-        super().__init__(len(work.layout.levels), work.confidences, work.plan.sample.waves)
+        super().__init__(len(work.layout.levels), work.confidences)
         self._store, self._work = store, work
 
     def at(self, number: int, grid: Grid) -> Held | None:
-        """Return the data and guides of a level's sites in a window, without the phases; None if there are none."""
+        """Return the data and guides of a level's sites in a window; None if there are none."""
         if not self._work.held or grid.part is None:
             return None
         window = Tile(*grid.within[:2], grid.rows, grid.cols)

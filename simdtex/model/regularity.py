@@ -163,18 +163,19 @@ class Waves(NamedTuple):
     weight: float
     height: float
 
-    def sample(self, number: int, rows: int, cols: int) -> NDArray[np.uint16]:
-        """Return the guide (4, rows, cols) of one of the sample's pictures."""
-        return self._levels(self.pictures[number], np.arange(rows), np.arange(cols))
+    def sample(self, number: int, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.uint16]:
+        """Return the guide (4, ...) at pixels of one of the sample's pictures."""
+        return self._levels(self.pictures[number], row, col)
 
     def at(self, grid: Grid) -> NDArray[np.uint16]:
         """Return the guide (4, rows, cols) of the output at the sites of a lattice, or of a window of it."""
         whole = grid.within
         row = (whole.top + np.arange(grid.rows)) % whole.rows * whole.step
-        return self._levels(self.output, row, (whole.left + np.arange(grid.cols)) % whole.cols * whole.step)
+        col = (whole.left + np.arange(grid.cols)) % whole.cols * whole.step
+        return self._levels(self.output, row[:, None], col[None, :])
 
     def _levels(self, lattice: Lattice, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.uint16]:
-        angles = 2 * np.pi * lattice.phases(row[:, None], col[None, :])
+        angles = 2 * np.pi * lattice.phases(row, col)
         waves = np.stack([wave(angle) for angle in angles for wave in (np.cos, np.sin)])
         found: NDArray[np.uint16] = np.rint((1 + np.rint(waves * ROUND) / ROUND) * self.height).astype(np.uint16)
         return found

@@ -109,7 +109,7 @@ class Sample:
         Pixels between two pictures at least, where more than their margins: what looks so far from a pixel of one sees
         no other.
     phases : Phases, optional
-        The guide by the sample's own lattice, whose channels come last.
+        The guide by the sample's own lattice, which is no channel: `phases_at`.
 
     Attributes
     ----------
@@ -118,11 +118,9 @@ class Sample:
     channels : int
         Channels that are matched: those, and the structure channel.
     guides : (G, H, W) uint16 array
-        Working levels of the output's guides, without the phases.
+        Working levels of the output's guides.
     waves : Waves or None
         The phases in working levels.
-    guiding : int
-        Channels that are guides, the phases among them.
     guided : list of (G, rows, cols) uint16 arrays
         Those of each picture's; empty without guides.
     boxes : list of (int, int, int)
@@ -169,10 +167,6 @@ class Sample:
             levels = [np.concatenate(pair) for pair in zip(levels, guide.samples, strict=True)]
         self.guides = np.concatenate([guide.output for guide in guiding]) if guiding else np.zeros((0, 1, 1), np.uint16)
         self.waves = phases and phases.waves(spread * self.shown, highest(values))
-        if self.waves:
-            planes = [self.waves.sample(number, *one.shape[1:]) for number, one in enumerate(levels)]
-            levels = [np.concatenate(pair) for pair in zip(levels, planes, strict=True)]
-        self.guiding = len(self.guides) + (WAVES if phases else 0)
         self._lay(levels, margin, step, apart)
         self.channels = channels
         self.pixels = self._stacked(list(self.pictures.pixels), self.pictures.pixels[0].flat[0])
@@ -183,7 +177,7 @@ class Sample:
         sample = cls.__new__(cls)
         sample.pixels, sample.shown, sample.pictures = levels[..., None], 1, Pictures((levels[..., None],))
         sample.top, sample.unit, sample.direct = count - 1, 1.0, True
-        sample.guides, sample.guiding = np.zeros((0, 1, 1), np.uint16), 0
+        sample.guides, sample.waves = np.zeros((0, 1, 1), np.uint16), None
         sample._lay([levels[None].astype(np.uint16)], 0)
         return sample
 
@@ -314,6 +308,16 @@ class Sample:
         found: NDArray[np.intp] = np.maximum(np.searchsorted(tops, row, "right") - 1, 0)
         return found
 
+    def phases_at(self, source: NDArray[np.integer]) -> NDArray[np.uint16]:
+        """Return the phases (waves, n) of pixels (n,) of a regular sample."""
+        assert self.waves
+        row, col = np.divmod(source, self.cols) - np.full(2, self.margin)[:, None]
+        number, found = self.picture_of(source), np.empty((WAVES, source.size), np.uint16)
+        for here, (top, *_) in enumerate(self.boxes):
+            own = number == here
+            found[:, own] = self.waves.sample(here, row[own] - top, col[own])
+        return found
+
     def planes(self, machine: Any) -> Any:
         """Return the working levels as an array (C, rows * cols) of a machine, float32."""
         return machine.put(self.working.astype(np.float32))
@@ -334,11 +338,11 @@ class Sample:
             self.planes(machine) if planes is None else planes,
             machine.put(np.concatenate([positions, padding])),
             positions.size,
-            machine.put(np.pad(places.reach, (0, bool(self.guiding)))),  # a guide's site itself
+            machine.put(np.pad(places.reach, (0, bool(len(self.guides))))),  # a guide's site itself
             machine.put(index_of),
             self.rows,
             self.cols,
-            self.guiding,
+            len(self.guides),
         )
 
     def place(self, source: NDArray[np.int32]) -> NDArray[np.int32]:

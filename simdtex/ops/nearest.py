@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from simdtex.machine.interface import Array, Launcher, Machine, Operation
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates, Places, Sample
-from simdtex.ops import coherence, lcpdf, neighbourhood
+from simdtex.ops import coherence, lcpdf, neighbourhood, phases
 from simdtex.ops.charge import charge
 from simdtex.ops.lcpdf import Relaxed
 from simdtex.ops.leaves import FEATURES, Leaves, grow
 from simdtex.ops.neighbourhood import Field
+from simdtex.ops.phases import Phased
 
 CHECK = 4
 """Neighbours between two looks at the bound; every neighbourhood has a multiple of 4."""
@@ -95,23 +96,24 @@ def nearest(
     grid: Grid,
     candidates: Candidates,
     strip: Strip,
-    terms: tuple[np.float32, Array],
+    terms: tuple[np.float32, Array, Phased | None],
 ) -> Relaxed:
-    """Return the nearest candidate of each site by its distance, discounted for coherence, plus its penalty.
+    """Return the nearest candidate of each site by its distance, discounted for coherence, plus its other costs.
 
-    ``terms`` the discount, and the penalties of the candidates.
+    ``terms`` the discount, the penalties of the candidates, and their phases.
     """
-    discount, penalty = terms
+    discount, penalty, phased = terms
     if machine is None:
         around = neighbourhood.neighbourhood.reference(sites, field, offsets, grid)
         distances = lcpdf.distance.reference(around, candidates)
         distances = coherence.coherence.reference(distances, candidates, sites, field, offsets, grid, discount)
-        distances = charge.reference(distances, candidates, penalty)
+        distances = charge.reference(distances, candidates, penalty, sites, phased)
         choice = candidates.positions[distances.distance.argmin(0)]
         return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
     count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
     plane = np.int32(candidates.rows * candidates.cols)
-    defines = {"V": machine.vector, "C": channels, "STEP": machine.step, "CHECK": CHECK}
+    defines = {"V": machine.vector, "C": channels, "STEP": machine.step, "CHECK": CHECK} | phases.defines(phased)
+    apart = phases.arguments(machine, phased)
     f, i, leaves = np.float32, np.int32, strip.leaves()
     near = machine.empty((count, neighbours * (1 + channels)), f)
     listed = machine.empty((count, neighbours * (2 + channels)), i)
@@ -125,7 +127,7 @@ def nearest(
         *(sites, i(count), i(neighbours), *field, i(prod(field.values.shape[1:])), offsets, grid.struct),
         *(candidates.index_of, plane),
         *(candidates.pixels, candidates.positions, candidates.reach, strip.reach),
-        *(machine.constant(_spread(strip.offsets)), discount, penalty, axes, f(leaves.middle if leaves else 0)),
+        *(machine.constant(_spread(strip.offsets)), discount, penalty, *apart, axes, f(leaves.middle if leaves else 0)),
         *(near, listed, used, features, least, where, certain),
     )
     split = machine.split(count, -(-strip.cols // (machine.vector * machine.step)) * strip.rows)
@@ -136,17 +138,17 @@ def nearest(
         machine.launch(
             machine.kernel("nearest", "nearest_leaves", **defines),
             (count * split,),
-            *(i(count), i(neighbours), near, features, least, where, certain),
+            *(sites, i(count), i(neighbours), near, features, least, where, certain),
             *(leaves.box, leaves.rows, leaves.order, i(leaves.number), f(leaves.blur)),
-            *(candidates.pixels, plane, candidates.positions, candidates.reach, penalty),
+            *(candidates.pixels, plane, candidates.positions, candidates.reach, penalty, *apart),
             *(i(split), found, at, work, wanted),
         )
     shape = (strip.first, strip.pitch, strip.rows, strip.cols)
     machine.launch(
         machine.kernel("nearest", "nearest_scan", **defines),
         (count * split,),
-        *(i(count), i(neighbours), listed, used, near, least, where),
-        *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach, penalty),
+        *(sites, i(count), i(neighbours), listed, used, near, least, where),
+        *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach, penalty, *apart),
         *(slack(neighbours * channels), i(split), i(leaves is None), wanted, i(row), found, at, work),
     )
     tally = machine.fma_counters(count, 2 * count * candidates.size * neighbours * channels)

@@ -19,13 +19,14 @@ from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.lattice import LATTICE, Grid
 from simdtex.model.sample import Candidates
-from simdtex.ops import lcpdf
+from simdtex.ops import lcpdf, phases
 from simdtex.ops.charge import charge
 from simdtex.ops.coherence import coherence, continuing, sources
 from simdtex.ops.commit import commit
 from simdtex.ops.lcpdf import Choice, Distances, Key, Relaxed
 from simdtex.ops.nearest import Strip, nearest
 from simdtex.ops.neighbourhood import USUAL, Confidences, Field, gathered, neighbourhood
+from simdtex.ops.phases import Phased
 from simdtex.ops.square import Square
 from simdtex.ops.temperature import temperature
 
@@ -61,7 +62,7 @@ class Everything(NamedTuple):
         found = lcpdf.distance.reference(near, self.candidates)
         where = (sites, field, relaxation.offsets, relaxation.grid)
         found = coherence.reference(found, self.candidates, *where, relaxation.discount)
-        found = charge.reference(found, self.candidates, relaxation.penalty)
+        found = charge.reference(found, self.candidates, relaxation.penalty, sites, relaxation.phased)
         if relaxation.novelty > 0:
             source = sources(relaxation.grid.neighbours(sites, relaxation.offsets), field)
             same = np.where(source >= 0, self.candidates.index_of[source], -1)
@@ -99,6 +100,8 @@ class Listed(NamedTuple):
             offsets = np.concatenate([offsets, np.zeros((1, 2), np.int32)])
         d = self.square.distance(numbers, *gathered(sites, r, field, relaxation.confidences), offsets)
         d = np.where(suggested, d * relaxation.discount, d) + relaxation.penalty[np.maximum(numbers, 0)]
+        if relaxation.phased:
+            d += relaxation.phased.apart(numbers, sites)
         return numbers, Distances(d, None, sites.size)
 
     def _list(
@@ -166,7 +169,8 @@ class Relaxation(NamedTuple):
     the factor of the distance of candidates that continue a neighbour's source; ``novelty`` the penalty for each
     neighbour whose source is continued, and `AGAIN` times that for each whose source the candidate is; ``penalty``
     (n or more,) float32 the penalty of each candidate (`simdtex.ops.use`); ``choice`` among them; ``confidences`` how
-    much values count; ``xi`` of equation (13) in 1/1024; ``seed`` and ``level`` the keys of its random numbers.
+    much values count; ``phased`` the phases of a regular sample; ``xi`` of equation (13) in 1/1024; ``seed`` and
+    ``level`` the keys of its random numbers.
     """
 
     grid: Grid
@@ -180,6 +184,7 @@ class Relaxation(NamedTuple):
     seed: int
     level: int
     confidences: Confidences = USUAL
+    phased: Phased | None = None
 
     @property
     def fused(self) -> bool:
@@ -260,14 +265,14 @@ def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxatio
     assert isinstance(proposal, Everything)
     candidates = proposal.candidates
     if not (choice.draws or relaxation.confidences.own):
-        terms = (relaxation.discount, relaxation.penalty)
+        terms = (relaxation.discount, relaxation.penalty, relaxation.phased)
         relaxed = nearest(machine, sites, field, offsets, grid, candidates, proposal.strip, terms)
     else:
         near = neighbourhood(machine, sites, field, offsets, grid, relaxation.confidences)
         distances = lcpdf.distance(machine, near, candidates)
         if relaxation.discount != 1:
             distances = coherence(machine, distances, candidates, sites, field, offsets, grid, relaxation.discount)
-        distances = charge(machine, distances, candidates, relaxation.penalty)
+        distances = charge(machine, distances, candidates, relaxation.penalty, sites, relaxation.phased)
         key = Key(relaxation.seed, relaxation.level, turn)
         relaxed = lcpdf.take(machine, distances, candidates, sites, grid, choice, key)
     return relaxed, temperature(machine, sites, field, offsets, grid, relaxation.xi)
@@ -289,7 +294,8 @@ def _fused(
     common = (offsets, candidates.reach, candidates.index_of, candidates.positions)
     key = np.uint32(turn)
     defines = {"C": len(field.values), "V": machine.vector} | ({"TILES": 1} if grid.tile else {})
-    defines |= confidences.defines
+    defines |= confidences.defines | phases.defines(relaxation.phased)
+    costs = relaxation.penalty, *phases.arguments(machine, relaxation.phased)
     own: list[Any]
     if isinstance(proposal, Everything):
         strip = proposal.strip
@@ -297,11 +303,11 @@ def _fused(
         level |= {"strip_rows": strip.rows, "strip_cols": strip.cols}
         most = 256 if proposal.slots <= 256 else KEPT  # so that few programs serve all
         defines |= {"ALL": most, "N": -(-offsets.shape[0] // 64) * 64, "STEP": machine.step}
-        name, own = "relax_all", [strip.pixels, strip.reach, relaxation.penalty, noise, key]
+        name, own = "relax_all", [strip.pixels, strip.reach, *costs, noise, key]
     else:
         square = proposal.square
         level |= {"plane": square.levels.shape[1], "down": square.down, "chance": proposal.chance}
         defines |= {"RADIUS": square.disc.shape[0] // 2, "SLOTS": -(-proposal.slots // 64) * 64}
-        name, own = "relax_list", [square.disc, square.at, square.levels, relaxation.penalty, noise, weighed, key]
+        name, own = "relax_list", [square.disc, square.at, square.levels, *costs, noise, weighed, key]
     arguments = [sites, np.int32(sites.size), *field, constants(grid, **level), *common, *own]
     return name, defines, arguments

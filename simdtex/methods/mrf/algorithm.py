@@ -154,6 +154,7 @@ def rule(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
         discount=level.discount,
         novelty=level.novelty,
         confidences=level.confidences,
+        phased=level.phased,
         penalty=level.machine.put(np.pad(penalty, (0, -penalty.size % BLOCK))),
         choice=level.choice,  # 6.2.2.2 a draw from it, or its mode
         xi=level.xi,  # 6.2.2.3 the temperature, equation (13)

@@ -15,7 +15,6 @@ from simdtex.methods.mrf.input import Input
 from simdtex.model.given import NO_STAND_IN, Stand, stand_ins
 from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import Grid
-from simdtex.model.regularity import WAVES, Waves
 from simdtex.ops.neighbourhood import UNTOUCHED, Confidences, Field
 
 FREE, KNOWN, STANDING = 0, 1, 2
@@ -38,43 +37,35 @@ class Conditions(ABC):
     """Conditioning data and guides of an output: all in memory, or windows out of a store.
 
     ``levels`` is M of Algorithm 1; ``confidences`` says which channels are guides, whether values have confidences of
-    their own, and the weights; ``waves`` are the phases of the sample's lattice, computed wherever they are needed.
+    their own, and the weights.
     """
 
-    def __init__(self, levels: int, confidences: Confidences, waves: Waves | None) -> None:
-        self.levels, self.confidences, self.waves = levels, confidences, waves
+    def __init__(self, levels: int, confidences: Confidences) -> None:
+        self.levels, self.confidences = levels, confidences
 
     @abstractmethod
     def at(self, number: int, grid: Grid) -> Held | None:
-        """Return the data and guides of a level at the sites of its lattice, or of a window, without the phases.
-
-        None if there are none.
-        """
+        """Return the data and guides of a level at the sites of its lattice, or of a window; None if there are none."""
 
     def entered(self, machine: Machine, number: int, grid: Grid, field: Field) -> Field:
         """Return the field at the beginning of a level, with its known sites at temperature 0.
 
         Data between the sites have stand-ins; the stand-ins of the level above are free again, at temperature 1.
         """
-        held, phases = self.at(number, grid), WAVES if self.waves else 0
-        if held is None and not phases:
+        held = self.at(number, grid)
+        if held is None:
             return field
         planes = [np.array(machine.get(plane)) for plane in field]
         values, source, temperature = (grid.view(plane) for plane in planes)
-        if self.waves:
-            values[-WAVES:] = self.waves.at(grid)
-        if held is None:
-            return Field(*map(machine.put, planes))
         (top, rows), (left, cols) = grid.above
         if number + 1 < self.levels and rows and cols:
             coarse = Grid(grid.within.rows, grid.within.cols, 2, grid.torus).window(top, left, rows, cols)
             above = self.at(number + 1, coarse)
             released = temperature[grid.within.top % 2 :: 2, grid.within.left % 2 :: 2]
             released[above is not None and above.kind == STANDING] = UNTOUCHED
-        guides = self.confidences.guides - phases
-        matched, known = len(values) - self.confidences.guides, held.kind != FREE
-        if guides:
-            values[matched : matched + guides] = held.values[-guides:]
+        guides, known = self.confidences.guides, held.kind != FREE
+        matched = len(values) - guides
+        values[matched:] = held.values[len(held.values) - guides :]
         if known.any():
             values[:matched, known] = held.values[:matched, known]
             source[known], temperature[known] = held.source[known], 0
@@ -98,13 +89,13 @@ class Conditioning(Conditions):
         hard = planes is not None and bool((planes.source < 0)[planes.known].any())
         centre = np.float32(max(1, round(sqrt(neighbours) / 2)))
         weight = np.float32(round(8 * sqrt(plan.options.data_weight)) / 8)  # in eighths, so that sums stay exact
-        confidences = Confidences(sample.guiding, sample.guiding > 0 or hard, centre, weight)
-        super().__init__(plan.levels, confidences, sample.waves)
+        confidences = Confidences(len(sample.guides), len(sample.guides) > 0 or hard, centre, weight)
+        super().__init__(plan.levels, confidences)
         self.guides, self.planes = sample.guides, planes
         self._held: dict[int, Held] = {}
 
     def at(self, number: int, grid: Grid) -> Held | None:
-        """Return the data and guides of a level at the sites of its lattice, or of a window, without the phases."""
+        """Return the data and guides of a level at the sites of its lattice, or of a window."""
         if self.planes is None and not len(self.guides):
             return None
         if number not in self._held:

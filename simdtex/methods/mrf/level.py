@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from math import log2, prod
+from math import log2, prod, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,11 +17,13 @@ from simdtex.methods.mrf.conditioning import Conditioning, Conditions
 from simdtex.methods.mrf.input import Input
 from simdtex.methods.mrf.options import Options
 from simdtex.model.lattice import Grid
+from simdtex.model.regularity import WAVES
 from simdtex.model.sample import Candidates, Places
 from simdtex.ops import active, lcpdf
 from simdtex.ops.lcpdf import Choice
 from simdtex.ops.nearest import strip_of
 from simdtex.ops.neighbourhood import Confidences, Field
+from simdtex.ops.phases import Phased
 from simdtex.ops.relax import EXHAUSTIVE, KEPT, Everything, Listed
 from simdtex.ops.square import square_of
 from simdtex.ops.use import FairUse
@@ -162,6 +164,7 @@ class Lattices:
             weighed=machine.put(np.zeros((grid.height, grid.width), np.int32)),
             lists=Lists(machine),
             movable=self.conditions.movable(machine, number, grid),
+            phased=level.phased and level.phased._replace(sites=self._phases(grid)),
         )
 
     def _level(self, number: int) -> Level:
@@ -198,7 +201,23 @@ class Lattices:
             weighed=self.weighed,
             lists=Lists(machine),
             movable=self.conditions.movable(machine, number, grid),
+            phased=self._phased(number, proposal.candidates),
         )
+
+    def _phased(self, number: int, candidates: Candidates) -> Phased | None:
+        waves = self.sample.waves
+        if not waves:
+            return None
+        those = self.sample.phases_at(self.machine.get(candidates.positions)).astype(np.float32)
+        certain = np.float32(round(sqrt(1.25 * len(self.offsets))))  # what a guide counts there and at the site
+        return Phased(self.machine.put(those), self._phases(self.grid(number)), certain)
+
+    def _phases(self, grid: Grid) -> Array:
+        """Return the phases (waves, H, W) of the output at the sites of a lattice, or of a window of it."""
+        assert self.sample.waves
+        planes = np.zeros((WAVES, grid.height, grid.width), np.uint16)
+        grid.view(planes)[...] = self.sample.waves.at(grid)
+        return self.machine.put(planes)
 
     def _in_place(self, grid: Grid) -> bool:
         schedule = self.plan.schedule
@@ -275,6 +294,8 @@ class Level:
         Counts the candidates that each site has weighed.
     movable : (H, W) uint16 array of the machine, optional
         0 at sites whose values are given, which free sweeps leave alone. None: every site may relax.
+    phased : Phased, optional
+        The phases of a regular sample and of the output.
     """
 
     number: int
@@ -294,6 +315,7 @@ class Level:
     weighed: Array
     lists: Lists = field(repr=False)
     movable: Array | None = None
+    phased: Phased | None = None
 
     @property
     def machine(self) -> Machine:

@@ -20,7 +20,7 @@ from simdtex.model.given import Given, planes
 from simdtex.model.guide import AnyGuide, Guide, GuidePair, Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures
-from simdtex.model.regularity import WAVES, Phases, parse_lattice, phases
+from simdtex.model.regularity import Phases, parse_lattice, phases
 from simdtex.model.sample import NothingUsable, Sample
 from simdtex.ops.finish import around
 from simdtex.options import SMALLER, within_32_bits
@@ -97,10 +97,8 @@ def plan(
     lattice = parse_lattice(options.lattice)
     regular = None if lattice is None else phases(pictures, shape, options.boundary == "torus", lattice, known)
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in guides)
-    channels += WAVES if regular else 0
-    guided = len(guides) + bool(regular)
-    heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or guided else 1.0  # in sums of squares
-    values = round(heavy * (channels * len(offsets) + guided))
+    heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or guides else 1.0  # in sums of squares
+    values = round(heavy * (channels * len(offsets) + len(guides)))
     levels, sample = sampled(pictures, levels, offsets, values, options, guides, regular)
     held = planes(given, sample) if given and known else None
     return Plan(sample, shape, offsets, options, schedules.get(options.schedule), levels, given, held)
