@@ -89,8 +89,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
 
     // 6.2.2.1: the neighbourhood, and which candidates continue a neighbour's source.
     float u[(N + 1) * CONFIDENCES], xu[(N + 1) * C];
-    int list[N], next[N], same[N], m = 0, sum = g.xi, members = 0;
-    ulong seen = 0;
+    int next[N], same[N], sum = g.xi, members = 0;
     const int neighbours = g.neighbours;
     for (int k = 0; k < neighbours; ++k) {
         const int r = neighbour(g.lattice, i, j, offsets[k].x, offsets[k].y);
@@ -105,7 +104,6 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
         members += r < 0 ? 0 : 1;
         next[k] = t < UNTOUCHED ? continuing(index_of, source[r], reach[k], g.pixels) : -1;
         same[k] = t < UNTOUCHED ? number_of(index_of, source[r]) : -1;
-        m = proposed(next[k], list, m, &seen);
     }
     if (G)
         GATHER(neighbours, site, 0.0f, g.centre);
@@ -139,8 +137,14 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
             STORE(sums[q], d + n / wide * g.strip_cols + n % wide * V);
         }
     }
-    for (int k = 0; k < m; ++k)
-        d[list[k]] *= g.discount;
+    ulong coherent[ALL / 64] = {0}; // a bit for each candidate
+    for (int k = 0; k < neighbours; ++k) {
+        const int p = next[k];
+        if (p < 0 || coherent[p / 64] >> p % 64 & 1)
+            continue;
+        coherent[p / 64] |= 1ul << p % 64;
+        d[p] *= g.discount;
+    }
     for (int p = 0; p < g.candidates; p += V) { // both lists have whole vectors
         vec apart = 0.0f;
         for (int c = 0; c < WAVES; ++c) {
