@@ -151,7 +151,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
             const vec e = ((float)phases[c * area_ + site] - LOAD(waves + c * listed + p)) * certain_;
             apart = fma(e, e, apart);
         }
-        STORE(LOAD(d + p) + LOAD(penalty + p) + apart, d + p);
+        STORE(LOAD(d + p) + LOAD(penalty + p) + fmax(apart - free_, (vec)0.0f), d + p);
     }
     if (g.novelty > 0.0f)
         for (int k = 0; k < neighbours; ++k) {

@@ -108,7 +108,7 @@ class Problem(NamedTuple):
         rng, candidates = np.random.default_rng(7), self.candidates(REFERENCE, every).positions.size
         waves = rng.choice([0, 0, 40, 97], (4, candidates)).astype(np.float32)
         here = rng.choice([0, 40], (4, *self.field.source.shape)).astype(np.uint16)
-        return Phased(machine.put(waves), machine.put(here), np.float32(3))
+        return Phased(machine.put(waves), machine.put(here), np.float32(3), np.float32(15000))
 
     def on(self, machine):
         """Sites, field and offsets as arrays of a machine."""

@@ -400,15 +400,16 @@ def distances(level, near, numbers, lanes):
 
 
 def apart_in_phase(level, s, numbers):
-    """What each candidate costs for its place on the sample's lattice, rounded after each term."""
-    of_pictures, of_output, certain = level.Y.waves
+    """What each candidate costs for its place on the sample's lattice, rounded after each term; half a step is free."""
+    of_pictures, of_output, certain, half = level.Y.waves
+    free = round(certain**2 * half(level.step))
     d = np.zeros(len(numbers), float32)
     for c, plane in enumerate(of_output):
         for k, p in enumerate(numbers):
             n, i, j = level.places[p]
             e = (int(plane[level.pixel(s)]) - int(of_pictures[n][c][i, j])) * certain
             d[k] = float32(e * e + float(d[k]))  # the double is exact
-    return d
+    return np.maximum(d - float32(free), float32(0))
 
 
 def weights(level, d):

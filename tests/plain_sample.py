@@ -69,7 +69,8 @@ def material(pictures, o, shape, mask=None, known=None, known_source=None, guide
     if lattices:
         raised = min(sqrt(2 * spread / 4), Y.height / 2)
         own = [phases(one, raised, *y[0].shape) for y, one in zip(planes, lattices[0], strict=True)]
-        Y.waves = own, phases(lattices[1], raised, *shape), round(sqrt(5 / 4 * N))
+        half = lambda step: apart(lattices[1], step / 2) * raised**2  # noqa: E731
+        Y.waves = own, phases(lattices[1], raised, *shape), round(sqrt(5 / 4 * N)), half
     Y.planes = planes
 
     Y.given = {}  # of sites that are known: grey levels of the matched channels, and where they are from
@@ -274,6 +275,15 @@ def phases(lattice, raised, rows, cols):
             for plane, wave in zip(planes[2 * k : 2 * k + 2], (cos, sin), strict=True):
                 plane[i, j] = round((1 + round(wave(2 * pi * along) * 2**20) / 2**20) * raised)
     return planes
+
+
+def apart(lattice, pixels):
+    """The squared difference of the waves of points so many pixels apart: the mean of one below and one beside."""
+    (a, b), (c, d), _ = lattice
+    area, total = a * d - b * c, 0
+    for along in ((pixels * d) / area, (-pixels * b) / area, (-pixels * c) / area, (pixels * a) / area):
+        total += (cos(2 * pi * along) - 1) ** 2 + sin(2 * pi * along) ** 2
+    return total / 2
 
 
 def clamped(i, n):

@@ -32,9 +32,10 @@ def apart(p, s):
     """What each candidate costs for its phases at the s-th site: whole numbers, which float32 adds exactly."""
     if not p.regular:
         return np.float32(0)
-    waves, here, certain = p.phased(REFERENCE)
+    waves, here, certain, free = p.phased(REFERENCE)
     at = here.reshape(4, -1)[:, p.sites[s], None].astype(np.float32)
-    return ((waves[:, : p.candidates(REFERENCE).size] - at) ** 2).sum(0) * certain**2
+    d = ((waves[:, : p.candidates(REFERENCE).size] - at) ** 2).sum(0) * certain**2
+    return np.maximum(d - free, 0)
 
 
 @given(problems(max_order=5), strengths, penalties)

@@ -320,3 +320,21 @@ def test_categories_and_densities_have_none():
     for given in ({"categorical": True}, {"pixel": "density", "relaxation": "gibbs"}):
         chosen = options(lattice="4,0,0,4", **given)
         assert chosen.resolved(chosen.of(pictures)).lattice == "none"
+
+
+def test_what_half_a_step_is_apart_costs_nothing():
+    lattice = Lattice((12, 1), (-3, 9), (2.5, 4.5))
+    waves = regularity.Waves((lattice,), lattice, 1.0, 1e4)
+    here = waves.sample(0, np.array([5.0, 7.0, 5.0]), np.array([6.0, 6.0, 8.0])).astype(float)
+    assert waves.half(4) == pytest.approx(((here[:, 1:] - here[:, :1]) ** 2).sum(0).mean(), rel=1e-3)
+
+
+def test_seeds_do_not_make_one_picture():
+    """Of all candidates in phase some are nearer to the phase than others, which is no reason to take only them."""
+    rng, sample = np.random.default_rng(3), spots(BASES["square"], (96, 96))[..., 0].astype(int)
+    sample = np.clip(sample + rng.integers(-50, 50, (8, 8)).repeat(12, 0).repeat(12, 1), 0, 255).astype(np.uint8)
+    options = {"full_output": True, "free_sweeps": 0}
+    made = [simdtex.synthesize(sample, (108, 120), rng=seed, **options)[1] for seed in range(6)]
+    assert all(one.statistics["lattice"] for one in made)
+    same = [(a.source == b.source).all(-1).mean() for a, b in zip(made[::2], made[1::2], strict=True)]
+    assert np.mean(same) < 0.2

@@ -87,6 +87,7 @@ def reflecting(draw):
         edges="reflect",
         phases=draw(st.sampled_from(["all", "decimated"])),
         count=24,
+        regular=draw(st.booleans()),
     )
 
 
@@ -117,6 +118,7 @@ GIVEN = [
     {"nowhere": 0.3, "weight": 1.0},
     {"guides": 2, "channels": 2, "spacing": 2, "torus": False},
     {"guides": 1, "nowhere": 0.2, "weight": 1.0, "masked": 0.3},
+    {"channels": 2, "regular": True},
 ]
 """Hard data, guides, and a sample that may be used in part."""
 

@@ -174,6 +174,11 @@ class Waves(NamedTuple):
         col = (whole.left + np.arange(grid.cols)) % whole.cols * whole.step
         return self._levels(self.output, row[:, None], col[None, :])
 
+    def half(self, step: int) -> float:
+        """Return the squared difference, in levels, of pixels half a step apart: the mean along rows and columns."""
+        turns = self.output._replace(origin=(0.0, 0.0)).phases(*(np.eye(2) * step / 2))
+        return float(np.rint((1 - np.cos(2 * np.pi * turns)).sum() * ROUND) / ROUND) * self.height**2
+
     def _levels(self, lattice: Lattice, row: NDArray[Any], col: NDArray[Any]) -> NDArray[np.uint16]:
         angles = 2 * np.pi * lattice.phases(row, col)
         waves = np.stack([wave(angle) for angle in angles for wave in (np.cos, np.sin)])

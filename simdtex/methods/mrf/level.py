@@ -210,7 +210,9 @@ class Lattices:
             return None
         those = self.sample.phases_at(self.machine.get(candidates.positions)).astype(np.float32)
         certain = np.float32(round(sqrt(1.25 * len(self.offsets))))  # what a guide counts there and at the site
-        return Phased(self.machine.put(those), self._phases(self.grid(number)), certain)
+        step = 1 if self.options.phases == "all" else 2**number
+        free = np.float32(round(float(certain) ** 2 * waves.half(step)))
+        return Phased(self.machine.put(those), self._phases(self.grid(number)), certain, free)
 
     def _phases(self, grid: Grid) -> Array:
         """Return the phases (waves, H, W) of the output at the sites of a lattice, or of a window of it."""
