@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma OPENCL FP_CONTRACT OFF
-#include "common/phases.h"
+#include "common/costs.h"
 
 #ifndef BLOCK
 #define BLOCK 64
 #endif
 
-// Add the penalty of each candidate and its place on a lattice to its distance, for distances that are kept.
+// Add the costs of each candidate to its distance, for distances that are kept.
 //
-// penalty    (blocks * BLOCK,)      of ops/use.py
 // distance (blocks * BLOCK, P)    in and out; the sign bit that marks what coherence.cl has favoured is gone
 // nearest  (blocks, P)            out: the smallest of each block
 // One work-item per (site, block).
-__kernel void charge(__global const int *restrict sites, const int S, const int P, const int count, const int blocks, __global const float *restrict penalty, PHASES,
+__kernel void charge(__global const int *restrict sites, const int S, const int P, const int count, const int blocks, COSTS,
                      __global float *restrict distance, __global float *restrict nearest)
 {
     const int s = get_global_id(0), block = get_global_id(1);
@@ -20,7 +19,7 @@ __kernel void charge(__global const int *restrict sites, const int S, const int 
         return;
     float least = INFINITY;
     for (int p = block * BLOCK; p < min((block + 1) * BLOCK, count); ++p) {
-        const float d = fabs(distance[p * P + s]) + penalty[p] + APART_IN_PHASE(p, sites[s]);
+        const float d = PLUS_COSTS(fabs(distance[p * P + s]), p, sites[s]);
         distance[p * P + s] = d;
         least = fmin(least, d);
     }

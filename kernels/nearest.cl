@@ -2,16 +2,16 @@
 // ICM over sample positions without keeping a distance: for each site the candidate of the least squared distance of
 // equation (12), divided where it continues a neighbour's source, and of several the first.
 //
-//   d_p = sum_r ((x_r - y_r)(1 - t_r))^2,   d'_p = discount d_p + penalty_p + apart_p, discount = 1 unless p is coherent
+//   d_p = sum_r ((x_r - y_r)(1 - t_r))^2,   d'_p = discount d_p + cost_p, discount = 1 unless p is coherent
 //
 // Whoever is proved to lie beyond the best so far is skipped. Three facts make that exact: partial sums never fall, no
-// penalty and no difference of phase (common/phases.h) is below 0, and a sum in another order differs by less than SLACK. What survives is weighed again in the
+// cost (common/costs.h) is below 0, and a sum in another order differs by less than SLACK. What survives is weighed again in the
 // canonical order.
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/distance.h"
 #include "common/coherence.h"
 #include "common/lattice.h"
-#include "common/phases.h"
+#include "common/costs.h"
 #include "common/vector.h"
 
 #ifndef C
@@ -79,7 +79,7 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
               __global const int *restrict index_of, const int plane,
               __global const float *restrict sample, __global const int *restrict positions,
               __global const int *restrict reach, __global const int *restrict strip_reach,
-              __global const int *restrict spread, const float discount, __global const float *restrict penalty, PHASES,
+              __global const int *restrict spread, const float discount, COSTS,
               __global const float *restrict axes, const float middle, __global float *restrict near,
               __global int *restrict terms, __global int *restrict count,
               __global float *restrict features, __global float *restrict least,
@@ -120,8 +120,7 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
     float best = INFINITY;
     int at = 0x7fffffff;
     if (own >= 0) {
-        best = canonical(here, sample + positions[own], plane, reach, N, INFINITY) + penalty[own] +
-               APART_IN_PHASE(own, sites[s]);
+        best = PLUS_COSTS(canonical(here, sample + positions[own], plane, reach, N, INFINITY), own, sites[s]);
         at = own;
     }
     int last = -1, before = -1;
@@ -131,8 +130,8 @@ nearest_begin(__global const int *restrict sites, const int S, const int N, __gl
             continue;
         before = last;
         last = p;
-        const float d = canonical(here, sample + positions[p], plane, reach, N, INFINITY) * discount + penalty[p] +
-                        APART_IN_PHASE(p, sites[s]);
+        const float d =
+            PLUS_COSTS(canonical(here, sample + positions[p], plane, reach, N, INFINITY) * discount, p, sites[s]);
         if (d < best || (d == best && p < at)) {
             best = d;
             at = p;
@@ -181,7 +180,7 @@ nearest_leaves(__global const int *restrict sites, const int S, const int N, __g
                __global const float *restrict rows, __global const int *restrict order, const int leaves,
                const float blur, __global const float *restrict sample, const int plane,
                __global const int *restrict positions, __global const int *restrict reach,
-               __global const float *restrict penalty, PHASES, const int split, __global float *restrict found, __global int *restrict at, __global ulong *restrict work,
+               COSTS, const int split, __global float *restrict found, __global int *restrict at, __global ulong *restrict work,
                __global int *restrict open)
 {
     const int s = get_global_id(0) / split, turn = get_global_id(0) % split;
@@ -232,11 +231,11 @@ nearest_leaves(__global const int *restrict sites, const int S, const int N, __g
                     STORE(d, one);
                     for (int w = 0; w < V; ++w) {
                         const int p = order[v + w];
-                        if (one[w] > radius || (best == 0.0f && p >= best_at))
+                        if (one[w] > radius || (best == 0.0f && p >= best_at) || PLUS_COSTS(0.0f, p, sites[s]) > best)
                             continue;
                         __global const float *y = sample + positions[p];
-                        const float d_p = canonical(near + s * (N * (1 + C)), y, plane, reach, N, best) + penalty[p] +
-                                          APART_IN_PHASE(p, sites[s]);
+                        const float d_p =
+                            PLUS_COSTS(canonical(near + s * (N * (1 + C)), y, plane, reach, N, best), p, sites[s]);
                         ++weighed;
                         if (d_p < best || (d_p == best && p < best_at)) {
                             best = d_p;
@@ -271,7 +270,7 @@ nearest_scan(__global const int *restrict sites, const int S, const int N, __glo
              __global const float *restrict near, __global const float *restrict least,
              __global const int *restrict where, __global const float *restrict strip, const int size,
              const int first, const int pitch, const int rows, const int cols,
-             __global const int *restrict strip_reach, __global const float *restrict penalty, PHASES, const float slack,
+             __global const int *restrict strip_reach, COSTS, const float slack,
              const int split,
              const int all, __global const int *restrict open, const int row,
              __global float *restrict found, __global int *restrict at,
@@ -294,8 +293,15 @@ nearest_scan(__global const int *restrict sites, const int S, const int N, __glo
         __global const float *y = strip + first + i * pitch + j;
         vec d[STEP];
 #pragma unroll
-        for (int q = 0; q < STEP; ++q)
-            d[q] = 0.0f;
+        for (int q = 0; q < STEP; ++q) {
+            d[q] = 0.0f; // with the phases, which are known at once
+            for (int c = 0; c < WAVES; ++c) {
+                const float x = (float)phases[c * area_ + sites[s]];
+                const vec e = (x - LOAD(waves + c * listed + i * cols + j + q * V)) * certain_;
+                d[q] = fma(e, e, d[q]);
+            }
+            d[q] = fmax(d[q] - free_, (vec)0.0f);
+        }
         int k = 0, alive = 1;
         while (alive && k < m) {
 #pragma unroll
@@ -329,8 +335,7 @@ nearest_scan(__global const int *restrict sites, const int S, const int N, __glo
                 if (col >= cols || as_int(one[v]) >= limit)
                     continue;
                 const float exact =
-                    canonical(near + s * (N * (1 + C)), y + q * V + v, size, strip_reach, N, best) + penalty[p] +
-                    APART_IN_PHASE(p, sites[s]);
+                    PLUS_COSTS(canonical(near + s * (N * (1 + C)), y + q * V + v, size, strip_reach, N, best), p, sites[s]);
                 if (exact < best || (exact == best && p < best_at)) {
                     best = exact;
                     best_at = p;

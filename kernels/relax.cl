@@ -17,7 +17,6 @@
 // reach    (N,)         pixel offset of each in the sample
 // index_of (pixels,)    number of the candidate at a pixel of the sample, -1 where there is none
 // positions (count,)    pixel index of each candidate
-// penalty    (blocks * BLOCK,)  what each candidate costs beside its distance, and its place on a lattice: common/phases.h
 // noise                 the kernel of equation (7) over grey levels, as in lcpdf.cl
 #pragma OPENCL FP_CONTRACT OFF
 #ifdef ALL
@@ -26,11 +25,11 @@
 #define LEVEL ushort
 #endif
 #include "common/confidence.h"
+#include "common/costs.h"
 #include "common/vector.h"
 #include "common/choose.h"
 #include "common/cool.h"
 #include "common/distance.h"
-#include "common/phases.h"
 #include "common/coherence.h"
 #include "common/propose.h"
 #include "common/square.h"
@@ -76,7 +75,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
                         __global ushort *temperature, const Level g, __global const int2 *restrict offsets,
                         __global const int *restrict reach, __global const int *restrict index_of,
                         __global const int *restrict positions, __global const float *restrict strip,
-                        __global const int *restrict strip_reach, __global const float *restrict penalty, PHASES,
+                        __global const int *restrict strip_reach, COSTS,
                         __global const uint *restrict noise, const uint turn,
                         __global ushort *restrict new_values, __global int *restrict new_source,
                         __global ushort *restrict new_temperature)
@@ -153,6 +152,11 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
         }
         STORE(LOAD(d + p) + LOAD(penalty + p) + fmax(apart - free_, (vec)0.0f), d + p);
     }
+#if SCATTERED
+    if (begin_[site] < begin_[site + 1])
+        for (int p = 0; p < g.candidates; ++p)
+            d[p] += MISFIT(p, site);
+#endif
     if (g.novelty > 0.0f)
         for (int k = 0; k < neighbours; ++k) {
             if (next[k] >= 0)
@@ -209,7 +213,7 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
                          __global const int *restrict reach, __global const int *restrict index_of,
                          __global const int *restrict positions, __global const float *restrict disc,
                          __global const int *restrict at, __global const ushort *restrict levels,
-                         __global const float *restrict penalty, PHASES,
+                         COSTS,
                          __global const uint *restrict noise, __global int *restrict weighed, const uint turn,
                          __global ushort *restrict new_values,
                          __global int *restrict new_source, __global ushort *restrict new_temperature)
@@ -319,8 +323,9 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
     }
     float d[SLOTS];
     for (int k = 0; k < m; ++k)
-        d[k] = distance_in_lanes(at[list[k]], u, xu, levels, g.plane, g.down) * (k < suggested ? g.discount : 1.0f) +
-               penalty[list[k]] + APART_IN_PHASE(list[k], site);
+        d[k] = PLUS_COSTS(distance_in_lanes(at[list[k]], u, xu, levels, g.plane, g.down) *
+                              (k < suggested ? g.discount : 1.0f),
+                          list[k], site);
 
     // 6.2.2.2
 #define NUMBER(k) list[k]

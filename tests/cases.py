@@ -15,9 +15,9 @@ from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
 from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
-from simdtex.ops.nearest import strip_of
+from simdtex.ops.costs import Costs, Phased, Scattered
+from simdtex.ops.nearest import TAIL, strip_of
 from simdtex.ops.neighbourhood import Confidences, Field, neighbourhood
-from simdtex.ops.phases import Phased
 from simdtex.ops.square import square_of
 from simdtex.schedules import Setting
 
@@ -65,6 +65,7 @@ class Problem(NamedTuple):
     phases: str
     nowhere: float = 0.0
     regular: bool = False
+    between: bool = False
 
     @property
     def confidences(self):
@@ -106,9 +107,27 @@ class Problem(NamedTuple):
         if not self.regular:
             return None
         rng, candidates = np.random.default_rng(7), self.candidates(REFERENCE, every).positions.size
-        waves = rng.choice([0, 0, 40, 97], (4, candidates)).astype(np.float32)
+        waves = rng.choice([0, 0, 40, 97], (4, candidates + TAIL)).astype(np.float32)
         here = rng.choice([0, 40], (4, *self.field.source.shape)).astype(np.uint16)
         return Phased(machine.put(waves), machine.put(here), np.float32(3), np.float32(15000))
+
+    def scattered(self, machine):
+        """Up to 3 data around each site, some unknown in some channels; None without."""
+        if not self.between:
+            return None
+        rng, channels = np.random.default_rng(8), self.sample.channels
+        begin = np.zeros(self.field.source.size + 1, np.int32)
+        begin[self.sites + 1] = rng.integers(0, 4, self.sites.size)
+        begin, reach = np.cumsum(begin, dtype=np.int32), int(self.offsets.max()) * self.grid.spacing
+        apart = rng.integers(-reach, reach + 1, (begin[-1] + 1, 2))
+        values = rng.integers(0, self.sample.top + 1, (begin[-1] + 1, channels)).astype(np.uint16)
+        values[rng.random(values.shape) < 0.2] = UNKNOWN
+        put = (begin, (apart @ [self.sample.cols, 1]).astype(np.int32), values)
+        return Scattered(*map(machine.put, put), np.float32(1.5))
+
+    def costs(self, machine, dear=1.0, every=False):
+        """The penalties of the candidates, or places, their phases, and data between the sites."""
+        return Costs(machine.put(self.penalty(dear, every)), self.phased(machine, every), self.scattered(machine))
 
     def on(self, machine):
         """Sites, field and offsets as arrays of a machine."""
@@ -175,12 +194,13 @@ def problem(
     nowhere=0.0,
     masked=0.0,
     regular=False,
+    between=False,
 ):
     """A problem from a seed. A third of its sites stand beside what their neighbours were taken from.
 
     ``guides`` channels of a guide, unknown at a quarter of the sites; ``nowhere`` share of the sites that are hard
     data, whose structure is unknown; ``masked`` share of the sample's pixels that may not be used;
-    ``regular`` whether candidates and sites have phases.
+    ``regular`` whether candidates and sites have phases; ``between`` whether data lie between the sites.
     """
     rng = np.random.default_rng(seed)
     offsets = neighbourhood_offsets(order)
@@ -219,7 +239,7 @@ def problem(
         if weight:
             values[channels, hard] = UNKNOWN
     field = Field(values, source, t.astype(np.uint16))
-    return Problem(sample, order, grid, field, sites, edges, phases, nowhere, regular)
+    return Problem(sample, order, grid, field, sites, edges, phases, nowhere, regular, between)
 
 
 @st.composite
@@ -245,6 +265,7 @@ def problems(draw, max_order=9, channels=(1, 2, 3)):
         phases="all",
         count=draw(st.sampled_from([1, 7, 24, 37])),  # PoCL compiles anew for each
         regular=draw(st.booleans()),
+        between=draw(st.booleans()),
     )
 
 

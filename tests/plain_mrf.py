@@ -17,7 +17,7 @@ import plain
 from numpy import float32
 from plain_multires import within
 from plain_numbers import cumulative, exponential
-from plain_sample import NOWHERE, UNKNOWN, lay, material, stand_ins
+from plain_sample import NOWHERE, UNKNOWN, between, lay, material, stand_ins
 from plain_schedules import below, schedule, words
 from plain_shown import finished, picture
 
@@ -77,7 +77,7 @@ def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, 
     X, level = at_random(Y, shape, seed), None  # 2., 5.
     for number in reversed(range(levels)):  # 6.
         level = Level(number, levels, Y, shape, seed, o, level)  # 3., 4., 6.1
-        place_stand_ins(level, X, Y)
+        place_guides(level, X, Y)
         level.penalty = penalties(level, X)
         cooling = True
 
@@ -118,18 +118,11 @@ def at_random(Y, shape, seed):
     return X
 
 
-def place_stand_ins(level, X, Y):
-    """Where a level begins: data between its sites stand at these, and no longer at those of the level above."""
-    torus, released = level.o.boundary == "torus", level.above.stands if level.above else {}
-    for s in released:
-        X.t[s] = 1024
-    for s, datum in level.stands.items():
-        for x, value in zip(X.x, Y.given[datum][0], strict=False):
-            x[s] = value
-        X.source[s], X.t[s] = NOWHERE, 0
+def place_guides(level, X, Y):
+    """Where a level begins: values of a guide between its sites stand at these."""
     for x, guide in zip(X.x[Y.matched :], Y.guides, strict=True):
         x[:] = guide
-        for s, datum in stand_ins(guide != UNKNOWN, level.spacing, torus).items():
+        for s, datum in stand_ins(guide != UNKNOWN, level.spacing, level.o.boundary == "torus").items():
             x[s] = guide[datum]
 
 
@@ -165,6 +158,8 @@ def relaxed(level, X, old, s, turn):
     d = d + level.penalty[numbers]
     if level.Y.waves:
         d = d + apart_in_phase(level, s, numbers)
+    if level.between:
+        d = d + misfit(level, s, numbers)
     for p, times in charged if level.novelty else []:  # neighbour by neighbour; the numbers are all candidates
         d[p] += float32(times) * level.novelty
 
@@ -226,8 +221,8 @@ class Level:
         name, _, parameter = o.schedule.partition(":")
         self.tile = tuple(map(int, (parameter or "16x16").split("x"))) if name == "block" else (self.rows, self.cols)
 
-        self.stands = stand_ins(Y.whole, self.spacing, torus) if Y.given else {}
-        self.held = Y.given.keys() | self.stands.keys()
+        self.between = self.data_between(torus) if Y.given else {}
+        self.held = {(i, j) for i, j in Y.given if i % self.spacing == j % self.spacing == 0}
 
         radius, step = isqrt(o.order), 1 if o.phases == "all" else self.spacing
         self.step, self.above = step, above
@@ -275,6 +270,21 @@ class Level:
     def together(self, s, r):
         """Whether two sites are of one tile."""
         return all(a // side == b // side for a, b, side in zip(s, r, self.tile, strict=True))
+
+    def data_between(self, torus):
+        """{site: [(datum, pixels from site to datum)]}: the 8 nearest data that no site around them is known for."""
+        found, reach, spacing = {}, isqrt(self.o.order), self.spacing
+        for r, c in between(self.Y.whole, spacing, torus):
+            lines = [range(n // spacing - reach, n // spacing + reach + 2) for n in (r, c)]
+            for i, j in product(*lines):
+                apart = (r - i * spacing, c - j * spacing)
+                site = (i % self.rows, j % self.cols) if torus else (i, j)
+                far = (
+                    max(map(abs, apart)) > reach * spacing or apart[0] ** 2 + apart[1] ** 2 > self.o.order * spacing**2
+                )
+                if site in self.near and not far:
+                    found.setdefault(site, []).append(((r, c), apart))
+        return {site: sorted(near, key=lambda one: one[1][0] ** 2 + one[1][1] ** 2)[:8] for site, near in found.items()}
 
     def beside(self, c, offset):
         """y_r of every candidate, each picture of the sample being continued by reflection."""
@@ -410,6 +420,20 @@ def apart_in_phase(level, s, numbers):
             e = (int(plane[level.pixel(s)]) - int(of_pictures[n][c][i, j])) * certain
             d[k] = float32(e * e + float(d[k]))  # the double is exact
     return np.maximum(d - float32(free), float32(0))
+
+
+def misfit(level, s, numbers):
+    """How far each candidate is from the data around a site, each compared where it lies, rounded after each term."""
+    d = np.zeros(len(numbers), float32)
+    for datum, apart in level.between.get(s, []):
+        for c, x in enumerate(level.Y.given[datum][0]):
+            for k, p in enumerate(numbers if x != UNKNOWN else []):
+                n, i, j = level.places[p]
+                rows, cols = level.Y.usable[n].shape
+                y = level.Y.planes[n][c][within(i + apart[0], rows, False), within(j + apart[1], cols, False)]
+                e = (x - int(y)) * level.Y.hard
+                d[k] = float32(e * e + float(d[k]))  # the double is exact
+    return d
 
 
 def weights(level, d):

@@ -346,6 +346,23 @@ def guide_planes(guide, o, spread, top):
     return planes, told
 
 
+def between(known, spacing, torus):
+    """The known pixels between the sites of a lattice, where none of the up to four sites around is known."""
+
+    def around(i, axis):
+        """The one or two lattice lines around a line."""
+        lines = len(range(0, known.shape[axis], spacing))
+        those = {i // spacing, -(-i // spacing)}
+        return {k % lines if torus else min(k, lines - 1) for k in those}
+
+    return [
+        (i, j)
+        for i, j in map(tuple, np.argwhere(known).tolist())
+        if (i % spacing or j % spacing)
+        and not any(known[a * spacing, b * spacing] for a in around(i, 0) for b in around(j, 1))
+    ]
+
+
 def stand_ins(known, spacing, torus):
     """{site: datum}: pixels of a level's lattice that stand for known ones between them.
 
@@ -354,22 +371,17 @@ def stand_ins(known, spacing, torus):
     """
     shape, found = known.shape, {}
 
-    def around(i, axis):
-        """The one or two lattice lines around a line, and the one it goes to with the distance to it."""
+    def nearest(i, axis):
+        """The lattice line that a line goes to, and the distance to it."""
         lines = len(range(0, shape[axis], spacing))
-        below, beyond = divmod(i, spacing)
-        to = below + (2 * beyond >= spacing)
+        to = (i + spacing // 2) // spacing
         if torus:
-            apart = abs(min(to * spacing, shape[axis]) - i)  # a torus ends where it begins again
-            return {below % lines, (below + (beyond > 0)) % lines}, to % lines, apart
+            return to % lines, abs(min(to * spacing, shape[axis]) - i)  # a torus ends where it begins again
         to = min(to, lines - 1)
-        return {min(below, lines - 1), min(below + (beyond > 0), lines - 1)}, to, abs(to * spacing - i)
+        return to, abs(to * spacing - i)
 
-    for i, j in map(tuple, np.argwhere(known).tolist()):
-        if i % spacing == j % spacing == 0:
-            continue
-        (rows, row, down), (cols, col, right) = around(i, 0), around(j, 1)
-        if not any(known[a * spacing, b * spacing] for a in rows for b in cols):
-            site = (row * spacing, col * spacing)
-            found[site] = min(found.get(site, (np.inf,)), (down**2 + right**2, i, j))
+    for i, j in between(known, spacing, torus):
+        (row, down), (col, right) = nearest(i, 0), nearest(j, 1)
+        site = (row * spacing, col * spacing)
+        found[site] = min(found.get(site, (np.inf,)), (down**2 + right**2, i, j))
     return {site: (i, j) for site, (_, i, j) in found.items()}

@@ -13,11 +13,12 @@ from simdtex.ops.charge import charge
 def test_each_candidate_has_its_penalty(machine, p, strength):
     found, candidates = p.distances(REFERENCE, strength)
     expected = found.distance + p.penalty()[: candidates.size, None]
-    if p.regular:
-        expected = expected + p.phased(REFERENCE).apart(np.arange(candidates.size)[:, None], p.sites)
+    numbers = np.arange(candidates.size)[:, None]
+    for term, more in ((p.phased(REFERENCE), ()), (p.scattered(REFERENCE), (candidates,))):
+        expected = expected + term.cost(numbers, p.sites, *more) if term else expected
     for m in (REFERENCE, machine):
         distances, candidates = p.distances(m, strength)
-        charged = charge(m, distances, candidates, m.put(p.penalty()), m.put(p.sites), p.phased(m))
+        charged = charge(m, distances, candidates, m.put(p.sites), p.costs(m))
         distance = np.asarray(m.get(charged.distance))[: candidates.size, : charged.sites]
         assert_same_bits(distance, expected)
         if charged.nearest is not None:  # the least of each block of candidates

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from plain_sample import stand_ins as plainly
 
 import simdtex
-from simdtex.model.given import Given, planes, stand_ins
+from simdtex.model.given import MOST_NEAR, Given, around, planes, stand_ins
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Sample
 from simdtex.schedules import SCHEDULES
@@ -290,12 +290,36 @@ def test_proportions_are_about_kept():
     assert abs(found[0.75] - 0.75) < 0.12
 
 
-def test_a_stage_shows_what_stands_for_data():
-    """At a coarse level a datum shows at the site that stands for it, up to what levels round away."""
-    known = np.ma.masked_all((16, 16), np.float32)
-    known[5, 5] = 2.0
-    sample = texture((16, 16), dtype=np.float32)
-    _, output = run(sample, (16, 16), known=known, order=1, levels=3)
-    coarse = np.asarray(output.stages[0].image)
-    assert coarse.shape == (4, 4)
-    assert coarse[1, 1] == pytest.approx(min(2.0, sample.max()), abs=1e-2)
+def near(place, grid, order):
+    """{site: [(number of the datum, offset)]} of the data near the sites of a lattice."""
+    found = {}
+    for site, datum, apart in zip(*(one.tolist() for one in around(np.array(place), grid, order)), strict=True):
+        found.setdefault(site, []).append((datum, tuple(apart)))
+    return found
+
+
+def test_a_site_is_compared_with_the_data_that_its_neighbourhood_reaches():
+    found = near([(5, 6)], Grid(16, 16, 4), 1)
+    assert found == {68: [(0, (1, 2))], 72: [(0, (1, -2))], 132: [(0, (-3, 2))], 136: [(0, (-3, -2))]}
+    assert near([(13, 6)], Grid(16, 16, 4), 1)[4] == [(0, (-3, 2))], "around the seam"
+    assert 4 not in near([(13, 6)], Grid(16, 16, 4, False), 1), "but of no open lattice"
+    far = [one for those in near([(5, 6)], Grid(64, 64, 2), 18).values() for _, one in those]
+    assert np.abs(far).max() == 8, "no farther along rows and columns than the neighbourhood, whatever its order"
+
+
+def test_of_many_data_the_nearest_count():
+    place = [(20, 20 + k) for k in range(1, 24)]
+    here = near(place, Grid(64, 64, 8, False), 18)[16 * 64 + 16]
+    assert [datum for datum, _ in here] == list(range(MOST_NEAR))
+    other = near(place[::-1], Grid(64, 64, 8, False), 18)[16 * 64 + 16]
+    assert [datum for datum, _ in other] == list(range(22, 22 - MOST_NEAR, -1))
+
+
+@pytest.mark.parametrize("torus", [True, False])
+def test_a_window_has_the_data_of_the_whole(torus):
+    rng, grid = np.random.default_rng(2), Grid(40, 48, 4, torus)
+    place = rng.integers(0, 40, (30, 2))
+    whole, window = near(place, grid, 8), grid.window(7 if torus else 4, 9 if torus else 6, 6, 5)
+    rows, cols = (window.within.top + np.arange(6)) % 10, (window.within.left + np.arange(5)) % 12
+    expected = {a * 5 + b: whole.get(i * 4 * 48 + j * 4, []) for a, i in enumerate(rows) for b, j in enumerate(cols)}
+    assert near(place, window, 8) == {site: data for site, data in expected.items() if data}

@@ -6,6 +6,7 @@ from cases import REFERENCE, assert_same_bits, host, opencl, problem, problems
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.ops import nearest as module
 from simdtex.ops.leaves import FEATURES
@@ -23,9 +24,9 @@ FORMS = [
 
 def run(machine, p, strength=1.0, dear=0.1):
     sites, field, offsets = p.on(machine)
-    terms = (np.float32(1 / (1 + strength)), machine.put(p.penalty(dear)), p.phased(machine))
+    terms = (np.float32(1 / (1 + strength)), p.costs(machine, dear))
     candidates, strip = p.candidates(machine), p.strip(machine)
-    return host(machine, nearest(machine, sites, field, offsets, p.grid, candidates, strip, terms))
+    return host(machine, nearest(machine, sites, field, offsets, p.grid, candidates, strip, *terms))
 
 
 def apart(p, s):
@@ -38,13 +39,26 @@ def apart(p, s):
     return np.maximum(d - free, 0)
 
 
+def misfit(p, s):
+    """How far each candidate is from the data around the s-th site, datum by datum and rounded as `fma_sum` does."""
+    found, data = p.candidates(REFERENCE), p.scattered(REFERENCE)
+    if data is None:
+        return np.float32(0)
+    terms = [np.zeros(found.size, np.float32)]
+    for k in range(data.begin[p.sites[s]], data.begin[p.sites[s] + 1]):
+        for x, y in zip(data.values[k].tolist(), p.sample.working, strict=True):
+            e = (x - y[found.positions[: found.size] + data.reach[k]].astype(np.float32)) * data.certain
+            terms.append(e if x != UNKNOWN else 0 * e)
+    return fma_sum(np.stack(terms, 1))
+
+
 @given(problems(max_order=5), strengths, penalties)
 @settings(max_examples=20)
 def test_the_reference_is_the_nearest_of_the_rule_the_first_of_several(p, strength, dear):
     choice, values = run(REFERENCE, p, strength, dear)
     found, candidates = p.distances(REFERENCE, strength)
     for s in range(p.sites.size):
-        column = (found.distance[:, s] + p.penalty(dear)[: candidates.size] + apart(p, s)).tolist()
+        column = (found.distance[:, s] + p.penalty(dear)[: candidates.size] + apart(p, s) + misfit(p, s)).tolist()
         assert choice[s] == candidates.positions[column.index(min(column))]
     assert np.array_equal(values, p.sample.working[:, choice])
 
@@ -62,8 +76,8 @@ def test_places_that_may_not_be_taken_cost_infinity(machine, masked):
     found = {}
     for m in (REFERENCE, machine):
         sites, field, offsets = p.on(m)
-        terms = (np.float32(0.5), m.put(p.penalty(0.1, every=True)), None)
-        outcome = nearest(m, sites, field, offsets, p.grid, p.candidates(m, every=True), p.strip(m), terms)
+        terms = (np.float32(0.5), p.costs(m, 0.1, every=True))
+        outcome = nearest(m, sites, field, offsets, p.grid, p.candidates(m, every=True), p.strip(m), *terms)
         found[m.name] = host(m, outcome)
     first, second = found.values()
     assert_same_bits(first, second)
@@ -73,7 +87,15 @@ def test_places_that_may_not_be_taken_cost_infinity(machine, masked):
 @pytest.mark.parametrize(("channels", "dtype"), [(3, np.uint8), (2, np.uint16), (4, np.float32)])
 def test_vectors_and_large_orders_have_the_references_bits(machine, channels, dtype):
     p = problem(
-        2, order=50, channels=channels, dtype=dtype, sample_shape=(33, 31), shape=(20, 17), count=40, regular=True
+        2,
+        order=50,
+        channels=channels,
+        dtype=dtype,
+        sample_shape=(33, 31),
+        shape=(20, 17),
+        count=40,
+        regular=True,
+        between=True,
     )
     assert_same_bits(run(machine, p), run(REFERENCE, p))
 

@@ -27,21 +27,13 @@ def proposal(machine, p, exhaustive=False, chance=4):
 def relaxation(machine, p, gibbs=False, noisy=False, coherence=1.0, level=0, dear=0.0, novelty=0.0, **options):
     window, _ = p.window(0.5)
     discount, choice = np.float32(1 / (1 + coherence)), Choice(gibbs, noisy, window)
-    penalty = machine.put(p.penalty(dear, options.get("exhaustive", False)))
-    terms = (discount, np.float32(novelty * p.sample.variance), penalty)
-    proposed = proposal(machine, p, **options)
-    return Relaxation(
-        p.grid,
-        machine.put(p.offsets),
-        proposed,
-        *terms,
-        choice,
-        -1024,
-        2**33 + 5,
-        level,
-        p.confidences,
-        p.phased(machine, options.get("exhaustive", False)),
+    terms = (
+        discount,
+        np.float32(novelty * p.sample.variance),
+        p.costs(machine, dear, options.get("exhaustive", False)),
     )
+    proposed = proposal(machine, p, **options)
+    return Relaxation(p.grid, machine.put(p.offsets), proposed, *terms, choice, -1024, 2**33 + 5, level, p.confidences)
 
 
 def counter(machine, p):
@@ -88,6 +80,7 @@ def reflecting(draw):
         phases=draw(st.sampled_from(["all", "decimated"])),
         count=24,
         regular=draw(st.booleans()),
+        between=draw(st.booleans()),
     )
 
 
@@ -118,7 +111,8 @@ GIVEN = [
     {"nowhere": 0.3, "weight": 1.0},
     {"guides": 2, "channels": 2, "spacing": 2, "torus": False},
     {"guides": 1, "nowhere": 0.2, "weight": 1.0, "masked": 0.3},
-    {"channels": 2, "regular": True},
+    {"channels": 2, "regular": True, "between": True},
+    {"guides": 1, "nowhere": 0.2, "between": True},
 ]
 """Hard data, guides, and a sample that may be used in part."""
 

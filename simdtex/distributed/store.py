@@ -30,13 +30,13 @@ from numpy.typing import NDArray
 from simdtex.checkpoint import pack, unpack
 from simdtex.distributed.description import described, restored
 from simdtex.distributed.layout import Layout, LevelLayout, planned
-from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Held
+from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Data, Held
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.tiles import Tally, Tile
 from simdtex.model.lattice import Grid
 from simdtex.ops.neighbourhood import Confidences, Field
 
-FORMAT = 4
+FORMAT = 5
 """Format of the store; another one is refused."""
 
 TOGETHER = 2**22
@@ -107,6 +107,9 @@ class Store:
                 held = True
                 for name, plane in here._asdict().items():
                     store._planes(f"given/held{level.number}/{name}", level, plane.shape[:-2], plane.dtype)[:] = plane
+            if (data := conditions.scattered(level.number)) is not None:
+                for name, array in data._asdict().items():
+                    work.create_array(f"scattered{level.number}/{name}", data=array)
         sample, finest = plan.sample, layout.levels[0]
         if given is not None:
             for name, array in (("values", given.values), ("known", given.known)):
@@ -274,7 +277,7 @@ class Stored(Conditions):
     """Conditioning data and guides of an output, window by window out of a store."""
 
     def __init__(self, store: Store, work: Work) -> None:
-        super().__init__(len(work.layout.levels), work.confidences)
+        super().__init__(work.confidences)
         self._store, self._work = store, work
 
     def at(self, number: int, grid: Grid) -> Held | None:
@@ -283,6 +286,11 @@ class Stored(Conditions):
             return None
         window = Tile(*grid.within[:2], grid.rows, grid.cols)
         return self._store.held(self._work.layout.levels[number], window)
+
+    def scattered(self, number: int) -> Data | None:
+        """Return the conditioning data between the sites of a level; None if there are none."""
+        work, name = self._store.root["work"], f"scattered{number}"
+        return Data(*(work[name][field][...] for field in Data._fields)) if name in work else None
 
 
 def first_turn(layout: Layout) -> Turn:

@@ -89,7 +89,7 @@ def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
     sd = run.options.finish or 0
     frame = framed(level.lattice, tile, int(around(sd)[0].max()) if sd else 0)
     state = here.store.read(level, turn.read, frame.window)
-    known = here.store.held(level, frame.window).kind > 0 if work.held else None
+    known = here.store.held(level, frame.window).known if work.held else None
     field, grid = Field(*map(run.machine.put, state)), run.grid(0).window(*frame.window)
     shown = finished(run, grid, field, known, state.source[frame.rows], frame.rows.start)[:, frame.cols]
     if here.work.given:

@@ -2,14 +2,15 @@
 """Sites whose values are given: hard data, the known part of a picture. They stay what they are.
 
 A given site has the temperature 0 from the beginning, and nothing relaxes it. At a coarse level a datum that lies
-between the sites stands for the nearest one, for that level only, as in multiple-point simulation (Strebelle 2002); of
-several the nearest, and of those the first, row by row.
+between the sites is compared where it lies (`simdtex.ops.costs`). A guide's value between the sites stands for the
+nearest site that has none, for that level only; of several the nearest, and of those the first, row by row.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import isqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -66,23 +67,48 @@ class Given:
 
 
 class Stand(NamedTuple):
-    """Sites that stand for off-grid data at a level: ``site`` and ``datum``, (n,) pixel indices of the output."""
+    """Sites that stand for values between them: ``site`` and ``datum``, (n,) pixel indices of the output."""
 
     site: NDArray[np.int64]
     datum: NDArray[np.int64]
 
 
+MOST_NEAR = 8
+"""Data between the sites of a level that a site is compared with at most: the nearest."""
+
 NO_STAND_IN = Stand(np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 
 def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
-    """Return the sites of a level's lattice that stand in for off-grid data, in ascending order.
+    """Return the sites of a level's lattice that stand in for values between them, in ascending order.
 
-    ``known`` (H, W) are the data. A datum moves if none of the four sites around it is given itself.
+    ``known`` (H, W) are the values. One moves if none of the four sites around it is known itself.
     """
     step, (height, width) = grid.spacing, known.shape
-    if step == 1:
-        return NO_STAND_IN
+    row, col = between(known, grid)
+
+    def at(i: NDArray[np.intp], n: int) -> NDArray[np.intp]:
+        return i % n if grid.torus else np.minimum(i, n - 1)
+
+    i, j = (row + step // 2) // step, (col + step // 2) // step
+    if not grid.torus:
+        i, j = np.minimum(i, grid.rows - 1), np.minimum(j, grid.cols - 1)
+    apart = (np.minimum(i * step, height) - row) ** 2 + (np.minimum(j * step, width) - col) ** 2
+    site = at(i, grid.rows) * step * width + at(j, grid.cols) * step
+    datum = row * width + col
+    order = np.lexsort((datum, apart, site))
+    site, datum = site[order], datum[order]
+    first = np.ones(site.size, bool)
+    first[1:] = site[1:] != site[:-1]
+    return Stand(site[first].astype(np.int64), datum[first].astype(np.int64))
+
+
+def between(known: NDArray[np.bool_], grid: Grid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return rows and columns of the data between the sites of a lattice that have no given site around them.
+
+    ``known`` (H, W) are the data; around a datum are the four sites of its cell.
+    """
+    step = grid.spacing
     own = np.zeros((grid.rows, grid.cols), bool)
     own[:] = known[::step, ::step]
     row, col = np.nonzero(known)
@@ -97,18 +123,41 @@ def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
     for down, right in ((0, 0), (0, 1), (1, 0), (1, 1)):
         needed = (row % step >= down) & (col % step >= right)  # a datum in a site's row has none above or below
         represented |= needed & own[at(above + down, grid.rows), at(left + right, grid.cols)]
-    row, col = row[~represented], col[~represented]
-    i, j = (row + step // 2) // step, (col + step // 2) // step
-    if not grid.torus:
-        i, j = np.minimum(i, grid.rows - 1), np.minimum(j, grid.cols - 1)
-    apart = (np.minimum(i * step, height) - row) ** 2 + (np.minimum(j * step, width) - col) ** 2
-    site = at(i, grid.rows) * step * width + at(j, grid.cols) * step
-    datum = row * width + col
-    order = np.lexsort((datum, apart, site))
-    site, datum = site[order], datum[order]
-    first = np.ones(site.size, bool)
-    first[1:] = site[1:] != site[:-1]
-    return Stand(site[first].astype(np.int64), datum[first].astype(np.int64))
+    return row[~represented], col[~represented]
+
+
+def around(
+    place: NDArray[np.int32], grid: Grid, order: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return the data near each site of a lattice, or of a window of it, site by site, the nearest first.
+
+    ``place`` (n, 2) rows and columns of the data in pixels; those no farther than the neighbourhood of ``order``
+    reaches are near, and of them the `MOST_NEAR` nearest count. Returns the pixel index of the site in the grid's
+    picture, the number of the datum, and its offset (m, 2) from the site in pixels.
+    """
+    whole, reach = grid.within, isqrt(order)
+    found: list[list[NDArray[np.int64]]] = [[], [], []]
+    for a in range(-reach, reach + 2):
+        for b in range(-reach, reach + 2):
+            i, j = place[:, 0] // whole.step + a, place[:, 1] // whole.step + b
+            apart = place - np.stack([i, j], 1) * whole.step
+            near = ((apart.astype(np.int64) ** 2).sum(1) <= order * whole.step**2) & (
+                abs(apart).max(1) <= reach * whole.step
+            )
+            if grid.torus:
+                i, j = (i - whole.top) % whole.rows, (j - whole.left) % whole.cols
+            else:
+                i, j = i - whole.top, j - whole.left
+            near &= (i >= 0) & (i < grid.rows) & (j >= 0) & (j < grid.cols)
+            datum = np.flatnonzero(near)
+            found[0].append((i[near] * grid.width + j[near]).astype(np.int64) * grid.spacing)
+            found[1].append(datum)
+            found[2].append(apart[near].astype(np.int64))
+    site, datum, apart = (np.concatenate(parts) for parts in found)
+    sorting = np.lexsort((datum, (apart**2).sum(1), site))
+    site, datum, apart = site[sorting], datum[sorting], apart[sorting]
+    rank = np.arange(site.size) - np.searchsorted(site, site)
+    return site[rank < MOST_NEAR], datum[rank < MOST_NEAR], apart[rank < MOST_NEAR]
 
 
 class Planes(NamedTuple):

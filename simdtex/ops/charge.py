@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The penalty of each candidate and its place on a lattice, added to distances that are kept."""
+"""The costs of each candidate, added to distances that are kept."""
 
 from __future__ import annotations
 
@@ -7,34 +7,23 @@ import numpy as np
 
 from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.sample import BLOCK, Candidates
-from simdtex.ops import phases
+from simdtex.ops.costs import Costs
 from simdtex.ops.lcpdf import Distances
-from simdtex.ops.phases import Phased
 
 
 @Operation
 def charge(
-    machine: Launcher | None,
-    distances: Distances,
-    candidates: Candidates,
-    penalty: Array,
-    sites: Array,
-    phased: Phased | None = None,
+    machine: Launcher | None, distances: Distances, candidates: Candidates, sites: Array, costs: Costs
 ) -> Distances:
-    """Return d_p + penalty_p + what p is apart in phase, (n, P); a device changes the distances in place.
-
-    ``penalty`` (n or more,) float32 of `simdtex.ops.use`.
-    """
+    """Return d_p with the costs of p, (n, P). A device changes the distances in place."""
     if machine is None:
-        d = distances.distance + penalty[: candidates.size, None]
-        return distances._replace(
-            distance=d + phased.apart(np.arange(candidates.size)[:, None], sites) if phased else d
-        )
+        numbers = np.arange(candidates.size)[:, None]
+        return distances._replace(distance=costs.added(distances.distance, numbers, sites, candidates))
     blocks, padded = distances.nearest.shape
     machine.launch(
-        machine.kernel("charge", "charge", BLOCK=BLOCK, **phases.defines(phased)),
+        machine.kernel("charge", "charge", BLOCK=BLOCK, **costs.defines),
         (distances.sites, blocks),
-        *(sites, np.int32(distances.sites), np.int32(padded), np.int32(candidates.size), np.int32(blocks), penalty),
-        *(*phases.arguments(machine, phased), distances.distance, distances.nearest),
+        *(sites, np.int32(distances.sites), np.int32(padded), np.int32(candidates.size), np.int32(blocks)),
+        *(*costs.arguments(machine, candidates), distances.distance, distances.nearest),
     )
     return distances

@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Machine, Operation
 from simdtex.model.lattice import Grid
+from simdtex.model.regularity import WAVES
 from simdtex.model.sample import Candidates, Places, Sample
-from simdtex.ops import coherence, lcpdf, neighbourhood, phases
+from simdtex.ops import coherence, lcpdf, neighbourhood
 from simdtex.ops.charge import charge
+from simdtex.ops.costs import Costs
 from simdtex.ops.lcpdf import Relaxed
 from simdtex.ops.leaves import FEATURES, Leaves, grow
 from simdtex.ops.neighbourhood import Field
-from simdtex.ops.phases import Phased
 
 CHECK = 4
 """Neighbours between two looks at the bound; every neighbourhood has a multiple of 4."""
@@ -96,24 +97,24 @@ def nearest(
     grid: Grid,
     candidates: Candidates,
     strip: Strip,
-    terms: tuple[np.float32, Array, Phased | None],
+    discount: np.float32,
+    costs: Costs,
 ) -> Relaxed:
     """Return the nearest candidate of each site by its distance, discounted for coherence, plus its other costs.
 
-    ``terms`` the discount, the penalties of the candidates, and their phases.
+    ``discount`` is 1 / (1 + coherence).
     """
-    discount, penalty, phased = terms
     if machine is None:
         around = neighbourhood.neighbourhood.reference(sites, field, offsets, grid)
         distances = lcpdf.distance.reference(around, candidates)
         distances = coherence.coherence.reference(distances, candidates, sites, field, offsets, grid, discount)
-        distances = charge.reference(distances, candidates, penalty, sites, phased)
+        distances = charge.reference(distances, candidates, sites, costs)
         choice = candidates.positions[distances.distance.argmin(0)]
         return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
     count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
     plane = np.int32(candidates.rows * candidates.cols)
-    defines = {"V": machine.vector, "C": channels, "STEP": machine.step, "CHECK": CHECK} | phases.defines(phased)
-    apart = phases.arguments(machine, phased)
+    defines = {"V": machine.vector, "C": channels, "STEP": machine.step, "CHECK": CHECK} | costs.defines
+    more = costs.arguments(machine, candidates)
     f, i, leaves = np.float32, np.int32, strip.leaves()
     near = machine.empty((count, neighbours * (1 + channels)), f)
     listed = machine.empty((count, neighbours * (2 + channels)), i)
@@ -127,7 +128,7 @@ def nearest(
         *(sites, i(count), i(neighbours), *field, i(prod(field.values.shape[1:])), offsets, grid.struct),
         *(candidates.index_of, plane),
         *(candidates.pixels, candidates.positions, candidates.reach, strip.reach),
-        *(machine.constant(_spread(strip.offsets)), discount, penalty, *apart, axes, f(leaves.middle if leaves else 0)),
+        *(machine.constant(_spread(strip.offsets)), discount, *more, axes, f(leaves.middle if leaves else 0)),
         *(near, listed, used, features, least, where, certain),
     )
     split = machine.split(count, -(-strip.cols // (machine.vector * machine.step)) * strip.rows)
@@ -140,7 +141,7 @@ def nearest(
             (count * split,),
             *(sites, i(count), i(neighbours), near, features, least, where, certain),
             *(leaves.box, leaves.rows, leaves.order, i(leaves.number), f(leaves.blur)),
-            *(candidates.pixels, plane, candidates.positions, candidates.reach, penalty, *apart),
+            *(candidates.pixels, plane, candidates.positions, candidates.reach, *more),
             *(i(split), found, at, work, wanted),
         )
     shape = (strip.first, strip.pitch, strip.rows, strip.cols)
@@ -148,8 +149,8 @@ def nearest(
         machine.kernel("nearest", "nearest_scan", **defines),
         (count * split,),
         *(sites, i(count), i(neighbours), listed, used, near, least, where),
-        *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach, penalty, *apart),
-        *(slack(neighbours * channels), i(split), i(leaves is None), wanted, i(row), found, at, work),
+        *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach, *more),
+        *(slack(neighbours * channels + WAVES), i(split), i(leaves is None), wanted, i(row), found, at, work),
     )
     tally = machine.fma_counters(count, 2 * count * candidates.size * neighbours * channels)
     out = Relaxed(machine.empty((count,), np.int32), machine.empty((channels, count), np.uint16))

@@ -19,14 +19,14 @@ from simdtex import random
 from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.lattice import LATTICE, Grid
 from simdtex.model.sample import Candidates
-from simdtex.ops import lcpdf, phases
+from simdtex.ops import lcpdf
 from simdtex.ops.charge import charge
 from simdtex.ops.coherence import coherence, continuing, sources
 from simdtex.ops.commit import commit
+from simdtex.ops.costs import Costs
 from simdtex.ops.lcpdf import Choice, Distances, Key, Relaxed
 from simdtex.ops.nearest import Strip, nearest
 from simdtex.ops.neighbourhood import USUAL, Confidences, Field, gathered, neighbourhood
-from simdtex.ops.phases import Phased
 from simdtex.ops.square import Square
 from simdtex.ops.temperature import temperature
 
@@ -62,7 +62,7 @@ class Everything(NamedTuple):
         found = lcpdf.distance.reference(near, self.candidates)
         where = (sites, field, relaxation.offsets, relaxation.grid)
         found = coherence.reference(found, self.candidates, *where, relaxation.discount)
-        found = charge.reference(found, self.candidates, relaxation.penalty, sites, relaxation.phased)
+        found = charge.reference(found, self.candidates, sites, relaxation.costs)
         if relaxation.novelty > 0:
             source = sources(relaxation.grid.neighbours(sites, relaxation.offsets), field)
             same = np.where(source >= 0, self.candidates.index_of[source], -1)
@@ -99,9 +99,7 @@ class Listed(NamedTuple):
         if relaxation.confidences.guides:
             offsets = np.concatenate([offsets, np.zeros((1, 2), np.int32)])
         d = self.square.distance(numbers, *gathered(sites, r, field, relaxation.confidences), offsets)
-        d = np.where(suggested, d * relaxation.discount, d) + relaxation.penalty[np.maximum(numbers, 0)]
-        if relaxation.phased:
-            d += relaxation.phased.apart(numbers, sites)
+        d = relaxation.costs.added(np.where(suggested, d * relaxation.discount, d), numbers, sites, self.candidates)
         return numbers, Distances(d, None, sites.size)
 
     def _list(
@@ -167,10 +165,9 @@ class Relaxation(NamedTuple):
 
     ``grid``, ``offsets`` its lattice and neighbourhood; ``proposal`` the candidates; ``discount`` 1 / (1 + coherence),
     the factor of the distance of candidates that continue a neighbour's source; ``novelty`` the penalty for each
-    neighbour whose source is continued, and `AGAIN` times that for each whose source the candidate is; ``penalty``
-    (n or more,) float32 the penalty of each candidate (`simdtex.ops.use`); ``choice`` among them; ``confidences`` how
-    much values count; ``phased`` the phases of a regular sample; ``xi`` of equation (13) in 1/1024; ``seed`` and
-    ``level`` the keys of its random numbers.
+    neighbour whose source is continued, and `AGAIN` times that for each whose source the candidate is; ``costs`` of
+    each candidate; ``choice`` among them; ``confidences`` how much values count; ``xi`` of equation (13) in 1/1024;
+    ``seed`` and ``level`` the keys of its random numbers.
     """
 
     grid: Grid
@@ -178,13 +175,12 @@ class Relaxation(NamedTuple):
     proposal: Everything | Listed
     discount: np.float32
     novelty: np.float32
-    penalty: Array
+    costs: Costs
     choice: Choice
     xi: int
     seed: int
     level: int
     confidences: Confidences = USUAL
-    phased: Phased | None = None
 
     @property
     def fused(self) -> bool:
@@ -265,14 +261,15 @@ def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxatio
     assert isinstance(proposal, Everything)
     candidates = proposal.candidates
     if not (choice.draws or relaxation.confidences.own):
-        terms = (relaxation.discount, relaxation.penalty, relaxation.phased)
-        relaxed = nearest(machine, sites, field, offsets, grid, candidates, proposal.strip, terms)
+        relaxed = nearest(
+            machine, sites, field, offsets, grid, candidates, proposal.strip, relaxation.discount, relaxation.costs
+        )
     else:
         near = neighbourhood(machine, sites, field, offsets, grid, relaxation.confidences)
         distances = lcpdf.distance(machine, near, candidates)
         if relaxation.discount != 1:
             distances = coherence(machine, distances, candidates, sites, field, offsets, grid, relaxation.discount)
-        distances = charge(machine, distances, candidates, relaxation.penalty, sites, relaxation.phased)
+        distances = charge(machine, distances, candidates, sites, relaxation.costs)
         key = Key(relaxation.seed, relaxation.level, turn)
         relaxed = lcpdf.take(machine, distances, candidates, sites, grid, choice, key)
     return relaxed, temperature(machine, sites, field, offsets, grid, relaxation.xi)
@@ -294,8 +291,8 @@ def _fused(
     common = (offsets, candidates.reach, candidates.index_of, candidates.positions)
     key = np.uint32(turn)
     defines = {"C": len(field.values), "V": machine.vector} | ({"TILES": 1} if grid.tile else {})
-    defines |= confidences.defines | phases.defines(relaxation.phased)
-    costs = relaxation.penalty, *phases.arguments(machine, relaxation.phased)
+    defines |= confidences.defines | relaxation.costs.defines
+    costs = relaxation.costs.arguments(machine, candidates)
     own: list[Any]
     if isinstance(proposal, Everything):
         strip = proposal.strip

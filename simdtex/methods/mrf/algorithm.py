@@ -22,6 +22,7 @@ from simdtex.model.lattice import Grid
 from simdtex.model.sample import BLOCK
 from simdtex.ops import active
 from simdtex.ops.commit import commit
+from simdtex.ops.costs import Costs
 from simdtex.ops.finish import finish
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import Relaxation, relax, relax_apart
@@ -154,8 +155,7 @@ def rule(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
         discount=level.discount,
         novelty=level.novelty,
         confidences=level.confidences,
-        phased=level.phased,
-        penalty=level.machine.put(np.pad(penalty, (0, -penalty.size % BLOCK))),
+        costs=Costs(level.machine.put(np.pad(penalty, (0, -penalty.size % BLOCK))), level.phased, level.scattered),
         choice=level.choice,  # 6.2.2.2 a draw from it, or its mode
         xi=level.xi,  # 6.2.2.3 the temperature, equation (13)
         seed=level.setting.seed,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Conditioning data and guides of an output, level by level: known sites, stand-ins for off-grid data, guides."""
+"""Conditioning data and guides of an output, level by level: known sites, data between the sites, guides."""
 
 from __future__ import annotations
 
@@ -12,58 +12,57 @@ from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf.input import Input
-from simdtex.model.given import NO_STAND_IN, Stand, stand_ins
+from simdtex.model.given import NO_STAND_IN, Stand, between, stand_ins
 from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import Grid
-from simdtex.ops.neighbourhood import UNTOUCHED, Confidences, Field
-
-FREE, KNOWN, STANDING = 0, 1, 2
-"""Site kinds: free, known, or standing in for an off-grid datum."""
+from simdtex.ops.neighbourhood import Confidences, Field
 
 
 class Held(NamedTuple):
     """Conditioning data and guides of a level's sites, on the host.
 
-    ``values`` (C, rows, cols) uint16, at free sites only those of guides; ``source`` (rows, cols) int32; ``kind``
-    (rows, cols) uint8: `FREE`, `KNOWN` or `STANDING`.
+    ``values`` (C, rows, cols) uint16, at free sites only those of guides; ``source`` (rows, cols) int32;
+    ``known`` (rows, cols) bool, False at free sites.
     """
 
     values: NDArray[np.uint16]
     source: NDArray[np.int32]
-    kind: NDArray[np.uint8]
+    known: NDArray[np.bool_]
+
+
+class Data(NamedTuple):
+    """Conditioning data between the sites of a level: ``place`` (n, 2) int32, ``values`` (n, C) uint16."""
+
+    place: NDArray[np.int32]
+    values: NDArray[np.uint16]
 
 
 class Conditions(ABC):
     """Conditioning data and guides of an output: all in memory, or windows out of a store.
 
-    ``levels`` is M of Algorithm 1; ``confidences`` says which channels are guides, whether values have confidences of
+    ``confidences`` says which channels are guides, whether values have confidences of
     their own, and the weights.
     """
 
-    def __init__(self, levels: int, confidences: Confidences) -> None:
-        self.levels, self.confidences = levels, confidences
+    def __init__(self, confidences: Confidences) -> None:
+        self.confidences = confidences
 
     @abstractmethod
     def at(self, number: int, grid: Grid) -> Held | None:
         """Return the data and guides of a level at the sites of its lattice, or of a window; None if there are none."""
 
-    def entered(self, machine: Machine, number: int, grid: Grid, field: Field) -> Field:
-        """Return the field at the beginning of a level, with its known sites at temperature 0.
+    @abstractmethod
+    def scattered(self, number: int) -> Data | None:
+        """Return the conditioning data between the sites of a level; None if there are none."""
 
-        Data between the sites have stand-ins; the stand-ins of the level above are free again, at temperature 1.
-        """
+    def entered(self, machine: Machine, number: int, grid: Grid, field: Field) -> Field:
+        """Return the field at the beginning of a level, with its known sites at temperature 0."""
         held = self.at(number, grid)
         if held is None:
             return field
         planes = [np.array(machine.get(plane)) for plane in field]
         values, source, temperature = (grid.view(plane) for plane in planes)
-        (top, rows), (left, cols) = grid.above
-        if number + 1 < self.levels and rows and cols:
-            coarse = Grid(grid.within.rows, grid.within.cols, 2, grid.torus).window(top, left, rows, cols)
-            above = self.at(number + 1, coarse)
-            released = temperature[grid.within.top % 2 :: 2, grid.within.left % 2 :: 2]
-            released[above is not None and above.kind == STANDING] = UNTOUCHED
-        guides, known = self.confidences.guides, held.kind != FREE
+        guides, known = self.confidences.guides, held.known
         matched = len(values) - guides
         values[matched:] = held.values[len(held.values) - guides :]
         if known.any():
@@ -74,10 +73,10 @@ class Conditions(ABC):
     def movable(self, machine: Machine, number: int, grid: Grid) -> Array | None:
         """Return an (H, W) uint16 array that is 0 at the known sites of a grid; None if all sites are free."""
         held = self.at(number, grid)
-        if held is None or not held.kind.any():
+        if held is None or not held.known.any():
             return None
         plane = np.zeros((grid.height, grid.width), np.uint16)
-        grid.view(plane)[...] = held.kind == FREE
+        grid.view(plane)[...] = ~held.known
         return machine.put(plane)
 
 
@@ -90,8 +89,9 @@ class Conditioning(Conditions):
         centre = np.float32(max(1, round(sqrt(neighbours) / 2)))
         weight = np.float32(round(8 * sqrt(plan.options.data_weight)) / 8)  # in eighths, so that sums stay exact
         confidences = Confidences(len(sample.guides), len(sample.guides) > 0 or hard, centre, weight)
-        super().__init__(plan.levels, confidences)
+        super().__init__(confidences)
         self.guides, self.planes = sample.guides, planes
+        self.torus = plan.options.boundary == "torus"
         self._held: dict[int, Held] = {}
 
     def at(self, number: int, grid: Grid) -> Held | None:
@@ -99,10 +99,17 @@ class Conditioning(Conditions):
         if self.planes is None and not len(self.guides):
             return None
         if number not in self._held:
-            self._held = {other: held for other, held in self._held.items() if other == number + 1}  # two are enough
-            self._held[number] = self._whole(Grid(*self._shape, 2**number, grid.torus))
+            self._held = {number: self._whole(Grid(*self._shape, 2**number, grid.torus))}  # one level is enough
         held = self._held[number]
         return Held(*(grid.cut(plane) for plane in held)) if grid.part else held
+
+    def scattered(self, number: int) -> Data | None:
+        """Return the conditioning data between the sites of a level; None if there are none."""
+        if self.planes is None or not number:
+            return None
+        row, col = between(self.planes.known, Grid(*self._shape, 2**number, self.torus))
+        place, values = np.stack([row, col], 1).astype(np.int32), self.planes.values[:, row, col].T
+        return Data(place, np.ascontiguousarray(values)) if row.size else None
 
     @property
     def _shape(self) -> tuple[int, int]:
@@ -113,16 +120,13 @@ class Conditioning(Conditions):
         """Return the data and guides of a whole lattice."""
         planes, matched = self.planes, 0 if self.planes is None else len(self.planes.values)
         values = np.zeros((matched + len(self.guides), *self._shape), np.uint16)
-        source, kind = np.full(self._shape, -1, np.int32), np.full(self._shape, FREE, np.uint8)
+        source, known = np.full(self._shape, -1, np.int32), np.zeros(self._shape, bool)
         if planes is not None:
             values[:matched] = np.where(planes.known, planes.values, 0)
-            source[:], kind[:] = planes.source, planes.known * np.uint8(KNOWN)
-            site, datum = stand_ins(planes.known, grid)
-            values.reshape(len(values), -1)[:matched, site] = planes.values.reshape(matched, -1)[:, datum]
-            source.flat[site], kind.flat[site] = -1, STANDING
+            source, known = planes.source, planes.known
         gaps = bool((self.guides == UNKNOWN).any())
         for plane, guide in zip(values[matched:], self.guides, strict=True):
             stand: Stand = stand_ins(guide != UNKNOWN, grid) if gaps else NO_STAND_IN
             plane[:] = guide
             plane.flat[stand.site] = guide.flat[stand.datum]
-        return Held(*(np.ascontiguousarray(grid.view(plane)) for plane in (values, source, kind)))
+        return Held(*(np.ascontiguousarray(grid.view(plane)) for plane in (values, source, known)))

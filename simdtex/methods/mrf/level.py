@@ -16,14 +16,15 @@ from simdtex.machine.interface import Array, Machine
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions
 from simdtex.methods.mrf.input import Input
 from simdtex.methods.mrf.options import Options
+from simdtex.model.given import around
 from simdtex.model.lattice import Grid
 from simdtex.model.regularity import WAVES
 from simdtex.model.sample import Candidates, Places
 from simdtex.ops import active, lcpdf
+from simdtex.ops.costs import Phased, Scattered
 from simdtex.ops.lcpdf import Choice
-from simdtex.ops.nearest import strip_of
+from simdtex.ops.nearest import TAIL, strip_of
 from simdtex.ops.neighbourhood import Confidences, Field
-from simdtex.ops.phases import Phased
 from simdtex.ops.relax import EXHAUSTIVE, KEPT, Everything, Listed
 from simdtex.ops.square import square_of
 from simdtex.ops.use import FairUse
@@ -165,6 +166,7 @@ class Lattices:
             lists=Lists(machine),
             movable=self.conditions.movable(machine, number, grid),
             phased=level.phased and level.phased._replace(sites=self._phases(grid)),
+            scattered=self._scattered(number, grid),
         )
 
     def _level(self, number: int) -> Level:
@@ -202,6 +204,7 @@ class Lattices:
             lists=Lists(machine),
             movable=self.conditions.movable(machine, number, grid),
             phased=self._phased(number, proposal.candidates),
+            scattered=self._scattered(number, grid),
         )
 
     def _phased(self, number: int, candidates: Candidates) -> Phased | None:
@@ -212,6 +215,7 @@ class Lattices:
         certain = np.float32(round(sqrt(1.25 * len(self.offsets))))  # what a guide counts there and at the site
         step = 1 if self.options.phases == "all" else 2**number
         free = np.float32(round(float(certain) ** 2 * waves.half(step)))
+        those = np.pad(those, ((0, 0), (0, TAIL)))  # whole vectors are read at the end, too
         return Phased(self.machine.put(those), self._phases(self.grid(number)), certain, free)
 
     def _phases(self, grid: Grid) -> Array:
@@ -220,6 +224,19 @@ class Lattices:
         planes = np.zeros((WAVES, grid.height, grid.width), np.uint16)
         grid.view(planes)[...] = self.sample.waves.at(grid)
         return self.machine.put(planes)
+
+    def _scattered(self, number: int, grid: Grid) -> Scattered | None:
+        """Return the conditioning data between the sites of a lattice, or of a window of it; None if there are none."""
+        data = self.conditions.scattered(number)
+        if data is None:
+            return None
+        site, datum, apart = around(data.place, grid, self.options.order)
+        if not site.size:
+            return None
+        begin = np.searchsorted(site, np.arange(grid.height * grid.width + 1)).astype(np.int32)
+        reach = (apart @ np.array([self.sample.cols, 1])).astype(np.int32)
+        put = self.machine.put
+        return Scattered(put(begin), put(reach), put(data.values[datum]), self.conditions.confidences.hard)
 
     def _in_place(self, grid: Grid) -> bool:
         schedule = self.plan.schedule
@@ -298,6 +315,8 @@ class Level:
         0 at sites whose values are given, which free sweeps leave alone. None: every site may relax.
     phased : Phased, optional
         The phases of a regular sample and of the output.
+    scattered : Scattered, optional
+        Conditioning data between the sites.
     """
 
     number: int
@@ -318,6 +337,7 @@ class Level:
     lists: Lists = field(repr=False)
     movable: Array | None = None
     phased: Phased | None = None
+    scattered: Scattered | None = None
 
     @property
     def machine(self) -> Machine:

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// What candidate p costs a site beside its distance, simdtex.ops.costs:
+//
+//   penalty_p + max(0, sum_c (certain (x_c - y_c))^2 - free) + sum_r (hard (x_r - y_r))^2
+//
+// the penalty for its use; the difference of their phases where the sample is regular (-D WAVES: cosines and sines);
+// and the differences from data r that lie between the sites of the level (-D SCATTERED: channels of each).
+#ifndef SIMDTEX_COSTS_H
+#define SIMDTEX_COSTS_H
+#include "common/confidence.h"
+
+#ifndef WAVES
+#define WAVES 0
+#endif
+#ifndef SCATTERED
+#define SCATTERED 0
+#endif
+
+// penalty (listed,)        of each candidate
+// waves   (WAVES, listed)  of each candidate
+// phases  (WAVES, area)    of each site
+// begin   (area + 1,)      where the data of the site at each pixel index begin
+// reach_  (n,)             pixel offset of each datum in the sample
+// told    (n, SCATTERED)   its grey levels
+// pixels_ (C, plane_)      the sample
+// at_     (listed,)        pixel index of each candidate
+#define COSTS                                                                                                          \
+    __global const float *restrict penalty, __global const float *restrict waves, const int listed,                    \
+        __global const ushort *restrict phases, const int area_, const float certain_, const float free_,              \
+        __global const int *restrict begin_, __global const int *restrict reach_, __global const ushort *restrict told, \
+        const float hard_, __global const float *restrict pixels_, const int plane_, __global const int *restrict at_
+#define PLUS_COSTS(d, p, site)                                                                                         \
+    ((d) + penalty[p] + apart_in_phase(waves + (p), listed, phases + (site), area_, certain_, free_) + MISFIT(p, site))
+#if SCATTERED
+#define MISFIT(p, site)                                                                                                \
+    misfit(begin_[site], begin_[(site) + 1], reach_, told, hard_, pixels_ + at_[p], plane_)
+#else
+#define MISFIT(p, site) 0.0f
+#endif
+
+inline float apart_in_phase(__global const float *y, const int listed, __global const ushort *x, const int area,
+                            const float certain, const float free)
+{
+    float d = 0.0f;
+    for (int c = 0; c < WAVES; ++c) {
+        const float e = ((float)x[c * area] - y[c * listed]) * certain;
+        d = fma(e, e, d);
+    }
+    return fmax(d - free, 0.0f);
+}
+
+inline float misfit(const int begin, const int end, __global const int *reach, __global const ushort *told,
+                    const float hard, __global const float *y, const int plane)
+{
+    float d = 0.0f;
+    for (int n = begin; n < end; ++n)
+        for (int c = 0; c < SCATTERED; ++c) {
+            const ushort x = told[n * SCATTERED + c];
+            const float e = x == UNKNOWN ? 0.0f : ((float)x - y[c * plane + reach[n]]) * hard;
+            d = fma(e, e, d);
+        }
+    return d;
+}
+
+#endif

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a candidate costs a site beside its distance: its use, its place on a lattice, and data between the sites."""
+
+from __future__ import annotations
+
+from math import prod
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.machine.interface import Array, Launcher
+from simdtex.model.guide import UNKNOWN
+from simdtex.model.sample import Candidates
+from simdtex.ops.arithmetic import fma32
+
+
+class Phased(NamedTuple):
+    """Cosines and sines of the phases of a regular sample (`simdtex.model.regularity`).
+
+    Candidate and site are as far apart in phase at every neighbour as at the site itself, so it is enough to look
+    there. ``candidates`` (waves, n rounded up to blocks) float32 by number; ``sites`` (waves, H, W) uint16; ``certain``
+    the factor of their differences, whose square is the number of neighbours that they count for; ``free`` how much of
+    the cost is not counted, so that all candidates within half a step of a phase are alike.
+    """
+
+    candidates: Array
+    sites: Array
+    certain: np.float32
+    free: np.float32
+
+    def cost(self, numbers: NDArray[np.integer], sites: NDArray[np.int32]) -> NDArray[np.float32]:
+        """Return how far the candidates of these numbers, (slots, S or 1), are from the phases of sites (S,)."""
+        d = np.zeros((len(numbers), sites.size), np.float32)
+        for y, x in zip(self.candidates, self.sites.reshape(len(self.sites), -1), strict=True):
+            e = (x[sites].astype(np.float32) - y[np.maximum(numbers, 0)]) * self.certain
+            d = fma32(e, e, d)
+        over: NDArray[np.float32] = np.maximum(d - self.free, np.float32(0))
+        return over
+
+
+class Scattered(NamedTuple):
+    """Conditioning data that lie between the sites of a level, each compared where it lies.
+
+    ``begin`` (H * W + 1,) int32: those of the site at pixel index s are begin[s] .. begin[s + 1] - 1; ``reach`` (n,)
+    int32 is the pixel offset of each in the sample, ``values`` (n, C) uint16 its grey levels, `UNKNOWN` in channels
+    that tell nothing; ``certain`` the factor of the differences.
+    """
+
+    begin: Array
+    reach: Array
+    values: Array
+    certain: np.float32
+
+    def cost(
+        self, numbers: NDArray[np.integer], sites: NDArray[np.int32], candidates: Candidates
+    ) -> NDArray[np.float32]:
+        """Return how far the candidates of these numbers, (slots, S or 1), are from the data around sites (S,)."""
+        d = np.zeros((len(numbers), sites.size), np.float32)
+        first, end = self.begin[sites], self.begin[sites + 1]
+        place = np.broadcast_to(candidates.positions[np.maximum(numbers, 0)], d.shape)
+        for k in range(int((end - first).max(initial=0))):
+            here = np.flatnonzero(first + k < end)
+            datum = (first + k)[here]
+            for x, y in zip(self.values[datum].T, candidates.pixels, strict=False):
+                e = (x.astype(np.float32) - y[place[:, here] + self.reach[datum]].astype(np.float32)) * self.certain
+                e = np.where(x == UNKNOWN, np.float32(0), e)
+                d[:, here] = fma32(e, e, d[:, here])
+        return d
+
+
+class Costs(NamedTuple):
+    """All costs: the ``penalty`` (n or more,) float32 of `simdtex.ops.use`, ``phased`` and ``scattered``."""
+
+    penalty: Array
+    phased: Phased | None = None
+    scattered: Scattered | None = None
+
+    @property
+    def defines(self) -> dict[str, int]:
+        """-D constants of kernels: kernels/common/costs.h."""
+        waves = {"WAVES": len(self.phased.candidates)} if self.phased else {}
+        return waves | ({"SCATTERED": self.scattered.values.shape[1]} if self.scattered else {})
+
+    def arguments(self, machine: Launcher, candidates: Candidates) -> tuple[Any, ...]:
+        """Return the arguments ``COSTS`` of kernels."""
+        nothing = machine.constant(np.zeros((1, 1), np.int32))
+        phased = self.phased or Phased(nothing, nothing, np.float32(0), np.float32(0))
+        scattered = self.scattered or Scattered(nothing, nothing, nothing, np.float32(0))
+        area, plane = prod(phased.sites.shape[1:]), candidates.rows * candidates.cols
+        return (
+            *(self.penalty, phased.candidates, np.int32(phased.candidates.shape[1]), phased.sites, np.int32(area)),
+            *(phased.certain, phased.free, scattered.begin, scattered.reach, scattered.values, scattered.certain),
+            *(candidates.pixels, np.int32(plane), candidates.positions),
+        )
+
+    def added(
+        self,
+        d: NDArray[np.float32],
+        numbers: NDArray[np.integer],
+        sites: NDArray[np.int32],
+        candidates: Candidates,
+    ) -> NDArray[np.float32]:
+        """Return distances (slots, S) with all costs of the candidates of these numbers, (slots, S or 1), in NumPy."""
+        d = d + self.penalty[np.maximum(numbers, 0)]
+        if self.phased:
+            d = d + self.phased.cost(numbers, sites)
+        return d + self.scattered.cost(numbers, sites, candidates) if self.scattered else d
