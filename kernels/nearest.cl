@@ -31,11 +31,9 @@
 #define BUCKETS 8     // of confidence
 #if V == 1
 typedef int ivec;
-#define ANY(x) (x)
 #define BITS(x) as_int(x)
 #else
 typedef JOIN(int, V) ivec;
-#define ANY(x) any(x)
 #define BITS(x) JOIN(as_int, V)(x)
 #endif
 

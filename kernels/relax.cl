@@ -321,7 +321,7 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
         for (int n = 0; n < 4 && k + n < draws; ++n)
             m = proposed((int)((ulong)word[n] * (uint)g.candidates >> 32), list, m, &seen);
     }
-    float d[SLOTS];
+    float d[SLOTS + V];
     for (int k = 0; k < m; ++k)
         d[k] = PLUS_COSTS(distance_in_lanes(at[list[k]], u, xu, levels, g.plane, g.down) *
                               (k < suggested ? g.discount : 1.0f),

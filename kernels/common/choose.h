@@ -6,26 +6,39 @@
 #include "common/level.h"
 #include "common/parzen.h"
 #include "common/philox.h"
+#include "common/vector.h"
 
 // The place in the list of the candidate that is taken. NUMBER(k) is the number of the k-th of m candidates, PIXEL(k) the
-// place of its grey levels in `sample`.
+// place of its grey levels in `sample`. Distances are looked at V together, and one by one only where one of them matters;
+// `d` has room for V more.
 #define CHOOSE(best, g, d, m, sample, stride, noise, turn, place)                                                      \
-    int best = 0;                                                                                                      \
+    int best = -1;                                                                                                     \
     {                                                                                                                  \
-        for (int k = 1; k < m; ++k)                                                                                    \
-            best = d[k] < d[best] || (d[k] == d[best] && NUMBER(k) < NUMBER(best)) ? k : best;                         \
+        STORE((vec)INFINITY, d + m);                                                                                   \
+        vec nearest = LOAD(d);                                                                                         \
+        for (int p = V; p < m; p += V)                                                                                 \
+            nearest = fmin(nearest, LOAD(d + p));                                                                      \
+        const float smallest = least_of(nearest);                                                                      \
+        for (int p = 0; p < m; p += V)                                                                                 \
+            if (ANY(LOAD(d + p) == smallest))                                                                          \
+                for (int k = p; k < min(p + V, m); ++k)                                                                \
+                    best = d[k] == smallest && (best < 0 || NUMBER(k) < NUMBER(best)) ? k : best;                      \
         if (g.draws) {                                                                                                 \
-            const float smallest = d[best];                                                                            \
             ulong total = 0, reached = 0;                                                                              \
-            for (int k = 0; k < m; ++k)                                                                                \
-                total += mass_of(d[k], smallest, g.scale, sample, stride, PIXEL(k), noise, g.radius, g.top);           \
+            for (int p = 0; p < m; p += V)                                                                             \
+                if (ANY(WEIGHS(LOAD(d + p), smallest, g.scale)))                                                       \
+                    for (int k = p; k < min(p + V, m); ++k)                                                            \
+                        total += mass_of(d[k], smallest, g.scale, sample, stride, PIXEL(k), noise, g.radius, g.top);   \
             const uint4 bits = draw4(g.seed, g.level, turn, place, PURPOSE_DRAW, 0);                                   \
             const ulong target = below(bits.x, bits.y, total);                                                         \
             best = -1;                                                                                                 \
-            for (int k = 0; k < m && best < 0; ++k) {                                                                  \
-                reached += mass_of(d[k], smallest, g.scale, sample, stride, PIXEL(k), noise, g.radius, g.top);         \
-                best = reached > target ? k : -1;                                                                      \
-            }                                                                                                          \
+            for (int p = 0; p < m && best < 0; p += V)                                                                 \
+                if (ANY(WEIGHS(LOAD(d + p), smallest, g.scale)))                                                       \
+                    for (int k = p; k < min(p + V, m) && best < 0; ++k) {                                              \
+                        reached +=                                                                                     \
+                            mass_of(d[k], smallest, g.scale, sample, stride, PIXEL(k), noise, g.radius, g.top);        \
+                        best = reached > target ? k : -1;                                                              \
+                    }                                                                                                  \
         }                                                                                                              \
     }
 

@@ -16,6 +16,9 @@
 #endif
 #define NO_WEIGHT 28.0f // exp(-28) 2^40 < 1
 
+// Whether a distance, or any of a vector of them, has a weight.
+#define WEIGHS(d, smallest, scale) (((d) - (smallest)) * (scale) < NO_WEIGHT)
+
 // W_p: Gaussian of equation (7) relative to the best candidate.
 inline ulong weight(const float d, const float smallest, const float scale)
 {

@@ -112,12 +112,10 @@ def _of_kinds(used: NDArray[np.int64], fair_use: FairUse) -> NDArray[np.float32]
 
 def _blurred(counts: NDArray[np.integer], radius: int) -> NDArray[np.int64]:
     """Return the sum over the square of this radius around each place, clipped to the array."""
-    sums = np.pad(counts.astype(np.int64), ((1, 0), (1, 0))).cumsum(0).cumsum(1)
-    rows, cols = (np.arange(n) for n in counts.shape)
-    (top, bottom), (left, right) = (
-        (np.maximum(at - radius, 0), np.minimum(at + radius + 1, n))
-        for at, n in zip((rows, cols), counts.shape, strict=True)
-    )
-    a, b, c, d = (sums[r][:, q] for r, q in ((bottom, right), (top, right), (bottom, left), (top, left)))
-    found: NDArray[np.int64] = a - b - c + d
+    rows, cols = counts.shape
+    sums = np.zeros((rows + 1, cols + 1), np.int64)
+    sums[1:, 1:] = counts.cumsum(0).cumsum(1)
+    row, col = np.arange(rows), np.arange(cols)
+    lines = sums[np.minimum(row + radius + 1, rows)] - sums[np.maximum(row - radius, 0)]
+    found: NDArray[np.int64] = lines[:, np.minimum(col + radius + 1, cols)] - lines[:, np.maximum(col - radius, 0)]
     return found
