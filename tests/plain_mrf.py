@@ -202,7 +202,9 @@ def number_of_levels(samples, shape, o):
         assert o.levels <= most
         return o.levels
     levels = 1
-    while levels < most and enough(levels + 1, o.overview) and min(shape) > 2 * radius * 2**levels:
+    while levels < most and min(shape) > 2 * radius * 2**levels:
+        if not enough(levels + 1, o.overview if levels > 3 else min(32, o.overview)):
+            break
         levels += 1
     return levels
 
@@ -257,7 +259,7 @@ class Level:
         self.rate, self.strict = o.balance * differing, 2.0 * differing
         crossings = len(self.lines[0]) * len(self.lines[1])
         anew = coarsest and crossings <= MOST_KEPT
-        self.novelty = float32(o.novelty * min(1.0, 256 / n) * Y.matched * Y.variance if anew else 0)
+        self.novelty = float32(o.novelty * min(1.0, 256 / n, (n / 128) ** 2) * Y.matched * Y.variance if anew else 0)
 
     def pixel(self, s):
         """The pixel of X that a site of the level's lattice is."""

@@ -220,7 +220,7 @@ CHANGES = {
         (DENSITY, 0.15, 1.0),
     ],
     "coherence": [(EXACT, 1.0, 0.0), (FEW, 0.2, 1.0), (FEW, 0.2, 0.0), (FEW | {"relaxation": "gibbs"}, 0.2, 3.0)],
-    "overview": [({"order": 2}, 128, 90), ({"order": 2, "search": "exact"}, 91, 90)],
+    "overview": [({"order": 2}, 32, 20), ({"order": 2, "search": "exact"}, 21, 20)],
     "balance": [(EXACT, 0.0, 0.5), (FEW, 0.0, 0.5), (MORE, 0.5, 0.6), (DENSITY, 0.0, 0.5)],
     "structure": [(EXACT, 0.0, 0.5), (FEW, 0.0, 2.0), (MORE, 2.0, 1.5)],
     "lattice": [(EXACT, "auto", "3,0,0,3"), (FEW, ((3, 0), (0, 3)), ((3, 0), (1, 3))), (MORE, "none", "3,0,0,5")],

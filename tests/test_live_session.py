@@ -122,7 +122,7 @@ def test_categories_and_16_bits_stay(kind):
     page.session.close()
 
 
-COARSEST = 1  # of two levels
+COARSEST = 2  # of three levels
 CHANGES = [
     ({"finish": 0.5}, 0),
     ({}, 0),

@@ -33,6 +33,12 @@ from simdtex.schedules import Setting
 WHOLE = 256
 """Candidates of a coarsest level whose neighbourhoods see much of the sample's layout; of more they see less."""
 
+SMALL = 128
+"""Candidates of a coarsest level from which on novelty counts in full: of fewer hardly two are alike."""
+
+FEWEST, WIDE = 32, 8
+"""Candidates of the coarsest level of a small sample at least, up to a spacing of so many pixels."""
+
 STRICT = 2.0
 """lambda of the penalty of a category that is used more than it is to be."""
 
@@ -184,7 +190,8 @@ class Lattices:
         variance = sample.variance
         h = options.bandwidth * lcpdf.optimal_bandwidth(variance, count, dimensions)  # (8)
         draws = options.relaxation == "gibbs" or coarsest
-        novelty = options.novelty * min(1.0, WHOLE / count) if coarsest and proposal.slots <= KEPT else 0.0
+        freedom = min(1.0, WHOLE / count, (count / SMALL) ** 2)
+        novelty = options.novelty * freedom if coarsest and proposal.slots <= KEPT else 0.0
         return Level(
             number=number,
             setting=Setting(machine, grid, offsets, options.order, self.seed, number),
@@ -431,7 +438,9 @@ def number_of_levels(
     if options.levels is None:
         levels = 1
         reach = 2 * int(offsets.max()) * 2  # of a neighbourhood at the next level
-        while levels < most and candidates(levels + 1) >= options.overview and min(shape) > reach * 2 ** (levels - 1):
+        while levels < most and min(shape) > reach * 2 ** (levels - 1):
+            if candidates(levels + 1) < (min(FEWEST, options.overview) if 2**levels <= WIDE else options.overview):
+                break
             levels += 1
         return levels
     if options.levels > most:

@@ -125,9 +125,9 @@ class Options:
         1.0,
         Number(0),
         "Break up the sample's layout: more keeps less of it",
-        more="At the coarsest level, of n candidates, one costs mu C sigma^2 min(1, 256 / n) for each neighbour whose "
-        "source it continues, and four times that for each whose source it is: mu is the novelty. This holds if sites "
-        "take pixels of the sample and n is 1024 or less.",
+        more="At the coarsest level, of n candidates, one costs mu C sigma^2 min(1, 256 / n, (n / 128)^2) for each "
+        "neighbour whose source it continues, and four times that for each whose source it is: mu is the novelty. This "
+        "holds if sites take pixels of the sample and n is 1024 or less.",
         paper=0.0,
         jobs={"fill": 0.0, "extend": 0.0, "simulate": 0.25},
         slider=(0, 4, 0.25),
@@ -149,6 +149,7 @@ class Options:
         Whole(1),
         "Keep this many candidates of the sample at the coarsest of the default levels, at least; the fewer, the more "
         "of its layout comes out again",
+        more="32 are enough for four levels or fewer: the coarsest spacing of a small sample is 8 pixels, too.",
         paper=64,
         shown=(),
         slider=(16, 1024, 16),
