@@ -39,6 +39,7 @@ NO_DATA = -9966699
 
 MAGIC = b"\xb2\x11\x17\x5d"
 
+_BLOCKS = (b"\0\0\0\x0cRegionBlock\0", b"\0\0\0\x0bGroupBlock\0")
 _WHOLE = (np.uint8, np.int16, np.int32)
 _SIDES = re.compile(r"\(\s*([0-9]+)\s*x\s*([0-9]+)\s*x\s*([0-9]+)\s*\)\s*$")
 _LINE = 2**14
@@ -212,7 +213,7 @@ def _gslib(file: BinaryIO, most: int) -> Read:
     check_size(count, BYTES * count, most)
     what = f"{' x '.join(map(str, sides))} cells of {len(names)} variable{'s' * (len(names) != 1)}, {count} values"
     begin = file.tell()
-    if os.fstat(file.fileno()).st_size - begin < 2 * count:  # a digit and a blank for each
+    if os.fstat(file.fileno()).st_size - begin < 2 * count - 1:  # a digit for each, and blanks between them
         raise ValueError(f"it is too short for what its header says, {what}: get it again, or correct the header")
     numbers = _parsed(file, count, what, 3 + int(words[0]))
     blocks = numbers.reshape(realisations, prod(sides), int(words[0]))
@@ -339,7 +340,8 @@ def _sgems(file: BinaryIO, most: int) -> Read:
             f"propert{'y' if variables == 1 else 'ies'}: it is cut short; get it again"
         )
     columns = np.frombuffer(file.read(4 * count), ">f4").astype(np.float32).reshape(variables, -1)
-    if file.tell() < length and word() not in ("RegionBlock", "GroupBlock"):
+    rest = file.read(16)
+    if rest and not rest.startswith(_BLOCKS):
         raise ValueError("it is longer than its header says: get it again, or save it again")
     return dict(zip(names, columns, strict=True)), sides, lies
 

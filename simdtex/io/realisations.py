@@ -132,6 +132,7 @@ def _axis(array: DataArray, axis: str) -> tuple[float, float]:
     values = np.atleast_1d(np.asarray(array.coords[axis].values, np.float64))
     between = (values[-1] - values[0]) / (len(values) - 1) if len(values) > 1 else 1.0
     size = float(array.attrs.get(f"cell_{axis}", between))
-    if not (np.abs(values - (values[0] + size * np.arange(len(values)))) <= size / 1000).all():  # NaN and size 0 too
+    off = np.abs(values - (values[0] + size * np.arange(len(values))))
+    if not (size > 0 and (off <= size / 1000).all()):  # NaN too
         raise ValueError(f"the coordinate {axis} is not evenly spaced in ascending order, as those of a grid are")
     return float(values[0]), size
