@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.atomic import atomic_path, check_target
 from simdtex.io.limits import BYTES, TooLarge, check_file, check_size, max_pixels_or_default
+from simdtex.options import shown
 
 __all__ = ["MISSING", "SUFFIXES", "CartesianGrid", "check_grid", "frame", "kind_of", "read_grid", "write_grid"]
 
@@ -42,6 +43,9 @@ MAGIC = b"\xb2\x11\x17\x5d"
 _BLOCKS = (b"\0\0\0\x0cRegionBlock\0", b"\0\0\0\x0bGroupBlock\0")
 _WHOLE = (np.uint8, np.int16, np.int32)
 _SIDES = re.compile(r"\(\s*([0-9]+)\s*x\s*([0-9]+)\s*x\s*([0-9]+)\s*\)\s*$")
+_FAR = 1e30
+"""The largest coordinate, which is far within 32-bit floats."""
+
 _LINE = 2**14
 """Bytes of a line of a header, at most."""
 
@@ -82,8 +86,8 @@ def frame(origin: Sequence[float] | None, cell: Sequence[float] | None) -> Frame
     )
     if len(found.origin) != len(found.cell):
         raise ValueError(f"origin has {len(found.origin)} numbers and cell {len(found.cell)}; give as many")
-    if min(found.cell) <= 0:
-        raise ValueError(f"cell is {found.cell}; give sizes above 0")
+    if min(found.cell) < 1 / _FAR:
+        raise ValueError(f"cell is {found.cell}; give sizes above 0, from {1 / _FAR:g} on")
     if any(size < abs(at) * 2.0**-40 for at, size in zip(*found, strict=True)):
         raise ValueError(f"cells of {found.cell} cannot be told apart at {found.origin}; give coordinates nearer to 0")
     return found
@@ -94,8 +98,8 @@ def _numbers(name: str, values: Sequence[float]) -> tuple[float, ...]:
         found = tuple(float(value) for value in values)
     except (TypeError, ValueError):
         found = ()
-    if len(found) not in (2, 3) or not all(map(isfinite, found)):
-        raise ValueError(f"{name} is {values!r}; give (x, y) or (x, y, z), finite numbers")
+    if len(found) not in (2, 3) or not all(abs(number) < _FAR for number in found):
+        raise ValueError(f"{name} is {shown(values)}; give (x, y) or (x, y, z), numbers below {_FAR:g}")
     return found
 
 
