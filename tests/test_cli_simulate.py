@@ -179,6 +179,19 @@ def axes(folder, *args):
     return [(float(found[axis].min()), found.attrs[f"cell_{axis}"]) for axis in "xyz" if axis in found.coords]
 
 
+@pytest.mark.parametrize("case", ["a grid that holds no such number", "a grid too far away"])
+def test_what_a_grid_cannot_hold_is_told_before_the_run(folder, case, monkeypatch):
+    monkeypatch.setattr("simdtex.simulate", lambda *_, **__: pytest.fail("this takes hours"))
+    refused(folder, *BAD[case])
+
+
+def test_a_report_of_data_on_the_ground(folder):
+    pytest.importorskip("gstools")
+    args = ("--known", "wells.eas", "--several", "most", "--size", "14x12", "--categorical", "--report", "report")
+    assert (made(folder, "ti.gslib", *args).values[0, 4, 3] == 3).all()
+    assert "wells.eas" in (folder / "report" / "index.html").read_text(encoding="utf-8")
+
+
 def test_where_cells_lie(folder):
     """What is given on the command line counts more than the file of the training image."""
     assert axes(folder, "ti.sgems") == [(1005, 10), (2002.5, 5), (3, 2)]
@@ -205,6 +218,8 @@ def test_grids_as_guides(folder):
     guide = pixels(folder, "facies.png"), pixels(folder, "facies.png")[:12, :14]
     own = simdtex.simulate(pixels(folder, "grey.png"), 1, guide=guide, labels=True, shape=(12, 14), **OPTIONS)
     assert found.values.tobytes() == own.values.tobytes()
+    args = ["grey.png", "-o", "two.npz", "--guide", "ti.gslib=two.gslib"]
+    refused(folder, args, "has 1 channels and that of the output 2")
 
 
 def test_an_existing_file_is_replaced(folder):

@@ -136,6 +136,11 @@ def test_decimals_of_sgems_are_the_shortest(tmp_path):
     assert (grid.origin, grid.cell) == ((5, -7.5, 0.3), (10, 20, 0.1))
 
 
+def test_a_name_of_sgems_that_comes_again_gets_a_number(tmp_path):
+    content = by_hand([1, 2], (1, 1, 1)).replace(b"\0\0\0\1\0\0\0\2v\0", b"\0\0\0\2" + 2 * b"\0\0\0\2v\0")
+    assert list(read_grid(saved(tmp_path, content)).values) == ["v", "v_1"]
+
+
 def test_regions_of_sgems_are_passed_over(tmp_path):
     regions = word(b"RegionBlock") + b"\0\0\0\1" + word(b"r") + b"\1" * 6
     assert read_grid(saved(tmp_path, by_hand(range(6)) + regions)).values["v"].max() == 5
@@ -268,6 +273,7 @@ def test_files_that_are_none(tmp_path):
     [
         ("wells\n3\nX\nY\nv\n1 2 3\n", "points"), ("1 2 3\n4 5 6\n", None), ("x y a b\n5 6 7 8\n1 2 3 4\n", None),
         ("x,y,v\n1,2,3\n", None), ("", None), ("5 5 1\n1\nv\n", "grid"), ("t\n1 5 5 1\nv\n", "grid"),
+        ("t\n1 5 5 1\na name of four\n", "grid"),
         ("a (5x5x1)\n1\nv\n", "grid"), ("a\nfacies\n1\n", None), ("\x89PNG\n", None),
     ],
 )  # fmt: skip

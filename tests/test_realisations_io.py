@@ -112,6 +112,8 @@ def test_layers_and_arrays_without_coordinates(tmp_path, suffix):
     grid = read_grid(tmp_path / f"a{suffix}")
     assert np.array_equal(grid.values["realisations__real1"], values[1].transpose(2, 0, 1))
     assert (grid.origin, grid.cell) == ((0, 0, 0), (1, 1, 1))
+    write_realisations(tmp_path / f"a{suffix}", array.assign_attrs(cell_y=2.5))
+    assert read_grid(tmp_path / f"a{suffix}").cell == (1, 2.5, 1)
     write_realisations(tmp_path / f"a{suffix}", array[0, 0:1, 0:1].assign_coords(x=[7.0]).assign_attrs(cell_x=3.0))
     assert read_grid(tmp_path / f"a{suffix}").cell == (3, 1, 1)
 
