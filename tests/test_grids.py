@@ -302,6 +302,7 @@ ARGUMENTS = {
     "far away": ("a.sgems", GOOD, {"origin": (4.5e6 + 0.3, 0)}, ValueError, "x = 4500000.3 .* end its name in .gslib"),
     "four numbers": ("a.gslib", GOOD, {"origin": (1, 2, 3, 4)}, ValueError, "origin is .*; give"),
     "unequal numbers": ("a.gslib", GOOD, {"origin": (1, 2, 3), "cell": (1, 2)}, ValueError, "origin has 3 .* cell 2"),
+    "one number": ("a.gslib", GOOD, {"cell": 5}, ValueError, "cell is 5; give"),
     "words": ("a.gslib", GOOD, {"cell": "ab"}, ValueError, "cell is 'ab'; give"),
     "numbers beyond 32-bit floats": ("a.gslib", GOOD, {"origin": (1e31, 0)}, ValueError, "numbers below 1e.30"),
     "a size of next to nothing": ("a.gslib", GOOD, {"cell": (1, 1e-31)}, ValueError, "above 0, from 1e-30 on"),

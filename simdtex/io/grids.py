@@ -79,11 +79,10 @@ class CartesianGrid:
 
 def frame(origin: Sequence[float] | None, cell: Sequence[float] | None) -> Frame:
     """Check where cells lie; None is 0 for the origin and 1 for the size of a cell."""
-    axes = len(origin) if origin is not None else 2 if cell is None else len(cell)
-    found = Frame(
-        _numbers("origin", (0.0,) * axes if origin is None else origin),
-        _numbers("cell", (1.0,) * axes if cell is None else cell),
-    )
+    first = None if origin is None else _numbers("origin", origin)
+    size = None if cell is None else _numbers("cell", cell)
+    axes = len(first or size or "xy")
+    found = Frame(first or (0.0,) * axes, size or (1.0,) * axes)
     if len(found.origin) != len(found.cell):
         raise ValueError(f"origin has {len(found.origin)} numbers and cell {len(found.cell)}; give as many")
     if min(found.cell) < 1 / _FAR:
