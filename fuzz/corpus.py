@@ -85,6 +85,19 @@ def pictures():
     return made
 
 
+def grids():
+    """Grids of geostatistics, one of two layers."""
+    values = _pixels(1, np.uint8)[..., 0].ravel()
+    head = b"\xb2\x11\x17\x5d\0\0\0\6Cgrid\0\0\0\0\2g\0\0\0\0\x64"
+    head += struct.pack(">3I6f", SIDE, SIDE, 1, 10, 10, 1, 5, 5, 0) + b"\0\0\0\1\0\0\0\2v\0"
+    text = b"\n".join(b"%d" % v for v in values) + b"\n"
+    return {
+        "grid.sgems": head + values.astype(">f4").tobytes(),
+        "grid.gslib": b"%d %d 1\n1\nv\n" % (SIDE, SIDE) + text,
+        "solid.gslib": b"t\n1 %d %d 2 0 0 0 1 1 1\nv\n" % (SIDE, SIDE) + 2 * text,
+    }
+
+
 def _holed(rgb):
     from PIL import Image
 
@@ -199,6 +212,7 @@ def build():
         "picture": pictures(),
         "mask": masks(),
         "table": tables(),
+        "grid": grids(),
         "volume": volumes(),
         "strange": strange(),
     }

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
 
     from simdtex.checkpoint import Checkpoint
     from simdtex.experiments import quality
+    from simdtex.io.grids import read_grid, write_grid
     from simdtex.io.hard_data import place_hard_data, read_hard_data
     from simdtex.jobs.filling import extend, fill
     from simdtex.jobs.simulation import simulate
@@ -35,10 +36,12 @@ __all__ = [
     "open_machine",
     "place_hard_data",
     "quality",
+    "read_grid",
     "read_hard_data",
     "simulate",
     "synthesize",
     "synthesize_solid",
+    "write_grid",
 ]
 
 _HOMES = {
@@ -54,10 +57,12 @@ _HOMES = {
     "mix": "simdtex.methods.pyramid.mixtures",
     "open_machine": "simdtex.machine",
     "place_hard_data": "simdtex.io.hard_data",
+    "read_grid": "simdtex.io.grids",
     "read_hard_data": "simdtex.io.hard_data",
     "simulate": "simdtex.jobs.simulation",
     "synthesize": "simdtex.synthesis",
     "synthesize_solid": "simdtex.synthesis",
+    "write_grid": "simdtex.io.grids",
 }
 """Where the public names live; each is loaded when it is asked for first, so that the command line starts at once."""
 

@@ -9,6 +9,7 @@ from click.testing import CliRunner
 import simdtex
 from simdtex.cli import main
 from simdtex.io import image
+from simdtex.io.grids import read_grid, write_grid
 from simdtex.io.hard_data import read_hard_data
 
 xarray = pytest.importorskip("xarray")
@@ -16,7 +17,7 @@ pytest.importorskip("zarr")
 pytest.importorskip("h5netcdf")
 
 OPTIONS = {"order": 2, "rng": 5, "device": "reference"}
-ENDS = (".png", ".tif", ".npy", ".npz", ".nc", ".zarr", ".csv", ".xyz")
+ENDS = (".png", ".tif", ".npy", ".npz", ".nc", ".zarr", ".csv", ".xyz", ".gslib", ".sgems", ".dat", ".eas")
 
 
 @pytest.fixture
@@ -42,6 +43,18 @@ def folder(tmp_path):
         "facies.csv": "x,y,facies\n3,4,3\n10,7,0\n5,5,3\n",
     }
     np.save(tmp_path / "huge.npy", np.where(facies, 1e200, 3.0))
+    lies = {"origin": (1005.0, 2002.5, 3), "cell": (10.0, 5.0, 2.0)}
+    for suffix in (".gslib", ".sgems"):
+        write_grid(tmp_path / f"ti{suffix}", {"facies": facies}, **lies)
+    write_grid(tmp_path / "two.gslib", {"por": grey / 8, "facies": facies}, **lies)
+    write_grid(tmp_path / "holed.gslib", {"por": holed}, **lies)
+    write_grid(tmp_path / "solid.gslib", {"facies": np.stack([facies, facies])})
+    tables |= {
+        "wells.eas": "wells\n4\nX\nY\nZ\nfacies\n1035 2022.5 3 3\n1104 2037 2.5 0\n1107 2036 2.5 0\n1108 2036 2.5 3\n",
+        "ti.dat": "20 16 1\n1\nfacies\n" + "\n".join(map(str, facies.ravel())) + "\n",
+        "unsized.dat": "title\n1\nfacies\n1\n",
+        "cut.gslib": (tmp_path / "ti.gslib").read_text()[:-9],
+    }
     for name, text in tables.items():
         (tmp_path / name).write_text(text)
     return tmp_path
@@ -132,6 +145,83 @@ def test_categories(folder):
     assert (found.values[:, 4, 3] == 3).all() and (found.values[:, 7, 10] == 0).all()
 
 
+@pytest.mark.parametrize("name", ["ti.gslib", "ti.sgems"])
+@pytest.mark.parametrize("out", ["out.gslib", "out.sgems"])
+def test_from_a_grid_to_a_grid(folder, name, out):
+    args = ["--known", "wells.eas", "--categorical", "--several", "most", "--size", "14x12", "-n", 2]
+    result = simulate(folder, name, *args, "-o", out)
+    assert result.exit_code == 0, result.output
+    grid = read_grid(folder / out)
+    assert (grid.origin, grid.cell) == ((1005, 2002.5, 3), (10, 5, 2))
+    assert list(grid.values) == ["simulation__real0", "simulation__real1"]
+    options = {"known": folder / "wells.eas", "several": "most", "origin": grid.origin, "cell": grid.cell} | OPTIONS
+    own = simdtex.simulate(pixels(folder, "facies.png"), 2, shape=(12, 14), categorical=True, **options)
+    assert np.array_equal(np.concatenate(list(grid.values.values())), own.values)
+    assert (own.values[:, 4, 3] == 3).all() and (own.values[:, 7, 10] == 0).all()
+
+
+def test_a_grid_is_a_picture_with_coordinates(folder):
+    for name in ("ti.gslib", "ti.dat"):
+        found = made(folder, name, "--size", "14x12", "--categorical")
+        own = simdtex.simulate(pixels(folder, "facies.png"), 1, shape=(12, 14), categorical=True, **OPTIONS)
+        assert found.values.tobytes() == own.values.tobytes() and found.dtype == own.dtype
+        ground = name == "ti.gslib"
+        assert found.x[1] == (1015 if ground else 1) and found.y[1] == (2007.5 if ground else 1)
+    found = made(folder, "two.gslib", "--size", "14x12")
+    both = np.stack([pixels(folder, "grey.png") / 8, pixels(folder, "facies.png")], -1)
+    own = simdtex.simulate(both, 1, shape=(12, 14), channel_axis=-1, **OPTIONS)
+    assert found.values.tobytes() == own.values.tobytes() and found.dtype == own.dtype
+    assert not np.isnan(made(folder, "holed.gslib", "--size", "14x12")).any()
+
+
+def axes(folder, *args):
+    found = made(folder, *args, "--size", "4x4", out="out.nc")
+    return [(float(found[axis].min()), found.attrs[f"cell_{axis}"]) for axis in "xyz" if axis in found.coords]
+
+
+@pytest.mark.parametrize("case", ["a grid that holds no such number", "a grid too far away"])
+def test_what_a_grid_cannot_hold_is_told_before_the_run(folder, case, monkeypatch):
+    monkeypatch.setattr("simdtex.simulate", lambda *_, **__: pytest.fail("this takes hours"))
+    refused(folder, *BAD[case])
+
+
+def test_a_report_of_data_on_the_ground(folder):
+    pytest.importorskip("gstools")
+    args = ("--known", "wells.eas", "--several", "most", "--size", "14x12", "--categorical", "--report", "report")
+    assert (made(folder, "ti.gslib", *args).values[0, 4, 3] == 3).all()
+    assert "wells.eas" in (folder / "report" / "index.html").read_text(encoding="utf-8")
+
+
+def test_where_cells_lie(folder):
+    """What is given on the command line counts more than the file of the training image."""
+    assert axes(folder, "ti.sgems") == [(1005, 10), (2002.5, 5), (3, 2)]
+    assert axes(folder, "ti.gslib", "--origin", "-7,0,0.5") == [(-7, 10), (0, 5), (0.5, 2)]
+    assert axes(folder, "ti.gslib", "--origin", "-7,0") == [(-7, 10), (0, 5)]
+    assert axes(folder, "ti.gslib", "--cell", "2,3") == [(1005, 2), (2002.5, 3)]
+    assert axes(folder, "grey.png", "--cell", "2,3") == [(0, 2), (0, 3)]
+    assert axes(folder, "grey.png", "--origin", "5,6", "--cell", "2,3") == [(5, 2), (6, 3)]
+
+
+def test_a_grid_of_known_values(folder):
+    known = np.full((16, 20), np.nan)
+    known[3, 4] = 200
+    write_grid(folder / "known.gslib", {"v": known, "w": known})
+    refused(folder, ["grey.png", "-o", "out.npz", "--known", "known.gslib"], "known is")
+    write_grid(folder / "known.gslib", {"v": known})
+    found = made(folder, "grey.png", "--known", "known.gslib")
+    assert_same(found, simdtex.simulate(pixels(folder, "grey.png"), 1, known=known, **OPTIONS))
+
+
+def test_grids_as_guides(folder):
+    write_grid(folder / "wanted.gslib", {"v": pixels(folder, "facies.png")[:12, :14]})
+    found = made(folder, "grey.png", "--guide", "ti.gslib=wanted.gslib", "--size", "14x12")
+    guide = pixels(folder, "facies.png"), pixels(folder, "facies.png")[:12, :14]
+    own = simdtex.simulate(pixels(folder, "grey.png"), 1, guide=guide, labels=True, shape=(12, 14), **OPTIONS)
+    assert found.values.tobytes() == own.values.tobytes()
+    args = ["grey.png", "-o", "two.npz", "--guide", "ti.gslib=two.gslib"]
+    refused(folder, args, "has 1 channels and that of the output 2")
+
+
 def test_an_existing_file_is_replaced(folder):
     made(folder, "grey.png", "-n", 2, "--size", "14x12")
     assert made(folder, "grey.png", "--size", "9x8").shape == (1, 8, 9)
@@ -150,6 +240,24 @@ def test_a_report_is_a_page_and_numbers(folder):
 GREY = ["grey.png", "-o", "out.npz", "--size", "14x12"]
 FACIES = ["facies.png", "-o", "out.npz", "--size", "14x12", "--categorical"]
 BAD = {
+    "a grid of two layers": (["solid.gslib", "-o", "out.npz"], "has 2 layers and simulations are of one: give a grid"),
+    "a grid without sizes": (["unsized.dat", "-o", "out.npz"], "write nx ny nz on the first line"),
+    "a grid cut short": (
+        ["cut.gslib", "-o", "out.npz"],
+        "too short for what its header says, 20 x 16 x 1 cells of 1 variable, 320 values",
+    ),
+    "a well off the grid": ([*FACIES, "--known", "wells.eas"], "line 7 of the hard data is at x 1035.0"),
+    "an unequal cell": (
+        ["ti.gslib", "-o", "out.npz", "--known", "wells.eas", "--categorical"],
+        "line 8 and line 10 of the hard data are both at row 7, column 10",
+    ),
+    "an origin in words": ([*GREY, "--origin", "here"], "--origin here must be numbers parted by commas"),
+    "an origin of one number": ([*GREY, "--origin", "1"], "origin is [1.0]; give (x, y) or (x, y, z)"),
+    "no origin": ([*GREY, "--origin", ""], "must be numbers"),
+    "a negative cell": ([*GREY, "--cell", "1,-1"], "give sizes above 0"),
+    "an unknown rule": ([*FACIES, "--known", "facies.csv", "--several", "least"], "choose one of: refuse, mean, most"),
+    "a grid that holds no such number": (["huge.npy", "-o", "out.sgems"], "end its name in .gslib"),
+    "a grid too far away": (["ti.gslib", "-o", "out.sgems", "--origin", "4500000.3,0"], "x = 4500000.3"),
     "an unknown suffix": (["grey.png", "-o", "out.xyz"], "names no format of realisations"),
     "proportions in words": ([*FACIES, "--proportions", "half"], "numbers parted by commas"),
     "no realisation": ([*GREY, "-n", 0], "n is 0; give 1 or more"),

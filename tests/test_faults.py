@@ -51,7 +51,7 @@ WRITERS = {
     "slices": lambda path, seed: volume.write(path, block(seed)),
     **{
         f"r{suffix}": lambda path, seed: realisations.write_realisations(path, many(seed))
-        for suffix in (".zarr", ".nc", ".npz")
+        for suffix in (".zarr", ".nc", ".npz", ".gslib", ".sgems")
     },
     "map.npz": lambda path, seed: save_source_map(path, np.random.default_rng(seed).integers(0, 99, (40, 40, 2))),
     "report": page,

@@ -18,6 +18,7 @@ from click.testing import CliRunner
 
 from simdtex.cli import main
 from simdtex.io import decode, image, limits
+from simdtex.io.grids import read_grid
 from simdtex.io.hard_data import read_hard_data
 from simdtex.model.source_map import load_source_map
 
@@ -191,6 +192,22 @@ def test_source_maps_and_hard_data(tmp_path):
     for name, (reading, data) in files.items():
         (tmp_path / name).write_bytes(data)
         refused(reading, tmp_path / name, f"{TOO_LARGE}|no more than .* are read: give fewer rows", peak=2**23)
+
+
+def test_grids(tmp_path):
+    """What a header says is compared with the length of the file before memory is asked for."""
+    sgems = b"\xb2\x11\x17\x5d\0\0\0\6Cgrid\0\0\0\0\1\0\0\0\0\x64%s" + struct.pack(">6f", *[1] * 6)
+    files = {
+        "far.gslib": (b"40000 40000 9\n1\nv\n1\n", "14400000000 pixels and no more than"),
+        "near.gslib": (b"10000 10000 1\n1\nv\n1\n", "too short for what its header says"),
+        "names.gslib": (b"1 1 1\n999999999\nv\n1\n", "line 5 has no name of a variable"),
+        "far.sgems": (sgems % struct.pack(">3I", 40000, 40000, 9) + b"\0\0\0\1\0\0\0\1\0", "14400000000 pixels"),
+        "near.sgems": (sgems % struct.pack(">3I", 10000, 10000, 1) + b"\0\0\0\1\0\0\0\1\0", "before the last of"),
+        "names.sgems": (sgems % struct.pack(">3I", 1, 1, 1) + b"\xff" * 8, "ends within its header"),
+    }
+    for name, (data, words) in files.items():
+        (tmp_path / name).write_bytes(data)
+        refused(read_grid, tmp_path / name, words, peak=2**20)
 
 
 def test_lines_that_no_table_has(tmp_path):

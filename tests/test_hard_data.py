@@ -105,6 +105,56 @@ def test_files_that_are_no_tables(tmp_path):
             read_hard_data(tmp_path / "b.npy")
 
 
+POINTS = "wells\n{}\n" + "{}\n" * 4
+
+
+@pytest.mark.parametrize(
+    ("names", "points", "values"),
+    [
+        (("X", "Y", "Z", "facies"), [[1, 2, 3], [4.5, 5, 6]], [[7], [NAN]]),
+        (("xcoord", "Ylocation", "z (m)", "Zn"), [[1, 2, 3], [4.5, 5, 6]], [[7], [NAN]]),
+        (("X", "Y", "Zn", "Pb"), [[1, 2], [4.5, 5]], [[3, 7], [6, NAN]]),
+    ],
+)
+def test_a_point_set_of_geo_eas(tmp_path, names, points, values):
+    data = read_hard_data(table(tmp_path, POINTS.format(4, *names) + "1 2 3 7\n\n 4.5\t5 6 -999\n", "a.eas"))
+    assert data.points.tolist() == points
+    np.testing.assert_array_equal(data.values, values)
+    assert data.names == names[len(points[0]) :]
+    assert data.lines == (7, 9)
+
+
+def test_minus_999_is_a_value_in_a_table(tmp_path):
+    assert read_hard_data(table(tmp_path, "1,2,-999\n")).values.tolist() == [[-999]]
+
+
+def test_z_is_a_coordinate_if_the_header_says_so(tmp_path):
+    data = read_hard_data(table(tmp_path, "x,y,z,facies\n1,2,3,\n"))
+    assert data.points.tolist() == [[1, 2, 3]] and data.names == ("facies",) and np.isnan(data.values).all()
+    for text, names in (("x,y,z\n1,2,3\n", ("z",)), ("x,y,a,z\n1,2,3,4\n", ("a", "z"))):
+        data = read_hard_data(table(tmp_path, text))
+        assert data.points.tolist() == [[1, 2]] and data.names == names
+    with pytest.raises(ValueError, match=r"line 2 has '' in column 3, .* decimal point$"):
+        read_hard_data(table(tmp_path, "x,y,z,facies\n1,2,,4\n"))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("a\n2\nX\nY\n1 2\n", ".* has 2 columns: give x, y and one value"),
+        ("a\n3\nX\nY\nv\n", ".* no line after the names of its 3 columns"),
+        ("a\n3\nX\nY\n", ".* no line after the names"),
+        ("a\n3\nwell\nX\nv\n1 2 3\n", "the first columns are 'well' and 'X': put x and y there"),
+        ("a\n3\nX\nY\nv\n1 2 3\n1 2\n", "line 7 has 2 cells and those before it 3"),
+        ("a\n3\nX\nY\nv\n1 2 3\n1 2 sand\n", "line 7 has 'sand' in column 3, which is no number"),
+    ],
+)
+def test_point_sets_that_are_wrong(tmp_path, text, words):
+    with pytest.raises(ValueError, match=rf"a\.eas: {words}") as caught:
+        read_hard_data(table(tmp_path, text, "a.eas"))
+    assert "\n" not in str(caught.value)
+
+
 def plainly(rows, shape, variables):
     """Site by site: which datum is nearest to it, in exact halves."""
     placed = {}
@@ -155,6 +205,75 @@ def test_data_that_agree_at_one_site_are_one():
     assert placed[1, 1].tolist() == [5, 8]
     assert placed.count() == 2
     assert place_hard_data([[0, 0, 0.1], [0, 0, 0.1 + 1e-12]], (1, 1), "float32").count() == 1, "the same in this type"
+
+
+GROUND = {"origin": (1005.0, 2002.5), "cell": (10.0, 5.0)}
+
+
+def test_coordinates_on_the_ground():
+    for x, y, site in ((1000, 2000, (0, 0)), (1009.9, 2004.9, (0, 0)), (1010, 2005, (1, 1)), (1039.9, 2014.9, (2, 3))):
+        placed = place_hard_data([[x, y, 7]], (3, 4), "uint8", **GROUND)
+        assert np.argwhere(~placed.mask).tolist() == [list(site)]
+    for x, y in ((999.9, 2000), (1040, 2000), (1000, 1999.9), (1000, 2015)):
+        with pytest.raises(ValueError, match=rf"row 0 .* at x {x}.*, y {y}.*, outside .* of 4 x 3 pixels") as caught:
+            place_hard_data([[x, y, 7]], (3, 4), "uint8", **GROUND)
+        assert "give x from 1000.0 to below 1040.0, y from 2000.0 to below 2015.0, or tell" in str(caught.value)
+    assert place_hard_data([[12, 3, 7]], (3, 4), "uint8", cell=(10, 5))[1, 1] == 7
+    with pytest.raises(ValueError, match="give sizes above 0"):
+        place_hard_data([[12, 3, 7]], (3, 4), cell=(10, 0))
+
+
+def points(*rows):
+    rows = np.array(rows, float)
+    return HardData(rows[:, :3], rows[:, 3:], ("v",))
+
+
+def test_data_in_layers():
+    wells = points((1, 2, 0.2, 7), (3, 0, 1.4, 8))
+    placed = place_hard_data(wells, (2, 3, 4), "uint8")
+    assert placed.shape == (2, 3, 4) and placed.count() == 2
+    assert placed[0, 2, 1] == 7 and placed[1, 0, 3] == 8
+    placed = place_hard_data(wells, (2, 3, 4), origin=(-9, -8, 0.2), cell=(10, 10, 1.2))
+    assert placed[0, 1, 1] == 7 and placed[1, 1, 1] == 8
+    with pytest.raises(
+        ValueError,
+        match=r"z 1.4, outside of a picture of 4 x 3 x 1 pixels \(width x height x depth\): .*"
+        "z from -0.5 to below 0.5",
+    ):
+        place_hard_data(wells, (3, 4))
+    assert place_hard_data(wells, (3, 4), origin=(0, 0, 1), cell=(1, 1, 2)).shape == (3, 4)
+    with pytest.raises(ValueError, match=r"row 0 and row 1 .* at layer 1, row 2, column 0 of"):
+        place_hard_data(points((0, 2, 1, 7), (0, 2, 1, 8)), (2, 3, 4))
+    with pytest.raises(ValueError, match=r"shape is \(2, 3, 4\): give \(rows, cols\), or hard data with a column z"):
+        place_hard_data([[0, 0, 1]], (2, 3, 4))
+
+
+SEVERAL = [[1, 1, 5, 5], [0, 1, 8, NAN], [1, 1, 2, 4], [0.9, 1.1, 2, NAN], [1.2, 1, 5, NAN]]
+
+
+@pytest.mark.parametrize(
+    ("several", "dtype", "first", "second"),
+    [
+        ("mean", "float64", 3.5, 4.5), ("mean", "uint8", 4, 5), ("most", "float32", 5, 5), ("most", "uint8", 5, 5),
+    ],
+)  # fmt: skip
+def test_several_data_of_one_cell(several, dtype, first, second):
+    placed = place_hard_data(SEVERAL, (2, 2), dtype, several=several)
+    assert placed[1, 1].tolist() == [first, second]
+    assert placed[1, 0, 0] == 8 and placed.count() == 3 and placed.dtype == dtype
+
+
+def test_of_equally_frequent_values_the_first_counts():
+    for values, found in (((9, 3), 9), ((3, 9), 3), ((3, 9, 9), 9), ((4, 9, 3, 9, 3), 9), ((4, 3, 9, 9, 3), 3)):
+        placed = place_hard_data([[0, 0, value] for value in values], (1, 1), several="most")
+        assert placed.tolist() == [[found]]
+
+
+def test_an_unknown_rule_is_refused():
+    with pytest.raises(ValueError, match="unknown several 'median'; choose one of: refuse, mean, most"):
+        place_hard_data(SEVERAL, (2, 2), several="median")
+    with pytest.raises(ValueError, match="keep one of them, or let `several` say that their mean"):
+        place_hard_data(SEVERAL, (2, 2))
 
 
 def test_masked_numbers_are_unknown():

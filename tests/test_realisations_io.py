@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 import xarray
 
+from simdtex.io.grids import read_grid
 from simdtex.io.realisations import check_realisations_path, write_realisations
 
 SUFFIXES = [".zarr", ".nc", ".npz"]
+GRIDS = [".gslib", ".sgems"]
 ATTRIBUTES = {"text": "Höhe ≥ 3", "seed": 2**64 - 1, "share": 0.25, "options": '{"order": 8, "levels": null}'}
 
 
@@ -88,6 +90,43 @@ def test_a_file_is_replaced(tmp_path, suffix):
     assert os.listdir(tmp_path) == [path.name]
 
 
+@pytest.mark.parametrize("suffix", GRIDS)
+@pytest.mark.parametrize("variables", [None, 2])
+def test_a_grid_keeps_values_origin_and_cells(tmp_path, suffix, variables):
+    array = some("float32", variables).assign_coords(z=3.5).assign_attrs(cell_x=1.0, cell_z=0.25)
+    write_realisations(tmp_path / f"many{suffix}", array)
+    grid = read_grid(tmp_path / f"many{suffix}")
+    assert (grid.origin, grid.cell) == ((0, 0.25, 3.5), (1, 0.5, 0.25))
+    parts = [""] if variables is None else ["_0", "_1"]
+    assert list(grid.values) == [f"rock{part}__real{number}" for number in (7, 9, 11) for part in parts]
+    planes = array.values if variables is None else np.moveaxis(array.values, -1, 1)
+    found = np.stack(list(grid.values.values())).astype(np.float32)[:, 0]
+    assert np.array_equal(found, planes.reshape(-1, 5, 4), equal_nan=True)
+
+
+@pytest.mark.parametrize("suffix", GRIDS)
+def test_layers_and_arrays_without_coordinates(tmp_path, suffix):
+    values = np.arange(48, dtype=np.uint8).reshape(2, 3, 4, 2)
+    array = xarray.DataArray(values, dims=("realisation", "y", "x", "z"))
+    write_realisations(tmp_path / f"a{suffix}", array)
+    grid = read_grid(tmp_path / f"a{suffix}")
+    assert np.array_equal(grid.values["realisations__real1"], values[1].transpose(2, 0, 1))
+    assert (grid.origin, grid.cell) == ((0, 0, 0), (1, 1, 1))
+    write_realisations(tmp_path / f"a{suffix}", array.assign_attrs(cell_y=2.5))
+    assert read_grid(tmp_path / f"a{suffix}").cell == (1, 2.5, 1)
+    write_realisations(tmp_path / f"a{suffix}", array[0, 0:1, 0:1].assign_coords(x=[7.0]).assign_attrs(cell_x=3.0))
+    assert read_grid(tmp_path / f"a{suffix}").cell == (3, 1, 1)
+
+
+@pytest.mark.parametrize("x", [[0, 1, 3, 4], [3, 2, 1, 0], [1, 1, 1, 1], [0, 1, np.nan, 3]])
+def test_coordinates_that_no_grid_has(tmp_path, x):
+    with pytest.raises(ValueError, match="the coordinate x is not evenly spaced in ascending order"):
+        write_realisations(tmp_path / "a.gslib", some().assign_coords(x=x))
+    with pytest.raises(ValueError, match="have the dimensions realisation, y, row: give"):
+        write_realisations(tmp_path / "a.gslib", some().rename(x="row"))
+    assert os.listdir(tmp_path) == []
+
+
 def refused(path, words):
     for attempt in (check_realisations_path, lambda path: write_realisations(path, some())):
         with pytest.raises(ValueError, match=words) as said:
@@ -101,7 +140,7 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch):
     (tmp_path / "photos.zarr" / "a.png").touch()
     (tmp_path / "file.zarr").touch()
     for name, words in (
-        ("many.png", "names no format of realisations: end its name in one of .zarr, .nc, .npz"),
+        ("many.png", "names no format of realisations: end its name in one of .zarr, .nc, .npz, .gsl"),
         ("many", "names no format"),
         (".zarr", "names no format"),
         ("none/many.nc", "the folder .* does not exist"),

@@ -159,6 +159,30 @@ def test_dimensions_coordinates_and_type(dtype):
     assert found.seed.dims == ("realisation",) and found.seed.dtype == np.uint64
 
 
+def test_coordinates_on_the_ground():
+    found = simulate(origin=(1005, 2010.5), cell=(10, 21), n=1)
+    assert np.array_equal(found.x, 1005 + 10 * np.arange(14)) and np.array_equal(found.y, 2010.5 + 21 * np.arange(12))
+    assert (found.attrs["cell_x"], found.attrs["cell_y"]) == (10, 21) and "z" not in found.coords
+    assert_same_bits(found.values, simulate(n=1).values)
+    found = simulate(origin=(1, 2, 3), n=1)
+    assert (found.x[0], found.y[0], found.z) == (1, 2, 3) and found.x[1] == 2 and found.attrs["cell_z"] == 1
+    assert simulate(n=1).x.dtype.kind == "i", "columns, if nothing is said of the ground"
+
+
+def test_data_on_the_ground(tmp_path):
+    path = tmp_path / "wells.csv"
+    path.write_text("x,y,value\n1035,2094.5,20\n1074,2053,30\n1065,2051,33\n")
+    found = simulate(known=path, origin=(1005, 2010.5), cell=(10, 21), several="mean")
+    assert (found.values[:, 4, 3] == 20).all() and (found.values[:, 2, [6, 7]] == [33, 30]).all()
+    rows = [(3, 4, 20), (7, 2, 30), (6, 2, 33)]
+    assert_same_bits(found.values, simulate(known=place_hard_data(rows, SHAPE, np.uint8)).values)
+    with pytest.raises(ValueError, match=r"line 2 of the hard data is at x 1035\.0, y 2094\.5, outside"):
+        simulate(known=path)
+    path.write_text("x,y,value\n3,4,20\n3,4,30\n3,4,31\n")
+    assert (simulate(known=path, several="mean").values[:, 4, 3] == 27).all()
+    assert (simulate(known=path, several="most").values[:, 4, 3] == 20).all()
+
+
 @pytest.mark.parametrize("axis", [0, -1])
 def test_several_variables_are_the_last_dimension(axis):
     training = np.moveaxis(texture((16, 20), 3), -1, axis)
@@ -301,6 +325,8 @@ BAD = {
     "data of another size": ({"known": holed(shape=(12, 13))}, ValueError, "known is 12x13x1 and the output 12x14"),
     "an unknown category": (
         {"training": CATEGORIES, "categorical": True, "known": with_value(NOTHING, 1.0)}, ValueError, "1"),
+    "a cell of no size": ({"cell": (1, 0)}, ValueError, "give sizes above 0"),
+    "an origin of one number": ({"origin": (1,)}, ValueError, "origin is .*; give"),
     "no such table": ({"known": "nowhere.csv"}, ValueError, "nowhere.csv does not exist"),
     "an unknown option": ({"preset": "default", "reach": 3}, TypeError, "unknown option 'reach'"),
 }  # fmt: skip

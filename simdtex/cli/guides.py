@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.inputs import Material, channels, read_known, read_masks, read_pair
+from simdtex.cli.inputs import Material, channels, read_known, read_masks, read_pair, read_pixels
 
 
 def read_data(samples: Material, options: dict[str, Any]) -> dict[str, Any]:
@@ -37,12 +37,12 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tupl
     Colours of 8 bits are labels if ``labels`` is true or, if it is None, the samples' guides have few of them; they
     become whole numbers. Where the guide of the output is transparent or NaN, the output is free: it has NaN there.
     """
-    from simdtex.io import image
     from simdtex.methods.mrf.options import few
 
     paths, out = read_pair("--guide", "SAMPLE-GUIDE=OUTPUT-GUIDE", text, samples)
-    own = [image.read(path).pixels for path in paths]
-    wanted, free = _free(image.read(out).pixels, channels(own[0]))
+    own = [read_pixels(path)[0] for path in paths]
+    wanted, lies = read_pixels(out)
+    wanted, free = _free(wanted, channels(wanted if lies else own[0]))  # a grid has no alpha
     are_few = few([one.reshape(*one.shape[:2], -1) for one in own])
     colours = all(one.dtype == np.uint8 and channels(one) == channels(wanted) > 1 for one in (*own, wanted))
     if labels is not False and colours and (labels or are_few):

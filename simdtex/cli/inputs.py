@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from simdtex.io.grids import Frame
     from simdtex.io.hard_data import HardData
 
 TABLES = (".csv", ".tsv", ".txt", ".dat")
@@ -19,11 +20,15 @@ TABLES = (".csv", ".tsv", ".txt", ".dat")
 
 
 class Material(NamedTuple):
-    """Pictures of one type: ``paths``, and their ``pixels``, which all have the axes of the first."""
+    """Pictures of one type: ``paths``, and their ``pixels``, which all have the axes of the first.
+
+    ``lies`` is where the cells of the first lie, if it is a grid.
+    """
 
     paths: tuple[Path, ...]
     pixels: list[NDArray[Any]]
     channel_axis: int | None
+    lies: Frame | None = None
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
@@ -87,13 +92,24 @@ def check_alike(path: Path, pixels: NDArray[Any], other: Path, like: NDArray[Any
         raise ValueError(f"{path} has {kind(pixels)} and {other} {kind(like)}; convert them to one type")
 
 
-def read_material(paths: Sequence[Path]) -> Material:
-    """Read pictures; one of a single channel gets two axes."""
-    from simdtex.io import image
+def read_pixels(path: Path) -> tuple[NDArray[Any], Frame | None]:
+    """Read a picture, or a grid as one, whose variables are channels; also return where the cells of a grid lie."""
+    from simdtex.io import grids, image
 
-    pictures = [image.read(path).pixels for path in paths]
+    if grids.kind_of(path) is None:
+        return image.read(path).pixels, None
+    grid = grids.read_grid(path)
+    values = np.stack(list(grid.values.values()), -1)
+    if len(values) > 1:
+        raise ValueError(f"{path} has {len(values)} layers and simulations are of one: give a grid with nz = 1")
+    return values[0], grids.Frame(grid.origin, grid.cell)
+
+
+def read_material(paths: Sequence[Path]) -> Material:
+    """Read pictures or grids; one of a single channel gets two axes."""
+    pictures, lie = zip(*map(read_pixels, paths), strict=True)
     pixels = [one[..., 0] if channels(one) == 1 and one.ndim == 3 else one for one in pictures]
-    return Material(tuple(paths), pixels, None if pixels[0].ndim == 2 else -1)
+    return Material(tuple(paths), pixels, None if pixels[0].ndim == 2 else -1, lie[0])
 
 
 def read_masks(paths: Sequence[Path], samples: Material) -> list[NDArray[np.bool_]] | None:
@@ -199,17 +215,17 @@ def check_source_map(path: Path | None, samples: Material, *, everywhere: bool =
 
 
 def read_known(path: Path, like: NDArray[Any]) -> HardData | np.ma.MaskedArray[Any, Any]:
-    """Read the known values of an output: a table, recognised by its name, or a picture.
+    """Read the known values of an output: a table, recognised by its name, a point set, a grid or a picture.
 
     A picture is unknown where it is transparent, if it has alpha and the sample ``like`` has none.
     """
-    from simdtex.io import image
+    from simdtex.io import grids, image
     from simdtex.io.hard_data import read_hard_data
 
-    if path.suffix.lower() in TABLES:
+    if path.suffix.lower() in TABLES or grids.kind_of(path) == "points":
         return read_hard_data(path)
-    values, gone = image.read(path).pixels, None
-    if channels(values) == channels(like) + 1:
+    (values, lies), gone = read_pixels(path), None
+    if lies is None and channels(values) == channels(like) + 1:
         values, gone = image.split_alpha(values)
     if channels(values) == 1:
         values = values.reshape(values.shape[:2])

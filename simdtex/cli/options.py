@@ -163,8 +163,8 @@ KNOWN = option(
     group=DATA,
     type=READ,
     metavar="FILE",
-    help="mrf: keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), or a picture that is "
-    "transparent or NaN where nothing is known.",
+    help="mrf: keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of "
+    "Geo-EAS, or a picture or a grid that is transparent or NaN where nothing is known.",
 )
 GUIDE = option(
     "--guide",

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,11 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.command import DEVICE_GROUP
+from simdtex.cli.command import DATA, DEVICE_GROUP
 from simdtex.cli.guides import read_data
-from simdtex.cli.inputs import output_shape, read_material
+from simdtex.cli.inputs import Material, output_shape, read_material
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import GUIDE, KNOWN, SAMPLE_MASK, given, option, report_option, size_option
+from simdtex.cli.options import GUIDE, KNOWN, SAMPLE_MASK, given, numbers, option, report_option, size_option
 from simdtex.cli.places import EITHER, READ
 
 
@@ -25,6 +26,7 @@ from simdtex.cli.places import EITHER, READ
         "50 that honour the data of wells.",
     ),
     ("simulate facies.png -o many.zarr --number 10 --size 500x500 --report page", "A size, and a page of statistics."),
+    ("simulate facies.gslib -o many.sgems --known wells.csv --origin 5,5 --cell 10,10", "From a grid to a grid."),
 )
 @click.argument("training_image", nargs=-1, required=True, type=READ)
 @click.option(
@@ -32,11 +34,31 @@ from simdtex.cli.places import EITHER, READ
     "--output",
     required=True,
     type=EITHER,
-    help="Write the realisations here: .zarr, .nc or .npz.",
+    help="Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib or .sgems.",
 )
 @click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
 @click.option("--first", default=0, show_default=True, type=int, help="Begin with the realisation of this number.")
 @size_option("that of --known, else of TRAINING_IMAGE", "realisations")
+@option(
+    "--origin",
+    metavar="X,Y[,Z]",
+    group=DATA,
+    help="Begin at this centre of the first cell, in the units of the table of --known.  [that of a grid "
+    "TRAINING_IMAGE, else 0,0]",
+)
+@option(
+    "--cell",
+    metavar="DX,DY[,DZ]",
+    group=DATA,
+    help="Make cells of this size, in the same units.  [that of a grid TRAINING_IMAGE, else 1,1]",
+)
+@option(
+    "--several",
+    words=("refuse", "mean", "most"),
+    group=DATA,
+    help="Take this for data of a table that lie in one cell and differ: an error, their mean, or the most frequent.  "
+    "[refuse]",
+)
 @KNOWN
 @SAMPLE_MASK
 @GUIDE
@@ -53,6 +75,9 @@ def simulate(
     number: int,
     size: str | None,
     report: Path | None,
+    origin: str | None,
+    cell: str | None,
+    several: str | None,
     **options: Any,
 ) -> Task:
     """Simulate what TRAINING_IMAGE shows: realisations that look like it and honour data.
@@ -60,6 +85,7 @@ def simulate(
     A realisation depends on the seed and on its own number alone.
     """
     from simdtex import simulate
+    from simdtex.io.grids import SUFFIXES, check_grid
     from simdtex.io.realisations import check_realisations_path, write_realisations
     from simdtex.run import Output
 
@@ -68,12 +94,16 @@ def simulate(
     data = read_data(material, options)
     known = data["known"]
     shape = output_shape(size, pixels, known, pixels)
-    check_realisations_path(output)
+    lies = _lies(material, origin, cell)
+    place = lies | ({} if several is None else {"several": several})
+    if check_realisations_path(output) in SUFFIXES:
+        check_grid(output, material.pixels, **lies)
     writers: list[Any] = [lambda made, run: write_realisations(output, made)]
     if report:
         _check_report(report, material.pixels, shape, getattr(known, "values", known))
-        writers.append(lambda made, run: _report(report, pixels, made, None if known is None else _rows(known, shape)))
-    inputs = data | given(options) | {"shape": shape}
+        rows = partial(_rows, known, shape, place)
+        writers.append(lambda made, run: _report(report, pixels, made, None if known is None else rows()))
+    inputs = data | given(options) | {"shape": shape} | place
 
     def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
         made = simulate(material.array, number, **inputs, **call)
@@ -85,6 +115,16 @@ def simulate(
         str(output),
         writers,
     )
+
+
+def _lies(material: Material, origin: str | None, cell: str | None) -> dict[str, Any]:
+    """Return the origin and the size of cells: as given, else of a training image that is a grid, else None."""
+    options = (("--origin", origin), ("--cell", cell))
+    found: list[Any] = [None if text is None else numbers(name, text) for name, text in options]
+    if material.lies:  # whose z is left out if that of the other option is
+        axes = min((len(one) for one in found if one), default=3)
+        found = [one or own[:axes] for one, own in zip(found, material.lies, strict=True)]
+    return dict(zip(("origin", "cell"), found, strict=True))
 
 
 def _report(folder: Path, pixels: Any, made: Any, data: Any) -> None:
@@ -113,10 +153,10 @@ def _check_report(folder: Path, pictures: list[Any], shape: tuple[int, int], kno
     check_folder(folder)
 
 
-def _rows(known: Any, shape: tuple[int, int]) -> Any:
-    """Return hard data as rows of x, y and value."""
+def _rows(known: Any, shape: tuple[int, int], place: dict[str, Any]) -> Any:
+    """Return hard data as rows of column, row and value."""
     from simdtex.io.hard_data import HardData, place_hard_data
 
-    known = place_hard_data(known, shape) if isinstance(known, HardData) else np.ma.masked_invalid(known)
+    known = place_hard_data(known, shape, **place) if isinstance(known, HardData) else np.ma.masked_invalid(known)
     row, col = np.nonzero(~np.ma.getmaskarray(known))
     return np.stack([col, row, known.data[row, col].astype(np.float64)], -1)

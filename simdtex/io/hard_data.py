@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Hard data: values known at points, read from a table and placed on the sites of a picture.
+"""Hard data: values known at points, read from a table and placed on the cells of a grid or the pixels of a picture.
 
-x is the column and y the row, in pixels: (0, 0) is the centre of the first pixel and row 0 is at the top. NaN is an
-unknown value.
+x grows with the column, y with the row, and z with the layer. Without an origin and a size of cells they are in pixels:
+(0, 0) is the centre of the first pixel, of row 0. NaN is an unknown value.
 """
 
 from __future__ import annotations
 
 import csv
 import os
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import chain, islice
+from math import prod
 from operator import index
 from pathlib import Path
 from typing import Any
@@ -18,11 +21,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from simdtex.io.grids import MISSING, frame
 from simdtex.io.image import cast
 from simdtex.io.limits import BYTES, TooLarge, check_file, max_pixels_or_default, read_npy
+from simdtex.options import one_of
 
 PathLike = str | os.PathLike[str]
 Floats = NDArray[np.float64]
+
+SEVERAL = ("refuse", "mean", "most")
+"""What becomes of data of one cell that differ."""
+
+_AXES = tuple(re.compile(rf"{axis}(?:$|[^a-z]|loc|coord)", re.IGNORECASE) for axis in "xyz")
+"""How columns of coordinates are called: x, Xlocation, X_coord, x (m), but not Zn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,8 +42,8 @@ class HardData:
 
     Attributes
     ----------
-    points : ndarray of float64, (data, 2)
-        x and y of each datum, pixels.
+    points : ndarray of float64, (data, 2) or (data, 3)
+        x and y, or x, y and z, of each datum, in the units of the file.
     values : ndarray of float64, (data, variables)
         NaN if a variable is unknown.
     names : tuple of str
@@ -63,8 +74,14 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
         A text with a datum in each line: x, y and a value, or one value for each of several variables. Cells are
         separated by semicolons, tabs, commas or blanks: the first of these, in this order, that is in the first line.
         Numbers have a decimal point. An empty cell, or NaN, is an unknown value. A first line with names for x and y
-        is a header, which names the variables. From ``#`` to the end of a line is a comment. Or a NumPy ``.npy`` of
-        real numbers, (data, 3 or more), with the same columns.
+        is a header, which names the variables; if it calls the third of four or more columns z, that is the third
+        coordinate. From ``#`` to the end of a line is a comment.
+
+        Or a point set of Geo-EAS, told by a second line of one number: a title, the number of columns, their names,
+        each in a line, and a datum in each line, with blanks between numbers. The first columns are x and y and, if it
+        is called so, z; a number of `simdtex.io.grids.MISSING` is an unknown value.
+
+        Or a NumPy ``.npy`` of real numbers, (data, 3 or more), with the columns x, y and values.
     max_pixels : int, optional
         The most cells, or bytes of a text, that are read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
 
@@ -103,8 +120,12 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
 
 
 def _parsed(text: Iterable[str]) -> HardData:
-    """Parse the lines of a table."""
-    stripped = ((number, line.partition("#")[0].strip("\r\n ")) for number, line in enumerate(text, 1))
+    """Parse the lines of a table or of a point set."""
+    lines = iter(text)
+    first = list(islice(lines, 2))
+    if len(first) == 2 and re.fullmatch(r"\s*[0-9]{1,9}\s*", first[1]):
+        return _point_set(int(first[1]), lines)
+    stripped = ((number, line.partition("#")[0].strip("\r\n ")) for number, line in enumerate(chain(first, lines), 1))
     kept = [(number, line) for number, line in stripped if line.strip()]
     if not kept:
         raise ValueError("the table is empty: give a line with x, y and a value for each datum")
@@ -121,20 +142,43 @@ def _parsed(text: Iterable[str]) -> HardData:
         _check_order(names)
     if not rows:
         raise ValueError("the table has a header and no rows: give a line with x, y and a value for each datum")
+    return _of_rows(rows, columns, names)
+
+
+def _point_set(columns: int, lines: Iterable[str]) -> HardData:
+    """Parse a point set of Geo-EAS from its third line on."""
+    numbered = enumerate(lines, 3)
+    names = [line.strip() for _, line in islice(numbered, columns)]
+    if columns < 3:
+        raise ValueError(f"the point set has {columns} column{'s' * (columns != 1)}: give x, y and one value or more")
+    rows = [(number, cells) for number, line in numbered if (cells := line.split())]
+    if not rows:
+        raise ValueError(f"the point set has no line after the names of its {columns} columns: get the file again")
+    if not all(axis.match(name) for axis, name in zip(_AXES[:2], names, strict=False)):
+        raise ValueError(f"the first columns are {names[0]!r} and {names[1]!r}: put x and y there, and call them so")
+    data = _of_rows(rows, columns, names)
+    data.values[np.isin(data.values, MISSING)] = np.nan
+    return data
+
+
+def _of_rows(rows: Sequence[tuple[int, list[str]]], columns: int, names: Sequence[str] | None) -> HardData:
+    """Return the data of numbered rows of cells."""
+    axes = 3 if names and columns > 3 and _AXES[2].match(names[2]) else 2
     for number, cells in rows:
         if len(cells) != columns:
             raise ValueError(f"line {number} has {len(cells)} cells and those before it {columns}: give as many in all")
     table = np.empty((len(rows), columns))
     for k, (number, cells) in enumerate(rows):
         for column, cell in enumerate(cells):
-            value = np.nan if not cell and column >= 2 else _number(cell)
+            value = np.nan if not cell and column >= axes else _number(cell)
             if value is None:
                 raise ValueError(
                     f"line {number} has {cell[:40]!r} in column {column + 1}, which is no number: write numbers with a "
-                    "decimal point" + (", and leave the cell of an unknown value empty" if column >= 2 else "")
+                    "decimal point" + (", and leave the cell of an unknown value empty" if column >= axes else "")
                 )
             table[k, column] = value
-    return HardData(table[:, :2], table[:, 2:], _names(columns - 2, names), tuple(number for number, _ in rows))
+    values = _names(columns - axes, names and names[axes:])
+    return HardData(table[:, :axes], table[:, axes:], values, tuple(number for number, _ in rows))
 
 
 def _cells(line: str, number: int, delimiter: str | None) -> list[str]:
@@ -165,7 +209,7 @@ def _check_order(header: Sequence[str]) -> None:
 
 def _names(variables: int, header: Sequence[str] | None = None) -> tuple[str, ...]:
     plain = ["value"] if variables == 1 else [f"value {k + 1}" for k in range(variables)]
-    return tuple(given or name for given, name in zip(header[2:] if header else plain, plain, strict=True))
+    return tuple(given or name for given, name in zip(header or plain, plain, strict=True))
 
 
 def _table(array: Any) -> HardData:
@@ -185,25 +229,39 @@ def _table(array: Any) -> HardData:
 
 
 def place_hard_data(
-    table: HardData | ArrayLike, shape: Sequence[int], dtype: DTypeLike | None = None
+    table: HardData | ArrayLike,
+    shape: Sequence[int],
+    dtype: DTypeLike | None = None,
+    *,
+    origin: Sequence[float] | None = None,
+    cell: Sequence[float] | None = None,
+    several: str = "refuse",
 ) -> np.ma.MaskedArray:
-    """Place known values on the sites of a picture.
+    """Place known values on the cells of a grid, or the pixels of a picture.
 
     Parameters
     ----------
     table : HardData or array_like, (data, 3 or more)
-        x, y and the value of each datum, or one value for each of several variables; NaN is unknown. x is the column
-        and y the row, in pixels: (0, 0) is the centre of the first pixel, and row 0 is at the top. A datum belongs to
-        the nearest site; halfway between two, to the one at the right or below (1.5 goes to 2, -0.5 to 0).
-    shape : (rows, cols)
-        The size of the picture.
+        x, y and the value of each datum, or one value for each of several variables; NaN is unknown. x grows with the
+        column, y with the row and z with the layer. A datum belongs to the cell that it lies in, and on the border of
+        two to the one of the larger coordinate (without `origin` and `cell`, 1.5 goes to 2, -0.5 to 0).
+    shape : (rows, cols) or (layers, rows, cols)
+        The size of the grid. With two numbers z, if the data have it, must lie in the one layer that there is.
     dtype : dtype, optional
         The type of the values, which must be the training image's; None is float64. Integers must be exact; floats
         are rounded to the type.
+    origin : (x, y) or (x, y, z), optional
+        The centre of the first cell, in the units of the data. None is 0.
+    cell : (x, y) or (x, y, z), optional
+        The size of a cell. None is 1: coordinates are in pixels.
+    several : {"refuse", "mean", "most"}
+        What becomes of data of one cell that differ: an error; their mean, rounded to the nearest integer (halves up)
+        if the type is not of floats; or the most frequent value, of those that are equally frequent the one that is
+        first in the table. Each variable is treated for itself.
 
     Returns
     -------
-    MaskedArray, (rows, cols) or (rows, cols, variables)
+    MaskedArray, of `shape` or, with several variables, (*shape, variables)
         The known values; unknown ones are masked. A single variable has no last axis. ``filled()`` replaces unknown
         values by NaN, or by 0 if the type is not of floats.
 
@@ -212,8 +270,8 @@ def place_hard_data(
     TypeError
         The table or the type is not of real numbers.
     ValueError
-        A coordinate is not finite, a datum is outside of the picture, two data at one site have different values, the
-        type cannot hold a value, or nothing is known; the message names the row.
+        A coordinate is not finite, a datum is outside of the grid, two data of one cell have different values and
+        `several` is ``"refuse"``, the type cannot hold a value, or nothing is known; the message names the row.
 
     Examples
     --------
@@ -221,60 +279,99 @@ def place_hard_data(
     >>> print(known)
     [[-- -- --]
      [7 -- 9]]
+    >>> wells = [[1005, 2012, 7], [1029, 2013, 9], [1021, 2011, 10]]
+    >>> print(place_hard_data(wells, (2, 3), "uint8", origin=(1005, 2005), cell=(10, 10), several="mean"))
+    [[-- -- --]
+     [7 -- 10]]
     """
     data = table if isinstance(table, HardData) else _table(table)
     try:
-        rows, cols = (index(side) for side in shape)
+        sides = tuple(index(side) for side in shape)
     except (TypeError, ValueError):
-        rows = cols = 0
-    if rows < 1 or cols < 1:
+        sides = ()
+    if len(sides) not in (2, 3) or min(sides) < 1:
         raise ValueError(f"shape is {shape!r}: give (rows, cols) of the picture, integers of 1 or more")
     kind = np.dtype(np.float64 if dtype is None else dtype).newbyteorder("=")
     if kind.kind not in "buif":
         raise TypeError(f"dtype is {kind}: give bool, or a type of integers or real floats")
+    one_of("several", several, SEVERAL)
     if not len(data):
         raise ValueError("the hard data has no rows: give x, y and a value for each datum")
-    sites = _sites(data, rows, cols)
+    if len(sides) > data.points.shape[1]:
+        raise ValueError(f"shape is {shape!r}: give (rows, cols), or hard data with a column z after x and y")
+    sites = _sites(data, sides, origin, cell)
     values = _cast(data, kind)
     known = ~np.isnan(data.values)
     if not known.any():
         raise ValueError("the hard data has no known value: give a number for one datum at least")
     variables = data.values.shape[1]
-    placed = np.zeros((rows * cols, variables), dtype=kind)
-    mask = np.ones((rows * cols, variables), dtype=bool)
+    placed = np.zeros((prod(sides), variables), dtype=kind)
+    mask = np.ones((prod(sides), variables), dtype=bool)
     for k in range(variables):
         rows_known = np.flatnonzero(known[:, k])
-        here = sites[rows_known]
-        placed[here, k], mask[here, k] = values[rows_known, k], False
-        wrong = np.flatnonzero(placed[here, k] != values[rows_known, k])
+        here, found = sites[rows_known], values[rows_known, k]
+        if several != "refuse":
+            here, found = (_mean if several == "mean" else _most)(here, found)
+        placed[here, k], mask[here, k] = found, False
+        wrong = np.flatnonzero(placed[here, k] != found)
         if len(wrong):
             one = int(rows_known[wrong[0]])
-            other = int(rows_known[(here == sites[one]) & (values[rows_known, k] != values[one, k])][0])
-            i, j = divmod(int(sites[one]), cols)
+            other = int(rows_known[(here == sites[one]) & (found != values[one, k])][0])
+            *layer, i, j = np.unravel_index(sites[one], sides)
             raise ValueError(
-                f"{data.where(one)} and {data.where(other)} of the hard data are both at row {i}, column {j} of the "
-                f"picture and have {values[one, k]} and {values[other, k]} for {data.names[k]}: keep one of them"
+                f"{data.where(one)} and {data.where(other)} of the hard data are both at "
+                f"{''.join(f'layer {z}, ' for z in layer)}row {i}, column {j} of the picture and have "
+                f"{values[one, k]} and {values[other, k]} for {data.names[k]}: keep one of them, or let `several` say "
+                "that their mean or the most frequent counts"
             )
-    form = (rows, cols) if variables == 1 else (rows, cols, variables)
+    form = sides if variables == 1 else (*sides, variables)
     unknown = np.nan if kind.kind == "f" else 0
     return np.ma.MaskedArray(placed.reshape(form), mask=mask.reshape(form), fill_value=unknown)
 
 
-def _sites(data: HardData, rows: int, cols: int) -> NDArray[np.intp]:
+def _mean(sites: NDArray[np.intp], values: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[Any]]:
+    """Return each site once, with the mean of its values."""
+    found, inverse, counts = np.unique(sites, return_inverse=True, return_counts=True)
+    means = np.bincount(inverse, values.astype(np.float64)) / counts
+    return found, (means if values.dtype.kind == "f" else np.floor(means + 0.5)).astype(values.dtype)
+
+
+def _most(sites: NDArray[np.intp], values: NDArray[Any]) -> tuple[NDArray[np.intp], NDArray[Any]]:
+    """Return each site once, with the most frequent of its values; of several, the first."""
+    _, kinds = np.unique(values, return_inverse=True)
+    pairs, first, counts = np.unique(sites * len(values) + kinds, return_index=True, return_counts=True)
+    order = np.lexsort((first, -counts, pairs // len(values)))
+    found, chosen = np.unique(pairs[order] // len(values), return_index=True)
+    return found, values[first[order][chosen]]
+
+
+def _sites(
+    data: HardData, shape: tuple[int, ...], origin: Sequence[float] | None, cell: Sequence[float] | None
+) -> NDArray[np.intp]:
     """Return the index of each datum's site, row by row."""
-    low = np.floor(data.points)
-    with np.errstate(invalid="ignore"):  # infinity is outside
-        nearest = low + (data.points - low >= 0.5)  # not floor(x + 0.5), which rounds the sum first
-    outside = ~((nearest >= 0) & (nearest <= (cols - 1, rows - 1))).all(axis=1)  # NaN too
+    axes = data.points.shape[1]
+    lies = frame(origin, cell)
+    at, size = np.array(((*lies.origin, 0.0)[:axes], (*lies.cell, 1.0)[:axes]))
+    sides = np.array((1, *shape)[: -axes - 1 : -1])  # along x, y and z
+    with np.errstate(invalid="ignore", over="ignore"):  # infinity is outside
+        cells = (data.points - at) / size
+        low = np.floor(cells)
+        nearest = low + (cells - low >= 0.5)  # not floor(x + 0.5), which rounds the sum first
+    outside = ~((nearest >= 0) & (nearest < sides)).all(axis=1)  # NaN too
     if outside.any():
         row = int(outside.argmax())
-        x, y = data.points[row]
+        there = ", ".join(f"{axis} {x}" for axis, x in zip("xyz", data.points[row], strict=False))
+        first, last = at - size / 2, at + (sides - 0.5) * size
+        ranges = ", ".join(f"{axis} from {a} to below {b}" for axis, a, b in zip("xyz", first, last, strict=False))
         raise ValueError(
-            f"{data.where(row)} of the hard data is at x {x}, y {y}, outside of a picture of {cols} x {rows} pixels "
-            f"(width x height): give x from -0.5 to below {cols - 0.5}, y from -0.5 to below {rows - 0.5}"
+            f"{data.where(row)} of the hard data is at {there}, outside of a picture of "
+            f"{' x '.join(map(str, sides))} pixels (width x height{' x depth' * (axes > 2)}): give {ranges}, or tell "
+            "`simulate` the origin and the size of its cells"
         )
-    sites: NDArray[np.intp] = (nearest[:, 1] * cols + nearest[:, 0]).astype(np.intp)
-    return sites
+    found: NDArray[np.intp] = np.zeros(len(data), np.intp)
+    for axis in range(axes)[::-1]:
+        found = found * sides[axis] + nearest[:, axis].astype(np.intp)
+    return found
 
 
 def _cast(data: HardData, kind: np.dtype[Any]) -> NDArray[Any]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writing the realisations of a simulation: by xarray's own writers, or as plain NumPy arrays.
+"""Writing the realisations of a simulation: by xarray's own writers, as plain NumPy arrays, or as a grid.
 
 Realisations are an `xarray.DataArray`, as `simdtex.simulate` returns. The extra ``simulate`` installs the libraries:
 ``pip install 'simdtex[simulate]'``.
@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import warnings
+from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable, check_target
+from simdtex.io.grids import SUFFIXES, write_grid
 
 if TYPE_CHECKING:
     from xarray import DataArray
@@ -25,7 +27,10 @@ __all__ = ["check_realisations_path", "write_realisations"]
 
 PathLike = str | os.PathLike[str]
 
-_NEEDED = {".zarr": ("xarray", "zarr"), ".nc": ("xarray", "h5netcdf", "h5py"), ".npz": ()}
+_NEEDED: dict[str, tuple[str, ...]] = {
+    **{".zarr": ("xarray", "zarr"), ".nc": ("xarray", "h5netcdf", "h5py"), ".npz": ()},
+    **dict.fromkeys(SUFFIXES, ()),
+}
 """The libraries that each suffix needs."""
 
 
@@ -64,9 +69,12 @@ def write_realisations(path: PathLike, array: DataArray) -> None:
     path : path
         ``.zarr`` (a folder, Zarr format 3) and ``.nc`` (netCDF 4, compressed), which ``xarray.open_dataarray`` reads;
         or ``.npz`` for ``numpy.load``: ``values``, each coordinate under its name, and ``attributes``, a JSON text.
-        An existing file or Zarr store is replaced.
+        ``.gslib`` (text) and ``.sgems`` are grids of which each realisation is a variable, called by the array's name,
+        ``__real`` and its number, as SGeMS does: `simdtex.write_grid`; they keep origin and size of cells, and no
+        attributes. An existing file or Zarr store is replaced.
     array : DataArray, (realisation, y, x) or (realisation, y, x, variable)
-        What `simdtex.simulate` returns; attributes are texts and numbers. Writing ``.npz`` does not import xarray.
+        What `simdtex.simulate` returns; attributes are texts and numbers. A grid may have layers, (realisation, z, y,
+        x), and its coordinates must be evenly spaced and ascend. ``.zarr`` and ``.nc`` alone need xarray.
 
     Raises
     ------
@@ -78,6 +86,10 @@ def write_realisations(path: PathLike, array: DataArray) -> None:
     if not hasattr(array, "coords"):
         raise TypeError(f"the realisations are of type {type(array).__name__}: give an xarray.DataArray")
     suffix = check_realisations_path(path)
+    if suffix in SUFFIXES:
+        origin, cell = zip(*(_axis(array, axis) for axis in "xyz"), strict=True)
+        write_grid(path, dict(_variables(array)), origin=origin, cell=cell)
+        return
     if suffix == ".npz":
         coordinates: dict[str, Any] = {str(name): np.asarray(one.values) for name, one in array.coords.items()}
         attributes = np.array(json.dumps(array.attrs))
@@ -94,3 +106,33 @@ def write_realisations(path: PathLike, array: DataArray) -> None:
     with atomic_folder(path) as store, warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Consolidated metadata")  # not yet in the specification, but read by xarray
         named.to_zarr(store, mode="w", zarr_format=3)
+
+
+def _variables(array: DataArray) -> Iterator[tuple[str, Any]]:
+    """Yield the name and the values, (z, y, x) or (y, x), of every variable of every realisation."""
+    dims = [str(dim) for dim in array.dims]
+    wanted: list[str] = [dim for dim in ("realisation", "variable", "z", "y", "x") if dim in dims]
+    if sorted(dims) != sorted(wanted) or wanted[-2:] != ["y", "x"]:
+        raise ValueError(f"the realisations have the dimensions {', '.join(dims)}: give realisation, y and x")
+    planes = np.asarray(array.values).transpose([dims.index(dim) for dim in wanted])
+    names = [str(array.name or "realisations")]
+    for dim, joint in (("variable", "_"), ("realisation", "__real")):
+        if dim in dims:
+            count = planes.shape[wanted.index(dim)]
+            numbers = array.coords[dim].values.tolist() if dim in array.coords else range(count)
+            names = [f"{name}{joint}{number}" for number in numbers for name in names]
+    sides = planes.shape[sum(dim in dims for dim in ("realisation", "variable")) :]
+    yield from zip(names, planes.reshape(-1, *sides), strict=True)
+
+
+def _axis(array: DataArray, axis: str) -> tuple[float, float]:
+    """Return the first coordinate along an axis and the size of a cell, which is that of the attribute if there is."""
+    if axis not in array.coords:
+        return 0.0, float(array.attrs.get(f"cell_{axis}", 1.0))
+    values = np.atleast_1d(np.asarray(array.coords[axis].values, np.float64))
+    between = (values[-1] - values[0]) / (len(values) - 1) if len(values) > 1 else 1.0
+    size = float(array.attrs.get(f"cell_{axis}", between))
+    off = np.abs(values - (values[0] + size * np.arange(len(values))))
+    if not (size > 0 and (off <= size / 1000).all()):  # NaN too
+        raise ValueError(f"the coordinate {axis} is not evenly spaced in ascending order, as those of a grid are")
+    return float(values[0]), size

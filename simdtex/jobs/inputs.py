@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import prod
 from typing import Any, NamedTuple
 
@@ -18,6 +18,9 @@ from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair
 from simdtex.model.pictures import Mask, Pictures, unknown_in
 from simdtex.options import unmasked
+
+Placing = Callable[..., "np.ma.MaskedArray[Any, Any]"]
+"""`place_hard_data`, or what places a table where it lies on the ground."""
 
 
 class Inputs(NamedTuple):
@@ -50,10 +53,14 @@ def check_inputs(
     known: Any = None,
     known_source: Any = None,
     guide: Any = None,
+    place: Placing = place_hard_data,
 ) -> Inputs:
-    """Check the arrays of a job; the arguments are those of `simdtex.synthesize`, or a sample already checked."""
+    """Check the arrays of a job; the arguments are those of `simdtex.synthesize`, or a sample already checked.
+
+    ``place(table, shape, dtype)`` places a table of known values.
+    """
     pictures = sample if isinstance(sample, Pictures) else check_samples(sample, channel_axis, mask)
-    given = None if known is None else check_known(known, shape, channel_axis, pictures, known_source)
+    given = None if known is None else check_known(known, shape, channel_axis, pictures, known_source, place)
     return Inputs(pictures, given, None if guide is None else check_guide(guide, shape, pictures))
 
 
@@ -112,7 +119,12 @@ def as_known(known: Any) -> HardData | NDArray[Any]:
 
 
 def check_known(
-    known: Any, shape: tuple[int, int], channel_axis: int | None, pictures: Pictures, source: Any = None
+    known: Any,
+    shape: tuple[int, int],
+    channel_axis: int | None,
+    pictures: Pictures,
+    source: Any = None,
+    place: Placing = place_hard_data,
 ) -> Given:
     """Check the known values of an output: a masked array, floats with NaN for unknown, a table or its path."""
     known = as_known(known)
@@ -123,7 +135,7 @@ def check_known(
                 f"a datum has {len(known.names)} values and a pixel of the sample {variables}; give as many"
             )
         memory.require_host(prod(shape) * variables * (dtype.itemsize + 1))  # values and a mask
-        array = place_hard_data(known, shape, dtype).reshape(*shape, variables)
+        array = place(known, shape, dtype).reshape(*shape, variables)
     else:
         axes = 2 if channel_axis is None else 3
         if known.dtype.kind not in "buif":

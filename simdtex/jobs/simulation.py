@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from importlib.metadata import version
 from math import prod
 from queue import SimpleQueue
@@ -18,7 +19,8 @@ from numpy.typing import ArrayLike
 
 from simdtex.checkpoint import Checkpoint, Checkpointing, digest, opened
 from simdtex.driver import check_shape, drive, restored
-from simdtex.io.hard_data import HardData
+from simdtex.io.grids import frame
+from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.jobs.inputs import Inputs, as_known, check_inputs, check_samples
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
@@ -38,6 +40,9 @@ def simulate(
     *,
     shape: tuple[int, int] | None = None,
     known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
+    several: str = "refuse",
+    origin: Sequence[float] | None = None,
+    cell: Sequence[float] | None = None,
     guide: tuple[Any, Any] | None = None,
     mask: ArrayLike | None = None,
     first: int = 0,
@@ -62,6 +67,14 @@ def simulate(
     known : array, HardData or path, optional
         What is known: a masked array, or floats with NaN where nothing is known, of `shape`; or a table ``x,y,value``
         (`simdtex.read_hard_data`) or its file. Every realisation has these values, to the bit.
+    several : {"refuse", "mean", "most"}
+        What becomes of data of a table that lie in one cell and differ: an error, their mean, or the most frequent
+        value, as in `simdtex.place_hard_data`.
+    origin : (x, y) or (x, y, z), optional
+        The centre of the first cell of a realisation, in the units of the table and of the result's coordinates. None
+        is 0.
+    cell : (x, y) or (x, y, z), optional
+        The size of a cell. None is 1; without `origin` and `cell`, coordinates are columns and rows.
     guide, mask
         As in `simdtex.synthesize`: secondary data of the training image and of the realisations, and what of the
         training image may be used.
@@ -85,10 +98,12 @@ def simulate(
     Returns
     -------
     xarray.DataArray
-        Dimensions ``realisation``, ``y`` (row 0 at the top), ``x`` and, with `channel_axis`, ``variable``, in the
-        training image's type. The coordinate ``seed`` is that of each realisation: `simdtex.synthesize` with it gives
-        the same. Attributes: ``seed``, ``options`` (a JSON text), ``version``, ``device``, and SHA-256 digests of the
-        arrays ``training_image``, ``hard_data``, ``guide`` and ``mask`` that are given. All are texts and numbers, so
+        Dimensions ``realisation``, ``y`` (row 0 is the smallest y), ``x`` and, with `channel_axis`, ``variable``, in
+        the training image's type. The coordinates ``y`` and ``x`` are those of the centres of cells, and a third number
+        of `origin` and `cell` is the coordinate ``z``. The coordinate ``seed`` is that of each realisation:
+        `simdtex.synthesize` with it gives the same. Attributes: ``seed``, ``options`` (a JSON text), ``version``,
+        ``device``, SHA-256 digests of the arrays ``training_image``, ``hard_data``, ``guide`` and ``mask`` that are
+        given, and with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. All are texts and numbers, so
         that ``to_netcdf`` and ``to_zarr`` of xarray write them.
 
     Raises
@@ -116,12 +131,14 @@ def simulate(
         whole("jobs", jobs, 1)
     if shape is not None:
         within_32_bits(check_shape(shape), 1)
+    lies = frame(origin, cell)
     pictures = check_samples(training, channel_axis, mask)
     known = None if known is None else as_known(known)
     size = check_shape(pictures.pixels[0].shape[:2] if shape is None else shape)
     if shape is None and isinstance(known, np.ndarray) and known.ndim == (2 if channel_axis is None else 3):
         size = known.shape if channel_axis is None else np.moveaxis(known, channel_axis, -1).shape[:2]
-    inputs = check_inputs(pictures, size, channel_axis, None, known, None, guide)
+    place = partial(place_hard_data, origin=origin, cell=cell, several=several)
+    inputs = check_inputs(pictures, size, channel_axis, None, known, None, guide, place)
     chosen = resolve(mrf.Options, "simulate", options)
     plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
     pixels = inputs.pictures.pixels[0]
@@ -175,6 +192,10 @@ def simulate(
         "seed": ("realisation", seeds),
     }
     attributes = _attributes(seed, chosen, machines[0].name, inputs)
+    if origin is not None or cell is not None:
+        for axis, at, side in zip("xyz", *lies, strict=False):
+            coordinates[axis] = at + side * coordinates[axis] if axis in coordinates else at
+            attributes[f"cell_{axis}"] = side
     result: xarray.DataArray = xr.DataArray(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
     return result
 

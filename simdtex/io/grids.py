@@ -1,0 +1,483 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Grids of cells in the files of geostatistics: the text of GSLIB and Geo-EAS, and the binary grids of SGeMS.
+
+An array of values has the axes (z, y, x), each in ascending order of its coordinate: row 0 is the smallest y, as in the
+files, whose values are x fastest, then y, then z. The origin is the centre of the first cell.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import struct
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from math import isfinite, prod
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from simdtex.io.atomic import atomic_path, check_target
+from simdtex.io.limits import BYTES, TooLarge, check_file, check_size, max_pixels_or_default
+from simdtex.options import shown
+
+__all__ = ["MISSING", "SUFFIXES", "CartesianGrid", "check_grid", "frame", "kind_of", "read_grid", "write_grid"]
+
+Array = NDArray[Any]
+PathLike = str | os.PathLike[str]
+
+SUFFIXES = (".gslib", ".sgems")
+"""How the name of a grid that is written ends; what a file is that is read is told by its first lines."""
+
+MISSING = (-999.0, -9999.0, -997799.0, -9966699.0, -9999999.0)
+"""Numbers that stand for an unknown value: those of GSLIB, grids of maps, MPSlib, SGeMS, and DeeSse."""
+
+NO_DATA = -9966699
+"""What is written for an unknown value, which is SGeMS's own."""
+
+MAGIC = b"\xb2\x11\x17\x5d"
+
+_BLOCKS = (b"\0\0\0\x0cRegionBlock\0", b"\0\0\0\x0bGroupBlock\0")
+_WHOLE = (np.uint8, np.int16, np.int32)
+_SIDES = re.compile(r"\(\s*([0-9]+)\s*x\s*([0-9]+)\s*x\s*([0-9]+)\s*\)\s*$")
+_FAR = 1e30
+"""The largest coordinate, which is far within 32-bit floats."""
+
+_LINE = 2**14
+"""Bytes of a line of a header, at most."""
+
+
+class Frame(NamedTuple):
+    """Where cells lie: the centre of the first and the size of each, (x, y) or (x, y, z)."""
+
+    origin: tuple[float, ...]
+    cell: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class CartesianGrid:
+    """A grid of cells with its variables.
+
+    Attributes
+    ----------
+    values : dict of str to ndarray, (nz, ny, nx)
+        Each variable by its name, in the order of the file. Whole numbers are of the smallest type of uint8, int16 and
+        int32 that holds them; others are float64 from a text and float32 from SGeMS. NaN is unknown.
+    origin : (x, y, z)
+        The centre of the first cell.
+    cell : (x, y, z)
+        The size of a cell.
+    """
+
+    values: dict[str, Array]
+    origin: tuple[float, ...]
+    cell: tuple[float, ...]
+
+
+def frame(origin: Sequence[float] | None, cell: Sequence[float] | None) -> Frame:
+    """Check where cells lie; None is 0 for the origin and 1 for the size of a cell."""
+    first = None if origin is None else _numbers("origin", origin)
+    size = None if cell is None else _numbers("cell", cell)
+    axes = len(first or size or "xy")
+    found = Frame(first or (0.0,) * axes, size or (1.0,) * axes)
+    if len(found.origin) != len(found.cell):
+        raise ValueError(f"origin has {len(found.origin)} numbers and cell {len(found.cell)}; give as many")
+    if min(found.cell) < 1 / _FAR:
+        raise ValueError(f"cell is {found.cell}; give sizes above 0, from {1 / _FAR:g} on")
+    if any(size < abs(at) * 2.0**-40 for at, size in zip(*found, strict=True)):
+        raise ValueError(f"cells of {found.cell} cannot be told apart at {found.origin}; give coordinates nearer to 0")
+    return found
+
+
+def _numbers(name: str, values: Sequence[float]) -> tuple[float, ...]:
+    try:
+        found = tuple(float(value) for value in values)
+    except (TypeError, ValueError):
+        found = ()
+    if len(found) not in (2, 3) or not all(abs(number) < _FAR for number in found):
+        raise ValueError(f"{name} is {shown(values)}; give (x, y) or (x, y, z), numbers below {_FAR:g}")
+    return found
+
+
+def kind_of(path: PathLike) -> str | None:
+    """Return what a file is by its first lines: ``"grid"``, ``"points"`` for a point set of Geo-EAS, or None."""
+    if not os.path.isfile(path):
+        return None
+    try:
+        with open(path, "rb") as file:
+            title, second, third = (file.readline(_LINE) for _ in range(3))
+    except OSError:
+        return None
+    if title.startswith(MAGIC):
+        return "grid"
+    words = second.split()
+    if len(words) not in (1, 4, 10, 11) or not words[0].isdigit():
+        return None
+    if len(words) > 1:  # else a table whose rows have as many numbers
+        return None if len(third.split()) == len(words) and _all_numbers(third.split()) else "grid"
+    return "grid" if _of_title(_text(title)) else "points"
+
+
+def read_grid(path: PathLike, *, missing: Iterable[float] = MISSING, max_pixels: int | None = None) -> CartesianGrid:
+    """Read a grid of GSLIB or Geo-EAS (text) or of SGeMS (binary), which are told apart by their content.
+
+    Parameters
+    ----------
+    path : path
+        A text: a title, the number of variables, their names, each in a line, and a value of each variable for each
+        cell, x fastest, then y, then z. Or a Cartesian grid that SGeMS has saved. What headers are understood is in the
+        notes.
+    missing : iterable of float
+        Numbers that stand for an unknown value, which becomes NaN.
+    max_pixels : int, optional
+        The most values that are read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
+
+    Returns
+    -------
+    CartesianGrid
+        Values (nz, ny, nx), the centre of the first cell, and the size of a cell.
+
+    Raises
+    ------
+    ValueError
+        The file is missing, no grid, too large, or its header and its length disagree. Nothing of the size that the
+        header says is asked for before the length of the file has been looked at.
+
+    Notes
+    -----
+    A text says how many cells there are in one of three ways:
+
+    * its first line is ``nx ny nz``, as of MPSlib, or ``nx ny nz sx sy sz ox oy oz``, as of DeeSse and geone: sizes of
+      a cell, and the corner of the grid, half a cell before the first centre;
+    * its second line is ``variables nx ny nz``, or ``variables nx ny nz xmn ymn zmn xsiz ysiz zsiz``, as of GSLIB: the
+      centre of the first cell, and sizes; a last number is that of realisations, which follow each other;
+    * its title ends in ``(NXxNYxNZ)``, as of SGeMS.
+
+    Where it does not say so, the origin is 0 and a cell 1. Files of SGeMS hold 32-bit floats, of which the shortest
+    decimal number is taken for origin and size. Regions and groups of SGeMS are passed over.
+    """
+    name = os.fspath(path)
+    most = max_pixels_or_default(max_pixels)
+    check_file(path, "the grid", most)
+    try:
+        with open(path, "rb") as file:
+            binary = file.read(len(MAGIC)) == MAGIC
+            columns, sides, lies = _sgems(file, most) if binary else _gslib(file, most)
+    except TooLarge as error:
+        raise ValueError(f"{name} {error}") from None
+    except MemoryError:
+        raise ValueError(f"{name} is too large for the memory: crop it first") from None
+    except OSError as error:
+        raise ValueError(f"{name} cannot be read ({error.strerror}): check the path") from None
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+    stands = np.array(tuple(missing), np.float64)
+    return CartesianGrid({key: _typed(column, stands).reshape(sides[::-1]) for key, column in columns.items()}, *lies)
+
+
+Read = tuple[dict[str, Array], tuple[int, ...], Frame]
+"""Columns of values by their names, nx ny nz, and where the cells lie."""
+
+
+def _typed(column: Array, missing: NDArray[np.float64]) -> Array:
+    """Return a column with NaN for unknown values, or as integers if all are known and whole."""
+    unknown = np.isnan(column) | np.isin(column, missing)
+    if unknown.any():
+        return np.where(unknown, column.dtype.type(np.nan), column)
+    low, high = column.min(), column.max()
+    for kind in _WHOLE:
+        if np.iinfo(kind).min <= low and high <= np.iinfo(kind).max and (column == np.floor(column)).all():
+            return column.astype(kind)
+    return column
+
+
+def _gslib(file: BinaryIO, most: int) -> Read:
+    """Read the text of a grid."""
+    file.seek(0)
+    title, second = (_text(file.readline(_LINE)) for _ in range(2))
+    words = second.split()
+    if not words or not re.fullmatch("[0-9]{1,9}", words[0]) or int(words[0]) < 1:
+        raise ValueError(
+            f"line 2 is {second.strip()[:40]!r} and not the number of variables: give a grid of GSLIB or SGeMS"
+        )
+    names = []
+    for number in range(int(words[0])):
+        names.append(_text(file.readline(_LINE)).strip())
+        if not names[-1]:
+            raise ValueError(f"line {number + 3} has no name of a variable: it is cut short, or line 2 is wrong")
+    sides, lies, realisations = _geometry(title, words)
+    if realisations > 1:
+        names = [f"{name}__real{k}" for k in range(realisations) for name in names]
+    names = _apart(names)
+    count = prod(sides) * len(names)
+    check_size(count, BYTES * count, most)
+    what = f"{' x '.join(map(str, sides))} cells of {len(names)} variable{'s' * (len(names) != 1)}, {count} values"
+    begin = file.tell()
+    if os.fstat(file.fileno()).st_size - begin < 2 * count - 1:  # a digit for each, and blanks between them
+        raise ValueError(f"it is too short for what its header says, {what}: get it again, or correct the header")
+    numbers = _parsed(file, count, what, 3 + int(words[0]))
+    blocks = numbers.reshape(realisations, prod(sides), int(words[0]))
+    return dict(zip(names, blocks.transpose(0, 2, 1).reshape(len(names), -1), strict=True)), sides, lies
+
+
+def _geometry(title: str, words: list[str]) -> tuple[tuple[int, ...], Frame, int]:
+    """Return nx ny nz, where cells lie, and the number of realisations, from the first two lines of a text."""
+    found = words[1:] or _of_title(title)
+    if found is None or len(found) not in (3, 6, 9, 10) or not _all_numbers(found):
+        raise ValueError(
+            "its first two lines do not say how many cells it has: write nx ny nz on the first line, as 250 250 1"
+        )
+    if not all(re.fullmatch("[0-9]{1,9}", word) and int(word) > 0 for word in (*found[:3], *found[9:])):
+        raise ValueError(f"its header says {' x '.join(found[:3])} cells: give whole numbers of 1 or more")
+    sides = tuple(int(word) for word in found[:3])
+    if words[1:]:  # of GSLIB: centre, then size
+        lies = Frame(tuple(map(float, found[3:6])) or (0.0,) * 3, tuple(map(float, found[6:9])) or (1.0,) * 3)
+    else:
+        size = found[3:6] or ["1"] * 3
+        corners = [Decimal(word) for word in found[6:9]] or [-Decimal(word) / 2 for word in size]
+        lies = Frame(  # in decimals: a binary sum would move 0.1
+            tuple(float(corner + Decimal(word) / 2) for corner, word in zip(corners, size, strict=True)),
+            tuple(map(float, size)),
+        )
+    return sides, frame(*lies), int(found[9]) if found[9:] else 1
+
+
+def _of_title(title: str) -> list[str] | None:
+    """Return the numbers that a title says of a grid, at least nx ny nz; None if it does not."""
+    words = title.split()
+    if len(words) in (3, 6, 9) and _all_numbers(words):
+        return words
+    match = _SIDES.search(title)
+    return list(match.groups()) if match else None
+
+
+def _all_numbers(words: Iterable[Any]) -> bool:
+    try:
+        return all(isfinite(float(word)) for word in words)
+    except ValueError:
+        return False
+
+
+def _parsed(file: BinaryIO, count: int, what: str, line: int) -> NDArray[np.float64]:
+    """Return the numbers of a text from here to its end, `count` of them; `line` is the number of the first line."""
+    found, at, last = np.empty(count), 0, b"\n"
+    while lines := file.readlines(2**20):
+        text, last = b"".join(lines), lines[-1][-1:]
+        words = text.split()
+        if at + len(words) > count:
+            raise ValueError(f"it has more values than its header says, {what}: correct the header")
+        try:
+            found[at : at + len(words)] = list(map(float, words))
+        except ValueError:
+            for number, row in enumerate(lines, line):
+                wrong = next((word for word in row.split() if not _is_number(word)), None)
+                if wrong is not None:
+                    raise ValueError(f"line {number} has {_text(wrong)[:40]!r}, not a number: correct it") from None
+        at += len(words)
+        line += len(lines)
+    if at < count:
+        raise ValueError(f"it has {at} values and its header says {what}: get it again, or correct the header")
+    if not last.isspace():
+        raise ValueError(
+            "it ends without the end of a line, as if it were cut short: get it again, or add the end of the line"
+        )
+    return found
+
+
+def _is_number(word: bytes) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _apart(names: list[str]) -> list[str]:
+    """Return names that differ: one that comes again gets a number."""
+    found: dict[str, None] = {}
+    for number, name in enumerate(names):
+        found[name if name not in found else f"{name}_{number}"] = None
+    return list(found)
+
+
+def _text(data: bytes) -> str:
+    return data.decode("utf-8", "replace")
+
+
+def _sgems(file: BinaryIO, most: int) -> Read:
+    """Read a binary grid of SGeMS, from behind its magic number on."""
+    length = os.fstat(file.fileno()).st_size
+
+    def take(form: str) -> tuple[Any, ...]:
+        size = struct.calcsize(form)
+        if length - file.tell() < size:
+            raise ValueError("it ends within its header: it is cut short; get it again")
+        return struct.unpack(form, file.read(size))
+
+    def word() -> str:
+        (size,) = take(">I")
+        return _text(take(f">{size}s")[0]).rstrip("\0")
+
+    kind = word()
+    if kind != "Cgrid":
+        raise ValueError(f"it holds the object {kind[:40]!r} of SGeMS: save a Cartesian grid")
+    word()  # the grid's name
+    (version,) = take(">i")
+    if version < 100:
+        raise ValueError(f"it is of the version {version} of SGeMS's files: save it by a newer SGeMS")
+    sides: tuple[int, ...] = take(">3I")
+    size, origin = (tuple(float(str(np.float32(one))) for one in take(">3f")) for _ in range(2))
+    (variables,) = take(">I")
+    names = _apart([word() for _ in range(variables)])
+    if not prod(sides) * variables:
+        raise ValueError(f"it has {' x '.join(map(str, sides))} cells and {variables} properties: save one with values")
+    lies = frame(origin, size)
+    count = prod(sides) * variables
+    check_size(count, 4 * count, most)
+    if length - file.tell() < 4 * count:
+        raise ValueError(
+            f"it ends before the last of {count} values, {' x '.join(map(str, sides))} cells of {variables} "
+            f"propert{'y' if variables == 1 else 'ies'}: it is cut short; get it again"
+        )
+    columns = np.frombuffer(file.read(4 * count), ">f4").astype(np.float32).reshape(variables, -1)
+    rest = file.read(16)
+    if rest and not rest.startswith(_BLOCKS):
+        raise ValueError("it is longer than its header says: get it again, or save it again")
+    return dict(zip(names, columns, strict=True)), sides, lies
+
+
+def write_grid(
+    path: PathLike,
+    values: Mapping[str, ArrayLike],
+    *,
+    origin: Sequence[float] | None = None,
+    cell: Sequence[float] | None = None,
+) -> None:
+    """Write a grid for GSLIB, MPSlib, DeeSse and others as a text, or for SGeMS, atomically.
+
+    Parameters
+    ----------
+    path : path
+        ``.gslib``, a text, or ``.sgems``. An existing file is replaced.
+    values : mapping of str to array_like, (nz, ny, nx) or (ny, nx)
+        Each variable by its name. NaN or masked is unknown, and is written as -9966699. A text keeps every digit; SGeMS
+        has 32-bit floats, to which larger floats are rounded.
+    origin : (x, y) or (x, y, z), optional
+        The centre of the first cell. None is 0.
+    cell : (x, y) or (x, y, z), optional
+        The size of a cell. None is 1.
+
+    Raises
+    ------
+    TypeError
+        The values are not real numbers.
+    ValueError
+        The path cannot be written, arrays differ in size, or the format cannot hold a value or the origin.
+
+    Notes
+    -----
+    The first line of a text is ``nx ny nz sx sy sz ox oy oz`` with the corner of the grid, half a cell before the first
+    centre, as `read_grid` says.
+    """
+    arrays: dict[str, np.ma.MaskedArray[Any, Any]] = {str(name): np.ma.asanyarray(one) for name, one in values.items()}
+    lies = check_grid(path, arrays.values(), origin, cell)
+    shapes = {array.shape for array in arrays.values()}
+    if len(shapes) != 1 or len(next(iter(shapes))) not in (2, 3):
+        raise ValueError(f"the variables have the shapes {sorted(shapes)}; give (nz, ny, nx) or (ny, nx), one for all")
+    for name in arrays:
+        if not name.strip() or not name.isprintable():
+            raise ValueError(f"a variable has the name {name!r}; give one of letters, digits and signs")
+    sides = (1, *next(iter(shapes)))[-3:]
+    whole = Frame(*((*one, last)[:3] for one, last in zip(lies, (0.0, 1.0), strict=True)))
+    layers = {name: array.reshape(sides) for name, array in arrays.items()}
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        file.writelines((_sgems_parts if _suffix(path) == ".sgems" else _gslib_parts)(layers, sides[::-1], whole))
+
+
+def check_grid(
+    path: PathLike, arrays: Iterable[Any], origin: Sequence[float] | None, cell: Sequence[float] | None
+) -> Frame:
+    """Check before a long run that such values and such an origin can be written; return where the cells lie."""
+    target = Path(path)
+    if _suffix(path) not in SUFFIXES:
+        raise ValueError(f"{target} names no format of grids: end its name in one of {', '.join(SUFFIXES)}")
+    check_target(target)
+    lies = frame(origin, cell)
+    for array in arrays:
+        _check_values(target, np.ma.asanyarray(array))
+    if _suffix(path) == ".sgems":
+        for axis, at, size in zip("xyz", *lies, strict=False):
+            if not abs(float(np.float32(at)) - at) <= size / 1000:
+                raise ValueError(
+                    f"{target} would hold {axis} = {at} as a 32-bit float, more than a thousandth of a cell beside it: "
+                    "end its name in .gslib, or give coordinates nearer to 0"
+                )
+    return lies
+
+
+def _check_values(target: Path, array: np.ma.MaskedArray[Any, Any]) -> None:
+    """Raise unless a format holds these values."""
+    if array.dtype.kind not in "buif":
+        raise TypeError(f"the grid holds {array.dtype} values; give real numbers")
+    known = array.compressed()
+    wrong = np.isin(known, MISSING) if known.dtype.kind != "b" else np.zeros(known.shape, bool)
+    if wrong.any():
+        raise ValueError(
+            f"{target} cannot hold {known[wrong][0]}, which stands for an unknown value there: give NaN where nothing "
+            "is known, or another number"
+        )
+    if target.suffix.lower() == ".sgems":
+        with np.errstate(over="ignore"):
+            kept = known.astype(np.float32)
+        wrong = (kept.astype(np.float64) != known) if known.dtype.kind in "iu" else np.isinf(kept) & np.isfinite(known)
+        if wrong.any():
+            raise ValueError(
+                f"{target} cannot hold {known[wrong][0]}, since SGeMS has 32-bit floats: end its name in .gslib"
+            )
+
+
+def _suffix(path: PathLike) -> str:
+    return Path(path).suffix.lower()
+
+
+def _gslib_parts(layers: Mapping[str, Any], sides: tuple[int, ...], lies: Frame) -> Iterator[bytes]:
+    """Yield the text of a grid."""
+    sizes = [Decimal(repr(size)) for size in lies.cell]
+    corners = [Decimal(repr(at)) - size / 2 for at, size in zip(lies.origin, sizes, strict=True)]
+    yield f"{' '.join(map(str, (*sides, *sizes, *corners)))}\n{len(layers)}\n".encode()
+    yield "".join(f"{name}\n" for name in layers).encode()
+    for layer in range(sides[2]):
+        for row in range(sides[1]):
+            cells = zip(*(_words(array[layer, row]) for array in layers.values()), strict=True)
+            yield "".join(" ".join(words) + "\n" for words in cells).encode()
+
+
+def _words(row: np.ma.MaskedArray[Any, Any]) -> list[str]:
+    """Return each value by the fewest digits that say it."""
+    data = row.data.astype(np.uint8) if row.dtype == bool else row.data
+    found: list[str] = np.where(_unknown(row), str(NO_DATA), data.astype(str)).tolist()
+    return found
+
+
+def _sgems_parts(layers: Mapping[str, Any], sides: tuple[int, ...], lies: Frame) -> Iterator[bytes]:
+    """Yield the parts of a binary grid of SGeMS."""
+
+    def word(text: str) -> bytes:
+        data = text.encode() + b"\0"
+        return struct.pack(">I", len(data)) + data
+
+    yield MAGIC + word("Cgrid") + word("grid") + struct.pack(">i", 100)
+    yield struct.pack(">3I6fI", *sides, *lies.cell, *lies.origin, len(layers))
+    yield b"".join(map(word, layers))
+    for array in layers.values():
+        values = array.data.astype(">f4")
+        values[_unknown(array)] = NO_DATA
+        yield values.tobytes()
+
+
+def _unknown(array: np.ma.MaskedArray[Any, Any]) -> NDArray[np.bool_]:
+    hidden = np.ma.getmaskarray(array)
+    return hidden | np.isnan(array.data) if array.dtype.kind == "f" else hidden
