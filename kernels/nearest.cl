@@ -10,7 +10,7 @@
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/distance.h"
 #include "common/coherence.h"
-#include "common/lattice.h"
+#include "common/level.h"
 #include "common/costs.h"
 #include "common/vector.h"
 
@@ -257,7 +257,8 @@ nearest_leaves(__global const int *restrict sites, const int S, const int N, __g
 // All candidates against the bound, in blocks of STEP vectors of neighbours in a row of the sample.
 //
 // strip  (C, size)        the sample's pixels of this level, row by row, from which candidates and neighbours are read
-// first, pitch            of the candidates' own pixels in the strip; rows x cols candidates
+// first, pitch            of the candidates' own pixels in the strip; rows x cols candidates, `high` rows to a layer
+// thick                   pixels of the strip to a layer
 // slack                   what a sum in another order may exceed this one by, as a factor
 // all, open  (split, S)   whether all sites are to be searched, or those for which some of these are not 0
 // found, at  (.., S)      out, from this row on: the least d' so far and its place
@@ -267,7 +268,7 @@ __kernel __attribute__((vec_type_hint(vec))) void
 nearest_scan(__global const int *restrict sites, const int S, const int N, __global const int *restrict terms, __global const int *restrict count,
              __global const float *restrict near, __global const float *restrict least,
              __global const int *restrict where, __global const float *restrict strip, const int size,
-             const int first, const int pitch, const int rows, const int cols,
+             const int first, const int pitch, const int rows, const int cols, const int high, const int thick,
              __global const int *restrict strip_reach, COSTS, const float slack,
              const int split,
              const int all, __global const int *restrict open, const int row,
@@ -288,7 +289,7 @@ nearest_scan(__global const int *restrict sites, const int S, const int N, __glo
         wanted |= open[n * S + s];
     for (int b = turn; wanted && b < rows * wide; b += split) {
         const int i = b / wide, j = b % wide * (V * STEP);
-        __global const float *y = strip + first + i * pitch + j;
+        __global const float *y = strip + first + STRIP_ROW(i, high, thick, pitch) + j;
         vec d[STEP];
 #pragma unroll
         for (int q = 0; q < STEP; ++q) {

@@ -116,7 +116,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
 #pragma unroll
         for (int q = 0; q < STEP; ++q) {
             const int n = min(b + q, g.strip_rows * wide - 1);
-            y[q] = strip + g.first + n / wide * g.pitch + n % wide * V;
+            y[q] = strip + g.first + STRIP_ROW(n / wide, g.strip_high, g.thick, g.pitch) + n % wide * V;
             sums[q] = 0.0f;
         }
         for (int k = 0; k < neighbours + (G > 0); ++k) {
@@ -167,7 +167,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
 
     // 6.2.2.2
 #define NUMBER(k) (k)
-#define PIXEL(k) (g.first + (k) / g.strip_cols * g.pitch + (k) % g.strip_cols)
+#define PIXEL(k) (g.first + STRIP_ROW((k) / g.strip_cols, g.strip_high, g.thick, g.pitch) + (k) % g.strip_cols)
     CHOOSE(chosen, g, d, g.candidates, strip, g.size, noise, turn, place)
     const int out = PLACE(s, site), step = STRIDE(S, g);
     for (int c = 0; c < MADE; ++c)
@@ -226,13 +226,13 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
         return;
 #endif
     const Lattice h = g.lattice;
-    const int site = sites[s], line = site / h.width, i = line / h.spacing, j = (site - line * h.width) / h.spacing;
+    const int site = sites[s], line = site / h.width, i = lattice_row(h, line), j = (site - line * h.width) / h.spacing;
     const ulong place = place_of(h, i, j);
 
     // 6.2.2.1: the neighbourhood, and the sum of equation (13). Vectors also read what is no neighbour, which others may
     // be writing, and multiply it by 0.
-    int row[SIDE], col[SIDE];
-    lines_around(i, h.rows, h.around_rows, h.width * h.spacing, row);
+    int row[ROWS], col[SIDE];
+    rows_around(h, i, row);
     lines_around(j, h.cols, h.around_cols, h.spacing, col);
 #ifdef TILES
 #define ELSEWHERE(a, b)                                                                                                \
@@ -247,10 +247,10 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
     SQUARE;
     int sum = g.xi, members = 0;
 #if V > 1
-    if (h.spacing <= 2 && !h.tile_rows && h.rows >= SIDE && j >= RADIUS &&
+    if (h.spacing <= 2 && !h.tile_rows && h.high >= SIDE && j >= RADIUS &&
         (j - RADIUS + 16 * CHUNKS) * h.spacing <= h.width) {
         float16 heat = 0.0f, inside = 0.0f; // integers below 2^24, so in any order
-        for (int a = 0; a < SIDE; ++a)
+        for (int a = 0; a < ROWS; ++a)
             for (int k = 0; k < CHUNKS; ++k) {
                 const int cell = a * CHUNKS + k, from = max(row[a], 0) + (j - RADIUS + 16 * k) * h.spacing;
                 const float16 in = row[a] < 0 ? (float16)0.0f : vload16(cell, disc);
@@ -286,7 +286,7 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
                     XU(cell, c, n) = 0.0f;
             }
         for (int k = 0; k < g.neighbours; ++k) {
-            const int a = offsets[k].x + RADIUS, b = offsets[k].y + RADIUS;
+            const int a = ROW(offsets[k].x), b = offsets[k].y + RADIUS;
             const int r = NEIGHBOUR(a, b);
             if (r < 0)
                 continue;
@@ -301,14 +301,14 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
             PUT(cell, n, r, ur, 1.0f);
         }
         if (G)
-            PUT(RADIUS * CHUNKS + RADIUS / 16, RADIUS % 16, site, 0.0f, g.centre);
+            PUT(ROW(0) * CHUNKS + RADIUS / 16, RADIUS % 16, site, 0.0f, g.centre);
     }
 
     // The list.
     int list[SLOTS], m = 0;
     ulong seen = 0;
     for (int k = 0; k < min(SUGGESTING, g.neighbours); ++k) {
-        const int r = NEIGHBOUR(offsets[k].x + RADIUS, offsets[k].y + RADIUS);
+        const int r = NEIGHBOUR(ROW(offsets[k].x), offsets[k].y + RADIUS);
         if (r >= 0 && temperature[r] < UNTOUCHED)
             m = proposed(continuing(index_of, source[r], reach[k], g.pixels), list, m, &seen);
     }
@@ -323,7 +323,7 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
     }
     float d[SLOTS + V];
     for (int k = 0; k < m; ++k)
-        d[k] = PLUS_COSTS(distance_in_lanes(at[list[k]], u, xu, levels, g.plane, g.down) *
+        d[k] = PLUS_COSTS(distance_in_lanes(at[list[k]], u, xu, levels, g.plane, g.down, g.deep) *
                               (k < suggested ? g.discount : 1.0f),
                           list[k], site);
 

@@ -195,10 +195,19 @@ def with_channels_last(options: dict[str, Any], channel_axis: int | None) -> dic
 
 def check_shape(shape: Any, least: int = 1) -> tuple[int, int]:
     """Return the rows and columns of an output; raise unless they are two integers of at least `least`."""
+    rows, cols = check_sides(shape, ("rows", "columns"), least)
+    return rows, cols
+
+
+def check_sides(shape: Any, names: tuple[str, ...], least: int = 1) -> tuple[int, ...]:
+    """Return the sides of an output, which have these names; raise unless they are integers of at least `least`."""
     try:
-        rows, cols = shape
-    except (TypeError, ValueError):
-        raise ValueError(f"shape must be two integers (rows, columns), not {shape!r}") from None
-    whole("rows of the output", rows, least, inf)  # `within_32_bits` limits their product in one sentence
-    whole("columns of the output", cols, least, inf)
-    return int(rows), int(cols)
+        sides = tuple(shape)
+    except TypeError:
+        sides = ()
+    if len(sides) != len(names):
+        count = {2: "two", 3: "three"}[len(names)]
+        raise ValueError(f"shape must be {count} integers ({', '.join(names)}), not {shape!r}")
+    for name, side in zip(names, sides, strict=True):
+        whole(f"{name} of the output", side, least, inf)  # `within_32_bits` limits their product in one sentence
+    return tuple(int(side) for side in sides)

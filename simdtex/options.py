@@ -187,8 +187,8 @@ class Option:
     label: str = ""
 
     def default_of(self, job: str) -> Any:
-        """Return the default value in a job."""
-        return self.jobs.get(job, self.default)
+        """Return the default value in a job; ``"simulate 3-D"`` has those of ``"simulate"`` that it has not itself."""
+        return self.jobs.get(job, self.jobs.get(job.partition(" ")[0], self.default))
 
     def check(self, name: str, value: Any) -> None:
         """Raise unless the value is valid; None is if it is the default."""

@@ -14,9 +14,10 @@ typedef struct {
     int pixels;                   // of the sample with its margin
     int candidates;               // of the level
     int chance;                   // candidates at random
-    int plane, down;              // of the sample with its columns side by side: pixels to a channel, and to a row
+    int plane, down, deep;        // of the sample with its columns side by side: pixels to a channel, a row, a layer
     int first, pitch, size;       // of the strip: the first candidate, pixels to a row, and to a channel
     int strip_rows, strip_cols;   // rows and columns of candidates
+    int strip_high, thick;        // rows of candidates to a layer, and pixels of the strip to a layer
     float discount;                 // 1 / (1 + coherence)
     float scale;                  // 1 / 2h^2 of equation (7)
     int radius;                   // of its kernel over grey levels; -1 where a pixel is the sample's own
@@ -27,5 +28,8 @@ typedef struct {
     float centre;                 // confidence of a guide at the site itself
     float hard;                   // confidence of hard data
 } Level;
+
+// Where row i of candidates begins in the strip, after the first.
+#define STRIP_ROW(i, high, thick, pitch) ((i) / (high) * (thick) + (i) % (high) * (pitch))
 
 #endif

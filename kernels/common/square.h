@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The square around a neighbourhood, row by row in cells of 16 lanes, and the distance of one candidate summed over it.
+// The square around a neighbourhood, or the cube (-D CUBE), row by row in cells of 16 lanes, and the distance of one
+// candidate summed over it.
 //
 // The sum has one order: lane n takes the columns n, n + 16, ... of the square, row by row, channels inside; then lanes n
 // and n + 8 are added, n and n + 4, n and n + 2, n and n + 1.
@@ -14,7 +15,14 @@
 #endif
 #define SIDE (2 * RADIUS + 1)
 #define CHUNKS ((SIDE + 15) / 16)
-#define CELLS (SIDE * CHUNKS)
+#ifdef CUBE
+#define ROWS (SIDE * SIDE)
+#define ROW(down) ((LAYERS(down) + RADIUS) * SIDE + (down) - (LAYERS(down) << 16) + RADIUS)
+#else
+#define ROWS SIDE
+#define ROW(down) ((down) + RADIUS)
+#endif
+#define CELLS (ROWS * CHUNKS)
 
 // Lines a = 0 .. SIDE - 1 about line `at` of `count`, as parts of a pixel index; -1 beyond an end that does not wrap.
 inline void lines_around(const int at, const int count, const int wraps, const int stride, __private int *line)
@@ -27,6 +35,20 @@ inline void lines_around(const int at, const int count, const int wraps, const i
             k -= count;
         line[a] = k < 0 || k >= count ? -1 : k * stride;
     }
+}
+
+// The rows around row i of a lattice, likewise.
+inline void rows_around(const Lattice g, const int i, __private int *row)
+{
+#ifdef CUBE
+    int layer[SIDE], line[SIDE];
+    lines_around(i / g.high, g.layers, 0, g.height * g.width * g.spacing, layer);
+    lines_around(i % g.high, g.high, 0, g.width * g.spacing, line);
+    for (int a = 0; a < ROWS; ++a)
+        row[a] = layer[a / SIDE] < 0 || line[a % SIDE] < 0 ? -1 : layer[a / SIDE] + line[a % SIDE];
+#else
+    lines_around(i, g.rows, g.around_rows, g.width * g.spacing, row);
+#endif
 }
 
 #if V == 1
@@ -58,7 +80,7 @@ inline float folded(const float16 a)
 inline float16 middle(const int a, const int k)
 {
     float16 lanes = 0.0f;
-    if (a == RADIUS && k == RADIUS / 16)
+    if (a == ROW(0) && k == RADIUS / 16)
         ((__private float *)&lanes)[RADIUS % 16] = 1.0f;
     return lanes;
 }
@@ -78,11 +100,18 @@ inline int16 spread_int(__global const int *p, const int spacing)
 #endif
 #endif
 
-// Equation (12): d of the candidate at place q of `levels`, the sample whose rows are `down` apart.
+// Where row a of the square around a candidate begins in `levels`, from the candidate.
+#ifdef CUBE
+#define ROW_AT(a, down, deep) (((a) / SIDE - RADIUS) * (deep) + ((a) % SIDE - RADIUS) * (down) - RADIUS)
+#else
+#define ROW_AT(a, down, deep) (((a) - RADIUS) * (down) - RADIUS)
+#endif
+
+// Equation (12): d of the candidate at place q of `levels`, the sample whose rows are `down` apart, and layers `deep`.
 inline float distance_in_lanes(const int q, SQUARE_ARG, __global const ushort *restrict levels, const int plane,
-                               const int down)
+                               const int down, const int deep)
 {
-    __global const ushort *y = levels + q - RADIUS * down - RADIUS;
+    __global const ushort *y = levels + q;
 #if V == 1
     float d[16];
     for (int n = 0; n < 16; ++n)
@@ -93,7 +122,7 @@ inline float distance_in_lanes(const int q, SQUARE_ARG, __global const ushort *r
                 const float un = U(cell, c, n);
                 if (un == 0.0f) // would add 0
                     continue;
-                const float yn = (float)y[c * plane + cell / CHUNKS * down + cell % CHUNKS * 16 + n];
+                const float yn = (float)y[c * plane + ROW_AT(cell / CHUNKS, down, deep) + cell % CHUNKS * 16 + n];
                 const float e = GAP(yn, un, xu[(cell * C + c) * 16 + n]);
                 d[n] = fma(e, e, d[n]);
             }
@@ -103,7 +132,7 @@ inline float distance_in_lanes(const int q, SQUARE_ARG, __global const ushort *r
     for (int cell = 0; cell < CELLS; ++cell)
 #pragma unroll
         for (int c = 0; c < C; ++c) {
-            const float16 yn = convert_float16(vload16(0, y + c * plane + cell / CHUNKS * down + cell % CHUNKS * 16));
+            const float16 yn = convert_float16(vload16(0, y + c * plane + ROW_AT(cell / CHUNKS, down, deep) + cell % CHUNKS * 16));
             const float16 e = GAP(yn, u[cell * CONFIDENCES + CONFIDENT(c)], xu[cell * C + c]);
             d = fma(e, e, d);
         }

@@ -224,22 +224,28 @@ def cast(values: Array, dtype: DTypeLike) -> tuple[Array, NDArray[np.bool_]]:
     return found, found != values
 
 
-def check_sample(array: Any, channel_axis: int | None, *, unknown: bool = False) -> Array:
+AXES = {2: "(rows, cols)", 3: "(layers, rows, cols)"}
+"""The axes of a picture and of a volume."""
+
+
+def check_sample(array: Any, channel_axis: int | None, *, unknown: bool = False, axes: int = 2) -> Array:
     """Check that an array can serve as a sample, and move its channels to the end.
 
     Parameters
     ----------
     array : array_like
-        Two axes (rows, cols) if `channel_axis` is None, else three. bool, any integer and any real float type. An
-        xarray or dask array is taken whole, its axes by position.
+        As many axes as `axes` says if `channel_axis` is None, else one more. bool, any integer and any real float type.
+        An xarray or dask array is taken whole, its axes by position.
     channel_axis : int or None
         The axis that holds the channels; negative counts from the end.
     unknown : bool
         Whether floats may be NaN and values masked, which means that they are unknown; the mask is dropped.
+    axes : {2, 3}
+        2: a picture (rows, cols); 3: a volume (layers, rows, cols).
 
     Returns
     -------
-    ndarray, (rows, cols, channels)
+    ndarray, ([layers,] rows, cols, channels)
         The values with their type, contiguous and in native byte order; a view of the input if it is so already.
 
     Raises
@@ -256,20 +262,20 @@ def check_sample(array: Any, channel_axis: int | None, *, unknown: bool = False)
     pixels = np.asarray(pixels)
     if pixels.dtype.kind not in "buif":
         raise TypeError(f"the sample holds {pixels.dtype} values: convert it to integers or real floats")
-    if channel_axis is None and pixels.ndim != 2:
-        hint = ", or channel_axis=-1 if its last axis holds the channels" * (pixels.ndim == 3)
-        raise ValueError(f"the sample is {pixels.ndim}-dimensional: give (rows, cols){hint}")
+    if channel_axis is None and pixels.ndim != axes:
+        hint = ", or channel_axis=-1 if its last axis holds the channels" * (pixels.ndim == axes + 1)
+        raise ValueError(f"the sample is {pixels.ndim}-dimensional: give {AXES[axes]}{hint}")
     if channel_axis is not None:
         if isinstance(channel_axis, bool) or not isinstance(channel_axis, (int, np.integer)):
             raise TypeError(f"channel_axis is {channel_axis!r}: give None or an integer")
-        if pixels.ndim != 3:
+        if pixels.ndim != axes + 1:
             grey = " (grey)" * (pixels.ndim == 2)
             raise ValueError(
-                f"the sample is {pixels.ndim}-dimensional{grey}: give three axes for channel_axis={channel_axis}, "
-                "one of them the channels"
+                f"the sample is {pixels.ndim}-dimensional{grey}: give {('three', 'four')[axes - 2]} axes for "
+                f"channel_axis={channel_axis}, one of them the channels"
             )
-        if not -3 <= channel_axis < 3:
-            raise ValueError(f"channel_axis is {channel_axis}: give one of -3 to 2")
+        if not -axes - 1 <= channel_axis < axes + 1:
+            raise ValueError(f"channel_axis is {channel_axis}: give one of {-axes - 1} to {axes}")
     if pixels.size == 0:
         raise ValueError(f"the sample is empty, of shape {pixels.shape}: give at least one pixel")
     planes = pixels[..., np.newaxis] if channel_axis is None else np.moveaxis(pixels, channel_axis, -1)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
-from simdtex.io.image import as_array, cast, check_sample
+from simdtex.io.image import AXES, as_array, cast, check_sample
 from simdtex.machine import memory
 from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair
@@ -47,7 +47,7 @@ class Inputs(NamedTuple):
 
 def check_inputs(
     sample: ArrayLike | Sequence[ArrayLike] | Pictures,
-    shape: tuple[int, int],
+    shape: tuple[int, ...],
     channel_axis: int | None = None,
     mask: Any = None,
     known: Any = None,
@@ -64,32 +64,38 @@ def check_inputs(
     return Inputs(pictures, given, None if guide is None else check_guide(guide, shape, pictures))
 
 
-def check_samples(sample: Any, channel_axis: int | None, mask: Any = None) -> Pictures:
-    """Check a sample, or a list or tuple of samples, and ``mask``, which says likewise what may be used."""
+def check_samples(sample: Any, channel_axis: int | None, mask: Any = None, axes: int = 2) -> Pictures:
+    """Check a sample, or a list or tuple of samples, and ``mask``, which says likewise what may be used.
+
+    With 3 ``axes`` the sample is a volume.
+    """
     several = is_several(sample, channel_axis)
     arrays: list[Any] = list(sample) if several else [sample]
     if several and len(axes := {one.ndim for one in arrays}) > 1:
         raise ValueError(f"the samples have {min(axes)} and {max(axes)} axes; give samples of one type, grey or colour")
-    pixels, unknown = zip(*(check_picture(one, channel_axis) for one in arrays), strict=True)
+    pixels, unknown = zip(*(check_picture(one, channel_axis, axes) for one in arrays), strict=True)
     for number, picture in enumerate(pixels[1:], 1):
-        if picture.dtype != pixels[0].dtype or picture.shape[2] != pixels[0].shape[2]:
-            kinds = [f"{one.shape[2]} channels of {one.dtype}" for one in (picture, pixels[0])]
+        if picture.dtype != pixels[0].dtype or picture.shape[-1] != pixels[0].shape[-1]:
+            kinds = [f"{one.shape[-1]} channels of {one.dtype}" for one in (picture, pixels[0])]
             raise ValueError(f"sample {number} has {kinds[0]} and sample 0 {kinds[1]}; give samples of one type")
     if mask is None:
         return Pictures(pixels, unknown)
     masks = list(mask) if several and np.iterable(mask) else [mask]
     if len(masks) != len(pixels):
         raise ValueError(f"there are {len(pixels)} samples and {len(masks)} masks; give one mask for each")
-    usable = tuple(check_mask(one, picture.shape[:2]) for one, picture in zip(masks, pixels, strict=True))
+    usable = tuple(check_mask(one, picture.shape[:-1]) for one, picture in zip(masks, pixels, strict=True))
     if not any(one.any() for one in usable):
         raise ValueError("the mask leaves nothing of the sample to be used; set it True where pixels may be taken from")
     return Pictures(pixels, unknown, usable)
 
 
-def check_picture(image: Any, channel_axis: int | None) -> tuple[NDArray[Any], Mask]:
-    """Check a picture; return its pixels (rows, cols, channels), and where a channel is NaN or masked (rows, cols)."""
+def check_picture(image: Any, channel_axis: int | None, axes: int = 2) -> tuple[NDArray[Any], Mask]:
+    """Check a picture; return its pixels (rows, cols, channels), and where a channel is NaN or masked (rows, cols).
+
+    With 3 ``axes`` it is a volume (layers, rows, cols, channels).
+    """
     array = as_array("the sample", image)
-    pixels = check_sample(array, channel_axis, unknown=True)
+    pixels = check_sample(array, channel_axis, unknown=True, axes=axes)
     hidden = np.ma.getmaskarray(array)
     return pixels, unknown_in(pixels) | (hidden if channel_axis is None else hidden.any(channel_axis))
 
@@ -102,7 +108,7 @@ def is_several(sample: Any, channel_axis: int | None) -> bool:
     return (2 if channel_axis is None else 3) in axes and min(axes) >= 2
 
 
-def check_mask(mask: Any, shape: tuple[int, int]) -> Mask:
+def check_mask(mask: Any, shape: tuple[int, ...]) -> Mask:
     """Return a mask as a bool array of a shape."""
     found = _unmasked("mask", mask)
     if found.dtype != np.bool_:
@@ -120,7 +126,7 @@ def as_known(known: Any) -> HardData | NDArray[Any]:
 
 def check_known(
     known: Any,
-    shape: tuple[int, int],
+    shape: tuple[int, ...],
     channel_axis: int | None,
     pictures: Pictures,
     source: Any = None,
@@ -128,7 +134,7 @@ def check_known(
 ) -> Given:
     """Check the known values of an output: a masked array, floats with NaN for unknown, a table or its path."""
     known = as_known(known)
-    variables, dtype = pictures.pixels[0].shape[2], pictures.pixels[0].dtype
+    variables, dtype = pictures.pixels[0].shape[-1], pictures.pixels[0].dtype
     if isinstance(known, HardData):
         if len(known.names) != variables:
             raise ValueError(
@@ -137,12 +143,13 @@ def check_known(
         memory.require_host(prod(shape) * variables * (dtype.itemsize + 1))  # values and a mask
         array = place(known, shape, dtype).reshape(*shape, variables)
     else:
-        axes = 2 if channel_axis is None else 3
+        axes = len(shape) + (channel_axis is not None)
         if known.dtype.kind not in "buif":
             raise TypeError(f"known holds {known.dtype} values; give integers or real floats")
         if known.ndim != axes:
             raise ValueError(
-                f"known is {known.ndim}-dimensional; give {'(rows, cols)' if axes == 2 else 'the channel axis too'}"
+                f"known is {known.ndim}-dimensional; give "
+                f"{AXES[len(shape)] if channel_axis is None else 'the channel axis too'}"
             )
         array = known[..., None] if channel_axis is None else np.moveaxis(known, channel_axis, -1)
     _check_size("known", array.shape, "the output", (*shape, variables))
@@ -184,8 +191,8 @@ def _check_source(source: Any, there: Mask, pictures: Pictures) -> NDArray[np.in
     return found
 
 
-def check_guide(guide: Any, shape: tuple[int, int], pictures: Pictures) -> GuidePair:
-    """Check a guide, ``(of the sample, of the output)``: arrays (rows, cols) or (rows, cols, G)."""
+def check_guide(guide: Any, shape: tuple[int, ...], pictures: Pictures) -> GuidePair:
+    """Check a guide, ``(of the sample, of the output)``: arrays (rows, cols) or (rows, cols, G), or of a volume."""
     if not isinstance(guide, (tuple, list)) or len(guide) != 2:
         raise TypeError("guide is no pair; give (guide of the sample, guide of the output)")
     first, second = guide
@@ -193,34 +200,36 @@ def check_guide(guide: Any, shape: tuple[int, int], pictures: Pictures) -> Guide
     if count > 1 and not (isinstance(first, (list, tuple)) and len(first) == count):
         raise ValueError(f"there are {count} samples; give a list of a guide for each")
     listed = count > 1 or (isinstance(first, (list, tuple)) and len(first) == 1 and hasattr(first[0], "ndim"))
-    samples = tuple(_guide("the guide of the sample", one) for one in (first if listed else [first]))
-    output = _guide("the guide of the output", second)
+    axes = len(shape)
+    samples = tuple(_guide("the guide of the sample", one, axes) for one in (first if listed else [first]))
+    output = _guide("the guide of the output", second, axes)
     for number, (one, picture) in enumerate(zip(samples, pictures.pixels, strict=True)):
         which = f"sample {number}" if count > 1 else "the sample"
-        _check_size(f"the guide of {which}", one.shape[:2], which, picture.shape[:2])
-        if one.shape[2] != output.shape[2]:
+        _check_size(f"the guide of {which}", one.shape[:-1], which, picture.shape[:-1])
+        if one.shape[-1] != output.shape[-1]:
             raise ValueError(
-                f"the guide of the sample has {one.shape[2]} channels and that of the output {output.shape[2]}; "
+                f"the guide of the sample has {one.shape[-1]} channels and that of the output {output.shape[-1]}; "
                 "give as many"
             )
         if unknown_in(one).any():
             raise ValueError(
                 "the guide of the sample has NaN; give a number everywhere, and NaN in that of the output alone"
             )
-    _check_size("the guide of the output", output.shape[:2], "the output", shape)
+    _check_size("the guide of the output", output.shape[:-1], "the output", shape)
     return samples, output
 
 
-def _guide(name: str, array: Any) -> NDArray[Any]:
+def _guide(name: str, array: Any, axes: int) -> NDArray[Any]:
     found = _unmasked(name, array)
     if found.dtype.kind not in "buif":
         raise TypeError(f"{name} holds {found.dtype} values; give integers or real floats")
-    if found.ndim not in (2, 3) or not found.size:
-        raise ValueError(f"{name} is {found.ndim}-dimensional; give (rows, cols) or (rows, cols, channels)")
+    if found.ndim not in (axes, axes + 1) or not found.size:
+        more = AXES[axes].replace(")", ", channels)")
+        raise ValueError(f"{name} is {found.ndim}-dimensional; give {AXES[axes]} or {more}")
     if found.dtype.kind == "f" and np.isinf(found).any():
         raise ValueError(f"{name} has infinite values; give numbers")
     found = found.astype(np.uint8) if found.dtype == np.bool_ else found
-    return found[..., None] if found.ndim == 2 else found
+    return found[..., None] if found.ndim == axes else found
 
 
 def _unmasked(name: str, values: Any) -> NDArray[Any]:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from simdtex.checkpoint import Checkpoint, Checkpointing, digest, opened
-from simdtex.driver import check_shape, drive, restored
+from simdtex.driver import check_sides, drive, restored
 from simdtex.io.grids import frame
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.jobs.inputs import Inputs, as_known, check_inputs, check_samples
@@ -38,7 +38,7 @@ def simulate(
     training: ArrayLike,
     n: int,
     *,
-    shape: tuple[int, int] | None = None,
+    shape: tuple[int, ...] | None = None,
     known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
     several: str = "refuse",
     origin: Sequence[float] | None = None,
@@ -58,12 +58,13 @@ def simulate(
 
     Parameters
     ----------
-    training : (rows, cols) or, with `channel_axis`, (rows, cols, variables) array; or a list of such
-        The training image, NaN where it is unknown. With ``categorical=True`` its numbers name categories.
+    training : (rows, cols) or (layers, rows, cols) array, or a list of (rows, cols) arrays
+        The training image, a picture or a volume, NaN where it is unknown. With ``categorical=True`` its numbers name
+        categories. With `channel_axis` it has an axis more, of variables.
     n : int
         How many realisations, 1 or more.
-    shape : (int, int), optional
-        Rows and columns of each. None: those of `known`, where that is an array, else of the training image.
+    shape : (int, int) or (int, int, int), optional
+        Rows and columns of each, or layers, rows and columns. None: those of `known`, where that is an array, else of the training image.
     known : array, HardData or path, optional
         What is known: a masked array, or floats with NaN where nothing is known, of `shape`; or a table ``x,y,value``
         (`simdtex.read_hard_data`) or its file. Every realisation has these values, to the bit.
@@ -98,9 +99,9 @@ def simulate(
     Returns
     -------
     xarray.DataArray
-        Dimensions ``realisation``, ``y`` (row 0 is the smallest y), ``x`` and, with `channel_axis`, ``variable``, in
-        the training image's type. The coordinates ``y`` and ``x`` are those of the centres of cells, and a third number
-        of `origin` and `cell` is the coordinate ``z``. The coordinate ``seed`` is that of each realisation:
+        Dimensions ``realisation``, ``z`` of a volume, ``y`` (row 0 is the smallest y), ``x`` and, with `channel_axis`,
+        ``variable``, in the training image's type. The coordinates ``z``, ``y`` and ``x`` are those of the centres of
+        cells; of a picture, a third number of `origin` and `cell` is the coordinate ``z``. The coordinate ``seed`` is that of each realisation:
         `simdtex.synthesize` with it gives the same. Attributes: ``seed``, ``options`` (a JSON text), ``version``,
         ``device``, SHA-256 digests of the arrays ``training_image``, ``hard_data``, ``guide`` and ``mask`` that are
         given, and with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. All are texts and numbers, so
@@ -129,22 +130,24 @@ def simulate(
     whole("first", first, 0)
     if jobs is not None:
         whole("jobs", jobs, 1)
+    axes = 3 if getattr(training, "ndim", 2) - (channel_axis is not None) == 3 else 2
+    sides = ("layers", "rows", "columns")[-axes:]
     if shape is not None:
-        within_32_bits(check_shape(shape), 1)
+        within_32_bits(check_sides(shape, sides), 1)
     lies = frame(origin, cell)
-    pictures = check_samples(training, channel_axis, mask)
+    pictures = check_samples(training, channel_axis, mask, axes)
     known = None if known is None else as_known(known)
-    size = check_shape(pictures.pixels[0].shape[:2] if shape is None else shape)
-    if shape is None and isinstance(known, np.ndarray) and known.ndim == (2 if channel_axis is None else 3):
-        size = known.shape if channel_axis is None else np.moveaxis(known, channel_axis, -1).shape[:2]
+    size = check_sides(pictures.pixels[0].shape[:-1] if shape is None else shape, sides)
+    if shape is None and isinstance(known, np.ndarray) and known.ndim == axes + (channel_axis is not None):
+        size = known.shape if channel_axis is None else np.moveaxis(known, channel_axis, -1).shape[:-1]
     place = partial(place_hard_data, origin=origin, cell=cell, several=several)
     inputs = check_inputs(pictures, size, channel_axis, None, known, None, guide, place)
-    chosen = resolve(mrf.Options, "simulate", options)
+    chosen = resolve(mrf.Options, "simulate" if axes == 2 else "simulate 3-D", options)
     plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
     pixels = inputs.pictures.pixels[0]
-    each = 2 * prod((*size, pixels.shape[2])) * pixels.dtype.itemsize  # they are copied once
+    each = 2 * prod((*size, pixels.shape[-1])) * pixels.dtype.itemsize  # they are copied once
     memory.require_host(n * (each + 64))
-    made = np.empty((n, *size, pixels.shape[2]), pixels.dtype)
+    made = np.empty((n, *size, pixels.shape[-1]), pixels.dtype)
     machines = _machines(device, jobs, n)
     finished: list[int] = []
     lock = Lock()
@@ -182,15 +185,11 @@ def simulate(
         except BaseException:
             checkpointing.offer(None, state, now=True)  # those that wait for their turn
             raise
-    dims, arrays = ["realisation", "y", "x", "variable"], made
+    dims, arrays = ["realisation", *"zyx"[-axes:], "variable"], made
     if channel_axis is None:
-        dims, arrays = dims[:3], made[..., 0]
-    coordinates: dict[str, Any] = {
-        "realisation": np.arange(first, first + n),
-        "y": np.arange(size[0]),
-        "x": np.arange(size[1]),
-        "seed": ("realisation", seeds),
-    }
+        dims, arrays = dims[:-1], made[..., 0]
+    coordinates: dict[str, Any] = {"realisation": np.arange(first, first + n), "seed": ("realisation", seeds)}
+    coordinates |= {axis: np.arange(side) for axis, side in zip("zyx"[-axes:], size, strict=True)}
     attributes = _attributes(seed, chosen, machines[0].name, inputs)
     if origin is not None or cell is not None:
         for axis, at, side in zip("xyz", *lies, strict=False):

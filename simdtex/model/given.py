@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from math import isqrt
 from typing import Any, NamedTuple
 
@@ -61,7 +62,7 @@ class Given:
 
     def shown(self, picture: NDArray[Any], grid: Grid) -> NDArray[Any]:
         """Return the picture (rows, cols, C) of a level with the known values at its sites."""
-        step = (slice(None, None, grid.spacing),) * 2
+        step = (slice(None, None, grid.spacing),) * len(grid.shape)
         found: NDArray[Any] = np.where(self.known[step], self.values[step], picture)
         return found
 
@@ -85,7 +86,7 @@ def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
     ``known`` (H, W) are the values. One moves if none of the four sites around it is known itself.
     """
     step, (height, width) = grid.spacing, known.shape
-    row, col = between(known, grid)
+    row, col = between(known, grid).T.astype(np.int64)
 
     def at(i: NDArray[np.intp], n: int) -> NDArray[np.intp]:
         return i % n if grid.torus else np.minimum(i, n - 1)
@@ -103,27 +104,22 @@ def stand_ins(known: NDArray[np.bool_], grid: Grid) -> Stand:
     return Stand(site[first].astype(np.int64), datum[first].astype(np.int64))
 
 
-def between(known: NDArray[np.bool_], grid: Grid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return rows and columns of the data between the sites of a lattice that have no given site around them.
+def between(known: NDArray[np.bool_], grid: Grid) -> NDArray[np.int32]:
+    """Return the places (n, 2 or 3) of the data between the sites of a lattice that have no given site around them.
 
-    ``known`` (H, W) are the data; around a datum are the four sites of its cell.
+    ``known`` (H, W) or (D, H, W) are the data; around a datum are the sites at the corners of its cell.
     """
-    step = grid.spacing
-    own = np.zeros((grid.rows, grid.cols), bool)
-    own[:] = known[::step, ::step]
-    row, col = np.nonzero(known)
-    between = (row % step > 0) | (col % step > 0)
-    row, col = row[between], col[between]
-
-    def at(i: NDArray[np.intp], n: int) -> NDArray[np.intp]:
-        return i % n if grid.torus else np.minimum(i, n - 1)
-
-    above, left = row // step, col // step
-    represented = np.zeros(row.size, bool)
-    for down, right in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        needed = (row % step >= down) & (col % step >= right)  # a datum in a site's row has none above or below
-        represented |= needed & own[at(above + down, grid.rows), at(left + right, grid.cols)]
-    return row[~represented], col[~represented]
+    step, own = grid.spacing, np.zeros(grid.shape, bool)
+    own[:] = grid.view(known)
+    place = np.argwhere(known)
+    place = place[(place % step > 0).any(1)]
+    represented = np.zeros(len(place), bool)
+    for corner in product((0, 1), repeat=known.ndim):
+        needed = (place % step >= corner).all(1)  # a datum in a site's row has none above or below
+        site = place // step + corner
+        site = site % own.shape if grid.torus else np.minimum(site, np.array(own.shape) - 1)
+        represented |= needed & own[tuple(site.T)]
+    return place[~represented].astype(np.int32)
 
 
 def around(
@@ -131,28 +127,23 @@ def around(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Return the data near each site of a lattice, or of a window of it, site by site, the nearest first.
 
-    ``place`` (n, 2) rows and columns of the data in pixels; those no farther than the neighbourhood of ``order``
+    ``place`` (n, 2 or 3) are the places of the data in pixels; those no farther than the neighbourhood of ``order``
     reaches are near, and of them the `MOST_NEAR` nearest count. Returns the pixel index of the site in the grid's
-    picture, the number of the datum, and its offset (m, 2) from the site in pixels.
+    picture, the number of the datum, and its offset (m, 2 or 3) from the site in pixels.
     """
-    whole, reach = grid.within, isqrt(order)
+    step, reach, axes = grid.step, isqrt(order), place.shape[1]
+    first = np.array([0, grid.within.top, grid.within.left])[-axes:]
+    sides = np.array([0, grid.within.rows, grid.within.cols])[-axes:]
     found: list[list[NDArray[np.int64]]] = [[], [], []]
-    for a in range(-reach, reach + 2):
-        for b in range(-reach, reach + 2):
-            i, j = place[:, 0] // whole.step + a, place[:, 1] // whole.step + b
-            apart = place - np.stack([i, j], 1) * whole.step
-            near = ((apart.astype(np.int64) ** 2).sum(1) <= order * whole.step**2) & (
-                abs(apart).max(1) <= reach * whole.step
-            )
-            if grid.torus:
-                i, j = (i - whole.top) % whole.rows, (j - whole.left) % whole.cols
-            else:
-                i, j = i - whole.top, j - whole.left
-            near &= (i >= 0) & (i < grid.rows) & (j >= 0) & (j < grid.cols)
-            datum = np.flatnonzero(near)
-            found[0].append((i[near] * grid.width + j[near]).astype(np.int64) * grid.spacing)
-            found[1].append(datum)
-            found[2].append(apart[near].astype(np.int64))
+    for by in product(range(-reach, reach + 2), repeat=axes):
+        site = place.astype(np.int64) // step + by
+        apart = place - site * step
+        near = ((apart**2).sum(1) <= order * step**2) & (abs(apart).max(1) <= reach * step)
+        site = (site - first) % sides if grid.torus else site - first
+        near &= ((site >= 0) & (site < grid.shape)).all(1)
+        found[0].append(np.ravel_multi_index(tuple(site[near].T * grid.spacing), grid.pixels).astype(np.int64))
+        found[1].append(np.flatnonzero(near))
+        found[2].append(apart[near])
     site, datum, apart = (np.concatenate(parts) for parts in found)
     sorting = np.lexsort((datum, (apart**2).sum(1), site))
     site, datum, apart = site[sorting], datum[sorting], apart[sorting]

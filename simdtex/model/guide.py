@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from simdtex.model.pictures import unknown_in
 from simdtex.model.scale import Scale, stretch
+from simdtex.model.sums import sums_around
 
 UNKNOWN = 2**16 - 1
 """The working level of an unknown value, which counts for nothing (kernels/common/confidence.h)."""
@@ -189,21 +190,10 @@ def smooth(levels: NDArray[np.uint16], known: NDArray[np.bool_]) -> NDArray[np.u
     found, before, reach = np.zeros_like(levels), 0, AROUND
     while before < needed.max():
         here = (needed > before) & (needed <= reach)
-        count = _sums(known, reach)[here]
+        count = sums_around(known, reach)[here]
         for plane, smoothed in zip(levels, found, strict=True):  # one by one, for the sake of memory
-            smoothed[here] = _sums(np.where(known, plane, 0), reach)[here] // count
+            smoothed[here] = sums_around(np.where(known, plane, 0), reach)[here] // count
         before, reach = reach, reach * 3 // 2
-    return found
-
-
-def _sums(plane: NDArray[Any], reach: int) -> NDArray[np.int64]:
-    """Return the sums over squares of 2 reach + 1 pixels to a side around each pixel of a plane (rows, cols)."""
-    found: NDArray[np.int64] = plane.astype(np.int64)
-    for axis in (0, 1):
-        n = found.shape[axis]
-        running = np.concatenate([np.zeros_like(found.take([0], axis)), found.cumsum(axis)], axis)
-        at = np.arange(n)
-        found = running.take(np.minimum(at + reach + 1, n), axis) - running.take(np.maximum(at - reach, 0), axis)
     return found
 
 

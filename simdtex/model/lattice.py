@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from math import isqrt
+from math import isqrt, prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,20 +17,32 @@ MOST_ORDER = 4096
 """The largest order of a neighbourhood: 64 pixels to each side, 12852 neighbours."""
 
 
-def neighbourhood_offsets(order: int) -> NDArray[np.int32]:
+LAYER = 2**16
+"""Rows that stand for a layer in an offset: (layers * LAYER + rows, columns)."""
+
+
+def neighbourhood_offsets(order: int, axes: int = 2) -> NDArray[np.int32]:
     """Return the offsets r - s of the neighbourhood of an order, equation (3): (N, 2) int32, row and column.
 
     The neighbours are the sites within the distance sqrt(order), 1 to `MOST_ORDER`, in canonical order: by distance,
-    then row, then column. Order 1 has 4, order 8 has 24, order 18 has 60.
+    then layer, then row, then column. Order 1 has 4, order 8 has 24, order 18 has 60. With 3 ``axes`` the neighbourhood
+    is a ball, and the row of an offset has its layers in units of `LAYER`: order 1 has 6, order 8 has 92.
     """
     whole("order", order, 1, MOST_ORDER)
     radius = isqrt(order)
-    row, col = np.mgrid[-radius : radius + 1, -radius : radius + 1].reshape(2, -1)
-    squared = row * row + col * col
+    side = slice(-radius, radius + 1)
+    layer, row, col = np.mgrid[side if axes > 2 else slice(0, 1), side, side].reshape(3, -1)
+    squared = layer * layer + row * row + col * col
     inside = (squared > 0) & (squared <= order)
-    row, col, squared = row[inside], col[inside], squared[inside]
-    canonical = np.lexsort((col, row, squared))
-    return np.stack([row, col], 1)[canonical].astype(np.int32)
+    layer, row, col, squared = layer[inside], row[inside], col[inside], squared[inside]
+    canonical = np.lexsort((col, row, layer, squared))
+    return np.stack([layer * LAYER + row, col], 1)[canonical].astype(np.int32)
+
+
+def parts_of(offsets: NDArray[np.integer[Any]]) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Return layers, rows and columns of offsets (N, 2), each (N,)."""
+    layer = (offsets[:, 0] + LAYER // 2) // LAYER
+    return layer, offsets[:, 0] - layer * LAYER, offsets[:, 1]
 
 
 LATTICE = np.dtype(
@@ -38,7 +50,7 @@ LATTICE = np.dtype(
         (name, np.int32)
         for name in (
             *("rows", "cols", "spacing", "width", "around_rows", "around_cols", "tile_rows", "tile_cols", "elsewhere"),
-            *("top", "left", "whole_rows", "whole_cols", "step", "whole_width", "unused"),
+            *("top", "left", "whole_rows", "whole_cols", "step", "whole_width", "layers", "high", "height"),
         )
     ],
     align=True,
@@ -65,10 +77,12 @@ class Part(NamedTuple):
 class Grid:
     """The lattice of one level within a picture, equation (10): sites (spacing i, spacing j); or a window of it.
 
+    Or the lattice of a volume, whose layers lie one below another: an open one, without windows and tiles.
+
     Parameters
     ----------
     height, width : int
-        The picture that holds it, in pixels.
+        The picture that holds it, or a layer of the volume, in pixels.
     spacing : int
         Pixels of that picture from site to site: 2**level, or 1 in a window.
     torus : bool
@@ -78,6 +92,8 @@ class Grid:
         picture that stands `plane` pixels on (`simdtex.ops.snapshot`).
     part : Part, optional
         Where it lies in the whole, for a window that `window` has made.
+    layers : int
+        Layers of pixels of a volume; 1: a picture.
 
     Notes
     -----
@@ -91,10 +107,31 @@ class Grid:
     torus: bool = True
     tile: tuple[int, int] | None = None
     part: Part | None = None
+    layers: int = 1
+
+    @classmethod
+    def of(cls, shape: tuple[int, ...], spacing: int = 1, torus: bool = True) -> Grid:
+        """Return the lattice of a whole picture (rows, cols) or volume (layers, rows, cols)."""
+        return cls(*shape[-2:], spacing, torus, layers=shape[0] if len(shape) > 2 else 1)
+
+    @property
+    def pixels(self) -> tuple[int, ...]:
+        """The shape of the picture, or of the volume."""
+        return (self.height, self.width) if self.layers == 1 else (self.layers, self.height, self.width)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of the grid: (rows, cols), or (layers, rows, cols) of a volume's."""
+        return tuple(-(-side // self.spacing) for side in self.pixels)
+
+    @property
+    def size(self) -> int:
+        """Its sites."""
+        return prod(self.shape)
 
     @property
     def rows(self) -> int:
-        """Rows of the grid."""
+        """Rows of the grid, or of each of its layers."""
         return -(-self.height // self.spacing)
 
     @property
@@ -104,8 +141,8 @@ class Grid:
 
     @property
     def plane(self) -> int:
-        """Pixels of the picture that holds it."""
-        return self.height * self.width
+        """Pixels of the picture that holds it, or of the volume."""
+        return prod(self.pixels)
 
     @property
     def within(self) -> Part:
@@ -126,9 +163,10 @@ class Grid:
     @cached_property
     def struct(self) -> np.void:
         """The grid as kernels take it, of the type `LATTICE`."""
-        whole, numbers = self.within, np.zeros((), LATTICE)
+        whole, numbers, deep = self.within, np.zeros((), LATTICE), self.size // (self.rows * self.cols)
         for name, value in {
-            **{"rows": self.rows, "cols": self.cols, "spacing": self.spacing, "width": self.width},
+            **{"layers": deep, "high": self.rows, "height": self.height},
+            **{"rows": deep * self.rows, "cols": self.cols, "spacing": self.spacing, "width": self.width},
             **{"around_rows": self.around[0], "around_cols": self.around[1], "elsewhere": self.plane},
             **dict(zip(("tile_rows", "tile_cols"), self.tile or (0, 0), strict=True)),
             **{"top": whole.top, "left": whole.left, "whole_rows": whole.rows, "whole_cols": whole.cols},
@@ -162,7 +200,7 @@ class Grid:
     @property
     def flat(self) -> Grid:
         """The same sites as a lattice of their own, numbered 0 .. rows * cols - 1."""
-        return Grid(self.rows, self.cols, 1, self.torus)
+        return Grid.of(self.shape, 1, self.torus)
 
     @property
     def above(self) -> tuple[tuple[int, int], tuple[int, int]]:
@@ -180,14 +218,17 @@ class Grid:
         return whole[..., row[:, None], col[None, :]]
 
     def sites(self) -> NDArray[np.int32]:
-        """Pixel index of every site, (rows * cols,), row by row."""
+        """Pixel index of every site, (size,), row by row."""
         row = np.arange(self.rows, dtype=np.int32)[:, None] * np.int32(self.width)
         col = np.arange(self.cols, dtype=np.int32)[None, :]
-        sites: NDArray[np.int32] = ((row + col) * np.int32(self.spacing)).ravel()
-        return sites
+        layer = np.arange(self.size // (self.rows * self.cols), dtype=np.int32)[:, None, None]
+        sites: NDArray[np.int32] = layer * np.int32(self.height * self.width) + row + col
+        return (sites * np.int32(self.spacing)).ravel()
 
     def places(self, sites: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
         """Return the pixel indices in the whole picture of sites of this grid; they key random numbers."""
+        if self.layers > 1:
+            return sites.astype(np.int64)
         whole = self.within
         row, col = np.divmod(sites.astype(np.int64), self.width)
         row = (whole.top + row // self.spacing) % whole.rows
@@ -196,14 +237,20 @@ class Grid:
         return places
 
     def view(self, picture: NDArray[Any]) -> NDArray[Any]:
-        """Return the sites of this grid as a view of a picture (..., H, W), without older pictures below it."""
-        return picture[..., : self.height : self.spacing, :: self.spacing]
+        """Return the sites of this grid as a view of a picture (..., H, W), without older pictures below it.
+
+        Or as a view of a volume (..., D, H, W).
+        """
+        every = (slice(None, None, self.spacing),)
+        return picture[(..., *every * (self.layers > 1), slice(None, self.height, self.spacing), *every)]
 
     def neighbours(self, sites: NDArray[np.int32], offsets: NDArray[np.int32]) -> NDArray[np.int32]:
         """Pixel index of each neighbour, (N, S); -1 outside an open lattice or a window, and for the site itself.
 
         If there are tiles, `plane` is added to that of a neighbour in another tile.
         """
+        if self.layers > 1:
+            return self._among_layers(sites, offsets)
         row = sites // self.width // self.spacing
         col = sites % self.width // self.spacing
         k = row[None, :] + offsets[:, 0, None]
@@ -219,6 +266,13 @@ class Grid:
             apart = (k // high != row // high) | (m // wide != col // wide)
             pixel = pixel + apart * self.plane
         return np.where(inside & ~itself, pixel, -1).astype(np.int32)
+
+    def _among_layers(self, sites: NDArray[np.int32], offsets: NDArray[np.int32]) -> NDArray[np.int32]:
+        pixel = np.stack(np.unravel_index(sites, self.pixels))[:, None, :]
+        there = pixel // self.spacing + np.stack(parts_of(offsets))[:, :, None]
+        inside = ((there >= 0) & (there < np.array(self.shape)[:, None, None])).all(0)
+        layer, row, col = there * self.spacing
+        return np.where(inside, (layer * self.height + row) * self.width + col, -1).astype(np.int32)
 
 
 @dataclass(frozen=True)
@@ -247,6 +301,21 @@ class Sublattice:
     def fits(self, rows: int, cols: int) -> bool:
         """Return whether a torus of this size holds the pattern without a seam."""
         return rows % self.a == 0 and cols % self.c == 0 and (cols // self.c * self.b) % self.a == 0
+
+
+@lru_cache(maxsize=64)
+def coloring_of_layers(order: int) -> tuple[int, int, int]:
+    """Return (m, a, b) of fewest colours m so that (a layer + b row + column) mod m differs among neighbours.
+
+    Neighbours are the sites of a ball, the neighbourhood of an order in three dimensions. Order 8 needs 21 colours.
+    """
+    layer, row, col = parts_of(neighbourhood_offsets(order, 3).astype(np.int64))
+    for m in range(2, 8 * (isqrt(order) + 1) ** 3):
+        a, b = np.mgrid[:m, :m].reshape(2, -1, 1)
+        apart = ((a * layer + b * row + col) % m != 0).all(1)
+        if apart.any():
+            return m, *(int(one[apart.argmax(), 0]) for one in (a, b))
+    raise AssertionError("m = (isqrt(order) + 1) ** 3 has such a pattern")
 
 
 @lru_cache(maxsize=64)

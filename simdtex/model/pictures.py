@@ -19,7 +19,7 @@ class Pictures:
     Parameters
     ----------
     pixels : tuple of (rows, cols, C) arrays
-        Of any sizes; NaN where a pixel is unknown.
+        Of any sizes; NaN where a pixel is unknown. Or one volume (layers, rows, cols, C).
     unknown : tuple of (rows, cols) bool arrays, optional
         Unknown pixels in addition to NaN: nothing is taken from there, and they are no neighbours.
     usable : tuple of (rows, cols) bool arrays, optional
@@ -56,6 +56,11 @@ class Pictures:
         object.__setattr__(self, "pixels", tuple(completed(*pair) for pair in zip(self.pixels, gaps, strict=True)))
 
     @property
+    def deep(self) -> bool:
+        """Whether the sample is a volume."""
+        return self.pixels[0].ndim > 3
+
+    @property
     def clean(self) -> bool:
         """Whether there is one picture, and all of it is known and may be used."""
         return len(self.pixels) == 1 and self.known is None and self.usable is None
@@ -79,9 +84,9 @@ class Pictures:
 
 
 def unknown_in(picture: NDArray[Any]) -> Mask:
-    """Return where a picture (rows, cols, C) is NaN in any channel."""
+    """Return where a picture ([layers,] rows, cols, C) is NaN in any channel."""
     if picture.dtype.kind != "f":
-        return np.zeros(picture.shape[:2], bool)
+        return np.zeros(picture.shape[:-1], bool)
     found: Mask = np.isnan(picture).any(-1)
     return found
 
@@ -92,6 +97,6 @@ def completed(picture: NDArray[Any], unknown: Mask) -> NDArray[Any]:
         return picture
     from scipy.ndimage import distance_transform_edt  # only where something is unknown: it takes long to load
 
-    row, col = distance_transform_edt(unknown, return_distances=False, return_indices=True)
-    filled: NDArray[Any] = np.ascontiguousarray(picture[row, col])
+    nearest = distance_transform_edt(unknown, return_distances=False, return_indices=True)
+    filled: NDArray[Any] = np.ascontiguousarray(picture[tuple(nearest)])
     return filled

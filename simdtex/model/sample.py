@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.model.guide import AnyGuide
+from simdtex.model.lattice import parts_of
 from simdtex.model.pictures import Pictures
 from simdtex.model.regularity import WAVES, Phases
 from simdtex.model.scale import Scale, highest
@@ -42,7 +43,7 @@ class Places(NamedTuple):
     ``offsets`` (N, 2) the neighbourhood; ``spacing`` 2**level, by which it is spread; ``step`` pixels of the sample
     from one crossing to the next; ``row`` and ``col`` of the crossings; ``everywhere`` (n,) int32 the pixel index of
     each, row by row; ``allowed`` (n,) whether each is a candidate, or None if all are; ``reach`` (N,) int32 pixel
-    offset of each neighbour.
+    offset of each neighbour; ``layers`` of crossings, 1 of pictures: the rows of a volume are those of all its layers.
     """
 
     offsets: NDArray[np.int32]
@@ -53,6 +54,13 @@ class Places(NamedTuple):
     everywhere: NDArray[np.int32]
     allowed: NDArray[np.bool_] | None
     reach: NDArray[np.int32]
+    layers: int = 1
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the crossings, (rows, cols) or (layers, rows, cols)."""
+        sides = (self.row.size // self.layers, self.col.size)
+        return sides if self.layers == 1 else (self.layers, *sides)
 
     @property
     def positions(self) -> NDArray[np.int32]:
@@ -85,7 +93,7 @@ class Candidates(NamedTuple):
 
 
 class Sample:
-    """A sample in working grey levels: one picture, or several one below another.
+    """A sample in working grey levels: one picture, several one below another, or the layers of one volume.
 
     Pixels become working levels as `simdtex.model.scale` says. Pixels of the output are taken from the sample itself,
     or moved from there by the finish in steps of an eighth of a level, so nothing is lost there.
@@ -125,6 +133,8 @@ class Sample:
         Those of each picture's; empty without guides.
     boxes : list of (int, int, int)
         Of each picture its first row, its rows and its columns.
+    layer : int
+        Rows of a layer of a volume with its margin; 0: there are pictures.
 
     Notes
     -----
@@ -182,9 +192,12 @@ class Sample:
         return sample
 
     def _lay(self, levels: Sequence[NDArray[np.uint16]], margin: int, step: int = 1, apart: int = 0) -> None:
-        self.margin, self.channels, self.boxes = margin, len(levels[0]), []
+        self.margin, self.channels, self.boxes, self.layer = margin, len(levels[0]), [], 0
         self._places: dict[tuple[Any, ...], Places] = {}
         self.__dict__.pop("variance", None)
+        if levels[0].ndim > 3:
+            self._lay_volume(levels[0], margin)
+            return
         top = 0
         for one in levels:
             self.boxes.append((top, *one.shape[1:]))
@@ -196,8 +209,19 @@ class Sample:
             around = ((0, 0), (margin, margin), (margin, margin))
             padded = np.pad(one, around, mode="reflect" if min(rows, cols) > 1 else "edge")
             canvas[:, first : first + rows + 2 * margin, : cols + 2 * margin] = padded
-        self.levels = canvas[:, margin : margin + self.height, margin : margin + self.width]
+        self.levels = [
+            canvas[:, margin + first : margin + first + rows, margin : margin + cols]
+            for first, rows, cols in self.boxes
+        ]
         self.working = canvas.reshape(len(canvas), -1)
+
+    def _lay_volume(self, levels: NDArray[np.uint16], margin: int) -> None:
+        layers, self.height, self.width = levels.shape[1:]
+        self.layer, self.cols = self.height + 2 * margin, self.width + 2 * margin
+        self.rows = (layers + 2 * margin) * self.layer
+        self.boxes.append((0, self.height, self.width))
+        self.levels = [levels]
+        self.working = np.pad(levels, ((0, 0), *[(margin, margin)] * 3), mode="reflect").reshape(len(levels), -1)
 
     def _stacked(self, pictures: Sequence[NDArray[Any]], between: Any) -> NDArray[Any]:
         """Return arrays (rows, cols, ...), one for each picture, stacked without the margin."""
@@ -211,15 +235,45 @@ class Sample:
     @cached_property
     def inside(self) -> NDArray[np.bool_]:
         """Whether a pixel (rows, cols), margins included, is one of the sample's that are known and may be used."""
-        here = [np.ones((rows, cols), bool) for _, rows, cols in self.boxes]
+        here = [np.ones(one.shape[1:], bool) for one in self.levels]
         for masks in (self.pictures.known, self.pictures.usable):
             here = [a & b for a, b in zip(here, masks, strict=True)] if masks else here
-        return np.pad(self._stacked(here, False), self.margin)
+        return self._framed(here)
+
+    def _framed(self, masks: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+        """Return masks of all pictures as one of the sample with its margin, (rows, cols)."""
+        return np.pad(self._stacked(masks, False), self.margin).reshape(self.rows, self.cols)
 
     @cached_property
     def variance(self) -> float:
         """sigma^2 of equation (8): the mean over the matched channels of the variance of the working levels."""
-        return variance(*(self.levels[: self.channels, top : top + rows, :cols] for top, rows, cols in self.boxes))
+        return variance(*(one[: self.channels] for one in self.levels))
+
+    def spread(self, offsets: NDArray[np.integer[Any]], spacing: int) -> NDArray[np.int32]:
+        """Return offsets (N, 2) in sites of a level as rows and columns of the sample with its margin."""
+        layer, row, col = parts_of(offsets)
+        return (np.stack([layer * self.layer + row, col], 1) * spacing).astype(np.int32)
+
+    def _crossings(
+        self, offsets: NDArray[np.int32], spacing: int, step: int
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.bool_]]:
+        """Return rows and columns of places, without the margin, and which have their whole neighbourhood inside."""
+        apart = [part * spacing for part in parts_of(offsets)]
+
+        def whole(at: NDArray[np.int32], axis: int, first: int, size: int) -> NDArray[np.bool_]:
+            inside: NDArray[np.bool_] = (at + apart[axis].min() >= first) & (at + apart[axis].max() < first + size)
+            return inside
+
+        row, col = (np.arange(0, n, step, dtype=np.int32) for n in (self.height, self.width))
+        found = np.zeros((row.size, col.size), bool)
+        for top, rows, cols in self.boxes:
+            found |= whole(row, 1, top, rows)[:, None] & whole(col, 2, 0, cols)[None, :]
+        if self.layer:
+            size = self.levels[0].shape[1]
+            layer = np.arange(0, size, step, dtype=np.int32)
+            found = (whole(layer, 0, 0, size)[:, None, None] & found).reshape(-1, col.size)
+            row = ((layer + self.margin)[:, None] * np.int32(self.layer) + row).ravel()
+        return row, col, found
 
     def places(
         self, offsets: NDArray[np.int32], spacing: int, phases: str = "decimated", edges: str = "whole"
@@ -250,13 +304,9 @@ class Sample:
         if key in self._places:
             return self._places[key]
         step, margin = 1 if phases == "all" else spacing, self.margin
-        row, col = (np.arange(0, n, step, dtype=np.int32) for n in (self.height, self.width))
+        row, col, whole = self._crossings(offsets, spacing, step)
         found: NDArray[np.bool_] = self.inside[np.ix_(row + margin, col + margin)]
-        (up, left), (down, right) = offsets.min(0) * spacing, offsets.max(0) * spacing
-        whole = np.zeros_like(found)
-        for top, rows, cols in self.boxes:
-            within = (row + up >= top) & (row + down < top + rows)
-            whole |= within[:, None] & ((col + left >= 0) & (col + right < cols))[None, :]
+        spread = self.spread(offsets, spacing)
         few = np.count_nonzero(found & whole) < ENOUGH_WHOLE * np.count_nonzero(found)
         if not (edges == "reflect" or (edges == "auto" and (spacing > 1 or few))):
             found &= whole
@@ -264,19 +314,20 @@ class Sample:
             row, col, allowed = row[found.any(1)], col[found.any(0)], None
         else:
             if self.pictures.known:
-                found &= self._sure(offsets * spacing, row + margin, col + margin)
+                found &= self._sure(spread, row + margin, col + margin)
             if not found.any():
                 raise NothingUsable("nothing of the sample may be used at some level; give more of it, or fewer levels")
             allowed = found.ravel()
         everywhere = ((row + margin)[:, None] * np.int32(self.cols) + (col + margin)[None, :]).astype(np.int32).ravel()
-        reach = (offsets @ np.array([self.cols, 1], np.int32) * np.int32(spacing)).astype(np.int32)
-        self._places[key] = Places(offsets, spacing, step, row, col, everywhere, allowed, reach)
+        reach = spread @ np.array([self.cols, 1], np.int32)
+        layers = len(set(((row + margin) // self.layer).tolist())) if self.layer else 1
+        self._places[key] = Places(offsets, spacing, step, row, col, everywhere, allowed, reach, layers)
         return self._places[key]
 
     def _sure(self, offsets: NDArray[np.int32], row: NDArray[np.int32], col: NDArray[np.int32]) -> NDArray[np.bool_]:
         """Return which crossings have few unknown neighbours, all in pixels of the sample with its margin."""
         assert self.pictures.known is not None
-        missing = np.pad(self._stacked([~known for known in self.pictures.known], False), self.margin)
+        missing = self._framed([~known for known in self.pictures.known])
         lines = np.flatnonzero(missing.any(1))
         near = (row + offsets[:, 0].max() >= lines[0]) & (row + offsets[:, 0].min() <= lines[-1])  # who can see one
         count = np.zeros((int(near.sum()), col.size), np.int16)
@@ -345,12 +396,23 @@ class Sample:
             len(self.guides),
         )
 
+    @property
+    def first(self) -> int:
+        """Pixel index of the first pixel that is not of the margin."""
+        return self.margin * ((self.layer + 1) * self.cols + 1)
+
+    def _coordinates(self, source: NDArray[np.int32]) -> tuple[NDArray[np.int32], ...]:
+        """Return row and column of pixel indices, without the margin; of a volume layer, row and column."""
+        row, col = np.divmod(source, np.int32(self.cols))
+        lines = (*np.divmod(row, np.int32(self.layer)), col) if self.layer else (row, col)
+        return tuple(line - np.int32(self.margin) for line in lines)
+
     def place(self, source: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return (row, column) in the user's sample of pixel indices, on a last axis; -1 for a pixel without source.
 
-        Of several pictures, the number of the picture is the third.
+        Of several pictures, the number of the picture is the third; of a volume, the layer is the first.
         """
-        place = np.stack(np.divmod(source, np.int32(self.cols)), -1) - np.int32(self.margin)
+        place = np.stack(self._coordinates(source), -1)
         if len(self.boxes) > 1:
             number = self.picture_of(source).astype(np.int32)
             place[..., 0] -= np.array([top for top, *_ in self.boxes], np.int32)[number]
@@ -359,8 +421,10 @@ class Sample:
 
     def index(self, place: NDArray[np.integer]) -> NDArray[np.int32]:
         """Return the pixel index of (row, column[, number of the picture]) on a last axis; -1 if the row is below 0."""
-        row, col = place[..., 0], place[..., 1]
-        if place.shape[-1] == 3:
+        row, col = place[..., -2 if self.layer else 0], place[..., -1 if self.layer else 1]
+        if self.layer:
+            row = row + (place[..., 0] + self.margin) * self.layer
+        elif place.shape[-1] == 3:
             row = row + np.array([top for top, *_ in self.boxes])[np.maximum(place[..., 2], 0)]
         found = (row + self.margin) * self.cols + col + self.margin
         return np.where(place[..., 0] < 0, -1, found).astype(np.int32)
@@ -372,16 +436,16 @@ class Sample:
         cols) are pixel indices in the sample. A pixel is the source's, plus what the working level differs from the
         source's own.
         """
-        source = np.maximum(source, self.margin * (self.cols + 1))  # what is from nowhere differs from the first pixel
-        own, usual = self._own(source), self.working[: self.shown, source]
+        source = np.maximum(source, self.first)  # what is from nowhere differs from the first pixel
+        own, usual = self.own(source), self.working[: self.shown, source]
         if not self.direct or (values[: self.shown] == usual).all():
             return np.ascontiguousarray(own)
         step = np.moveaxis(values[: self.shown].astype(np.int64) - usual, 0, -1)
         return moved(own, step * self.unit, self.pixels)
 
-    def _own(self, source: NDArray[np.int32]) -> NDArray[Any]:
-        row, col = np.divmod(np.maximum(source, self.margin * (self.cols + 1)), np.int32(self.cols))
-        own: NDArray[Any] = self.pixels[row - np.int32(self.margin), col - np.int32(self.margin)]
+    def own(self, source: NDArray[np.int32]) -> NDArray[Any]:
+        """Return the pixels (..., C) at pixel indices, in the sample's own type."""
+        own: NDArray[Any] = self.pixels[self._coordinates(np.maximum(source, self.first))]
         return own
 
     def moved(self, source: NDArray[Any], by: NDArray[np.int16]) -> NDArray[Any]:
@@ -390,7 +454,7 @@ class Sample:
         ``source`` (rows, cols) are pixel indices; ``by`` (C, rows, cols) are working levels of 8-bit samples, and
         `FINE`-ths of a working level of others.
         """
-        own, change = self._own(source), np.moveaxis(by, 0, -1)
+        own, change = self.own(source), np.moveaxis(by, 0, -1)
         if self.pixels.dtype == np.uint8 and self.direct:
             exact: NDArray[Any] = np.clip(own.astype(np.int32) + change, 0, 255).astype(np.uint8)
             return exact

@@ -19,7 +19,7 @@ def survey(machine: Launcher | None, grid: Grid, temperature: Array) -> tuple[in
     if machine is None:
         t = grid.view(temperature)
         return int((t > 0).sum()), int(t.sum(dtype=np.int64))
-    stretches = -(-grid.rows * grid.cols // CHUNK)
+    stretches = -(-grid.size // CHUNK)
     both = machine.empty((2, stretches), np.int32)
     machine.launch(
         machine.kernel("active", "active_survey"),
@@ -35,7 +35,7 @@ def total(machine: Launcher | None, grid: Grid, numbers: Array) -> int:
     """Return the sum of an (H, W) int32 array over the sites of a grid."""
     if machine is None:
         return int(grid.view(numbers).sum(dtype=np.int64))
-    stretches = -(-grid.rows * grid.cols // CHUNK)
+    stretches = -(-grid.size // CHUNK)
     sums = machine.empty((stretches,), np.int32)
     machine.launch(
         machine.kernel("active", "active_total"),

@@ -15,7 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex import random
-from simdtex.model.lattice import Grid, Sublattice, coloring_sublattice, neighbourhood_offsets
+from simdtex.model.lattice import (
+    Grid,
+    Sublattice,
+    coloring_of_layers,
+    coloring_sublattice,
+    neighbourhood_offsets,
+)
 
 UNCOLORED = -1
 
@@ -46,12 +52,17 @@ class Plan(NamedTuple):
 def coloring(grid: Grid, order: int, seed: int = 0) -> NDArray[np.int32]:
     """Return the colours of a level's lattice, or of a window of one: (rows, cols) int32, 0 .. colours - 1.
 
+    A volume's lattice, (layers, rows, cols), has the modular colouring of `coloring_of_layers`.
+
     The best lattice colouring of the plane if the size of the lattice takes it without a seam. Else either a lattice
     colouring with more colours that fits, or the best one with its clashes along the seam coloured greedily, whichever
     has fewer colours; of a vast lattice the former, if there is one. A window's sites have the colours that they have
     in the whole; ``seed`` sets the priorities of the greedy rounds. Cost: O(rows cols), and once for a whole lattice a
     few tens of rounds along its seam.
     """
+    if grid.layers > 1:
+        m, *by = coloring_of_layers(order)
+        return (np.tensordot([*by, 1], np.indices(grid.shape), 1) % m).astype(np.int32)
     whole = grid.within
     plan = lattice_plan(whole.rows, whole.cols, grid.torus, order, seed)
     row = (whole.top + np.arange(grid.rows)) % whole.rows

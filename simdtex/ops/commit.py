@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from math import prod
+
 import numpy as np
 
 from simdtex.machine.interface import Array, Launcher, Operation
@@ -13,7 +15,7 @@ from simdtex.ops.neighbourhood import Field
 @Operation
 def commit(machine: Launcher | None, field: Field, sites: Array, relaxed: Relaxed, cooled: Array) -> Field:
     """Write what sites have become into the field, in place."""
-    (channels, _), (_, height, width) = relaxed.values.shape, field.values.shape
+    channels = len(relaxed.values)
     if machine is None:
         field.values.reshape(len(field.values), -1)[:channels, sites] = relaxed.values
         field.source.ravel()[sites] = relaxed.choice
@@ -22,7 +24,7 @@ def commit(machine: Launcher | None, field: Field, sites: Array, relaxed: Relaxe
     machine.launch(
         machine.kernel("commit", "commit"),
         (sites.size,),
-        *(sites, np.int32(sites.size), np.int32(channels), np.int32(height * width)),
+        *(sites, np.int32(sites.size), np.int32(channels), np.int32(prod(field.values.shape[1:]))),
         *(relaxed.values, relaxed.choice, cooled, *field),
     )
     return field

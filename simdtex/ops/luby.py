@@ -25,7 +25,7 @@ def luby(
     ``active`` (rows, cols) uint8 says which sites may be members. The set is that of the greedy choice in the order of
     priorities, so it does not depend on the rounds. Cost: O(rows cols N) a round, some 5 to 10 rounds.
     """
-    sites = grid.rows * grid.cols
+    sites = grid.size
     if machine is None:
         draws = random.draw4(seed, level, count, np.arange(sites), random.SCHEDULE)[0].astype(np.int64)
         host = np.where(active.ravel(), UNDECIDED, OUT).astype(np.uint8)
@@ -38,7 +38,7 @@ def luby(
             host[undecided] = np.where(beaten.any(0), OUT, np.where(rival.any(0), UNDECIDED, IN))
         return np.asarray(host == IN, np.uint8).reshape(active.shape)
     priority = machine.empty((sites,), np.uint32)
-    state, following = (machine.empty((grid.rows, grid.cols), np.uint8) for _ in range(2))
+    state, following = (machine.empty(grid.shape, np.uint8) for _ in range(2))
     machine.launch(
         machine.kernel("luby", "luby_priority"),
         (sites,),

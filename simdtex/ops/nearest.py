@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Machine, Operation
-from simdtex.model.lattice import Grid
+from simdtex.model.lattice import Grid, parts_of
 from simdtex.model.regularity import WAVES
 from simdtex.model.sample import Candidates, Places, Sample
 from simdtex.ops import coherence, lcpdf, neighbourhood
@@ -37,7 +37,8 @@ class Strip(NamedTuple):
     """The sample's pixels that the candidates of a level and their neighbours are, row by row.
 
     ``pixels`` (C, size) float32, the last `TAIL` of them 0; candidate (i, j) of ``rows`` x ``cols``, in the order of
-    the list, is pixel ``first`` + i ``pitch`` + j; ``reach`` (N,) int32 pixel offset of each neighbour; ``offsets``
+    the list, is pixel ``first`` + i ``pitch`` + j, and ``thick`` pixels further in the next layer, every ``high`` rows;
+    ``reach`` (N,) int32 pixel offset of each neighbour; ``offsets``
     the bytes of the neighbourhood's own; ``leaves()`` the candidates by features, made when first asked for.
     """
 
@@ -46,6 +47,8 @@ class Strip(NamedTuple):
     pitch: int
     rows: int
     cols: int
+    high: int
+    thick: int
     reach: Array
     offsets: bytes
     leaves: Callable[[], Leaves | None]
@@ -54,14 +57,16 @@ class Strip(NamedTuple):
 def strip_of(machine: Machine, sample: Sample, places: Places) -> Strip:
     """Return the strip of a level's candidates."""
     offsets, positions, spacing, step = places.offsets, places.everywhere, places.spacing, places.step
-    row, col = (int(n) for n in divmod(positions[0], sample.cols))
-    planes = sample.working.reshape(-1, sample.rows, sample.cols)[:, row % step :: step, col % step :: step]
-    pitch = planes.shape[2]
+    line, col = (int(n) for n in divmod(positions[0], sample.cols))
+    layer, row = divmod(line, sample.layer or sample.rows)
+    planes = sample.working.reshape(len(sample.working), -1, sample.layer or sample.rows, sample.cols)
+    planes = planes[:, layer % step :: step, row % step :: step, col % step :: step]
+    thick, pitch = planes.shape[2] * planes.shape[3], planes.shape[3]
     pixels = np.pad(planes.reshape(len(planes), -1).astype(np.float32), ((0, 0), (0, TAIL)))
-    reach = (offsets[:, 0] * np.int32(pitch) + offsets[:, 1]) * np.int32(spacing // step)
-    wide = int(np.searchsorted(positions, (row + 1) * sample.cols))
-    first, reaches = row // step * pitch + col // step, machine.put(reach.astype(np.int32))
-    shape = (first, pitch, positions.size // wide, wide)
+    reach = np.stack(parts_of(offsets), 1) @ np.array([thick, pitch, 1]) * (spacing // step)
+    wide, lines = places.col.size, places.row.size
+    first, reaches = layer // step * thick + row // step * pitch + col // step, machine.put(reach.astype(np.int32))
+    shape = (first, pitch, lines, wide, lines // places.layers, thick)
     leaves = cache(partial(grow, machine, sample.working, positions, places.reach, sample.top))
     return Strip(machine.put(pixels), *shape, reaches, offsets.tobytes(), leaves)
 
@@ -78,7 +83,7 @@ def slack(terms: int) -> np.float32:
 @lru_cache(maxsize=16)
 def _spread(offsets: bytes) -> NDArray[np.int32]:
     """Return an order of neighbours in which each is far from those before: close ones differ by much the same."""
-    place = np.frombuffer(offsets, np.int32).reshape(-1, 2).astype(np.int64)
+    place = np.stack(parts_of(np.frombuffer(offsets, np.int32).reshape(-1, 2).astype(np.int64)), 1)
     gap = np.full(len(place), np.iinfo(np.int64).max)
     order = []
     for _ in place:
@@ -144,7 +149,7 @@ def nearest(
             *(candidates.pixels, plane, candidates.positions, candidates.reach, *more),
             *(i(split), found, at, work, wanted),
         )
-    shape = (strip.first, strip.pitch, strip.rows, strip.cols)
+    shape = (strip.first, strip.pitch, strip.rows, strip.cols, strip.high, strip.thick)
     machine.launch(
         machine.kernel("nearest", "nearest_scan", **defines),
         (count * split,),

@@ -138,7 +138,8 @@ LEVEL = np.dtype(
         ("seed", np.uint64),
         ("level", np.uint32),
         *((name, np.int32) for name in ("area", "neighbours", "pixels", "candidates", "chance")),
-        *((name, np.int32) for name in ("plane", "down", "first", "pitch", "size", "strip_rows", "strip_cols")),
+        *((name, np.int32) for name in ("plane", "down", "deep", "first", "pitch", "size", "strip_rows", "strip_cols")),
+        *((name, np.int32) for name in ("strip_high", "thick")),
         *((name, np.float32) for name in ("discount", "scale")),
         *((name, np.int32) for name in ("radius", "top", "draws", "xi")),
         ("novelty", np.float32),
@@ -297,13 +298,14 @@ def _fused(
     if isinstance(proposal, Everything):
         strip = proposal.strip
         level |= {"first": strip.first, "pitch": strip.pitch, "size": strip.pixels.shape[1]}
-        level |= {"strip_rows": strip.rows, "strip_cols": strip.cols}
+        level |= {"strip_rows": strip.rows, "strip_cols": strip.cols, "strip_high": strip.high, "thick": strip.thick}
         most = 256 if proposal.slots <= 256 else KEPT  # so that few programs serve all
         defines |= {"ALL": most, "N": -(-offsets.shape[0] // 64) * 64, "STEP": machine.step}
         name, own = "relax_all", [strip.pixels, strip.reach, *costs, noise, key]
     else:
         square = proposal.square
-        level |= {"plane": square.levels.shape[1], "down": square.down, "chance": proposal.chance}
+        level |= {"plane": square.levels.shape[1], "down": square.down, "deep": square.deep, "chance": proposal.chance}
+        defines |= {"CUBE": 1} if grid.layers > 1 else {}
         defines |= {"RADIUS": square.disc.shape[0] // 2, "SLOTS": -(-proposal.slots // 64) * 64}
         name, own = "relax_list", [square.disc, square.at, square.levels, *costs, noise, weighed, key]
     arguments = [sites, np.int32(sites.size), *field, constants(grid, **level), *common, *own]

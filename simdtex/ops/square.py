@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Machine
+from simdtex.model.lattice import parts_of
 from simdtex.model.sample import Places, Sample
 from simdtex.ops.arithmetic import fma32
 
@@ -20,13 +21,15 @@ class Square(NamedTuple):
     """A level's candidates and their neighbours, side by side.
 
     ``at`` (n,) int32 the candidates' places in ``levels`` (C, plane) uint16, the sample's working levels with the
-    columns that are a level's step apart side by side; ``down`` from one row of the lattice to the next there;
-    ``disc`` (side, columns) float32, 1 on the neighbourhood.
+    columns that are a level's step apart side by side; ``down`` from one row of the lattice to the next there, ``deep``
+    from one layer to the next; ``disc`` (side, columns) float32, of a volume (side, side, columns), 1 on the
+    neighbourhood.
     """
 
     at: Array
     levels: Array
     down: int
+    deep: int
     disc: Array
 
     def distance(
@@ -41,11 +44,12 @@ class Square(NamedTuple):
         ``numbers`` (slots, S), -1 for none; ``x`` (N, C, S) grey levels of the neighbours and ``u`` (N, C or
         1, S), how certain each is; one more of both where the site itself is among ``offsets``.
         """
-        radius = int(offsets.max())
+        radius = int(offsets[:, 1].max())
+        layer, line, _ = parts_of(offsets)
         d = np.zeros((LANES, *numbers.shape), np.float32)
         for k in np.lexsort((offsets[:, 1], offsets[:, 0])):
-            row, col = offsets[k]
-            apart = row * self.down + col
+            col = offsets[k, 1]
+            apart = layer[k] * self.deep + line[k] * self.down + col
             for c, y in enumerate(self.levels):
                 certain = u[k, c if u.shape[1] > 1 else 0]
                 e = (x[k, c] - y[self.at[np.maximum(numbers, 0)] + apart].astype(np.float32)) * certain
@@ -59,10 +63,11 @@ class Square(NamedTuple):
 def square_of(machine: Machine, sample: Sample, places: Places) -> Square:
     """Lay out the candidates of a level."""
     offsets, step = places.offsets, places.spacing
-    radius, rows, cols = int(offsets.max()), sample.rows, sample.cols
+    radius, rows, cols = int(offsets[:, 1].max()), sample.rows, sample.cols
     side, columns = 2 * radius + 1, -(-(2 * radius + 1) // LANES) * LANES
-    disc = np.zeros((side, columns), np.float32)
-    disc[tuple((offsets + radius).T)] = 1
+    disc = np.zeros((side, side, columns), np.float32)
+    disc[tuple(part + radius for part in parts_of(offsets))] = 1
+    disc = disc if sample.layer else disc[radius]
     wide = -(-cols // step)
     around = ((0, 0), (0, 0), (0, wide * step - cols))
     working = np.pad(sample.working.reshape(-1, rows, cols), around, mode="edge").reshape(-1, rows, wide, step)
@@ -73,5 +78,6 @@ def square_of(machine: Machine, sample: Sample, places: Places) -> Square:
         machine.put(at),
         machine.put(np.pad(levels, ((0, 0), (0, columns)))),  # whole vectors are read at the end, too
         step * step * wide,
+        sample.layer * step * step * wide,
         machine.put(disc),
     )

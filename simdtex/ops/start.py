@@ -14,7 +14,7 @@ from simdtex.ops.neighbourhood import Field
 @Operation
 def start(machine: Launcher | None, pixels: Array, positions: Array, grid: Grid, seed: int) -> Field:
     """Return a field whose sites are pixels of the sample at random positions."""
-    (channels, plane), shape = pixels.shape, (grid.height, grid.width)
+    (channels, plane), shape = pixels.shape, grid.pixels
     if machine is None:
         lo, hi, *_ = random.draw4(seed, 0, 0, grid.places(grid.sites()), random.START)
         source = positions[random.below(lo, hi, positions.size)].reshape(shape)

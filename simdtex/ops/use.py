@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from simdtex.machine.interface import Launcher, Operation
 from simdtex.model.lattice import Grid
 from simdtex.model.sample import Candidates
+from simdtex.model.sums import sums_around
 from simdtex.ops.neighbourhood import Field
 
 CAP = 4.0
@@ -22,13 +24,13 @@ CAP = 4.0
 class FairUse:
     """The places of a level's candidates, and how much use of each is fair.
 
-    ``shape`` rows and columns of the places; ``around`` places from one to the edge of its neighbourhood; ``fair``
+    ``shape`` of the places, (rows, cols) or (layers, rows, cols); ``around`` places from one to the edge of its neighbourhood; ``fair``
     (places,) int64 weight of each, 0 if no candidate, or None if all are alike; ``listed`` whether numbers run over the
     candidates alone, or over all places; ``kinds`` (places,) the category of each, and ``wanted`` the share of each
     category in the output, if shares are asked for; ``strict`` the penalty of a category that is used twice too often.
     """
 
-    shape: tuple[int, int]
+    shape: tuple[int, ...]
     around: int
     fair: NDArray[np.int64] | None = None
     listed: bool = False
@@ -40,7 +42,7 @@ class FairUse:
     def due(self) -> tuple[NDArray[np.int64], int]:
         """The fair weight of the square around each place, and of all places."""
         fair = np.ones(self.shape, np.int64) if self.fair is None else self.fair.reshape(self.shape)
-        return _blurred(fair, self.around), int(fair.sum())
+        return sums_around(fair, self.around), int(fair.sum())
 
 
 @Operation
@@ -55,7 +57,7 @@ def use(machine: Launcher | None, field: Field, grid: Grid, candidates: Candidat
         number = candidates.index_of[source[source >= 0]]
         return np.bincount(number[number >= 0], minlength=candidates.size).astype(np.int32)
     counts = machine.put(np.zeros(candidates.size, np.int32))
-    sites = grid.rows * grid.cols
+    sites = grid.size
     machine.launch(
         machine.kernel("use", "use"),
         (sites,),
@@ -82,13 +84,13 @@ def use_penalty(
     candidate serves as many sites as any other is semi-discrete optimal transport, and its dual raises the penalty of
     candidates that are used too often. Cost: some ten passes over the candidates, on the host.
     """
-    places, total = fair_use.shape[0] * fair_use.shape[1], int(counts.sum())
+    places, total = prod(fair_use.shape), int(counts.sum())
     there = np.ones(places, bool) if fair_use.fair is None else fair_use.fair > 0
     found = np.zeros(places, np.float32)
     if total and (rate or fair_use.kinds is not None):
         used = np.zeros(places, np.int64)
         used[there if fair_use.listed else slice(None)] = counts
-        around, (due, whole) = _blurred(used.reshape(fair_use.shape), fair_use.around), fair_use.due
+        around, (due, whole) = sums_around(used.reshape(fair_use.shape), fair_use.around), fair_use.due
         excess = around.astype(np.float64) * whole / (np.maximum(due, 1) * np.float64(total)) - 1
         found = (rate * np.clip(excess, 0, CAP)).astype(np.float32).ravel()
         if fair_use.kinds is not None:
@@ -108,14 +110,3 @@ def _of_kinds(used: NDArray[np.int64], fair_use: FairUse) -> NDArray[np.float32]
         excess = max(0.0, int(counts[kind]) / due - 1) if due else 1.0
         cost[kind] = fair_use.strict * min(1.0, excess)
     return cost[fair_use.kinds]
-
-
-def _blurred(counts: NDArray[np.integer], radius: int) -> NDArray[np.int64]:
-    """Return the sum over the square of this radius around each place, clipped to the array."""
-    rows, cols = counts.shape
-    sums = np.zeros((rows + 1, cols + 1), np.int64)
-    sums[1:, 1:] = counts.cumsum(0).cumsum(1)
-    row, col = np.arange(rows), np.arange(cols)
-    lines = sums[np.minimum(row + radius + 1, rows)] - sums[np.maximum(row - radius, 0)]
-    found: NDArray[np.int64] = lines[:, np.minimum(col + radius + 1, cols)] - lines[:, np.maximum(col - radius, 0)]
-    return found

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from simdtex import random
 from simdtex.machine.interface import Machine
-from simdtex.model.lattice import Grid
+from simdtex.model.lattice import Grid, coloring_of_layers, parts_of
 from simdtex.ops.coloring import coloring, lattice_plan
 from simdtex.options import whole
 from simdtex.schedules.schedule import Active, Info, Setting
@@ -108,6 +108,8 @@ class Coloring(Partition):
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
         """Return the number of colours of the whole lattice."""
+        if grid.layers > 1:
+            return coloring_of_layers(order)[0]
         return lattice_plan(grid.within.rows, grid.within.cols, grid.torus, order, seed).colors
 
 
@@ -136,10 +138,12 @@ class Checkerboard(Partition):
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Return whether every neighbour is of the other colour."""
         even = not grid.torus or all(n == 1 or n % 2 == 0 for n in (grid.rows, grid.cols))
-        return even and bool((offsets.sum(1) % 2 == 1).all())
+        return even and bool((sum(parts_of(offsets)) % 2 == 1).all())
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """Row plus column, odd or even."""
+        if grid.layers > 1:
+            return np.indices(grid.shape).sum(0) % 2
         whole = grid.within
         row, col = (whole.top + np.arange(grid.rows)) % whole.rows, (whole.left + np.arange(grid.cols)) % whole.cols
         colors: NDArray[Any] = (row[:, None] + col[None, :]) % 2
@@ -147,7 +151,7 @@ class Checkerboard(Partition):
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
         """Two, or one of a single site."""
-        return min(2, grid.within.rows * grid.within.cols)
+        return 2 if grid.layers > 1 else min(2, grid.within.rows * grid.within.cols)
 
 
 class Synchronous(Partition):
@@ -166,7 +170,7 @@ class Synchronous(Partition):
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """Return one group for all sites."""
-        return np.zeros((grid.rows, grid.cols), np.int64)
+        return np.zeros(grid.shape, np.int64)
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
         """One."""
@@ -188,7 +192,7 @@ class Raster(Partition):
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """Return a group for each site."""
-        return np.arange(grid.rows * grid.cols).reshape(grid.rows, grid.cols)
+        return np.arange(grid.size).reshape(grid.shape)
 
 
 class Block(Partition):
@@ -225,4 +229,4 @@ class Block(Partition):
 
 def neighbourless(grid: Grid) -> bool:
     """Return whether no site of the lattice has a neighbour: every neighbourhood holds the four nearest."""
-    return grid.rows * grid.cols == 1
+    return grid.size == 1

@@ -46,9 +46,7 @@ class Scattered:
         wanting, steps = active.numbers().size, state.steps + 1
         chosen = self.choose(setting, steps, active) if wanting else active.numbers()
         left = max(0, (state.left or wanting) - chosen.size) if wanting else 0
-        row, col = np.divmod(chosen, setting.grid.cols)
-        sites = ((row * setting.grid.width + col) * setting.grid.spacing).astype(np.int32)
-        return State(steps, left), Info(sites, steps, not left)
+        return State(steps, left), Info(setting.grid.sites()[chosen], steps, not left)
 
 
 class Luby(Scattered):

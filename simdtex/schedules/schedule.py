@@ -65,7 +65,7 @@ class Masked:
 
     def __init__(self, grid: Grid, mask: NDArray[np.bool_] | None = None) -> None:
         self._grid = grid
-        self._mask = np.ones((grid.rows, grid.cols), bool) if mask is None else mask
+        self._mask = np.ones(grid.shape, bool) if mask is None else mask
 
     def mask(self) -> NDArray[np.bool_]:
         """Return the mask as given."""

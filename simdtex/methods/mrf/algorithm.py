@@ -49,7 +49,7 @@ class Run(Lattices):
     def begin(self) -> State:
         """Return the state at the beginning of the coarsest level: sample pixels drawn at random, t = 1."""
         everywhere = self.machine.put(self.sample.places(np.zeros((1, 2), np.int32), 1).positions)
-        field = start(self.machine, self.planes, everywhere, Grid(*self.plan.shape), self.seed)  # 2, 5
+        field = start(self.machine, self.planes, everywhere, Grid.of(self.plan.shape), self.seed)  # 2, 5
         return self.enter(self.levels - 1, field)
 
     def enter(self, number: int, field: Field) -> State:
@@ -75,7 +75,7 @@ class Run(Lattices):
         return state.level == 0 and self.at_equilibrium(state)
 
     def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
-        """Return the picture (rows, cols, channels) in the sample's type, and the rest of the output."""
+        """Return the picture ([layers,] rows, cols, channels) in the sample's type, and the rest of the output."""
         grid, given = self.grid(0), self.plan.given
         source = grid.view(self.machine.get(state.source))
         known = given.whole if given and given.whole.any() else None
@@ -210,7 +210,7 @@ def finished(
         return sample.picture(values, seen)
     sd, rows = run.options.finish, max(1, AT_ONCE // grid.cols)
     picture = np.empty((*seen.shape, sample.shown), sample.pixels.dtype)
-    given = run.machine.put((np.zeros((grid.height, grid.width), bool) if known is None else known).view(np.uint8))
+    given = run.machine.put((np.zeros(grid.pixels, bool) if known is None else known).view(np.uint8))
     for top in range(0, len(seen), rows):
         here = seen[top : top + rows]
         by = finish(

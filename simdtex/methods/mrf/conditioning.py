@@ -31,7 +31,7 @@ class Held(NamedTuple):
 
 
 class Data(NamedTuple):
-    """Conditioning data between the sites of a level: ``place`` (n, 2) int32, ``values`` (n, C) uint16."""
+    """Conditioning data between the sites of a level: ``place`` (n, 2 or 3) int32, ``values`` (n, C) uint16."""
 
     place: NDArray[np.int32]
     values: NDArray[np.uint16]
@@ -75,7 +75,7 @@ class Conditions(ABC):
         held = self.at(number, grid)
         if held is None or not held.known.any():
             return None
-        plane = np.zeros((grid.height, grid.width), np.uint16)
+        plane = np.zeros(grid.pixels, np.uint16)
         grid.view(plane)[...] = ~held.known
         return machine.put(plane)
 
@@ -99,7 +99,7 @@ class Conditioning(Conditions):
         if self.planes is None and not len(self.guides):
             return None
         if number not in self._held:
-            self._held = {number: self._whole(Grid(*self._shape, 2**number, grid.torus))}  # one level is enough
+            self._held = {number: self._whole(Grid.of(self._shape, 2**number, grid.torus))}  # one level is enough
         held = self._held[number]
         return Held(*(grid.cut(plane) for plane in held)) if grid.part else held
 
@@ -107,14 +107,14 @@ class Conditioning(Conditions):
         """Return the conditioning data between the sites of a level; None if there are none."""
         if self.planes is None or not number:
             return None
-        row, col = between(self.planes.known, Grid(*self._shape, 2**number, self.torus))
-        place, values = np.stack([row, col], 1).astype(np.int32), self.planes.values[:, row, col].T
-        return Data(place, np.ascontiguousarray(values)) if row.size else None
+        place = between(self.planes.known, Grid.of(self._shape, 2**number, self.torus))
+        values = self.planes.values[(slice(None), *place.T)].T
+        return Data(place, np.ascontiguousarray(values)) if len(place) else None
 
     @property
-    def _shape(self) -> tuple[int, int]:
-        rows, cols = self.guides.shape[1:] if self.planes is None else self.planes.known.shape
-        return rows, cols
+    def _shape(self) -> tuple[int, ...]:
+        shape: tuple[int, ...] = self.guides.shape[1:] if self.planes is None else self.planes.known.shape
+        return shape
 
     def _whole(self, grid: Grid) -> Held:
         """Return the data and guides of a whole lattice."""

@@ -148,7 +148,7 @@ class Lattices:
 
     def grid(self, number: int) -> Grid:
         """Return the lattice of a level, equation (10)."""
-        return Grid(*self.plan.shape, 2**number, self.options.boundary == "torus")
+        return Grid.of(self.plan.shape, 2**number, self.options.boundary == "torus")
 
     def level(self, number: int, window: tuple[int, int, int, int] | None = None) -> Level:
         """Define the lattice, the neighbourhood, the candidates and the bandwidth of a level: (8), (10) and (11).
@@ -168,7 +168,7 @@ class Lattices:
             setting=level.setting._replace(grid=grid),
             grid=replace(grid, tile=level.schedule.tile),
             in_place=self._in_place(grid),
-            weighed=machine.put(np.zeros((grid.height, grid.width), np.int32)),
+            weighed=machine.put(np.zeros(grid.pixels, np.int32)),
             lists=Lists(machine),
             movable=self.conditions.movable(machine, number, grid),
             phased=level.phased and level.phased._replace(sites=self._phases(grid)),
@@ -240,8 +240,10 @@ class Lattices:
         site, datum, apart = around(data.place, grid, self.options.order)
         if not site.size:
             return None
-        begin = np.searchsorted(site, np.arange(grid.height * grid.width + 1)).astype(np.int32)
-        reach = (apart @ np.array([self.sample.cols, 1])).astype(np.int32)
+        begin = np.searchsorted(site, np.arange(grid.plane + 1)).astype(np.int32)
+        reach = (apart @ np.array([self.sample.layer * self.sample.cols, self.sample.cols, 1])[-apart.shape[1] :]).astype(
+            np.int32
+        )
         put = self.machine.put
         return Scattered(put(begin), put(reach), put(data.values[datum]), self.conditions.confidences.hard)
 
@@ -265,15 +267,15 @@ class Lattices:
         step = 2**number if self.options.phases == "all" else 1
         places = self.places(number)
         fair, kinds = self.sample.fair(places), (*self._kinds(places), STRICT * self.usual)
-        around = int(self.offsets.max()) * step
-        return FairUse((places.row.size, places.col.size), around, fair, not self.exhaustive(number), *kinds)
+        around = int(self.offsets[:, 1].max()) * step
+        return FairUse(places.shape, around, fair, not self.exhaustive(number), *kinds)
 
     def _kinds(self, places: Places) -> tuple[NDArray[np.intp] | None, tuple[float, ...]]:
         """Return the category of each place where candidates may lie, and the wanted shares."""
         categories, wanted = self.sample.pictures.categories(0), self.options.proportions
         if categories is None or wanted is None:
             return None, ()
-        return np.searchsorted(categories, self.sample.pixels[np.ix_(places.row, places.col)][..., 0].ravel()), wanted
+        return np.searchsorted(categories, self.sample.own(places.everywhere)[..., 0]), wanted
 
     def places(self, number: int) -> Places:
         """Return the places of the candidates of a level."""
@@ -384,13 +386,13 @@ class Active:
         """Read back from the machine."""
         grid = self._level.grid
         if self._plane is None:
-            return np.ones((grid.rows, grid.cols), bool)
+            return np.ones(grid.shape, bool)
         return np.asarray(grid.view(self._level.machine.get(self._plane)) > 0)
 
     def numbers(self) -> NDArray[np.int64]:
         """Read back from the machine."""
         grid = self._level.grid
-        return np.arange(grid.rows * grid.cols) if self._plane is None else np.flatnonzero(self.mask())
+        return np.arange(grid.size) if self._plane is None else np.flatnonzero(self.mask())
 
     def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
         """Found on the machine."""
@@ -420,25 +422,34 @@ def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int
 
 
 def number_of_levels(
-    samples: Sequence[tuple[int, ...]], offsets: NDArray[np.int32], shape: tuple[int, int], options: Options
+    samples: Sequence[tuple[int, ...]], offsets: NDArray[np.int32], shape: tuple[int, ...], options: Options
 ) -> int:
-    """M, checked against the rows and columns of the sample's pictures and against M <= 1 + log2(min(Mx, My))."""
+    """M, checked against the sides of the sample's pictures and against M <= 1 + log2(min(Mx, My)).
+
+    The layers of a volume may be fewer than a coarse level is wide: its rows and columns alone count.
+    """
+    radius = int(offsets[:, 1].max())
     for sample in samples:
-        check_fit(sample, int(offsets.max()), options.order)
+        check_fit(sample, radius, options.order)
     step = 1 if options.phases == "all" else 2
 
     def candidates(levels: int) -> int:
         spacing = 2 ** (levels - 1)
-        margin = 0 if options.edges != "whole" else 2 * int(offsets.max()) * spacing
-        return sum(prod(max(0, n - margin) // (spacing if step == 2 else 1) for n in sample) for sample in samples)
+        margin = 0 if options.edges != "whole" else 2 * radius * spacing
+        apart = spacing if step == 2 else 1
+        layers = [-(-max(0, n - margin) // apart) for sample in samples for n in sample[:-2] or (1 + margin,)]
+        return sum(
+            thick * prod(max(0, n - margin) // apart for n in sample[-2:])
+            for sample, thick in zip(samples, layers, strict=True)
+        )
 
-    most = 1 + int(log2(min(*shape, *(side for sample in samples for side in sample))))
+    most = 1 + int(log2(min(*shape[-2:], *(side for sample in samples for side in sample[-2:]))))
     while most > 1 and not candidates(most):
         most -= 1
     if options.levels is None:
         levels = 1
-        reach = 2 * int(offsets.max()) * 2  # of a neighbourhood at the next level
-        while levels < most and min(shape) > reach * 2 ** (levels - 1):
+        reach = 2 * radius * 2  # of a neighbourhood at the next level
+        while levels < most and min(shape[-2:]) > reach * 2 ** (levels - 1):
             if candidates(levels + 1) < (min(FEWEST, options.overview) if 2**levels <= WIDE else options.overview):
                 break
             levels += 1
@@ -454,7 +465,9 @@ def check_fit(sample: tuple[int, ...], radius: int, order: int) -> None:
     if side > 2 * radius:
         return
     largest = ((side - 1) // 2 + 1) ** 2 - 1 if side > 2 else 0
+    names = ("layers", "rows", "columns")[-len(sample) :]
+    sides = " x ".join(f"{n} {name}" for n, name in zip(sample, names, strict=True))
     raise ValueError(
-        f"a neighbourhood of order {order} does not fit the sample of {sample[0]} rows x {sample[1]} columns; "
-        + (f"the largest order that fits is {largest}" if largest else "give at least 3x3 pixels")
+        f"a neighbourhood of order {order} does not fit the sample of {sides}; "
+        + (f"the largest order that fits is {largest}" if largest else f"give at least {'x'.join('3' * len(sample))} pixels")
     )

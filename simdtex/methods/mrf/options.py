@@ -78,8 +78,9 @@ class Options:
         18,
         Whole(1, MOST_ORDER),
         "Compare neighbours within sqrt(order) pixels: 8 has 24 of them, 18 has 60; more keep larger shapes",
-        more="The time grows with the number of neighbours.",
+        more="The time grows with the number of neighbours. In three dimensions 8 has 92 and 18 has 340.",
         symbol="o of equation (3)",
+        jobs={"simulate 3-D": 8},
         slider=(2, 40, 1),
     )
     structure: float = appearance(
@@ -344,7 +345,8 @@ class Options:
     def resolved(self, pictures: Pictures) -> Options:
         """Return the options as they are executed: what ``search="auto"`` and ``finish=None`` mean for a sample.
 
-        Grey levels of a density have no source: no structure channel and no lattice.
+        Grey levels of a density have no source: no structure channel and no lattice. A volume has neither, and no
+        finish.
         """
         usual = "coherent" if self.relaxation == "icm" else "exact"
         search = usual if self.search == "auto" else self.search
@@ -352,9 +354,10 @@ class Options:
         if finish is None:
             categories = (pictures.categorical and any(pictures.categorical)) or few(pictures.pixels)
             finish = 0.0 if self.pixel == "density" or categories else FINISH
-        structure = 0.0 if self.pixel == "density" else self.structure
+        plain = self.pixel == "density" or pictures.deep
         named = pictures.categorical and any(pictures.categorical)
-        lattice = "none" if self.pixel == "density" or named else self.lattice
+        finish, structure = 0.0 if pictures.deep else finish, 0.0 if plain else self.structure
+        lattice = "none" if plain or named else self.lattice
         return replace(self, search=search, finish=finish, structure=structure, lattice=lattice)
 
 

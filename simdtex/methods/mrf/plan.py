@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given, planes
 from simdtex.model.guide import AnyGuide, Guide, GuidePair, Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
-from simdtex.model.pictures import Pictures
+from simdtex.model.pictures import Pictures, unknown_in
 from simdtex.model.regularity import Phases, parse_lattice, phases
 from simdtex.model.sample import NothingUsable, Sample
 from simdtex.ops.finish import around
@@ -47,7 +48,7 @@ class Plan(Input):
         of the sample (benchmarks/memory.py).
         """
         copies = 2 if self.schedule.tile else 1
-        pixels, channels = self.shape[0] * self.shape[1], len(self.sample.working)
+        pixels, channels = prod(self.shape), len(self.sample.working)
         within_32_bits(self.shape, channels * copies, TILED)
         field, held = copies * (6 + 2 * channels), self.sample.rows * self.sample.cols
         each = 68 + 16 * copies + channels * (10 + 3 * self.sample.pixels.dtype.itemsize // 2)
@@ -58,7 +59,7 @@ class Plan(Input):
 
 def plan(
     pictures: Pictures,
-    shape: tuple[int, int],
+    shape: tuple[int, ...],
     options: Options,
     given: Given | None = None,
     guide: GuidePair | Surroundings | None = None,
@@ -70,8 +71,8 @@ def plan(
     ----------
     pictures : Pictures
         Y, the sample.
-    shape : (int, int)
-        Rows and columns of X, the output.
+    shape : tuple of int
+        Rows and columns of X, the output; of a volume layers, rows and columns.
     options : Options
     given : Given, optional
         Conditioning data of X.
@@ -83,8 +84,10 @@ def plan(
     pictures = options.of(pictures)
     check_categories(pictures, given, options)
     options = options.resolved(pictures)
-    offsets = neighbourhood_offsets(options.order)
-    levels = number_of_levels([picture.shape[:2] for picture in pictures.pixels], offsets, shape, options)  # 1
+    if pictures.deep:
+        check_volume(pictures, options, guide)
+    offsets = neighbourhood_offsets(options.order, len(shape))
+    levels = number_of_levels([picture.shape[:-1] for picture in pictures.pixels], offsets, shape, options)  # 1
     levels = levels if most is None or options.levels is not None else min(levels, most)
     guides: list[AnyGuide] = []
     if guide:
@@ -95,7 +98,7 @@ def plan(
         guides.append(given.colocated(pictures.pixels))
     known = (given.values, given.whole, given.place) if given and given.whole.any() else None
     lattice = parse_lattice(options.lattice)
-    regular = None if lattice is None else phases(pictures, shape, options.boundary == "torus", lattice, known)
+    regular = None if lattice is None else phases(pictures, (shape[0], shape[1]), options.boundary == "torus", lattice, known)
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in guides)
     heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or guides else 1.0  # in sums of squares
     values = round(heavy * (channels * len(offsets) + len(guides)))
@@ -117,7 +120,7 @@ def sampled(
     far = int(around(options.finish)[0].max()) if options.finish else 0
     for fewer in range(levels, 0, -1):
         step = 2 ** (fewer - 1)
-        margin = int(offsets.max()) * step
+        margin = int(offsets[:, 1].max()) * step
         sample = Sample(pictures, values, margin, options.structure, step, guides, far, regular)
         try:
             for number in range(fewer):
@@ -128,6 +131,18 @@ def sampled(
             continue
         break
     return fewer, sample
+
+
+def check_volume(pictures: Pictures, options: Options, guide: GuidePair | Surroundings | None) -> None:
+    """Raise if a volume is asked for what only pictures have."""
+    if len(pictures.pixels) > 1:
+        raise ValueError("several samples are pictures; give one volume")
+    for name in ("boundary", "array", "schedule"):
+        value = getattr(options, name)
+        if value == "torus" or (name == "array" and value) or (name == "schedule" and schedules.get(value).tile):
+            raise ValueError(f"{name}={value} is for pictures; leave it out for a volume")
+    if isinstance(guide, tuple) and unknown_in(guide[1]).any():
+        raise ValueError("the guide of a volume has NaN; give a number everywhere")
 
 
 def check_categories(pictures: Pictures, given: Given | None, options: Options) -> None:

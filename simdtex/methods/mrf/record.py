@@ -52,7 +52,7 @@ class Record:
         """Count a part of a sweep, and report it to the callback."""
         if not self.reports or level.number != self.reports[-1]["level"]:
             self._begin(level)
-        free, sites = not state.active, level.grid.rows * level.grid.cols
+        free, sites = not state.active, level.grid.size
         left = state.temperature_sum / (1024 * sites)
         self._done = part.sites + (0 if self._ended else self._done)
         report = self.reports[-1]
@@ -122,7 +122,8 @@ class Record:
         self._began, self._first_left, self._skipped = time.perf_counter(), 0.0, level.machine.spared
         self._slots, self._listed = level.proposal.slots, isinstance(level.proposal, Listed)
         grid, candidates = level.grid, level.proposal.candidates.size
-        sizes = {"level": level.number, "rows": grid.rows, "cols": grid.cols, "candidates": candidates}
+        names = ("layers", "rows", "cols")[-len(grid.shape) :]
+        sizes = {"level": level.number, **dict(zip(names, grid.shape, strict=True)), "candidates": candidates}
         counts = {"sweeps": 0, "steps": 0, "relaxations": 0}
         work = {"fma": 0, "weighed": float(candidates), "skipped": 0, "seconds": 0.0}
         self.reports.append({**sizes, **counts, "equilibrium": dict(counts), **work})
@@ -164,7 +165,7 @@ def output(run: Lattices, state: State, source: NDArray[np.int32], record: Recor
         launches = run.machine.launches - record.launches
         statistics["accounting"] = record.account.report() | {"launches": launches}
     taken = place[..., 0] >= 0
-    if place.shape[-1] == 2 and taken.any():
+    if place.shape[-1] == 2 and taken.any():  # of one picture
         statistics["use"] = effective_use(place[taken][None], run.sample.pictures.pixels[0].shape).as_dict()
     given = run.plan.given
     if given and given.place is not None:
@@ -204,7 +205,7 @@ def expected_work(run: Lattices) -> dict[int, tuple[float, float]]:
         candidates = run.places(number).positions.size
         if not run.exhaustive(number):
             candidates = min(candidates, most_listed(len(run.offsets), options.chance))
-        sites = grid.rows * grid.cols * candidates
+        sites = grid.size * candidates
         work[number] = (sites * sweeps, float(sites * options.free_sweeps))
     return work
 
