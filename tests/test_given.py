@@ -164,7 +164,7 @@ def test_the_planes_of_what_is_given():
     laid = planes(Given(values, known, place), sample)
     assert laid.known.tolist() == known[..., 0].tolist()
     assert laid.values[:, 0, 1].tolist() == [7, 65535]
-    assert laid.values[:, 1, 2].tolist() == sample.levels[:, 4, 5].tolist()
+    assert laid.values[:, 1, 2].tolist() == sample.levels[0][:, 4, 5].tolist()
     assert laid.source.tolist() == [[-1, -1, -1], [-1, -1, (4 + 2) * (8 + 4) + 5 + 2]]
 
 

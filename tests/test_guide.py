@@ -114,8 +114,8 @@ def test_a_sample_has_its_guide_last_and_does_not_vary_with_it():
     guide = Guide((label,), label[:2], True, 1.0)
     plain, guided = Sample(pixels, 24, 2, 1.0), Sample(pixels, 24 * 6, 2, 1.0, guides=[guide])
     assert guide.channels == 4
-    assert guided.levels.shape == (1 + 1 + 4, 8, 9)
-    assert guided.levels[:2].tolist() == plain.levels.tolist()
+    assert guided.levels[0].shape == (1 + 1 + 4, 8, 9)
+    assert guided.levels[0][:2].tolist() == plain.levels[0].tolist()
     assert (guided.channels, guided.shown, guided.variance) == (2, 1, plain.variance)
     assert guided.guides.shape == (4, 2, 9)
 

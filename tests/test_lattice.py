@@ -62,9 +62,11 @@ def test_the_neighbours_of_every_site(height, width, spacing, order, torus):
 
 
 def test_what_a_kernel_is_told():
-    assert Grid(7, 9, 2, False).struct.tolist() == (4, 5, 2, 9, 0, 0, 0, 0, 63, 0, 0, 4, 5, 2, 9, 0)
+    picture, volume = Grid(7, 9, 2, False), Grid.of((5, 7, 9), 2, False)
+    assert picture.struct.tolist() == (4, 5, 2, 9, 0, 0, 0, 0, 63, 0, 0, 4, 5, 2, 9, 1, 4, 7)
+    assert volume.struct.tolist() == (12, 5, 2, 9, 0, 0, 0, 0, 315, 0, 0, 4, 5, 2, 9, 3, 4, 7)
     window = Grid(20, 30, 2, True, (3, 4)).window(-2, 7, 10, 6)
-    assert window.struct.tolist() == (10, 6, 1, 6, 1, 0, 0, 0, 60, 8, 7, 10, 15, 2, 30, 0)
+    assert window.struct.tolist() == (10, 6, 1, 6, 1, 0, 0, 0, 60, 8, 7, 10, 15, 2, 30, 1, 10, 10)
 
 
 def vectors(pattern, reach=12):

@@ -109,7 +109,7 @@ def test_coarse_levels_have_the_references_bits(machine, phases, edges):
 
 def flat(p, levels):
     """The problem with only so many grey levels, so that most distances have equals."""
-    few = (p.sample.levels // (256 // levels)).astype(np.uint16)
+    few = (p.sample.levels[0] // (256 // levels)).astype(np.uint16)
     p.sample._lay([few], p.sample.margin)
     return p._replace(field=p.field._replace(values=p.sample.working[:, p.field.source]))
 

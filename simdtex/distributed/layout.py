@@ -161,7 +161,7 @@ def planned(plan: Plan, seed: int, tile: int) -> Layout:
 
 def _level(plan: Plan, seed: int, number: int, side: int) -> LevelLayout:
     """Return a level; a sweep reaches as far as a neighbourhood with each step."""
-    lattice, torus = Grid(*plan.shape, 2**number), plan.options.boundary == "torus"
+    lattice, torus = Grid.of(plan.shape, 2**number), plan.options.boundary == "torus"
     assert isinstance(plan.schedule, Windowed)
     steps = plan.schedule.count(Grid(lattice.rows, lattice.cols, 1, torus), plan.options.order, seed)
     return LevelLayout(number, lattice.rows, lattice.cols, side, steps * int(plan.offsets.max()), torus)

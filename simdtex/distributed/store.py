@@ -102,7 +102,7 @@ class Store:
         conditions = Conditioning(plan)
         store, held = Store(where), False
         for level in layout.levels:
-            grid = Grid(*plan.shape, 2**level.number, options.boundary == "torus")
+            grid = Grid.of(plan.shape, 2**level.number, options.boundary == "torus")
             if (here := conditions.at(level.number, grid)) is not None:
                 held = True
                 for name, plane in here._asdict().items():

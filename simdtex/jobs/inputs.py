@@ -71,13 +71,14 @@ def check_samples(sample: Any, channel_axis: int | None, mask: Any = None, axes:
     """
     several = is_several(sample, channel_axis)
     arrays: list[Any] = list(sample) if several else [sample]
-    if several and len(axes := {one.ndim for one in arrays}) > 1:
-        raise ValueError(f"the samples have {min(axes)} and {max(axes)} axes; give samples of one type, grey or colour")
+    if several and len(kinds := {one.ndim for one in arrays}) > 1:
+        counts = f"{min(kinds)} and {max(kinds)}"
+        raise ValueError(f"the samples have {counts} axes; give samples of one type, grey or colour")
     pixels, unknown = zip(*(check_picture(one, channel_axis, axes) for one in arrays), strict=True)
     for number, picture in enumerate(pixels[1:], 1):
         if picture.dtype != pixels[0].dtype or picture.shape[-1] != pixels[0].shape[-1]:
-            kinds = [f"{one.shape[-1]} channels of {one.dtype}" for one in (picture, pixels[0])]
-            raise ValueError(f"sample {number} has {kinds[0]} and sample 0 {kinds[1]}; give samples of one type")
+            types = [f"{one.shape[-1]} channels of {one.dtype}" for one in (picture, pixels[0])]
+            raise ValueError(f"sample {number} has {types[0]} and sample 0 {types[1]}; give samples of one type")
     if mask is None:
         return Pictures(pixels, unknown)
     masks = list(mask) if several and np.iterable(mask) else [mask]

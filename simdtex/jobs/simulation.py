@@ -64,7 +64,8 @@ def simulate(
     n : int
         How many realisations, 1 or more.
     shape : (int, int) or (int, int, int), optional
-        Rows and columns of each, or layers, rows and columns. None: those of `known`, where that is an array, else of the training image.
+        Rows and columns of each, or layers, rows and columns. None: those of `known`, where that is an array, else of
+        the training image.
     known : array, HardData or path, optional
         What is known: a masked array, or floats with NaN where nothing is known, of `shape`; or a table ``x,y,value``
         (`simdtex.read_hard_data`) or its file. Every realisation has these values, to the bit.
@@ -101,11 +102,11 @@ def simulate(
     xarray.DataArray
         Dimensions ``realisation``, ``z`` of a volume, ``y`` (row 0 is the smallest y), ``x`` and, with `channel_axis`,
         ``variable``, in the training image's type. The coordinates ``z``, ``y`` and ``x`` are those of the centres of
-        cells; of a picture, a third number of `origin` and `cell` is the coordinate ``z``. The coordinate ``seed`` is that of each realisation:
-        `simdtex.synthesize` with it gives the same. Attributes: ``seed``, ``options`` (a JSON text), ``version``,
-        ``device``, SHA-256 digests of the arrays ``training_image``, ``hard_data``, ``guide`` and ``mask`` that are
-        given, and with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. All are texts and numbers, so
-        that ``to_netcdf`` and ``to_zarr`` of xarray write them.
+        cells; of a picture, a third number of `origin` and `cell` is the coordinate ``z``. The coordinate ``seed`` is
+        that of each realisation: with it `simdtex.synthesize` gives the same picture. Attributes: ``seed``, ``options``
+        (a JSON text), ``version``, ``device``, SHA-256 digests of the arrays ``training_image``, ``hard_data``,
+        ``guide`` and ``mask`` that are given, and with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``.
+        All are texts and numbers, so that ``to_netcdf`` and ``to_zarr`` of xarray write them.
 
     Raises
     ------

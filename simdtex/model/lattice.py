@@ -112,7 +112,7 @@ class Grid:
     @classmethod
     def of(cls, shape: tuple[int, ...], spacing: int = 1, torus: bool = True) -> Grid:
         """Return the lattice of a whole picture (rows, cols) or volume (layers, rows, cols)."""
-        return cls(*shape[-2:], spacing, torus, layers=shape[0] if len(shape) > 2 else 1)
+        return cls(shape[-2], shape[-1], spacing, torus, layers=shape[0] if len(shape) > 2 else 1)
 
     @property
     def pixels(self) -> tuple[int, ...]:
@@ -241,8 +241,9 @@ class Grid:
 
         Or as a view of a volume (..., D, H, W).
         """
-        every = (slice(None, None, self.spacing),)
-        return picture[(..., *every * (self.layers > 1), slice(None, self.height, self.spacing), *every)]
+        if self.layers > 1:
+            return picture[..., :: self.spacing, :: self.spacing, :: self.spacing]
+        return picture[..., : self.height : self.spacing, :: self.spacing]
 
     def neighbours(self, sites: NDArray[np.int32], offsets: NDArray[np.int32]) -> NDArray[np.int32]:
         """Pixel index of each neighbour, (N, S); -1 outside an open lattice or a window, and for the site itself.
@@ -314,7 +315,8 @@ def coloring_of_layers(order: int) -> tuple[int, int, int]:
         a, b = np.mgrid[:m, :m].reshape(2, -1, 1)
         apart = ((a * layer + b * row + col) % m != 0).all(1)
         if apart.any():
-            return m, *(int(one[apart.argmax(), 0]) for one in (a, b))
+            best = int(apart.argmax())
+            return m, int(a[best, 0]), int(b[best, 0])
     raise AssertionError("m = (isqrt(order) + 1) ** 3 has such a pattern")
 
 

@@ -399,7 +399,7 @@ class Sample:
     @property
     def first(self) -> int:
         """Pixel index of the first pixel that is not of the margin."""
-        return self.margin * ((self.layer + 1) * self.cols + 1)
+        return int(self.margin * ((self.layer + 1) * self.cols + 1))
 
     def _coordinates(self, source: NDArray[np.int32]) -> tuple[NDArray[np.int32], ...]:
         """Return row and column of pixel indices, without the margin; of a volume layer, row and column."""

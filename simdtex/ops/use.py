@@ -24,10 +24,11 @@ CAP = 4.0
 class FairUse:
     """The places of a level's candidates, and how much use of each is fair.
 
-    ``shape`` of the places, (rows, cols) or (layers, rows, cols); ``around`` places from one to the edge of its neighbourhood; ``fair``
-    (places,) int64 weight of each, 0 if no candidate, or None if all are alike; ``listed`` whether numbers run over the
-    candidates alone, or over all places; ``kinds`` (places,) the category of each, and ``wanted`` the share of each
-    category in the output, if shares are asked for; ``strict`` the penalty of a category that is used twice too often.
+    ``shape`` of the places, (rows, cols) or (layers, rows, cols); ``around`` places from one to the edge of its
+    neighbourhood; ``fair`` (places,) int64 weight of each, 0 if no candidate, or None if all are alike; ``listed``
+    whether numbers run over the candidates alone, or over all places; ``kinds`` (places,) the category of each, and
+    ``wanted`` the share of each category in the output, if shares are asked for; ``strict`` the penalty of a category
+    that is used twice too often.
     """
 
     shape: tuple[int, ...]

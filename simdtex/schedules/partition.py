@@ -138,20 +138,19 @@ class Checkerboard(Partition):
     def independent(self, grid: Grid, offsets: NDArray[np.int32]) -> bool:
         """Return whether every neighbour is of the other colour."""
         even = not grid.torus or all(n == 1 or n % 2 == 0 for n in (grid.rows, grid.cols))
-        return even and bool((sum(parts_of(offsets)) % 2 == 1).all())
+        return even and bool((np.sum(parts_of(offsets), 0) % 2 == 1).all())
 
     def groups(self, machine: Machine, grid: Grid, offsets: NDArray[np.int32], order: int, seed: int) -> NDArray[Any]:
         """Row plus column, odd or even."""
-        if grid.layers > 1:
-            return np.indices(grid.shape).sum(0) % 2
-        whole = grid.within
-        row, col = (whole.top + np.arange(grid.rows)) % whole.rows, (whole.left + np.arange(grid.cols)) % whole.cols
-        colors: NDArray[Any] = (row[:, None] + col[None, :]) % 2
+        first = np.array([0, grid.within.top, grid.within.left])[-len(grid.shape) :]
+        sides = np.array([*grid.shape[:-2], grid.within.rows, grid.within.cols])
+        place = np.moveaxis(np.indices(grid.shape), 0, -1) + first
+        colors: NDArray[Any] = (place % sides).sum(-1) % 2
         return colors
 
     def count(self, grid: Grid, order: int, seed: int) -> int:
         """Two, or one of a single site."""
-        return 2 if grid.layers > 1 else min(2, grid.within.rows * grid.within.cols)
+        return min(2, grid.size if grid.layers > 1 else grid.within.rows * grid.within.cols)
 
 
 class Synchronous(Partition):

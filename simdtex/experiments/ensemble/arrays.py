@@ -18,18 +18,23 @@ MOST_CATEGORIES = 16  # integers of more values are taken for continuous ones
 
 def as_image(array: ArrayLike, name: str = "image") -> Array:
     """Return an image (rows, cols), checked."""
-    return _checked(array, name, 2, "(rows, cols)")
+    return _checked(array, name, (2,), "(rows, cols)")
+
+
+def as_map(array: ArrayLike) -> Array:
+    """Return an image (rows, cols) or a volume (layers, rows, cols), checked."""
+    return _checked(array, "image", (2, 3), "(rows, cols) or (layers, rows, cols)")
 
 
 def as_ensemble(array: ArrayLike) -> Array:
     """Return an ensemble (realisations, rows, cols), checked."""
-    return _checked(array, "ensemble", 3, "(realisations, rows, cols)")
+    return _checked(array, "ensemble", (3,), "(realisations, rows, cols)")
 
 
-def _checked(given: ArrayLike, name: str, axes: int, shape: str) -> Array:
+def _checked(given: ArrayLike, name: str, axes: tuple[int, ...], shape: str) -> Array:
     unmasked(f"the {name}", given)
     array = np.asarray(given)
-    if array.ndim != axes or array.size == 0:
+    if array.ndim not in axes or array.size == 0:
         raise ValueError(f"the {name} has the shape {array.shape}: give {shape}, none of them 0")
     if array.dtype.kind not in "biuf":
         raise TypeError(f"the {name} holds {array.dtype}: give integers or floats")

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 from skimage.morphology import skeletonize
 
-from simdtex.experiments.ensemble.arrays import as_image
+from simdtex.experiments.ensemble.arrays import as_image, as_map
 
 Mask = NDArray[np.bool_]
 
@@ -24,8 +24,8 @@ class Connectivity(NamedTuple):
 
     Attributes
     ----------
-    function : ndarray of float64, (2, max_lag + 1)
-        Along axis 0 (down) and 1 (to the right), for h = 0, 1, ...: of the pairs of pixels at a distance of h that both
+    function : ndarray of float64, (axes, max_lag + 1)
+        Along each axis of the image, for h = 0, 1, ...: of the pairs of pixels at a distance of h that both
         have the category, the share whose pixels lie in the same component, 0 to 1. NaN if there is no such pair.
     components : float
         Connected components in 10,000 pixels of the image.
@@ -43,7 +43,7 @@ def connectivity(image: ArrayLike, category: int, max_lag: int) -> Connectivity:
 
     Parameters
     ----------
-    image : array_like, (rows, cols)
+    image : array_like, (rows, cols) or (layers, rows, cols)
     category : int
         The value of the pixels that are meant.
     max_lag : int
@@ -56,7 +56,7 @@ def connectivity(image: ArrayLike, category: int, max_lag: int) -> Connectivity:
     Raises
     ------
     ValueError
-        The image is not (rows, cols), or too small.
+        The image has other axes, or is too small.
 
     Notes
     -----
@@ -64,13 +64,14 @@ def connectivity(image: ArrayLike, category: int, max_lag: int) -> Connectivity:
     channel and the ground on both sides of it would each pass through the other. Two pieces that meet outside of the
     image are two. Cost: a few passes over the image, and two for each lag.
     """
-    pixels = as_image(image)
+    pixels = as_map(image)
     if not 1 <= max_lag < min(pixels.shape):
         raise ValueError(f"max_lag is {max_lag}: give 1 to {min(pixels.shape) - 1}, less than a side of the image")
     labels, count = ndimage.label(pixels == category)
     sizes = np.bincount(labels.ravel())[1:]
-    function = np.full((2, max_lag + 1), np.nan)
-    for axis, along in enumerate((labels, labels.T)):
+    function = np.full((pixels.ndim, max_lag + 1), np.nan)
+    for axis in range(pixels.ndim):
+        along = np.moveaxis(labels, axis, 0)
         for lag in range(max_lag + 1):
             first, second = along[: len(along) - lag], along[lag:]
             pairs = np.count_nonzero((first > 0) & (second > 0))

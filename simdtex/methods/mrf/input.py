@@ -18,9 +18,9 @@ from simdtex.model.sample import Sample
 class Input:
     """What a run is made from, validated, on the host.
 
-    ``sample`` is Y with its structure channel and guides, ``shape`` (rows, cols) or (layers, rows, cols) of X, the output, ``offsets`` (N,
-    2) the neighbourhood, ``options`` as they are executed, and ``levels`` M of Algorithm 1. ``given`` are conditioning
-    data, sites of X that keep their values, and ``planes`` the same in working levels.
+    ``sample`` is Y with its structure channel and guides, ``shape`` (rows, cols) or (layers, rows, cols) of X, the
+    output, ``offsets`` (N, 2) the neighbourhood, ``options`` as they are executed, and ``levels`` M of Algorithm 1.
+    ``given`` are conditioning data, sites of X that keep their values, and ``planes`` the same in working levels.
     """
 
     sample: Sample

@@ -241,9 +241,8 @@ class Lattices:
         if not site.size:
             return None
         begin = np.searchsorted(site, np.arange(grid.plane + 1)).astype(np.int32)
-        reach = (apart @ np.array([self.sample.layer * self.sample.cols, self.sample.cols, 1])[-apart.shape[1] :]).astype(
-            np.int32
-        )
+        strides = np.array([self.sample.layer * self.sample.cols, self.sample.cols, 1])
+        reach = (apart @ strides[-apart.shape[1] :]).astype(np.int32)
         put = self.machine.put
         return Scattered(put(begin), put(reach), put(data.values[datum]), self.conditions.confidences.hard)
 
@@ -464,10 +463,9 @@ def check_fit(sample: tuple[int, ...], radius: int, order: int) -> None:
     side = min(sample)
     if side > 2 * radius:
         return
-    largest = ((side - 1) // 2 + 1) ** 2 - 1 if side > 2 else 0
+    least = "x".join("3" * len(sample))
+    largest = f"the largest order that fits is {((side - 1) // 2 + 1) ** 2 - 1}" if side > 2 else ""
     names = ("layers", "rows", "columns")[-len(sample) :]
     sides = " x ".join(f"{n} {name}" for n, name in zip(sample, names, strict=True))
-    raise ValueError(
-        f"a neighbourhood of order {order} does not fit the sample of {sides}; "
-        + (f"the largest order that fits is {largest}" if largest else f"give at least {'x'.join('3' * len(sample))} pixels")
-    )
+    remedy = largest or f"give at least {least} pixels"
+    raise ValueError(f"a neighbourhood of order {order} does not fit the sample of {sides}; {remedy}")

@@ -290,7 +290,7 @@ class Options:
         None,
         Numbers(),
         "Make this much of the output of each category, in ascending order, kept by a penalty",
-        none="as follows from the sample and the known pixels",
+        none="as follows from the sample and the known pixels; in a volume of one variable those of the sample",
         shown=("simulate",),
     )
     data_weight: float = data(
@@ -358,7 +358,10 @@ class Options:
         named = pictures.categorical and any(pictures.categorical)
         finish, structure = 0.0 if pictures.deep else finish, 0.0 if plain else self.structure
         lattice = "none" if plain or named else self.lattice
-        return replace(self, search=search, finish=finish, structure=structure, lattice=lattice)
+        wanted = self.proportions
+        if wanted is None and named and pictures.deep and pictures.pixels[0].shape[-1] == 1:
+            wanted = tuple(np.unique(pictures.values(0, 0), return_counts=True)[1].tolist())
+        return replace(self, search=search, finish=finish, structure=structure, lattice=lattice, proportions=wanted)
 
 
 def begins(before: Options, now: Options, levels: int) -> int:

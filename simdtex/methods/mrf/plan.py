@@ -98,7 +98,8 @@ def plan(
         guides.append(given.colocated(pictures.pixels))
     known = (given.values, given.whole, given.place) if given and given.whole.any() else None
     lattice = parse_lattice(options.lattice)
-    regular = None if lattice is None else phases(pictures, (shape[0], shape[1]), options.boundary == "torus", lattice, known)
+    torus = options.boundary == "torus"
+    regular = None if lattice is None else phases(pictures, (shape[0], shape[1]), torus, lattice, known)
     channels = pictures.channels + bool(options.structure) + sum(one.channels for one in guides)
     heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or guides else 1.0  # in sums of squares
     values = round(heavy * (channels * len(offsets) + len(guides)))

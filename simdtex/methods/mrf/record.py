@@ -159,7 +159,7 @@ def output(run: Lattices, state: State, source: NDArray[np.int32], record: Recor
         "options": vars(run.options) | {"levels": run.levels, "schedule": run.plan.schedule.name},
         "levels": record.reports,
         "use": None,
-        "lattice": run.sample.phases and run.sample.phases.statistics(run.plan.shape),
+        "lattice": run.sample.phases and run.sample.phases.statistics((run.plan.shape[-2], run.plan.shape[-1])),
     }
     if record.account:
         launches = run.machine.launches - record.launches
