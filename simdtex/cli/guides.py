@@ -16,12 +16,14 @@ def read_data(samples: Material, options: dict[str, Any]) -> dict[str, Any]:
 
     These options are taken out; ``labels`` is set if the guides decide it.
     """
+    if samples.deep and (options["sample_mask"] or options["guide"]):
+        raise ValueError("--sample-mask and --guide are of pictures; give those of a volume to simdtex.simulate")
     masks = read_masks(options.pop("sample_mask"), samples)
     file, guide = options.pop("known"), options.pop("guide")
     found: dict[str, Any] = {
         "channel_axis": samples.channel_axis,
         "mask": masks and (masks if samples.several else masks[0]),
-        "known": read_known(file, samples.pixels[0]) if file else None,
+        "known": read_known(file, samples.pixels[0], samples.deep) if file else None,
         "guide": None,
     }
     if guide is not None:

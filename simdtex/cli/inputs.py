@@ -22,13 +22,14 @@ TABLES = (".csv", ".tsv", ".txt", ".dat")
 class Material(NamedTuple):
     """Pictures of one type: ``paths``, and their ``pixels``, which all have the axes of the first.
 
-    ``lies`` is where the cells of the first lie, if it is a grid.
+    ``lies`` is where the cells of the first lie, if it is a grid; ``deep`` whether there is one volume.
     """
 
     paths: tuple[Path, ...]
     pixels: list[NDArray[Any]]
     channel_axis: int | None
     lies: Frame | None = None
+    deep: bool = False
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
@@ -92,24 +93,34 @@ def check_alike(path: Path, pixels: NDArray[Any], other: Path, like: NDArray[Any
         raise ValueError(f"{path} has {kind(pixels)} and {other} {kind(like)}; convert them to one type")
 
 
-def read_pixels(path: Path) -> tuple[NDArray[Any], Frame | None]:
-    """Read a picture, or a grid as one, whose variables are channels; also return where the cells of a grid lie."""
-    from simdtex.io import grids, image
+def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | None]:
+    """Read a picture, or a grid as one, whose variables are channels; also return where the cells of a grid lie.
+
+    With ``deep`` a file of several layers is read, too, as a volume (layers, rows, cols, variables).
+    """
+    from simdtex.io import grids, image, volume
 
     if grids.kind_of(path) is None:
+        if deep and volume.is_volume(path):
+            values = volume.read(path)
+            return values if len(values) > 1 else values[0], None
         return image.read(path).pixels, None
     grid = grids.read_grid(path)
     values = np.stack(list(grid.values.values()), -1)
-    if len(values) > 1:
-        raise ValueError(f"{path} has {len(values)} layers and simulations are of one: give a grid with nz = 1")
-    return values[0], grids.Frame(grid.origin, grid.cell)
+    if len(values) > 1 and not deep:
+        raise ValueError(f"{path} has {len(values)} layers: give a grid with nz = 1")
+    return values if len(values) > 1 else values[0], grids.Frame(grid.origin, grid.cell)
 
 
-def read_material(paths: Sequence[Path]) -> Material:
-    """Read pictures or grids; one of a single channel gets two axes."""
-    pictures, lie = zip(*map(read_pixels, paths), strict=True)
-    pixels = [one[..., 0] if channels(one) == 1 and one.ndim == 3 else one for one in pictures]
-    return Material(tuple(paths), pixels, None if pixels[0].ndim == 2 else -1, lie[0])
+def read_material(paths: Sequence[Path], deep: bool = False) -> Material:
+    """Read pictures or grids, or with ``deep`` a volume; one of a single channel gets no axis for it."""
+    pictures, lie = zip(*(read_pixels(path, deep) for path in paths), strict=True)
+    volumes = [one.ndim == 4 for one in pictures]
+    if len(paths) > 1 and any(volumes):
+        raise ValueError(f"{paths[volumes.index(True)]} is a volume, of which one is taken: give it alone")
+    pixels = [one[..., 0] if one.shape[-1] == 1 and one.ndim > 2 else one for one in pictures]
+    plain = pixels[0].ndim == 2 + volumes[0]
+    return Material(tuple(paths), pixels, None if plain else -1, lie[0], volumes[0])
 
 
 def read_masks(paths: Sequence[Path], samples: Material) -> list[NDArray[np.bool_]] | None:
@@ -178,16 +189,19 @@ def _write_map(other: Also, made: NDArray[Any], run: Any) -> None:
     image.write(other.out, other.carried(run.source))
 
 
-def output_shape(size: str | None, pixels: Any, *like: Any) -> tuple[int, int]:
-    """Return rows and columns of ``--size``; by default those of the first picture of `like`, or twice the sample's."""
-    from simdtex.io.image import parse_size
+def output_shape(size: str | None, pixels: Any, *like: Any, axes: int = 2) -> tuple[int, ...]:
+    """Return the sides of ``--size``, rows and columns or, with 3 ``axes``, layers, rows and columns.
+
+    By default those of the first picture of `like`, or twice the sample's.
+    """
+    from simdtex.io.image import parse_size, parse_volume_size
 
     if size is not None:
-        return parse_size(size)
+        return parse_size(size) if axes == 2 else parse_volume_size(size)
     for picture in like:
         if hasattr(picture, "shape"):  # a table has none
-            return (picture.shape[0], picture.shape[1])
-    return (2 * pixels.shape[0], 2 * pixels.shape[1])
+            return tuple(picture.shape[:axes])
+    return tuple(2 * side for side in pixels.shape[:axes])
 
 
 def last_iteration(statistics: dict[str, Any]) -> str:
@@ -214,8 +228,10 @@ def check_source_map(path: Path | None, samples: Material, *, everywhere: bool =
         raise ValueError(f"{path} cannot hold {what}; end its name in .npz instead")
 
 
-def read_known(path: Path, like: NDArray[Any]) -> HardData | np.ma.MaskedArray[Any, Any]:
+def read_known(path: Path, like: NDArray[Any], deep: bool = False) -> HardData | np.ma.MaskedArray[Any, Any]:
     """Read the known values of an output: a table, recognised by its name, a point set, a grid or a picture.
+
+    Or, with ``deep``, a volume.
 
     A picture is unknown where it is transparent, if it has alpha and the sample ``like`` has none.
     """
@@ -224,7 +240,9 @@ def read_known(path: Path, like: NDArray[Any]) -> HardData | np.ma.MaskedArray[A
 
     if path.suffix.lower() in TABLES or grids.kind_of(path) == "points":
         return read_hard_data(path)
-    (values, lies), gone = read_pixels(path), None
+    (values, lies), gone = read_pixels(path, deep), None
+    if values.ndim == 4:
+        return np.ma.MaskedArray(values[..., 0] if values.shape[-1] == 1 else values)
     if lies is None and channels(values) == channels(like) + 1:
         values, gone = image.split_alpha(values)
     if channels(values) == 1:

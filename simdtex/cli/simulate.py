@@ -89,20 +89,21 @@ def simulate(
     from simdtex.io.realisations import check_realisations_path, write_realisations
     from simdtex.run import Output
 
-    material = read_material(training_image)
+    material = read_material(training_image, deep=True)
     pixels = material.pixels[0]
     data = read_data(material, options)
     known = data["known"]
-    shape = output_shape(size, pixels, known, pixels)
+    shape = output_shape(size, pixels, known, pixels, axes=2 + material.deep)
     lies = _lies(material, origin, cell)
     place = lies | ({} if several is None else {"several": several})
     if check_realisations_path(output) in SUFFIXES:
         check_grid(output, material.pixels, **lies)
     writers: list[Any] = [lambda made, run: write_realisations(output, made)]
     if report:
-        _check_report(report, material.pixels, shape, getattr(known, "values", known))
+        _check_report(report, material, shape, getattr(known, "values", known))
         rows = partial(_rows, known, shape, place)
-        writers.append(lambda made, run: _report(report, pixels, made, None if known is None else rows()))
+        flat = known is not None and not material.deep
+        writers.append(lambda made, run: _report(report, pixels, made, rows() if flat else None))
     inputs = data | given(options) | {"shape": shape} | place
 
     def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
@@ -111,7 +112,7 @@ def simulate(
 
     return Task(
         make,
-        lambda made: f"{number} realisation{'s' * (number != 1)} of {shape[1]}x{shape[0]}",
+        lambda made: f"{number} realisation{'s' * (number != 1)} of {'x'.join(map(str, shape[::-1]))}",
         str(output),
         writers,
     )
@@ -129,31 +130,37 @@ def _lies(material: Material, origin: str | None, cell: str | None) -> dict[str,
 
 def _report(folder: Path, pixels: Any, made: Any, data: Any) -> None:
     from simdtex.report.ensemble import write_ensemble
+    from simdtex.report.volumes import write_volumes
 
-    categories: list[Any] | None = None if json.loads(made.attrs["options"])["categorical"] else []
+    categorical = bool(json.loads(made.attrs["options"])["categorical"])
+    if pixels.ndim > 2:
+        write_volumes(folder, pixels, made.values, categorical, command_line())
+        return
+    categories: list[Any] | None = None if categorical else []
     write_ensemble(folder, pixels, made.values, data=data, categories=categories, command=command_line())
 
 
-def _check_report(folder: Path, pictures: list[Any], shape: tuple[int, int], known: Any) -> None:
+def _check_report(folder: Path, material: Material, shape: tuple[int, ...], known: Any) -> None:
     """Raise if a report cannot be made, before anything is simulated."""
+    pictures = material.pixels
     from simdtex.experiments.ensemble.summary import LARGEST, LEAST
     from simdtex.report.page import check_folder
 
-    if len(pictures) > 1 or pictures[0].ndim > 2:
+    if len(pictures) > 1 or material.channel_axis is not None:
         raise ValueError("--report is of one training image of one variable; leave it out")
     if pictures[0].dtype.kind == "f" and np.isnan(pictures[0]).any():
         raise ValueError("--report is of a training image that is known everywhere; leave it out")
     given = [pictures[0]] if known is None else [pictures[0], known]
-    if min(*shape, *pictures[0].shape) < LEAST:
+    if not material.deep and min(*shape, *pictures[0].shape) < LEAST:
         raise ValueError(f"--report is of {LEAST}x{LEAST} pixels or more; give a larger size, or leave it out")
     if any(np.fmax.reduce(np.abs(np.ma.getdata(one), dtype=np.float64), None) > LARGEST for one in given):
         raise ValueError(f"--report is of values up to {LARGEST:g}; give them in a larger unit, or leave it out")
-    if find_spec("gstools") is None:
+    if not material.deep and find_spec("gstools") is None:
         raise ValueError("gstools is not installed; pip install 'simdtex[simulate]', or leave --report out")
     check_folder(folder)
 
 
-def _rows(known: Any, shape: tuple[int, int], place: dict[str, Any]) -> Any:
+def _rows(known: Any, shape: tuple[int, ...], place: dict[str, Any]) -> Any:
     """Return hard data as rows of column, row and value."""
     from simdtex.io.hard_data import HardData, place_hard_data
 

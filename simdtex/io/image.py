@@ -290,6 +290,14 @@ def check_sample(array: Any, channel_axis: int | None, *, unknown: bool = False,
     return native(planes)
 
 
+def parse_volume_size(text: str) -> tuple[int, ...]:
+    """Return layers, rows and columns of WIDTHxHEIGHTxDEPTH, as ``100x80x30`` for 100 columns, 80 rows, 30 layers."""
+    sides = re.fullmatch(r"\s*([0-9]{1,8})\s*[xX\u00d7]\s*([0-9]{1,8})\s*[xX\u00d7]\s*([0-9]{1,8})\s*", text)
+    if not sides or "0" in sides.groups():
+        raise ValueError(f"size {text!r} is not WIDTHxHEIGHTxDEPTH: give columns x rows x layers, as 100x80x30")
+    return tuple(int(side) for side in sides.groups()[::-1])
+
+
 def parse_size(text: str) -> tuple[int, int]:
     """Return rows and columns of WIDTHxHEIGHT, as ``640x480`` for 640 columns and 480 rows, or of a square's side."""
     match = re.fullmatch(r"\s*([0-9]{1,8})(?:\s*[xX\u00d7]\s*([0-9]{1,8}))?\s*", text)

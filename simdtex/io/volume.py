@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writing of solid textures, which never changes a value.
+"""Reading and writing of volumes, which never changes a value.
 
 A volume is an array (depth, rows, cols) or (depth, rows, cols, channels): x-y slices one behind the other, each like a
 picture with row 0 at the top. x is the column, y the row, z the depth.
@@ -15,15 +15,17 @@ from typing import Any
 
 import nrrd
 import numpy as np
+import tifffile
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io import image
 from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable
 from simdtex.io.decode import native
 from simdtex.io.image import FLOATS, INTEGERS, Format, check_holds
+from simdtex.io.limits import TooLarge, check_array, check_file, max_pixels_or_default, read_npy
 from simdtex.options import unmasked
 
-__all__ = ["check_writable", "write"]
+__all__ = ["check_writable", "is_volume", "read", "write"]
 
 Array = NDArray[Any]
 PathLike = str | os.PathLike[str]
@@ -63,6 +65,67 @@ def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int
             raise ValueError(f"{target} is a file: give another name for the folder of slices, or a suffix")
     other = next(one for one in (".nrrd", ".tif", ".npz") if _FORMATS[one].holds(dtype, channels))
     check_holds(target, _FORMATS, dtype, channels, other)
+
+
+def is_volume(path: PathLike) -> bool:
+    """Return whether a file holds a volume: ``.nrrd``, a TIFF of several pages, or a ``.npy`` of four axes."""
+    suffix = Path(path).suffix.lower()
+    try:
+        if suffix in (".tif", ".tiff"):
+            with tifffile.TiffFile(path) as file:
+                return len(file.pages) > 1
+        if suffix == ".npy":
+            return int(np.load(path, mmap_mode="r", allow_pickle=False).ndim) == 4
+    except (OSError, ValueError, tifffile.TiffFileError):
+        return False  # the reader of pictures says what is wrong
+    return suffix == ".nrrd"
+
+
+def read(path: PathLike, *, max_pixels: int | None = None) -> Array:
+    """Read a volume.
+
+    Parameters
+    ----------
+    path : path
+        ``.nrrd`` of three axes, x fastest, or four, with variables before x; a TIFF of several pages, a layer each;
+        or a ``.npy`` of shape (layers, rows, cols, variables).
+    max_pixels : int, optional
+        The most values that are read, with 8 bytes for each. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else
+        2**27. The file's header is checked before anything is decoded.
+
+    Returns
+    -------
+    ndarray, (layers, rows, cols, variables)
+
+    Raises
+    ------
+    ValueError
+        The file is missing, damaged, no volume, or too large.
+    """
+    name, most = os.fspath(path), max_pixels_or_default(max_pixels)
+    check_file(name, "the volume", most)
+    suffix = Path(path).suffix.lower()
+    try:
+        if suffix == ".nrrd":
+            header = nrrd.read_header(name)
+            check_array(tuple(int(side) for side in header["sizes"]), 8, most)
+            values = nrrd.read(name, index_order="C")[0]
+        elif suffix == ".npy":
+            with open(name, "rb") as file:
+                values = read_npy(file, os.fstat(file.fileno()).st_size, most)
+        else:
+            with tifffile.TiffFile(name) as file:
+                check_array((len(file.pages), *file.pages.first.shape), 8, most)
+                values = np.stack([page.asarray() for page in file.pages])
+    except TooLarge as error:
+        raise ValueError(f"{name} {error}") from None
+    except MemoryError:
+        raise
+    except Exception as error:  # each library has errors of its own for a damaged file
+        raise ValueError(f"{name} cannot be read as a volume ({error}): save it again") from None
+    if values.ndim not in (3, 4) or values.size == 0 or values.dtype.kind not in "buif":
+        raise ValueError(f"{name} has the shape {values.shape} and the type {values.dtype}: give numbers of three axes")
+    return native(values[..., None] if values.ndim == 3 else values)
 
 
 def write(path: PathLike, volume: ArrayLike) -> None:
