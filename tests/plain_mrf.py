@@ -256,7 +256,7 @@ class Level:
         self.lanes = LANES if ALL_IN_LANES or not self.all else 1
 
         differing = len(self.offsets) * Y.matched * Y.variance  # two neighbourhoods that have nothing in common
-        self.rate, self.strict = o.balance * differing, 2.0 * differing
+        self.rate, self.strict = o.balance * differing, 0.5 * differing
         crossings = len(self.lines[0]) * len(self.lines[1])
         anew = coarsest and crossings <= MOST_KEPT
         self.novelty = float32(o.novelty * min(1.0, 256 / n, (n / 128) ** 2) * Y.matched * Y.variance if anew else 0)

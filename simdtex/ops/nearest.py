@@ -27,7 +27,7 @@ from simdtex.ops.leaves import FEATURES, Leaves, grow
 from simdtex.ops.neighbourhood import Field
 
 CHECK = 4
-"""Neighbours between two looks at the bound; every neighbourhood has a multiple of 4."""
+"""Neighbours between two looks at the bound; every neighbourhood of a picture has a multiple of 4, of a volume of 2."""
 
 TAIL = 1024
 """Values after a strip that may be read where the candidates' rows end; nothing comes of them."""
@@ -118,7 +118,8 @@ def nearest(
         return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
     count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
     plane = np.int32(candidates.rows * candidates.cols)
-    defines = {"V": machine.vector, "C": channels, "STEP": machine.step, "CHECK": CHECK} | costs.defines
+    check = CHECK if neighbours % CHECK == 0 else 2
+    defines = {"V": machine.vector, "C": channels, "STEP": machine.step, "CHECK": check} | costs.defines
     more = costs.arguments(machine, candidates)
     f, i, leaves = np.float32, np.int32, strip.leaves()
     near = machine.empty((count, neighbours * (1 + channels)), f)

@@ -39,7 +39,7 @@ SMALL = 128
 FEWEST, WIDE = 32, 8
 """Candidates of the coarsest level of a small sample at least, up to a spacing of so many pixels."""
 
-STRICT = 2.0
+STRICT = 0.5
 """lambda of the penalty of a category that is used more than it is to be."""
 
 TOGETHER = 2**16

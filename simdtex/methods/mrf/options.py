@@ -78,9 +78,9 @@ class Options:
         18,
         Whole(1, MOST_ORDER),
         "Compare neighbours within sqrt(order) pixels: 8 has 24 of them, 18 has 60; more keep larger shapes",
-        more="The time grows with the number of neighbours. In three dimensions 8 has 92 and 18 has 340.",
+        more="The time grows with the number of neighbours. In three dimensions 8 has 92 and 12 has 178.",
         symbol="o of equation (3)",
-        jobs={"simulate 3-D": 8},
+        jobs={"simulate 3-D": 12},
         slider=(2, 40, 1),
     )
     structure: float = appearance(

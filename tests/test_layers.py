@@ -1,0 +1,258 @@
+"""Volumes: the lattice of layers, its sample and its data against plain loops, and runs with the same bytes everywhere.
+
+A volume is indexed [layer, row, column]; the loops here share no code with the package.
+"""
+
+from itertools import product
+from math import isqrt
+
+import numpy as np
+import pytest
+from cases import assert_same_bits
+from scipy.ndimage import gaussian_filter
+
+import simdtex
+from simdtex import schedules
+from simdtex.methods import mrf
+from simdtex.model.given import around, between
+from simdtex.model.lattice import Grid, coloring_of_layers, neighbourhood_offsets, parts_of
+from simdtex.model.pictures import Pictures
+from simdtex.model.sample import Sample
+from simdtex.model.sums import sums_around
+from simdtex.ops.coloring import coloring
+from simdtex.ops.nearest import strip_of
+from simdtex.ops.square import square_of
+from simdtex.run import Simulating
+
+SHAPE = (7, 9, 11)
+CASES = [(1, 1), (1, 2), (2, 2), (5, 1), (8, 4)]  # order, spacing
+
+
+def ball(order):
+    """The offsets of a neighbourhood in canonical order."""
+    side = range(-isqrt(order), isqrt(order) + 1)
+    every = [o for o in product(side, side, side) if 0 < sum(n * n for n in o) <= order]
+    return sorted(every, key=lambda o: (sum(n * n for n in o), *o))
+
+
+def facies(shape=(9, 20, 22), seed=0, kinds=2):
+    """Blobs of so many categories, flat ones."""
+    field = gaussian_filter(np.random.default_rng(seed).standard_normal(shape), (1, 2.5, 2.5), mode="wrap")
+    return np.digitize(field, np.quantile(field, np.arange(1, kinds) / kinds)).astype(np.uint8)
+
+
+def simulated(training=None, **options):
+    training = facies() if training is None else training
+    given = {"categorical": True, "order": 3, "rng": 7, "device": "reference", "jobs": 1} | options
+    return simdtex.simulate(training, 1, **given).values[0]
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 5, 8, 12])
+def test_the_neighbourhood_is_a_ball(order):
+    found = neighbourhood_offsets(order, 3)
+    assert list(zip(*(part.tolist() for part in parts_of(found)), strict=True)) == ball(order)
+    assert [part.tolist() for part in parts_of(neighbourhood_offsets(order))][0] == [0] * len(
+        neighbourhood_offsets(order)
+    )
+
+
+@pytest.mark.parametrize(("order", "spacing"), CASES)
+def test_sites_and_neighbours_are_those_of_plain_loops(order, spacing):
+    grid = Grid.of(SHAPE, spacing, False)
+    sides = [range(0, n, spacing) for n in SHAPE]
+    sites = [np.ravel_multi_index(at, SHAPE) for at in product(*sides)]
+    assert grid.sites().tolist() == sites and grid.size == len(sites)
+    assert grid.places(grid.sites()).tolist() == sites
+    marked = np.arange(np.prod(SHAPE)).reshape(SHAPE)
+    assert grid.view(marked).ravel().tolist() == sites
+    found = grid.neighbours(grid.sites(), neighbourhood_offsets(order, 3))
+    for at, column in zip(product(*sides), found.T.tolist(), strict=True):
+        there = [tuple(n + spacing * by for n, by in zip(at, offset, strict=True)) for offset in ball(order)]
+        inside = [all(0 <= n < side for n, side in zip(one, SHAPE, strict=True)) for one in there]
+        assert column == [int(marked[one]) if yes else -1 for one, yes in zip(there, inside, strict=True)]
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 8, 9])
+def test_no_neighbours_share_a_colour(order):
+    grid = Grid.of((5, 9, 11), 1, False)
+    colors = coloring(grid, order)
+    assert colors.shape == grid.shape and set(colors.ravel()) <= set(range(coloring_of_layers(order)[0]))
+    near = grid.neighbours(grid.sites(), neighbourhood_offsets(order, 3))
+    same = colors.ravel()[near] == colors.ravel()[None, :]
+    assert not (same & (near >= 0)).any()
+
+
+@pytest.mark.parametrize("edges", ["whole", "reflect"])
+@pytest.mark.parametrize("phases", ["decimated", "all"])
+@pytest.mark.parametrize("spacing", [1, 2])
+def test_candidates_and_their_neighbours_are_those_of_plain_loops(spacing, phases, edges):
+    """A volume of different values, and its reflection, say where everything is read."""
+    order, shape = 5, (11, 10, 13)
+    volume = np.random.default_rng(1).permutation(np.prod(shape)).reshape(shape).astype(np.uint16)
+    offsets = neighbourhood_offsets(order, 3)
+    margin = 2 * spacing
+    sample = Sample(Pictures((volume[..., None],)), len(offsets), margin)
+    working = sample.scale.levels(volume[..., None])[0]
+    framed = np.pad(working, margin, mode="reflect")
+    places = sample.places(offsets, spacing, phases, edges)
+    step = 1 if phases == "all" else spacing
+    wanted = list(product(*(range(0, n, step) for n in shape)))
+    if edges == "whole":
+        wanted = [
+            at for at in wanted if all(2 * spacing <= a < n - 2 * spacing for a, n in zip(at, shape, strict=True))
+        ]
+    assert sample.place(places.positions).tolist() == [list(at) for at in wanted]
+    assert sample.index(np.array(wanted)).tolist() == places.positions.tolist()
+    assert sample.own(places.positions)[:, 0].tolist() == [volume[at] for at in wanted]
+    assert places.shape == tuple(len({at[axis] for at in wanted}) for axis in range(3))
+    machine = simdtex.open_machine("reference")
+    strip, square = strip_of(machine, sample, places), square_of(machine, sample, places)
+    for number, at in enumerate(wanted):
+        near = [framed[tuple(a + margin + spacing * b for a, b in zip(at, o, strict=True))] for o in ball(order)]
+        assert sample.working[0, places.positions[number] + places.reach].tolist() == near
+        row, col = divmod(number, strip.cols)
+        first = strip.first + row // strip.high * strip.thick + row % strip.high * strip.pitch + col
+        assert strip.pixels[0, first + strip.reach].tolist() == near
+        layer, line, column = parts_of(offsets)
+        there = square.at[number] + layer * square.deep + line * square.down + column
+        assert square.levels[0, there].tolist() == near
+
+
+def test_sums_are_those_of_plain_loops():
+    values, reach = np.random.default_rng(2).integers(0, 9, (3, 5, 4)), 1
+    for at in np.ndindex(*values.shape):
+        near = tuple(slice(max(0, n - reach), n + reach + 1) for n in at)
+        assert sums_around(values, reach)[at] == values[near].sum()
+
+
+@pytest.mark.parametrize(("order", "spacing"), [(2, 2), (5, 4)])
+def test_data_between_sites_are_those_of_plain_loops(order, spacing):
+    known = np.random.default_rng(3).random(SHAPE) < 0.05
+    grid = Grid.of(SHAPE, spacing, False)
+    wanted = []
+    for at in map(tuple, np.argwhere(known).tolist()):
+        corners = product(
+            *(
+                {n // spacing * spacing, min(-(-n // spacing), s - 1) * spacing}
+                for n, s in zip(at, grid.shape, strict=True)
+            )
+        )
+        if any(n % spacing for n in at) and not any(known[one] for one in corners):
+            wanted.append(list(at))
+    place = between(known, grid)
+    assert place.tolist() == wanted and wanted
+    site, datum, apart = around(place, grid, order)
+    found = {}
+    for one, number, by in zip(site.tolist(), datum.tolist(), apart.tolist(), strict=True):
+        found.setdefault(one, []).append((number, tuple(by)))
+    for at in product(*(range(0, n, spacing) for n in SHAPE)):
+        by = [tuple(a - b for a, b in zip(one, at, strict=True)) for one in wanted]
+        far = [max(map(abs, o)) > isqrt(order) * spacing or sum(n * n for n in o) > order * spacing**2 for o in by]
+        near = sorted((sum(n * n for n in o), k, o) for k, (o, no) in enumerate(zip(by, far, strict=True)) if not no)
+        assert found.get(int(np.ravel_multi_index(at, SHAPE)), []) == [(k, o) for _, k, o in near[:8]]
+
+
+FORMS = {
+    "plain": {},
+    "three": {"training": facies(kinds=3), "proportions": (0.2, 0.3, 0.5)},
+    "exact": {"search": "exact", "shape": (6, 8, 9), "order": 2},
+    "gibbs": {"search": "exact", "relaxation": "gibbs", "shape": (6, 8, 9), "order": 2},
+    "grey": {"training": facies(kinds=200), "categorical": False},
+    "grey-16-bit": {
+        "training": facies(kinds=200) * np.uint16(257),
+        "categorical": False,
+        "order": 8,
+        "shape": (6, 12, 11),
+    },
+    "all-phases": {"phases": "all", "shape": (6, 12, 11)},
+    "whole": {"edges": "whole", "order": 1},
+    "wide": {"order": 8, "shape": (9, 30, 33), "levels": 3},
+    "random": {"schedule": "random-subset", "shape": (5, 8, 9)},
+    "luby": {"schedule": "luby", "shape": (5, 8, 9)},
+    "synchronous": {"schedule": "synchronous", "shape": (5, 8, 9)},
+}
+
+
+def data(shape=(8, 14, 15), share=0.03):
+    truth = facies(seed=5)[: shape[0], : shape[1], : shape[2]]
+    return np.ma.MaskedArray(truth, np.random.default_rng(4).random(shape) >= share)
+
+
+def guided(shape=(8, 14, 15)):
+    own = np.broadcast_to(np.arange(9)[:, None, None] < 4, (9, 20, 22)).astype(np.uint8)
+    return {
+        "guide": (own, np.broadcast_to(np.arange(shape[0])[:, None, None] < 5, shape).astype(np.uint8)),
+        "shape": shape,
+    }
+
+
+GIVEN = {
+    "data": {"known": data()},
+    "data-exact": {"known": data((6, 9, 10)), "search": "exact", "order": 2},
+    "data-levels": {"known": data((9, 18, 20)), "levels": 3},
+    "guide": guided(),
+    "masked": {"training": np.ma.MaskedArray(facies(), np.indices((9, 20, 22))[2] < 3), "shape": (6, 9, 10)},
+}
+
+
+@pytest.mark.parametrize("name", [*FORMS, *GIVEN])
+def test_every_device_has_the_references_bits(cl_device, name):
+    options = FORMS.get(name) or GIVEN.get(name) or {}
+    assert_same_bits(simulated(device=str(cl_device.index), **options), simulated(**options))
+
+
+def test_data_are_honoured_and_pixels_are_the_samples():
+    known = data()
+    found = simulated(known=known)
+    assert (found[~known.mask] == known.data[~known.mask]).all()
+    assert set(np.unique(found)) <= {0, 1}
+    assert found.shape == known.shape
+
+
+def test_the_shares_are_those_of_the_training_image():
+    training = facies((10, 40, 40), kinds=3)
+    wanted = np.bincount(training.ravel()) / training.size
+    for seed in range(3):
+        made = simulated(training, order=8, rng=seed, device=None)
+        assert np.abs(np.bincount(made.ravel(), minlength=3) / made.size - wanted).max() < 0.04
+
+
+def test_a_thin_volume_has_as_many_levels_as_its_rows_and_columns_allow():
+    plan = mrf.plan(Pictures((facies((3, 64, 64))[..., None],)), (3, 64, 64), mrf.Options(boundary="open", order=1))
+    assert plan.levels == 4
+
+
+def test_the_schedule_is_checked_at_every_step():
+    """`Checked` raises where two neighbours relax together, which `synchronous` lets them."""
+    simulated(schedule=schedules.Checked(schedules.get("coloring")), shape=(6, 9, 10))
+    liar = schedules.get("synchronous")
+    liar.independent = lambda grid, offsets: True
+    with pytest.raises(RuntimeError, match="neighbours"):
+        simulated(schedule=schedules.Checked(liar), shape=(6, 9, 10))
+
+
+def test_a_callback_sees_volumes():
+    seen = []
+    simulated(shape=(4, 7, 8), callback=lambda progress: seen.append(progress))
+    assert isinstance(seen[-1], Simulating) and seen[-1].image().shape == (4, 7, 8)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"boundary": "torus"}, "boundary=torus is for pictures; leave it out for a volume"),
+        ({"schedule": "block"}, "schedule=block is for pictures; leave it out for a volume"),
+        ({"array": "4x4"}, "array=4x4 is for pictures; leave it out for a volume"),
+        ({"shape": (8, 9)}, "shape must be three integers .layers, rows, columns., not .8, 9."),
+        ({"shape": (0, 8, 9)}, "layers of the output is 0; give 1 or more"),
+        (
+            {"order": 40},
+            "order 40 does not fit the sample of 9 layers x 20 rows x 22 columns; the largest order that fits",
+        ),
+        ({"known": np.full((4, 4), np.nan)}, "known is 2-dimensional; give .layers, rows, cols."),
+        ({"guide": (guided()["guide"][0], np.full((9, 20, 22), np.nan))}, "the guide of a volume has NaN"),
+    ],
+)
+def test_what_only_pictures_have_is_refused(options, words):
+    with pytest.raises(ValueError, match=words):
+        simulated(**options)
