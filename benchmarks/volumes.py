@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Simulation in three dimensions: time, proportions, variograms and connectivity of channels in a volume.
 
-    python benchmarks/volumes.py [--size 100x100x30] [--data 0,200] [--number 2] [--order 8] [--out DIR] [--device TEXT]
+    python benchmarks/volumes.py [--size 100x100x30] [--data 0,200] [--number 2] [--order 12] [--out DIR] [--device TEXT]
 
 The training image and the truth that data are read off are two draws of one model: sinuous channels of elliptic cross
 section, along x, at random depths. Prints a line for each number of data: seconds of a realisation, the share of
 channels in it and in the training image, the data that it misses, and the mean absolute differences, from the training
 image, of the indicator variograms along z, y and x and of the connectivity functions (lags up to a third of a side).
-The second line of each is what the truth itself has. ``--out`` writes a sheet of slices for each.
+The line *truth* is what another draw of the model has. ``--out`` writes a sheet for each: the training image and the
+realisations in the middle slices across z, y and x.
 """
 
 import argparse
@@ -76,7 +77,7 @@ def main():
     parser.add_argument("--size", default="100x100x30", help="columns x rows x layers")
     parser.add_argument("--data", default="0,200", help="numbers of data")
     parser.add_argument("--number", type=int, default=2, help="realisations of each")
-    parser.add_argument("--order", type=int, default=8)
+    parser.add_argument("--order", type=int, default=12)
     parser.add_argument("--out", type=Path)
     parser.add_argument("--device")
     options = parser.parse_args()
