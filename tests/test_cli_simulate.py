@@ -240,7 +240,10 @@ def test_a_report_is_a_page_and_numbers(folder):
 GREY = ["grey.png", "-o", "out.npz", "--size", "14x12"]
 FACIES = ["facies.png", "-o", "out.npz", "--size", "14x12", "--categorical"]
 BAD = {
-    "a grid of two layers": (["solid.gslib", "-o", "out.npz"], "has 2 layers and simulations are of one: give a grid"),
+    "a grid of two layers": (
+        ["solid.gslib", "-o", "out.npz"],
+        "does not fit the sample of 2 layers x 16 rows x 20 columns",
+    ),
     "a grid without sizes": (["unsized.dat", "-o", "out.npz"], "write nx ny nz on the first line"),
     "a grid cut short": (
         ["cut.gslib", "-o", "out.npz"],

@@ -63,6 +63,7 @@ def small(code):
     code = code.replace("[266:362, 486:582]", "[266:282, 486:502]").replace("(10, 20), (64, 64)", "(5, 7), (6, 6)")
     code = (
         code.replace("(64, 64, 64)", "(8, 10, 12)")
+        .replace("(20, 64, 64)", "(8, 14, 16)")
         .replace("block[:, 20]", "block[:, 2]")
         .replace("--size 64", "--size 8")
     )

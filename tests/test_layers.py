@@ -52,9 +52,7 @@ def simulated(training=None, **options):
 def test_the_neighbourhood_is_a_ball(order):
     found = neighbourhood_offsets(order, 3)
     assert list(zip(*(part.tolist() for part in parts_of(found)), strict=True)) == ball(order)
-    assert [part.tolist() for part in parts_of(neighbourhood_offsets(order))][0] == [0] * len(
-        neighbourhood_offsets(order)
-    )
+    assert parts_of(neighbourhood_offsets(order))[0].tolist() == [0] * len(neighbourhood_offsets(order))
 
 
 @pytest.mark.parametrize(("order", "spacing"), CASES)

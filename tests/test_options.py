@@ -165,7 +165,7 @@ def test_a_declaration_is_complete_and_its_docstring_says_it(method):
     for name, one in table(options).items():
         assert one.help[0].isupper() and one.help[-1] != "." and ". " not in one.help, name
         assert one.help.split()[0].lower() in VERBS, one.help
-        assert one.group and set(one.jobs) <= {"synth", "fill", "extend", "simulate", "schedules"}
+        assert one.group and set(one.jobs) <= {"synth", "fill", "extend", "simulate", "simulate 3-D", "schedules"}
         assert (one.default is None) == bool(one.none), f"{name} says what None stands for"
         said = " ".join(told.partition(f"    {name} : ")[2].partition("\n    " + name)[0].split())
         assert said.startswith(f"{one.kind}") and one.help in said

@@ -98,12 +98,15 @@ def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | N
 
     With ``deep`` a file of several layers is read, too, as a volume (layers, rows, cols, variables).
     """
-    from simdtex.io import grids, image, volume
+    from simdtex.io import grids, image
 
     if grids.kind_of(path) is None:
-        if deep and volume.is_volume(path):
-            values = volume.read(path)
-            return values if len(values) > 1 else values[0], None
+        if deep:
+            from simdtex.io import volume  # whose libraries take long to load
+
+            if volume.is_volume(path):
+                values = volume.read(path)
+                return values if len(values) > 1 else values[0], None
         return image.read(path).pixels, None
     grid = grids.read_grid(path)
     values = np.stack(list(grid.values.values()), -1)

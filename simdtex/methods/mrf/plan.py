@@ -138,10 +138,13 @@ def check_volume(pictures: Pictures, options: Options, guide: GuidePair | Surrou
     """Raise if a volume is asked for what only pictures have."""
     if len(pictures.pixels) > 1:
         raise ValueError("several samples are pictures; give one volume")
-    for name in ("boundary", "array", "schedule"):
-        value = getattr(options, name)
-        if value == "torus" or (name == "array" and value) or (name == "schedule" and schedules.get(value).tile):
-            raise ValueError(f"{name}={value} is for pictures; leave it out for a volume")
+    flat = {
+        "boundary": options.boundary == "torus",
+        "array": options.array is not None,
+        "schedule": schedules.get(options.schedule).tile is not None,
+    }
+    for name in filter(flat.get, flat):
+        raise ValueError(f"{name}={vars(options)[name]} is for pictures; leave it out for a volume")
     if isinstance(guide, tuple) and unknown_in(guide[1]).any():
         raise ValueError("the guide of a volume has NaN; give a number everywhere")
 
