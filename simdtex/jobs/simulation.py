@@ -12,7 +12,7 @@ from importlib.metadata import version
 from math import prod
 from queue import SimpleQueue
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,8 +22,10 @@ from simdtex.driver import check_shape, drive, restored
 from simdtex.io.grids import frame
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.jobs.inputs import Inputs, as_known, check_inputs, check_samples
+from simdtex.jobs.maps import Maps, check_region, missing_value
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
+from simdtex.model.soft import Soft
 from simdtex.options import resolve, whole, within_32_bits
 from simdtex.run import Callback, Simulating
 
@@ -32,6 +34,14 @@ if TYPE_CHECKING:
 
 AT_ONCE = 4
 """Realisations that a processor works on at once, at most: each has a queue of its own."""
+
+
+@overload
+def simulate(training: ArrayLike, n: int, *, source: Literal[True], **options: Any) -> xarray.Dataset: ...
+
+
+@overload
+def simulate(training: ArrayLike, n: int, *, source: Literal[False] = ..., **options: Any) -> xarray.DataArray: ...
 
 
 def simulate(
@@ -45,6 +55,12 @@ def simulate(
     cell: Sequence[float] | None = None,
     guide: tuple[Any, Any] | None = None,
     mask: ArrayLike | None = None,
+    region: ArrayLike | None = None,
+    probabilities: ArrayLike | HardData | str | os.PathLike[str] | None = None,
+    image_map: ArrayLike | None = None,
+    rotation: ArrayLike | None = None,
+    scale: ArrayLike | None = None,
+    source: bool = False,
     first: int = 0,
     jobs: int | None = None,
     channel_axis: int | None = None,
@@ -53,7 +69,7 @@ def simulate(
     callback: Callback | None = None,
     checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
-) -> xarray.DataArray:
+) -> xarray.DataArray | xarray.Dataset:
     """Simulate realisations that look like a training image and honour data: multiple-point simulation.
 
     Parameters
@@ -63,7 +79,8 @@ def simulate(
     n : int
         How many realisations, 1 or more.
     shape : (int, int), optional
-        Rows and columns of each. None: those of `known`, where that is an array, else of the training image.
+        Rows and columns of each. None: those of `known`, or of the first map below, where that is an array, else of the
+        training image.
     known : array, HardData or path, optional
         What is known: a masked array, or floats with NaN where nothing is known, of `shape`; or a table ``x,y,value``
         (`simdtex.read_hard_data`) or its file. Every realisation has these values, to the bit.
@@ -78,6 +95,23 @@ def simulate(
     guide, mask
         As in `simdtex.synthesize`: secondary data of the training image and of the realisations, and what of the
         training image may be used.
+    region : (rows, cols) bool array, optional
+        True where cells are simulated. The others take no part, and have no value: NaN in floats, else the attribute
+        ``missing``.
+    probabilities : (categories, rows, cols) array, or table or its path, optional
+        Soft data: how probable each category, in ascending order, of the first variable is at each cell, adding up to
+        1; NaN where nothing is said. A table has the columns x, y, and one for each category. See `soft_weight`.
+    image_map : (rows, cols) or (training images, rows, cols) array, optional
+        The number of the training image, from 0 on, that each cell is from, or the weight of each training image there.
+        NaN: any.
+    rotation : (rows, cols) array, optional
+        How far the training image is turned at each cell, in degrees from x to y (from columns to rows), rounded to
+        eighths of a turn. NaN: as anywhere else.
+    scale : (rows, cols) array, optional
+        By which factor the training image is enlarged at each cell, 1/2 to 2, rounded to powers of the square root of
+        2. NaN likewise.
+    source : bool
+        Return where in the training image each cell of each realisation is from, too.
     first : int
         Number of the first realisation.
     jobs : int, optional
@@ -101,10 +135,16 @@ def simulate(
         Dimensions ``realisation``, ``y`` (row 0 is the smallest y), ``x`` and, with `channel_axis`, ``variable``, in
         the training image's type. The coordinates ``y`` and ``x`` are those of the centres of cells, and a third number
         of `origin` and `cell` is the coordinate ``z``. The coordinate ``seed`` is that of each realisation:
-        `simdtex.synthesize` with it gives the same. Attributes: ``seed``, ``options`` (a JSON text), ``version``,
-        ``device``, SHA-256 digests of the arrays ``training_image``, ``hard_data``, ``guide`` and ``mask`` that are
-        given, and with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. All are texts and numbers, so
-        that ``to_netcdf`` and ``to_zarr`` of xarray write them.
+        `simdtex.synthesize` with it gives the same, but for what `simulate` alone has: `region` and what follows it.
+        Attributes: ``seed``, ``options`` (a JSON text), ``version``, ``device``, SHA-256 digests of the arrays
+        ``training_image``, ``hard_data``, ``guide``, ``mask`` and those from `region` to `scale` that are given, and
+        with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. All are texts and numbers, so that
+        ``to_netcdf`` and ``to_zarr`` of xarray write them. With `region` there is a coordinate ``region`` (y, x) and,
+        where values are no floats, the attribute ``missing``.
+    xarray.Dataset
+        With `source`: that array is the variable ``simulation``, and ``source`` (realisation, y, x, place), int32, has
+        the row and the column, counted from 0, of the training image that each cell is from and, of several, the number
+        of the training image; -1 where from nowhere, as data are. Both have the attributes.
 
     Raises
     ------
@@ -113,7 +153,10 @@ def simulate(
 
     Notes
     -----
-    Cost: n times that of `simdtex.synthesize`, and of memory n results.
+    Cost: n times that of `simdtex.synthesize`, and of memory n results. Every combination of training image, eighth of
+    a turn and size that `rotation`, `scale` and `image_map` name is a training image of its own, 64 at most: the memory
+    of each is that of a further training image and 4 bytes per cell, and the coarsest level, which weighs every
+    candidate, takes as many times longer.
 
     Examples
     --------
@@ -134,32 +177,49 @@ def simulate(
     lies = frame(origin, cell)
     pictures = check_samples(training, channel_axis, mask)
     known = None if known is None else as_known(known)
-    size = check_shape(pictures.pixels[0].shape[:2] if shape is None else shape)
+    given = {"region": region, "probabilities": probabilities, "image_map": image_map, "rotation": rotation}
+    given["scale"] = scale
+    maps = Maps(**{name: as_known(one, name) for name, one in given.items() if one is not None})
+    size = check_shape((maps.shape or pictures.pixels[0].shape[:2]) if shape is None else shape)
     if shape is None and isinstance(known, np.ndarray) and known.ndim == (2 if channel_axis is None else 3):
         size = known.shape if channel_axis is None else np.moveaxis(known, channel_axis, -1).shape[:2]
     place = partial(place_hard_data, origin=origin, cell=cell, several=several)
     inputs = check_inputs(pictures, size, channel_axis, None, known, None, guide, place)
+    inputs = inputs if region is None else check_region(maps.region, size, inputs)
+    missing = None if region is None else missing_value(pictures.pixels)
     chosen = resolve(mrf.Options, "simulate", options)
-    plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
-    pixels = inputs.pictures.pixels[0]
-    each = 2 * prod((*size, pixels.shape[2])) * pixels.dtype.itemsize  # they are copied once
+    copies = maps.of_images(pictures, size)
+    if copies and chosen.shares:
+        raise ValueError("shares are those of the maps of training images, rotation and scale; leave shares out")
+    categories = chosen.of(pictures).categories(0)
+    soft = Soft(maps.of_categories(categories, size, place), copies and copies.probability)
+    sample, guides = inputs.pictures, inputs.guide
+    if copies:
+        sample = copies.pictures(sample)
+        guides = guides and (tuple(one.of(guides[0]) for one in copies.copies), guides[1])
+    plan = mrf.plan(sample, size, chosen, inputs.given, guides, soft=soft if soft.rows else None)
+    pixels = pictures.pixels[0]
+    columns = (2 + (len(pictures.pixels) > 1)) if source else 0
+    each = 2 * prod(size) * (pixels.shape[2] * pixels.dtype.itemsize + 4 * columns)  # they are copied once
     memory.require_host(n * (each + 64))
     made = np.empty((n, *size, pixels.shape[2]), pixels.dtype)
+    sources = np.empty((n, *size, columns), np.int32)
     machines = _machines(device, jobs, n)
     finished: list[int] = []
     lock = Lock()
 
     def identity() -> dict[str, Any]:
-        return {"shape": size, "n": n, "first": first, "options": chosen, **inputs.identity()}
+        call = {"shape": size, "n": n, "first": first, "options": chosen, "source": source}
+        return {**call, **inputs.identity(), **maps.digests()}
 
     def state() -> dict[str, Any]:
-        return {"numbers": list(finished), "pictures": made[finished]}
+        return {"numbers": list(finished), "pictures": made[finished], "sources": sources[finished]}
 
     with opened(checkpoint, "simulate", rng, identity, machines[0].name) as (seed, checkpointing):
         seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
         if checkpointing.found is not None:
             finished += checkpointing.found["numbers"]
-            made[finished] = checkpointing.found["pictures"]
+            made[finished], sources[finished] = checkpointing.found["pictures"], checkpointing.found["sources"]
 
         def offer_finished(info: Any, tree: Callable[[], Any]) -> None:
             if isinstance(checkpoint, Checkpoint) and checkpoint.stopping:  # a realisation has no state of its own
@@ -167,9 +227,14 @@ def simulate(
                     checkpointing.offer(info, state)
 
         def one(number: int, machine: Machine) -> None:
-            picture, _ = drive(plan, machine, int(seeds[number]), None, Checkpointing(None, offer_finished))
+            picture, output = drive(plan, machine, int(seeds[number]), None, Checkpointing(None, offer_finished))
+            if inputs.given and inputs.given.outside is not None:
+                picture[inputs.given.outside] = missing
             with lock:
                 made[number] = picture
+                if source:
+                    place = output.source if copies is None else copies.sources(output.source, columns == 3)
+                    sources[number] = place
                 finished.append(number)
                 checkpointing.offer(None, state)
                 if callback:
@@ -191,13 +256,20 @@ def simulate(
         "x": np.arange(size[1]),
         "seed": ("realisation", seeds),
     }
-    attributes = _attributes(seed, chosen, machines[0].name, inputs)
+    attributes = _attributes(seed, chosen, machines[0].name, inputs) | maps.digests()
+    if inputs.given and inputs.given.outside is not None:
+        coordinates["region"] = (("y", "x"), ~inputs.given.outside)
+        attributes |= {} if pixels.dtype.kind == "f" else {"missing": missing.item()}
     if origin is not None or cell is not None:
         for axis, at, side in zip("xyz", *lies, strict=False):
             coordinates[axis] = at + side * coordinates[axis] if axis in coordinates else at
             attributes[f"cell_{axis}"] = side
     result: xarray.DataArray = xr.DataArray(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
-    return result
+    if not source:
+        return result
+    both = result.to_dataset().assign_coords(place=["row", "column", "image"][:columns])
+    both["source"] = ([*dims[:3], "place"], sources)
+    return both.assign_attrs(attributes)
 
 
 def realisation_seed(seed: int, number: int) -> int:

@@ -107,7 +107,7 @@ class Conditioning(Conditions):
         """Return the conditioning data between the sites of a level; None if there are none."""
         if self.planes is None or not number:
             return None
-        row, col = between(self.planes.known, Grid(*self._shape, 2**number, self.torus))
+        row, col = between(self.planes.data, Grid(*self._shape, 2**number, self.torus))
         place, values = np.stack([row, col], 1).astype(np.int32), self.planes.values[:, row, col].T
         return Data(place, np.ascontiguousarray(values)) if row.size else None
 
