@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import prod
 from typing import Any, NamedTuple
 
@@ -124,13 +125,13 @@ def check_region(region: Any, shape: tuple[int, int], inputs: Inputs) -> Inputs:
     inside = check_mask(region, shape, "region", "the output")
     if not inside.any():
         raise ValueError("region is False everywhere; set it True where cells are to be simulated")
-    pixels, given = inputs.pictures.pixels[0], inputs.given
+    pixels = inputs.pictures.pixels[0]
     sides = (*shape, pixels.shape[2])
-    values, known = (given.values, given.known) if given else (np.zeros(sides, pixels.dtype), np.zeros(sides, bool))
-    if (known & ~inside[..., None]).any():
-        row, col = np.argwhere(known.any(-1) & ~inside)[0]
+    given = inputs.given or Given(np.zeros(sides, pixels.dtype), np.zeros(sides, bool))
+    if (given.known & ~inside[..., None]).any():
+        row, col = np.argwhere(given.known.any(-1) & ~inside)[0]
         raise ValueError(f"known has a value at row {row}, column {col}, outside region; leave it out, or widen region")
-    return inputs._replace(given=Given(values, known | ~inside[..., None], outside=~inside))
+    return inputs._replace(given=replace(given, known=given.known | ~inside[..., None], outside=~inside))
 
 
 def missing_value(pixels: Sequence[NDArray[Any]]) -> Any:

@@ -142,9 +142,10 @@ def simulate(
         ``to_netcdf`` and ``to_zarr`` of xarray write them. With `region` there is a coordinate ``region`` (y, x) and,
         where values are no floats, the attribute ``missing``.
     xarray.Dataset
-        With `source`: that array is the variable ``simulation``, and ``source`` (realisation, y, x, place), int32, has
-        the row and the column, counted from 0, of the training image that each cell is from and, of several, the number
-        of the training image; -1 where from nowhere, as data are. Both have the attributes.
+        With `source`: that array is the variable ``simulation``, and ``source_row`` and ``source_column`` (realisation,
+        y, x), int32, are the row and the column, counted from 0, of the training image that each cell is from and, of
+        several, ``source_image`` the number of the training image; -1 where from nowhere, as data are. The dataset has
+        the attributes, too.
 
     Raises
     ------
@@ -267,9 +268,8 @@ def simulate(
     result: xarray.DataArray = xr.DataArray(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
     if not source:
         return result
-    both = result.to_dataset().assign_coords(place=["row", "column", "image"][:columns])
-    both["source"] = ([*dims[:3], "place"], sources)
-    return both.assign_attrs(attributes)
+    places = {f"source_{name}": (dims[:3], sources[..., k]) for k, name in enumerate(("row", "column", "image")[:columns])}
+    return xr.merge([result, xr.Dataset(places)]).assign_attrs(attributes)
 
 
 def realisation_seed(seed: int, number: int) -> int:
@@ -314,8 +314,8 @@ def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) ->
     found: dict[str, Any] = {"seed": seed, "version": version("simdtex"), "device": device, "options": text}
     pictures = inputs.pictures  # whose pixels are completed where they are unknown
     found["training_image"] = digest(*pictures.pixels, *(pictures.known or ()))
-    if inputs.given:
-        found["hard_data"] = digest(np.where(inputs.given.known, inputs.given.values, 0), inputs.given.known)
+    if inputs.given and inputs.given.told.any():
+        found["hard_data"] = digest(np.where(inputs.given.told, inputs.given.values, 0), inputs.given.told)
     if inputs.guide:
         found["guide"] = digest(*inputs.guide[0], inputs.guide[1])
     if pictures.usable:

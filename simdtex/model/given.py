@@ -54,8 +54,13 @@ class Given:
         return np.asarray(self.known.all(-1))
 
     @property
+    def told(self) -> NDArray[np.bool_]:
+        """Which values are given at sites that take part, (H, W, C)."""
+        return self.known if self.outside is None else self.known & ~self.outside[..., None]
+
+    @property
     def data(self) -> NDArray[np.bool_]:
-        """Those of them that take part."""
+        """Sites that take part of which everything is given, (H, W)."""
         return self.whole if self.outside is None else self.whole & ~self.outside
 
     @cached_property

@@ -146,8 +146,7 @@ def check_categories(pictures: Pictures, given: Given | None, options: Options) 
         if categories is None:
             continue
         if given:
-            asked = given.known[..., variable] & (True if given.outside is None else ~given.outside)
-            asked = np.unique(given.values[asked, variable])
+            asked = np.unique(given.values[given.told[..., variable], variable])
             strange = asked[~np.isin(asked, categories)]
             if strange.size:
                 raise ValueError(
