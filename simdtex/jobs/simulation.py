@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from simdtex.checkpoint import Checkpoint, Checkpointing, digest, opened
 from simdtex.driver import check_shape, drive, restored
-from simdtex.io.grids import frame
+from simdtex.io.grids import Frame, frame
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.jobs.inputs import Inputs, as_known, check_inputs, check_samples
 from simdtex.jobs.maps import Maps, check_region, missing_value
@@ -168,7 +168,7 @@ def simulate(
     >>> dict(found.sizes)
     {'realisation': 2, 'y': 32, 'x': 40}
     """
-    xr = _xarray()
+    xr = require_xarray()
     whole("n", n, 1)
     whole("first", first, 0)
     if jobs is not None:
@@ -251,10 +251,10 @@ def simulate(
     dims, arrays = ["realisation", "y", "x", "variable"], made
     if channel_axis is None:
         dims, arrays = dims[:3], made[..., 0]
+    lying = grid_coordinates(size, lies if origin is not None or cell is not None else None)
     coordinates: dict[str, Any] = {
         "realisation": np.arange(first, first + n),
-        "y": np.arange(size[0]),
-        "x": np.arange(size[1]),
+        **lying,
         "seed": ("realisation", seeds),
     }
     attributes = _attributes(seed, chosen, machines[0].name, inputs) | maps.digests()
@@ -262,14 +262,20 @@ def simulate(
         coordinates["region"] = (("y", "x"), ~inputs.given.outside)
         attributes |= {} if pixels.dtype.kind == "f" else {"missing": missing.item()}
     if origin is not None or cell is not None:
-        for axis, at, side in zip("xyz", *lies, strict=False):
-            coordinates[axis] = at + side * coordinates[axis] if axis in coordinates else at
-            attributes[f"cell_{axis}"] = side
+        attributes |= {f"cell_{axis}": side for axis, side in zip("xyz", lies.cell, strict=False)}
     result: xarray.DataArray = xr.DataArray(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
     if not source:
         return result
     places = {f"source_{name}": (dims[:3], sources[..., k]) for k, name in enumerate(("row", "column", "image")[:columns])}
     return xr.merge([result, xr.Dataset(places)]).assign_attrs(attributes)
+
+
+def grid_coordinates(size: tuple[int, int], lies: Frame | None) -> dict[str, Any]:
+    """Return the coordinates y, x and, where cells have a third, z; rows and columns if nothing is said of the ground."""
+    found: dict[str, Any] = {"y": np.arange(size[0]), "x": np.arange(size[1])}
+    for axis, at, side in zip("xyz", *(lies or ((), ())), strict=False):
+        found[axis] = at + side * found[axis] if axis in found else at
+    return found
 
 
 def realisation_seed(seed: int, number: int) -> int:
@@ -323,7 +329,8 @@ def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) ->
     return found
 
 
-def _xarray() -> Any:
+def require_xarray() -> Any:
+    """Return the module xarray; raise if it is not installed."""
     try:
         import xarray
     except ModuleNotFoundError:
