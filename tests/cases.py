@@ -13,9 +13,9 @@ from simdtex.model.guide import UNKNOWN, Guide
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
+from simdtex.model.soft import EXCLUDED
 from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
-from simdtex.model.soft import EXCLUDED
 from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
 from simdtex.ops.nearest import TAIL, strip_of
 from simdtex.ops.neighbourhood import Confidences, Field, neighbourhood

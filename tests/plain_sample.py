@@ -96,7 +96,8 @@ def soft(Y, probability, name):
     """Probabilities of kinds, the kind of each pixel of the pictures, and the share of each among usable pixels."""
     of_pictures = [np.full(y.shape[:2], n) for n, y in enumerate(Y.pictures)]
     if name == "categories":
-        of_pictures = [np.array([[Y.categories[0].index(v) for v in row] for row in y[..., 0].tolist()]) for y in Y.pictures]
+        lists = [y[..., 0].tolist() for y in Y.pictures]
+        of_pictures = [np.array([[Y.categories[0].index(v) for v in row] for row in one]) for one in lists]
     there = [int(k) for of, usable in zip(of_pictures, Y.usable, strict=True) for k in of[usable]]
     counts = [max(1, there.count(k)) for k in range(len(probability))]
     return probability, of_pictures, [n / sum(counts) for n in counts]

@@ -32,8 +32,8 @@ class Case(NamedTuple):
     ``known`` share of the sites; ``placed`` share of those that are from somewhere in the sample; ``partly`` whether
     variables are known on their own; ``labels`` of the guide, 0 for grey levels and None for no guide; ``silent`` share
     of the sites where it says nothing; ``masked`` and ``gaps`` shares of the samples' pixels; ``kinds`` how many
-    categories, of the first variable where there are several; ``outside`` share of the sites that take no part; ``soft``
-    what there are probabilities of.
+    categories, of the first variable where there are several; ``outside`` share of the sites that take no part;
+    ``soft`` what there are probabilities of.
     """
 
     samples: tuple = ((9, 11),)
@@ -246,7 +246,10 @@ KINDS = {
         | {"dtype": np.float32, "channels": 2, "partly": True},
     ),
 }
-TWICE = ("known-three-levels", "placed-some", "partly", "labels-silent", "two-shares", "masked", "mixed", "soft-all", "everything")
+TWICE = (
+    *("known-three-levels", "placed-some", "partly", "labels-silent", "two-shares", "masked", "mixed", "soft-all"),
+    "everything",
+)
 CASES = {
     **{
         f"{name}-{how}": case(BOTH[how] | more, **inputs)

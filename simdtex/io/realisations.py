@@ -98,12 +98,14 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
         return
     if suffix == ".npz":
         coordinates: dict[str, Any] = {str(name): np.asarray(one.values) for name, one in array.coords.items()}
-        coordinates |= {name: one.values for name, one in (array.data_vars if source else {"values": array}).items()}
+        variables: Any = array.data_vars if source else {"values": array}
+        coordinates |= {name: one.values for name, one in variables.items()}
         attributes = np.array(json.dumps(array.attrs))
         with atomic_path(path) as temporary, temporary.open("wb") as file:
             np.savez_compressed(file, attributes=attributes, **coordinates)
         return
-    named: Any = array if source else array.rename(array.name or "realisations")
+    named: Any = array
+    named = named if source else named.rename(named.name or "realisations")
     if suffix == ".nc":
         # in memory first, since HDF5 does not survive a full disk
         packed = {name: {"zlib": True} for name in (named.data_vars if source else [named.name])}

@@ -110,6 +110,7 @@ def estimate(
     size = check_shape(known.shape if shape is None and isinstance(known, np.ndarray) and known.ndim == 2 else size)
     lies, place = frame(origin, cell), partial(place_hard_data, origin=origin, cell=cell, several=several)
     given = check_known(known, size, None, pictures, place=place)
+    mrf.check_categories(pictures, given)
     sample, machine = Sample(pictures, pictures.channels * (nearest + 1), reach), open_machine(device)
     positions = sample.places(np.zeros((1, 2), np.int32), 1).positions
     row, col = np.divmod(positions, sample.cols) - np.full((2, 1), sample.margin)
@@ -127,7 +128,7 @@ def estimate(
     found[:, certain] = names[:, None] == told if categorical else np.stack([told, np.zeros(len(told))])
     dims = ("y", "x")
     maps = found.reshape(-1, *size)
-    variables = {"mean": (dims, maps[0]), "variance": (dims, maps[1])}
+    variables: dict[str, Any] = {"mean": (dims, maps[0]), "variance": (dims, maps[1])}
     along = grid_coordinates(size, lies if origin is not None or cell is not None else None)
     if categorical:
         entropy = 0 - (maps * np.log2(np.where(maps > 0, maps, 1))).cumsum(0)[-1]
@@ -138,6 +139,8 @@ def estimate(
         **{"bandwidth": bandwidth, "training_image": digest(*pictures.pixels, *(pictures.known or ()))},
         "hard_data": digest(np.where(given.known, given.values, 0), given.known),
     }
+    if origin is not None or cell is not None:
+        attributes |= {f"cell_{axis}": side for axis, side in zip("xyz", lies.cell, strict=False)}
     result: xarray.Dataset = xr.Dataset(variables, along, attributes)
     return result
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The maps of a simulation, each checked once: where to simulate, probabilities, training images, rotation and scale."""
+"""The maps of a simulation, each checked once: region, probabilities, training images, rotation and scale."""
 
 from __future__ import annotations
 
@@ -41,7 +41,9 @@ class Maps(NamedTuple):
     def digests(self) -> dict[str, str]:
         """Return the SHA-256 digest of each, by name."""
         arrays = {
-            name: (one.points, one.values) if isinstance(one, HardData) else (np.ma.getdata(one), np.ma.getmaskarray(one))
+            name: (one.points, one.values)
+            if isinstance(one, HardData)
+            else (np.ma.getdata(one), np.ma.getmaskarray(one))
             for name, one in self._asdict().items()
             if one is not None
         }
@@ -65,11 +67,10 @@ class Maps(NamedTuple):
             return np.broadcast_to(np.array(areas)[:, None, None] / sum(areas), (count, *shape))
         given = as_array("image_map", self.image_map)
         if given.ndim == 3:
-            weights = _numbers("image_map", given, (count, *shape))
-            total = weights.sum(0)
-            if (weights < 0).any() or (total == 0).any():
+            each = _numbers("image_map", given, (count, *shape))
+            if (each < 0).any() or (each.sum(0) == 0).any():
                 raise ValueError("image_map has weights below 0, or 0 alone; give 0 or more, and NaN where any will do")
-            return weights / total
+            return np.asarray(each / each.sum(0))
         number = _numbers("image_map", given, shape)
         told = number[~np.isnan(number)]
         if not (np.isin(told, np.arange(count))).all():
@@ -78,7 +79,7 @@ class Maps(NamedTuple):
                 f"image_map has {wrong:g} and there {'is 1' if count == 1 else f'are {count}'} training "
                 f"image{'s' * (count > 1)}; give numbers from 0 on, or weights (training images, rows, cols)"
             )
-        weights = (number == np.arange(count)[:, None, None]).astype(np.float64)
+        weights: NDArray[np.float64] = (number == np.arange(count)[:, None, None]).astype(np.float64)
         weights[:, np.isnan(number)] = np.nan
         return weights
 
@@ -115,9 +116,8 @@ class Maps(NamedTuple):
                 f"the probabilities of row {row}, column {col} are {', '.join(f'{p:g}' for p in found[:, row, col])}; "
                 "give numbers of 0 or more that add up to 1, or NaN"
             )
-        found = found / total
         found[:, unknown] = np.nan
-        return found
+        return np.asarray(found / total)
 
 
 def check_region(region: Any, shape: tuple[int, int], inputs: Inputs) -> Inputs:

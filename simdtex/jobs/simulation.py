@@ -187,13 +187,13 @@ def simulate(
     place = partial(place_hard_data, origin=origin, cell=cell, several=several)
     inputs = check_inputs(pictures, size, channel_axis, None, known, None, guide, place)
     inputs = inputs if region is None else check_region(maps.region, size, inputs)
-    missing = None if region is None else missing_value(pictures.pixels)
+    missing: Any = None if region is None else missing_value(pictures.pixels)
     chosen = resolve(mrf.Options, "simulate", options)
     copies = maps.of_images(pictures, size)
     if copies and chosen.shares:
         raise ValueError("shares are those of the maps of training images, rotation and scale; leave shares out")
     categories = chosen.of(pictures).categories(0)
-    soft = Soft(maps.of_categories(categories, size, place), copies and copies.probability)
+    soft = Soft(maps.of_categories(categories, size, place), copies.probability if copies else None)
     sample, guides = inputs.pictures, inputs.guide
     if copies:
         sample = copies.pictures(sample)
@@ -234,8 +234,8 @@ def simulate(
             with lock:
                 made[number] = picture
                 if source:
-                    place = output.source if copies is None else copies.sources(output.source, columns == 3)
-                    sources[number] = place
+                    place: Any = output.source
+                    sources[number] = copies.sources(place, columns == 3) if copies else place
                 finished.append(number)
                 checkpointing.offer(None, state)
                 if callback:
@@ -266,12 +266,15 @@ def simulate(
     result: xarray.DataArray = xr.DataArray(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
     if not source:
         return result
-    places = {f"source_{name}": (dims[:3], sources[..., k]) for k, name in enumerate(("row", "column", "image")[:columns])}
-    return xr.merge([result, xr.Dataset(places)]).assign_attrs(attributes)
+    places = {
+        f"source_{name}": (dims[:3], sources[..., k]) for k, name in enumerate(("row", "column", "image")[:columns])
+    }
+    both: xarray.Dataset = xr.merge([result, xr.Dataset(places)]).assign_attrs(attributes)
+    return both
 
 
 def grid_coordinates(size: tuple[int, int], lies: Frame | None) -> dict[str, Any]:
-    """Return the coordinates y, x and, where cells have a third, z; rows and columns if nothing is said of the ground."""
+    """Return the coordinates y, x and, if cells have it, z; rows and columns if nothing is said of the ground."""
     found: dict[str, Any] = {"y": np.arange(size[0]), "x": np.arange(size[1])}
     for axis, at, side in zip("xyz", *(lies or ((), ())), strict=False):
         found[axis] = at + side * found[axis] if axis in found else at

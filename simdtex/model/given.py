@@ -187,7 +187,7 @@ class Planes(NamedTuple):
     @property
     def data(self) -> NDArray[np.bool_]:
         """Known sites that take part, (H, W)."""
-        return self.known & (self.values != UNKNOWN).any(0)
+        return np.asarray(self.known & (self.values != UNKNOWN).any(0))
 
 
 def planes(given: Given, sample: Sample) -> Planes:

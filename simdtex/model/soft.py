@@ -35,8 +35,10 @@ LEAST = 1e-3
 
 
 class Kind(NamedTuple):
-    """Kinds of candidates: ``of`` (n,) the kind of each candidate, ``shares`` (kinds,) of the sample's pixels that may
-    be taken, and ``probability`` (kinds, H, W) of each at each site; NaN where nothing is said.
+    """Kinds of candidates.
+
+    ``of`` (n,) the kind of each candidate, ``shares`` (kinds,) of the sample's pixels that may be taken, and
+    ``probability`` (kinds, H, W) of each at each site; NaN where nothing is said.
     """
 
     of: NDArray[np.intp]

@@ -59,9 +59,9 @@ def copy_of(image: int, shape: tuple[int, ...], eighths: int, halves: int) -> Co
     high, wide = (abs(cos) * a + abs(sin) * b for a, b in ((rows, cols), (cols, rows)))
     sides = [max(1, ceil(side * by - 1e-6)) for side in (high, wide)]
     y, x = ((np.arange(side) - (side - 1) / 2) / by for side in sides)
-    row = cos * y[:, None] - sin * x[None, :] + (rows - 1) / 2
-    col = sin * y[:, None] + cos * x[None, :] + (cols - 1) / 2
-    row, col = (np.floor(at + 0.5 + 1e-9).astype(np.int64) for at in (row, col))  # halves up, wherever they are rounded
+    down = cos * y[:, None] - sin * x[None, :] + (rows - 1) / 2
+    along = sin * y[:, None] + cos * x[None, :] + (cols - 1) / 2
+    row, col = (np.floor(at + 0.5 + 1e-9).astype(np.int64) for at in (down, along))  # halves up, however they come out
     inside = (row >= 0) & (row < rows) & (col >= 0) & (col < cols)
     return Copy(image, _mirrored(row, rows), _mirrored(col, cols), inside)
 

@@ -16,7 +16,7 @@ from simdtex.ops import lcpdf
 from simdtex.ops.charge import charge
 from simdtex.ops.costs import Costs, Scattered
 from simdtex.ops.histogram import histogram
-from simdtex.ops.neighbourhood import Field, Neighbourhoods, neighbourhood
+from simdtex.ops.neighbourhood import Field, neighbourhood
 
 AT_ONCE = 4096
 """Sites whose tables are made in one go."""
@@ -115,13 +115,15 @@ def given_data(
     places = sample.places(np.zeros((1, 2), np.int32), 1)
     candidates = sample.candidates(machine, places)
     kinds, size = int(of.max()) + 1, candidates.size
-    plane = np.zeros((1, sample.rows * sample.cols), np.float32)
-    plane[0, places.positions] = of
-    counted = candidates._replace(pixels=machine.put(plane))
+    kind = np.zeros((1, sample.rows * sample.cols), np.float32)
+    kind[0, places.positions] = of
+    counted = candidates._replace(pixels=machine.put(kind))
     free = machine.put(np.zeros(candidates.positions.shape[0] + BLOCK, np.float32))
+    itself = machine.put(np.zeros((1, 2), np.int32))  # which is no neighbour
     step = max(1, min(machine.chunk(size, 1, sample.channels), AT_ONCE, PAIRS // kinds))
-    for first in range(0, len(sites), max(1, PAIRS // max(1, len(data.place)))):
-        part = sites[first : first + max(1, PAIRS // max(1, len(data.place)))]
+    together = max(1, PAIRS // max(1, len(data.place)))
+    for first in range(0, len(sites), together):
+        part = sites[first : first + together]
         numbers, counts = near(part, data.place, nearest, sample.margin)
         for count in np.unique(counts).tolist():
             h = bandwidth * lcpdf.optimal_bandwidth(sample.variance, size, sample.channels * (count + 1))
@@ -137,14 +139,11 @@ def given_data(
                     machine.put(np.append(data.values[told.ravel()], data.values[:1], 0)),
                     np.float32(1),
                 )
-                padded = -(-here.size // machine.vector) * machine.vector
-                nothing = Neighbourhoods(
-                    machine.put(np.zeros((1, padded), np.float32)),
-                    machine.put(np.zeros((1, sample.channels, padded), np.float32)),
-                    here.size,
-                )
-                distances = lcpdf.distance(machine, nothing, candidates)
                 numbered = machine.put(np.arange(here.size, dtype=np.int32))
+                values, plane = np.zeros((sample.channels, 1, here.size), np.uint16), np.zeros((1, here.size), np.int32)
+                field = Field(machine.put(values), machine.put(plane), machine.put(plane.astype(np.uint16)))
+                nobody = neighbourhood(machine, numbered, field, itself, Grid(1, here.size, 1, torus=False))
+                distances = lcpdf.distance(machine, nobody, candidates)  # 0 so far
                 distances = charge(machine, distances, candidates, numbered, Costs(free, scattered=scattered))
                 mass = machine.get(lcpdf.density(machine, distances, counted, window)).astype(np.float64)
                 yield first + here, mass / np.cumsum(mass, 1)[:, -1:]

@@ -87,7 +87,7 @@ def plan(
         Which category, and which picture of Y, is how probable where in X.
     """
     pictures = options.of(pictures)
-    check_categories(pictures, given, options)
+    check_categories(pictures, given, options.proportions)
     options = options.resolved(pictures)
     offsets = neighbourhood_offsets(options.order)
     sides = [picture.shape[:2] for picture in pictures.pixels]
@@ -139,7 +139,7 @@ def sampled(
     return fewer, sample
 
 
-def check_categories(pictures: Pictures, given: Given | None, options: Options) -> None:
+def check_categories(pictures: Pictures, given: Given | None, proportions: Sequence[float] | None = None) -> None:
     """Raise if a known value or a proportion is of a category that the sample lacks."""
     for variable in range(pictures.pixels[0].shape[-1]):
         categories = pictures.categories(variable)
@@ -156,13 +156,13 @@ def check_categories(pictures: Pictures, given: Given | None, options: Options) 
             raise ValueError(
                 f"a variable has {len(categories)} categories; give {MOST} or fewer, or leave categorical out"
             )
-    if options.proportions:
+    if proportions:
         found = pictures.categories(0)
         if found is None or pictures.pixels[0].shape[-1] > 1:
             raise ValueError("proportions are of one variable of categories; give categorical=True, or leave them out")
-        if len(found) != len(options.proportions):
+        if len(found) != len(proportions):
             raise ValueError(
-                f"there are {len(options.proportions)} proportions and {len(found)} categories, {_listed(found)}; "
+                f"there are {len(proportions)} proportions and {len(found)} categories, {_listed(found)}; "
                 "give one for each"
             )
 
