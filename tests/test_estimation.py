@@ -104,7 +104,7 @@ def test_far_from_data_it_is_the_share_of_the_training_image():
     known = np.full((40, 9), np.nan)
     known[0, 0] = 4
     found = simdtex.estimate(TRAINING, known=known, categorical=True, device="reference", reach=4)
-    shares = [(TRAINING == name).mean() for name in (0, 4, 8)]
+    shares = [(name == TRAINING).mean() for name in (0, 4, 8)]
     np.testing.assert_allclose(found.probability[:, 20], np.repeat(shares, 9).reshape(3, 9), atol=1e-6)
     assert found.entropy.values[0, 0] == 0 and not np.signbit(found.entropy.values).any()
 

@@ -48,7 +48,7 @@ from simdtex.cli.places import EITHER, READ
     type=READ,
     metavar="FILE",
     group=DATA,
-    help="Simulate only where this picture or grid of the size of a realisation is white, or above 0 in a grid.",
+    help="Make cells only where this picture or grid of the size of a realisation is white, or above 0 in a grid.",
 )
 @option(
     "--probabilities",
@@ -63,8 +63,8 @@ from simdtex.cli.places import EITHER, READ
     type=READ,
     metavar="FILE",
     group=DATA,
-    help="Take each cell from the TRAINING_IMAGE of this number, from 0 on; or, of as many channels as there are, follow "
-    "these weights.",
+    help="Take each cell from the TRAINING_IMAGE of this number, from 0 on; or, with a channel for each, follow these "
+    "weights.",
 )
 @option(
     "--rotation",

@@ -37,8 +37,8 @@ class Inputs(NamedTuple):
 
     def identity(self) -> dict[str, Any]:
         """Return all arrays by the names of the arguments, as the identity of a run."""
-        given = self.given
-        values = given and (np.where(given.known, given.values, 0), given.known)
+        given = self.given if self.given and self.given.told.any() else None
+        values = given and (np.where(given.told, given.values, 0), given.told)
         return {
             **{"sample": (self.pictures.pixels, self.pictures.known), "mask": self.pictures.usable, "known": values},
             **{"known_source": given and given.place, "guide": self.guide},
