@@ -22,8 +22,8 @@ LINES = [words for name in COMMANDS for words, _ in load(name).examples] + [word
 VERBS = re.findall(
     r"\w+",
     """account add average be begin blend break bring carry check compare continue cool count cover draw estimate
-    exchange extend fill follow get give go have honour keep launch lay leave let listen look make match measure open prefer
-    print read relax run say show split start sweep take try use weigh write""",
+    exchange extend fill follow get give go have honour keep launch lay leave let listen look make match measure open
+    prefer print read relax run say show split start sweep take try use weigh write""",
 )
 
 
