@@ -120,8 +120,8 @@ def simulate(
     known = data["known"]
     files = {name: options.pop(name) for name in MAPS}
     maps = {name: read_map(name, path) for name, path in files.items() if path}
-    flat = (one[..., 0, :, :] if np.ndim(one) == 3 else one for one in maps.values())
-    shape = output_shape(size, pixels, known, *flat, pixels)
+    layers = [one[0] if one.ndim == 3 else one for one in maps.values() if isinstance(one, np.ndarray)]
+    shape = output_shape(size, pixels, known, *layers, pixels)
     lies = lies_of(material, origin, cell)
     place = lies | ({} if several is None else {"several": several})
     if check_realisations_path(output, source=source) in SUFFIXES:
