@@ -54,18 +54,19 @@ def estimate(
     from simdtex.io.grids import SUFFIXES, check_grid, write_grid
     from simdtex.io.realisations import check_realisations_path, write_realisations
 
-    if known is None:
-        raise ValueError("there is nothing to estimate from; give --known")
     began, material = time.perf_counter(), read_material(training_image)
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
-    data, masks = read_known(known, material.pixels[0]), read_masks(options.pop("sample_mask"), material)
+    masks = read_masks(options.pop("sample_mask"), material)
+    data = None if known is None else read_known(known, material.pixels[0])
+    shape = output_shape(size, material.pixels[0], data, material.pixels[0])
+    if data is None:
+        raise ValueError("there is nothing to estimate from; give --known")
     lies = lies_of(material, options.pop("origin"), options.pop("cell"))
     grid = check_realisations_path(output) in SUFFIXES
     if grid:
         check_grid(output, material.pixels, **lies)
     given = {name: value for name, value in options.items() if value is not None} | lies
-    shape = output_shape(size, material.pixels[0], data, material.pixels[0])
     mask = masks and (masks if material.several else masks[0])
     made = estimate(material.array, known=data, shape=shape, mask=mask, **given)
     if grid:
