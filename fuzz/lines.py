@@ -19,6 +19,7 @@ COMMANDS = {
     "fill": 12,
     "extend": 6,
     "simulate": 8,
+    "estimate": 3,
     "solid": 8,
     "mix": 8,
     "ising": 6,
@@ -80,7 +81,9 @@ DEEP = {"synth": 0.6, "schedules": 0.7, "demo": 0.2, "bench": 0.0}
 
 OUTPUTS = {
     "solid": ("out.npz", "out.npy", "out.nrrd", "out.tif", "out", "out.png", "out.xyz"),
-    "simulate": ("out.zarr", "out.nc", "out.npz", "out.gslib", "out.sgems", "out.png", "out"),
+    **dict.fromkeys(
+        ("simulate", "estimate"), ("out.zarr", "out.nc", "out.npz", "out.gslib", "out.sgems", "out.png", "out")
+    ),
     "": ("out.npy", "out.tif", "out.png", "out.webp", "out.jpg", "out.bmp", "out.xyz"),
 }
 
@@ -173,7 +176,7 @@ class _Maker:
                 count = (
                     rng.choices((1, 2, 3), (8, 1, 1) if name != "mix" else (3, 3, 1))[0] if parameter.nargs < 0 else 1
                 )
-                role = "grid" if name == "simulate" and rng.random() < 0.3 else "picture"
+                role = "grid" if name in ("simulate", "estimate") and rng.random() < 0.3 else "picture"
                 words += [self.file(role) for _ in range(count)]
             else:
                 options.append(parameter)

@@ -157,6 +157,10 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
         for (int p = 0; p < g.candidates; ++p)
             d[p] += MISFIT(p, site);
 #endif
+#if KINDS
+    for (int p = 0; p < g.candidates; ++p)
+        d[p] += OF_KIND(p, site);
+#endif
     if (g.novelty > 0.0f)
         for (int k = 0; k < neighbours; ++k) {
             if (next[k] >= 0)

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from simdtex.experiments import quality
     from simdtex.io.grids import read_grid, write_grid
     from simdtex.io.hard_data import place_hard_data, read_hard_data
+    from simdtex.jobs.estimation import estimate
     from simdtex.jobs.filling import extend, fill
     from simdtex.jobs.simulation import simulate
     from simdtex.live.widget import Live
@@ -29,6 +30,7 @@ __all__ = [
     "Output",
     "Progress",
     "devices",
+    "estimate",
     "extend",
     "fill",
     "lcpdf",
@@ -51,6 +53,7 @@ _HOMES = {
     "Output": "simdtex.run",
     "Progress": "simdtex.run",
     "devices": "simdtex.machine.devices",
+    "estimate": "simdtex.jobs.estimation",
     "extend": "simdtex.jobs.filling",
     "fill": "simdtex.jobs.filling",
     "lcpdf": "simdtex.synthesis",

@@ -13,9 +13,10 @@ from simdtex.model.guide import UNKNOWN, Guide
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Pictures
 from simdtex.model.sample import Sample
+from simdtex.model.soft import EXCLUDED
 from simdtex.ops import lcpdf
 from simdtex.ops.coherence import coherence
-from simdtex.ops.costs import Costs, Phased, Scattered
+from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
 from simdtex.ops.nearest import TAIL, strip_of
 from simdtex.ops.neighbourhood import Confidences, Field, neighbourhood
 from simdtex.ops.square import square_of
@@ -66,6 +67,7 @@ class Problem(NamedTuple):
     nowhere: float = 0.0
     regular: bool = False
     between: bool = False
+    soft: int = 0
 
     @property
     def confidences(self):
@@ -125,9 +127,19 @@ class Problem(NamedTuple):
         put = (begin, (apart @ [self.sample.cols, 1]).astype(np.int32), values)
         return Scattered(*map(machine.put, put), np.float32(1.5))
 
+    def kinds(self, machine, every=False):
+        """So many kinds of each candidate, or place, of four that there are, some excluded here and there; or None."""
+        if not self.soft:
+            return None
+        rng, candidates = np.random.default_rng(9), self.candidates(REFERENCE, every).positions.size
+        of = rng.integers(0, 4, (self.soft, candidates + TAIL)).astype(np.uint16)
+        dear = rng.choice([0, 0, 700.5, 90000.25, EXCLUDED], (4, *self.field.source.shape)).astype(np.float32)
+        return Kinds(machine.put(of), machine.put(dear))
+
     def costs(self, machine, dear=1.0, every=False):
-        """The penalties of the candidates, or places, their phases, and data between the sites."""
-        return Costs(machine.put(self.penalty(dear, every)), self.phased(machine, every), self.scattered(machine))
+        """The penalties of the candidates, or places, their phases, data between the sites, and kinds."""
+        penalty, phased = machine.put(self.penalty(dear, every)), self.phased(machine, every)
+        return Costs(penalty, phased, self.scattered(machine), self.kinds(machine, every))
 
     def on(self, machine):
         """Sites, field and offsets as arrays of a machine."""
@@ -195,12 +207,14 @@ def problem(
     masked=0.0,
     regular=False,
     between=False,
+    soft=0,
 ):
     """A problem from a seed. A third of its sites stand beside what their neighbours were taken from.
 
     ``guides`` channels of a guide, unknown at a quarter of the sites; ``nowhere`` share of the sites that are hard
     data, whose structure is unknown; ``masked`` share of the sample's pixels that may not be used;
-    ``regular`` whether candidates and sites have phases; ``between`` whether data lie between the sites.
+    ``regular`` whether candidates and sites have phases; ``between`` whether data lie between the sites; ``soft`` kinds
+    of a candidate.
     """
     rng = np.random.default_rng(seed)
     offsets = neighbourhood_offsets(order)
@@ -239,7 +253,7 @@ def problem(
         if weight:
             values[channels, hard] = UNKNOWN
     field = Field(values, source, t.astype(np.uint16))
-    return Problem(sample, order, grid, field, sites, edges, phases, nowhere, regular, between)
+    return Problem(sample, order, grid, field, sites, edges, phases, nowhere, regular, between, soft)
 
 
 @st.composite
@@ -266,6 +280,7 @@ def problems(draw, max_order=9, channels=(1, 2, 3)):
         count=draw(st.sampled_from([1, 7, 24, 37])),  # PoCL compiles anew for each
         regular=draw(st.booleans()),
         between=draw(st.booleans()),
+        soft=draw(st.sampled_from([0, 0, 1, 2])),
     )
 
 

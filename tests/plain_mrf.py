@@ -39,7 +39,7 @@ DEFAULTS = {
     **{"free_sweeps": 2, "pixel": "source", "phases": "decimated", "edges": "auto"},
     **{"schedule": "coloring", "boundary": "torus", "search": "auto", "chance": 4},
     **{"categorical": False, "weights": None, "shares": None, "proportions": None},
-    **{"data_weight": 16.0, "guide_weight": 10.0, "labels": None},
+    **{"data_weight": 16.0, "guide_weight": 10.0, "labels": None, "soft_weight": 1.0},
 }
 PAPER = {
     **{"relaxation": "gibbs", "bandwidth": 1.0, "coherence": 0.0, "free_sweeps": 0, "pixel": "density"},
@@ -62,17 +62,24 @@ def options(pictures, preset="default", **given):
     return o
 
 
-def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, guide=None, **given):
+def synthesize(pictures, shape, seed, mask=None, known=None, known_source=None, guide=None, maps=None, **given):
     """Image, source and temperature of every pixel, from a sample (rows, columns, channels) or a list of such.
 
     ``mask`` is a list too; ``known`` a masked array (rows, columns, channels), ``guide`` a list of pictures (rows,
-    columns, channels) and one of the output's size. A source is (row, column), or (row, column, picture) of a list.
+    columns, channels) and one of the output's size. ``maps`` is a dictionary of "region" (rows, columns), True inside,
+    and of "categories" and "images", probabilities (kinds, rows, columns). A source is (row, column), or (row, column,
+    picture) of a list.
     """
     one = isinstance(pictures, np.ndarray)
     pictures = [pictures] if one else pictures
     o = options(pictures, **given)
-    Y = material(pictures, o, shape, mask, known, known_source, guide)
-    levels = number_of_levels([y.shape[:2] for y in pictures], shape, o)  # 1.
+    maps = maps or {}
+    Y = material(pictures, o, shape, mask, known, known_source, guide, maps)
+    sides = [y.shape[:2] for y in pictures]
+    if "images" in maps:  # each picture is wanted somewhere, as often as the map says
+        told = [plane[~np.isnan(plane)].tolist() for plane in maps["images"]]
+        o.shares, sides = [max(0.001, sum(one) / max(1, len(one))) for one in told], [min(sides, key=min)]
+    levels = number_of_levels(sides, shape, o)  # 1.
     lay(Y, levels, o)
     X, level = at_random(Y, shape, seed), None  # 2., 5.
     for number in reversed(range(levels)):  # 6.
@@ -160,6 +167,8 @@ def relaxed(level, X, old, s, turn):
         d = d + apart_in_phase(level, s, numbers)
     if level.between:
         d = d + misfit(level, s, numbers)
+    if level.Y.soft:
+        d = d + of_kind(level, s, numbers)
     for p, times in charged if level.novelty else []:  # neighbour by neighbour; the numbers are all candidates
         d[p] += float32(times) * level.novelty
 
@@ -435,6 +444,25 @@ def misfit(level, s, numbers):
                 y = level.Y.planes[n][c][within(i + apart[0], rows, False), within(j + apart[1], cols, False)]
                 e = (x - int(y)) * level.Y.hard
                 d[k] = float32(e * e + float(d[k]))  # the double is exact
+    return d
+
+
+def of_kind(level, s, numbers):
+    """What each candidate costs for its category, and its picture, if these are not as probable as they are frequent.
+
+    w N C sigma^2 / 16 (m - ln(p / q)) with the greatest m of the site, in steps of 1/1024; 2^40 if p is 0.
+    """
+    d, places = np.zeros(len(numbers), float32), [level.places[p] for p in numbers]
+    rate = level.o.soft_weight * len(level.offsets) * level.Y.matched * level.Y.variance / 16
+    for probability, of_pictures, shares in level.Y.soft:
+        p = [float(plane[level.pixel(s)]) for plane in probability]
+        if any(map(np.isnan, p)):
+            continue
+        said = [log(one / share) if one else None for one, share in zip(p, shares, strict=True)]
+        most = max(one for one in said if one is not None)
+        cost = [2.0**40 if one is None else min(2.0**40, rate * round((most - one) * 1024) / 1024) for one in said]
+        for k, (n, i, j) in enumerate(places):
+            d[k] += float32(cost[of_pictures[n][i, j]])
     return d
 
 

@@ -23,7 +23,7 @@ UNKNOWN = -1
 COLOCATED = 16  # channels that a variable known where others are not may have, for all that room is made
 
 
-def material(pictures, o, shape, mask=None, known=None, known_source=None, guide=None):
+def material(pictures, o, shape, mask=None, known=None, known_source=None, guide=None, maps=None):
     """Y: the pictures, whole where they have gaps, and everything that is matched, as grey levels."""
     gaps = [np.isnan(y).any(-1) if y.dtype.kind == "f" else np.zeros(y.shape[:2], bool) for y in pictures]
     Y = SimpleNamespace(gaps=gaps, pictures=[completed(*pair) for pair in zip(pictures, gaps, strict=True)])
@@ -43,7 +43,8 @@ def material(pictures, o, shape, mask=None, known=None, known_source=None, guide
     N, channels = len(plain.offsets(o.order)), sum(1 if c is None else one_hot(c) for c in Y.categories)
     channels += bool(o.structure) + sum(COLOCATED * len(Y.variables) if g is None else channels_of(g) for g in beside)
     lattices = repeated(pictures, o, shape, known, known_source)
-    heavy = max(1, o.data_weight, N / 4) if known is not None or beside else 1
+    maps = maps or {}
+    heavy = max(1, o.data_weight, N / 4) if known is not None or beside or "region" in maps else 1
     values = round(heavy * (channels * N + len(beside)))
     Y.height = 2 ** min(12, int((33 - log2(values)) / 2)) - 1  # so that every distance is exact in float64
 
@@ -81,9 +82,25 @@ def material(pictures, o, shape, mask=None, known=None, known_source=None, guide
         if place != NOWHERE:
             told = [int(plane[place[1:]]) for plane in planes[place[0]][: Y.matched]]
         Y.given[s] = (told, place)
+    outside = [] if "region" not in maps else map(tuple, np.argwhere(~maps["region"]))
+    Y.outside = {s: ([UNKNOWN] * Y.matched, NOWHERE) for s in outside}  # known, and nothing is compared with them
+    Y.whole = np.zeros(shape, bool) if Y.outside and known is None else Y.whole
+    Y.given |= Y.outside
+    Y.soft = [soft(Y, maps[name], name) for name in ("categories", "images") if name in maps]
     Y.own = bool(Y.guides) or any(place == NOWHERE for _, place in Y.given.values())
     Y.centre, Y.hard = max(1, round(sqrt(N) / 2)), round(8 * sqrt(o.data_weight)) / 8
     return Y
+
+
+def soft(Y, probability, name):
+    """Probabilities of kinds, the kind of each pixel of the pictures, and the share of each among usable pixels."""
+    of_pictures = [np.full(y.shape[:2], n) for n, y in enumerate(Y.pictures)]
+    if name == "categories":
+        lists = [y[..., 0].tolist() for y in Y.pictures]
+        of_pictures = [np.array([[Y.categories[0].index(v) for v in row] for row in one]) for one in lists]
+    there = [int(k) for of, usable in zip(of_pictures, Y.usable, strict=True) for k in of[usable]]
+    counts = [max(1, there.count(k)) for k in range(len(probability))]
+    return probability, of_pictures, [n / sum(counts) for n in counts]
 
 
 def lay(Y, levels, o):

@@ -37,7 +37,7 @@ def finished(Y, X, o):
             if far or outside or (r == (i, j) and (a, b) != (0, 0)):
                 continue
             weight = round(1024 * exp(-(a * a + b * b) / (2 * o.finish**2)))
-            said, missed = usable(Y, X.source[r], (-a, -b)), usable(Y, own, (a, b)) if r in Y.given else None
+            said, missed = usable(Y, X.source[r], (-a, -b)), usable(Y, own, (a, b)) if gives(Y, r) else None
             for c in range(len(Y.variables)) if said or missed else []:  # not the structure channel
                 if said:
                     sums[c] += weight * (level_at(Y, c, said) - level_at(Y, c, own))
@@ -48,6 +48,11 @@ def finished(Y, X, o):
             step = (2 * fine * sums[c] + total) // max(1, 2 * total)
             image[i, j, c] = moved(Y, (*own, c), step, Y.unit[c] / fine)
     return image
+
+
+def gives(Y, r):
+    """Whether a pixel is given, and takes part."""
+    return r in Y.given and r not in Y.outside
 
 
 def usable(Y, place, by):

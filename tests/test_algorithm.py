@@ -204,7 +204,7 @@ def test_the_cases_give_every_option():
 NO_BYTE = {"array": None}
 """Options that change no byte, with their defaults: where a run is accounted for, and what is checked."""
 
-ELSEWHERE = {"categorical", "weights", "shares", "proportions", "data_weight", "guide_weight", "labels"}
+ELSEWHERE = {"categorical", "weights", "shares", "proportions", "data_weight", "guide_weight", "labels", "soft_weight"}
 """Options that want more than one grey sample: test_algorithm_given.py."""
 
 # For each option: what else is given, and two values of which each gives another output.

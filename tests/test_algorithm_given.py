@@ -10,6 +10,13 @@ from cases import REFERENCE, assert_same_bits, texture
 from test_algorithm import ELSEWHERE
 
 import simdtex
+from simdtex.driver import drive
+from simdtex.jobs.inputs import check_inputs
+from simdtex.jobs.maps import check_region
+from simdtex.machine import open_machine
+from simdtex.methods import mrf
+from simdtex.model.soft import Soft
+from simdtex.options import resolve
 
 SEED = 2**40 + 3
 
@@ -25,7 +32,8 @@ class Case(NamedTuple):
     ``known`` share of the sites; ``placed`` share of those that are from somewhere in the sample; ``partly`` whether
     variables are known on their own; ``labels`` of the guide, 0 for grey levels and None for no guide; ``silent`` share
     of the sites where it says nothing; ``masked`` and ``gaps`` shares of the samples' pixels; ``kinds`` how many
-    categories, of the first variable where there are several.
+    categories, of the first variable where there are several; ``outside`` share of the sites that take no part;
+    ``soft`` what there are probabilities of.
     """
 
     samples: tuple = ((9, 11),)
@@ -40,7 +48,22 @@ class Case(NamedTuple):
     masked: float = 0.0
     gaps: float = 0.0
     kinds: int = 0
+    outside: float = 0.0
+    soft: tuple = ()
     options: tuple = ()
+
+    @property
+    def maps(self):
+        """Of probabilities, a fifth of them 0 and a fifth of the sites unknown, and of the sites that take part."""
+        rng, found = np.random.default_rng(11), {}
+        for name in self.soft:
+            kinds = {"categories": self.kinds, "images": len(self.samples)}[name]
+            p = rng.random((kinds, *self.shape)) * (rng.random((kinds, *self.shape)) > 0.2) + 1e-9 * (kinds < 2)
+            p[0, p.sum(0) == 0] = 1
+            found[name] = np.where(rng.random(self.shape) < 0.2, np.nan, p / p.sum(0))
+        if self.outside:
+            found["region"] = rng.random(self.shape) >= self.outside
+        return found
 
     def arrays(self):
         """Samples, masks, known values and their source, and the guide, all with channels."""
@@ -67,6 +90,8 @@ class Case(NamedTuple):
         there = np.repeat(rng.random(self.shape)[..., None] < self.known, channels, -1)
         if self.partly:
             there &= rng.random(there.shape) < 0.6
+        if self.outside:
+            there &= self.maps["region"][..., None]
         known = np.ma.masked_array(values, ~there) if self.known else None
         source = np.stack([row, col, number][: 2 + (len(samples) > 1)], -1)
         source[rng.random(self.shape) >= self.placed] = -1
@@ -100,6 +125,8 @@ def run(case, device=REFERENCE):
         return array if case.channels else array[..., 0]
 
     options = dict(case.options)
+    if case.maps:
+        return mapped(case, device)
     image, output = simdtex.synthesize(
         [bare(one) for one in samples] if several else bare(samples[0]),
         case.shape,
@@ -116,11 +143,25 @@ def run(case, device=REFERENCE):
     return [image, output.source, output.temperature]
 
 
+def mapped(case, device):
+    """The same with maps, which no public function takes as they are."""
+    samples, masks, known, source, guide = case.arrays()
+    inputs = check_inputs(samples, case.shape, -1, masks, known, source, guide)
+    inputs = check_region(case.maps["region"], case.shape, inputs) if case.outside else inputs
+    soft = Soft(case.maps.get("categories"), case.maps.get("images")) if case.soft else None
+    chosen = resolve(mrf.Options, "synth", dict(case.options))
+    plan = mrf.plan(inputs.pictures, case.shape, chosen, inputs.given, inputs.guide, soft=soft)
+    image, output = drive(plan, open_machine(device), SEED)
+    if case.outside:
+        image[~case.maps["region"]] = 0
+    return [image if case.channels else image[..., 0], output.source, output.temperature]
+
+
 def plainly(case):
     """The same of the plain loops."""
     samples, masks, known, source, guide = case.arrays()
     options = dict(case.options) | ({"labels": True} if case.labels and "labels" not in dict(case.options) else {})
-    given = {"mask": masks, "known": known, "known_source": source, "guide": guide}
+    given = {"mask": masks, "known": known, "known_source": source, "guide": guide, "maps": case.maps}
     pictures = samples if len(samples) > 1 else samples[0]
     image, source, temperature = plain_mrf.synthesize(pictures, case.shape, SEED, **given, **options)
     return [image if case.channels else image[..., 0], source, temperature]
@@ -186,6 +227,18 @@ KINDS = {
         TWO | {"known": 0.2, "placed": 0.5, "labels": 2},
     ),
     "lattice-two": ({"lattice": "4,0,1,5"} | OPEN, TWO | {"gaps": 0.1, "dtype": np.float32, "known": 0.1}),
+    "outside": (OPEN | {"levels": 3}, {"outside": 0.4}),
+    "outside-known": ({"finish": 1.0}, {"outside": 0.3, "known": 0.2, "placed": 0.5, "dtype": np.float32}),
+    "soft": ({"categorical": True, "soft_weight": 0.5}, {"kinds": 3, "soft": ("categories",)}),
+    "soft-gibbs": (
+        OPEN | GIBBS | {"categorical": True, "proportions": (2.0, 1.0)},
+        {"kinds": 2, "known": 0.1, "soft": ("categories",), "masked": 0.2},
+    ),
+    "soft-images": (OPEN | {"soft_weight": 8.0}, TWO | {"soft": ("images",)}),
+    "soft-all": (
+        {"categorical": (0,), "levels": 3},
+        TWO | {"kinds": 3, "soft": ("categories", "images"), "channels": 2, "outside": 0.2, "labels": 2},
+    ),
     "everything": (
         {"shares": (1.0, 2.0), "schedule": "luby"},
         TWO
@@ -193,7 +246,10 @@ KINDS = {
         | {"dtype": np.float32, "channels": 2, "partly": True},
     ),
 }
-TWICE = ("known-three-levels", "placed-some", "partly", "labels-silent", "two-shares", "masked", "mixed", "everything")
+TWICE = (
+    *("known-three-levels", "placed-some", "partly", "labels-silent", "two-shares", "masked", "mixed", "soft-all"),
+    "everything",
+)
 CASES = {
     **{
         f"{name}-{how}": case(BOTH[how] | more, **inputs)
@@ -212,6 +268,7 @@ CASES = {
 
 ON_A_DEVICE = (
     *("known-three-levels-few", "labels-silent-exact", "partly-few", "masked-exact", "many-known"),
+    *("soft-all-exact", "soft-all-few", "outside-known-few", "soft-gibbs-few"),
     *(
         pytest.param(name, marks=pytest.mark.slow)  # a runtime that has not seen their kernels compiles for minutes
         for name in (
@@ -253,6 +310,10 @@ CHANGES = {
     ],
     "data_weight": [(EXACT, {"known": 0.2}, 16.0, 0.0), (FEW, {"known": 0.2}, 16.0, 1.0)],
     "guide_weight": [(EXACT, {"labels": 3}, 1.0, 0.0), (FEW, {"labels": 0}, 1.0, 0.1)],
+    "soft_weight": [
+        (EXACT | {"categorical": True}, {"kinds": 3, "soft": ("categories",)}, 1.0, 0.0),
+        (FEW, TWO | {"soft": ("images",)}, 1.0, 4.0),
+    ],
     "labels": [(EXACT | {"labels": True}, {"labels": 3}, True, False), (FEW, {"labels": 4}, True, False)],
 }
 

@@ -14,7 +14,7 @@ def test_each_candidate_has_its_penalty(machine, p, strength):
     found, candidates = p.distances(REFERENCE, strength)
     expected = found.distance + p.penalty()[: candidates.size, None]
     numbers = np.arange(candidates.size)[:, None]
-    for term, more in ((p.phased(REFERENCE), ()), (p.scattered(REFERENCE), (candidates,))):
+    for term, more in ((p.phased(REFERENCE), ()), (p.scattered(REFERENCE), (candidates,)), (p.kinds(REFERENCE), ())):
         expected = expected + term.cost(numbers, p.sites, *more) if term else expected
     for m in (REFERENCE, machine):
         distances, candidates = p.distances(m, strength)

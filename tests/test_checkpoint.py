@@ -204,7 +204,8 @@ def test_finished_realisations_are_kept(file):
     assert tree["numbers"] == made and len(made) >= 2
     assert_same_bits(tree["pictures"][..., 0], whole[made])
     for numbers in ([0, 1], [2, 0]):  # several machines end in any order
-        edited(file, {"numbers": numbers, "pictures": whole[numbers][..., None]})
+        sources = np.zeros((2, *whole.shape[1:], 0), np.int32)  # that are not asked for
+        edited(file, {"numbers": numbers, "pictures": whole[numbers][..., None], "sources": sources})
         kept, made[:] = file.read_bytes(), []
         found, _ = run(simulated, callback=callback, checkpoint=file)
         assert made == [number for number in range(3) if number not in numbers]

@@ -284,3 +284,113 @@ def refused(folder, args, words):
 @pytest.mark.parametrize("case", BAD)
 def test_bad_input_gets_one_sentence_and_writes_nothing(folder, case):
     refused(folder, *BAD[case])
+
+
+@pytest.fixture
+def maps(folder):
+    """Maps of the size of the training image in several formats."""
+    region = np.arange(20) < np.full((16, 1), 12)
+    p = np.stack([np.where(region, 0.2, 0.9), np.where(region, 0.8, 0.1)], -1)
+    image.write(folder / "region.png", region.astype(np.uint8) * np.uint8(255))
+    write_grid(folder / "region.gslib", {"in": region.astype(np.uint8)})
+    np.save(folder / "p.npy", p)
+    write_grid(folder / "p.gslib", {"clay": p[..., 0], "sand": p[..., 1]})
+    lines = [f"{j},{i},{p[i, j, 0]},{p[i, j, 1]}" for i, j in np.ndindex(16, 20)]
+    (folder / "p.csv").write_text("x,y,clay,sand\n" + "\n".join(lines) + "\n")
+    image.write(folder / "angles.tif", np.where(region, 0, 90).astype(np.float32))
+    np.save(folder / "sizes.npy", np.where(region, 1.0, 0.5))
+    np.save(folder / "numbers.npy", region.astype(np.uint8))
+    np.save(folder / "bad.npy", p * 2)
+    return {"region": region, "probabilities": np.moveaxis(p, -1, 0)}
+
+
+def test_maps_are_those_of_the_function(folder, maps):
+    facies = pixels(folder, "facies.png")
+    expected = simdtex.simulate(facies, 1, **maps, categorical=True, **OPTIONS)
+    for region in ("region.png", "region.gslib"):
+        for p in ("p.npy", "p.gslib", "p.csv"):
+            found = made(folder, "facies.png", "--region", region, "--probabilities", p, "--categorical")
+            assert np.array_equal(found, expected), (region, p)
+    rotation, scale = pixels(folder, "angles.tif"), np.load(folder / "sizes.npy")
+    expected = simdtex.simulate(facies, 1, rotation=rotation, scale=scale, **OPTIONS)
+    assert np.array_equal(made(folder, "facies.png", "--rotation", "angles.tif", "--scale", "sizes.npy"), expected)
+    both, number = [pixels(folder, name) for name in ("grey.png", "second.png")], np.load(folder / "numbers.npy")
+    expected = simdtex.simulate(both, 1, image_map=number, **OPTIONS)
+    assert np.array_equal(made(folder, "grey.png", "second.png", "--image-map", "numbers.npy"), expected)
+
+
+def test_the_size_is_that_of_a_map(folder, maps):
+    np.save(folder / "small.npy", np.full((7, 9, 2), 0.5))
+    assert made(folder, "facies.png", "--probabilities", "small.npy", "--categorical").shape == (1, 7, 9)
+
+
+def test_a_source_map_is_in_the_file(folder):
+    result = simulate(folder, "grey.png", "--source", "--finish", 0, "-o", "out.nc")
+    assert result.exit_code == 0, result.output
+    with xarray.open_dataset(folder / "out.nc") as found:
+        grey = pixels(folder, "grey.png")
+        assert np.array_equal(grey[found.source_row, found.source_column], found.simulation)
+
+
+def test_cells_outside_of_the_region_are_unknown_in_a_grid(folder, maps):
+    result = simulate(folder, "facies.png", "--region", "region.png", "--categorical", "-o", "out.gslib")
+    assert result.exit_code == 0, result.output
+    values = read_grid(folder / "out.gslib").values["simulation__real0"][0]
+    assert np.array_equal(np.isnan(values), ~maps["region"])
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--probabilities", "bad.npy", "--categorical"], "row 0, column 0 are 0.4, 1.6; give numbers of 0 or more"),
+        (["--probabilities", "p.npy"], "probabilities are of categories; give categorical=True"),
+        (["--rotation", "angles.tif", "--size", "8x8"], "rotation is 16x20 and has to be 8x8"),
+        (["--scale", "nowhere.npy"], "nowhere.npy does not exist"),
+        (["--image-map", "numbers.npy"], "image_map has 1 and there is 1 training image"),
+        (["--source", "-o", "out.gslib"], "is a grid, which holds no source map: end its name in .zarr, .nc or .npz"),
+        (["--source", "--report", "report"], "leave --source and --region out"),
+    ],
+)
+def test_maps_that_do_not_fit_are_refused_before_the_run(folder, maps, words, sentence):
+    before = sorted(folder.iterdir())
+    result = simulate(folder, "facies.png", *words, *([] if "-o" in words else ["-o", "out.npz"]))
+    assert result.exit_code != 0 and sentence in " ".join(result.output.split())
+    assert sorted(folder.iterdir()) == before
+
+
+def estimate(folder, *args):
+    words = [f"{folder}/{word}" if word.endswith(ENDS) else word for word in map(str, args)]
+    return CliRunner().invoke(main, ["estimate", *words, "--device", "reference"])
+
+
+@pytest.mark.parametrize("out", ["out.nc", "out.gslib"])
+def test_an_estimate_is_that_of_the_function(folder, out):
+    how = ["--several", "most", "--nearest", 3, "--size", "20x16"]
+    result = estimate(folder, "ti.gslib", "--known", "wells.eas", "--categorical", *how, "-o", out)
+    assert result.exit_code == 0 and "maps of 20x16" in result.output, result.output
+    expected = simdtex.estimate(
+        read_grid(folder / "ti.gslib").values["facies"][0], known=folder / "wells.eas", shape=(16, 20),
+        origin=(1005, 2002.5, 3), cell=(10, 5, 2), several="most", nearest=3, categorical=True, device="reference",
+    )  # fmt: skip
+    if out == "out.nc":
+        with xarray.open_dataset(folder / out) as found:
+            xarray.testing.assert_identical(found, expected)
+        return
+    grid = read_grid(folder / out)
+    assert (grid.origin, grid.cell) == ((1005, 2002.5, 3), (10, 5, 2))
+    assert np.array_equal(grid.values["probability_3"][0], expected.probability.sel(category=3))
+    assert np.array_equal(grid.values["entropy"][0], expected.entropy)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["grey.png"], "there is nothing to estimate from; give --known"),
+        (["colour.png", "--known", "wells.csv"], "has several channels; give a training image of one variable"),
+        (["grey.png", "--known", "wells.csv", "--nearest", 99], "nearest is 99; give 64 or fewer"),
+    ],
+)
+def test_an_estimate_of_nothing_is_refused(folder, words, sentence):
+    result = estimate(folder, *words, "-o", "out.npz")
+    assert result.exit_code != 0 and sentence in " ".join(result.output.split())
+    assert not (folder / "out.npz").exists()

@@ -81,6 +81,7 @@ def reflecting(draw):
         count=24,
         regular=draw(st.booleans()),
         between=draw(st.booleans()),
+        soft=draw(st.sampled_from([0, 1, 2])),
     )
 
 

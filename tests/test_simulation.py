@@ -228,7 +228,7 @@ def test_a_generator_is_asked_for_a_seed_that_gives_the_same_again():
     assert np.array_equal(found.values, simulate(n=1, rng=np.random.default_rng(3)).values)
 
 
-DIGESTS = ("training_image", "hard_data", "guide", "mask")
+DIGESTS = ("training_image", "hard_data", "guide", "mask", "region", "probabilities", "image_map", "rotation", "scale")
 FLOATS = texture((16, 20), dtype=np.float32)
 
 
@@ -238,8 +238,13 @@ def digests(**change):
         "known": holed(),
         "guide": (texture((16, 20), seed=7), texture(SHAPE, seed=8)),
         "mask": np.arange(20) < np.full((16, 1), 14),
+        "region": ~np.isnan(holed()) | (np.arange(14) < 9),
+        "image_map": np.zeros(SHAPE),
+        "rotation": np.zeros(SHAPE),
+        "scale": np.ones(SHAPE),
     } | change
-    attrs = simulate(n=1, levels=1, free_sweeps=0, **arguments).attrs
+    kind = {"categorical": True} if "probabilities" in change else {}
+    attrs = simulate(n=1, levels=1, free_sweeps=0, **kind, **arguments).attrs
     return {name: attrs.get(name) for name in DIGESTS}
 
 
@@ -257,6 +262,10 @@ CHANGES = {
     ],
     "hard_data": [{"known": with_value(holed(), 0.5)}, {"known": None}],
     "guide": [{"guide": (texture((16, 20), seed=7), texture(SHAPE, seed=9))}, {"guide": None}],
+    "region": [{"region": np.ones(SHAPE, bool)}, {"region": None}],
+    "image_map": [{"image_map": np.ones((1, *SHAPE))}, {"image_map": None}],
+    "rotation": [{"rotation": np.full(SHAPE, 5.0)}, {"rotation": None}],
+    "scale": [{"scale": np.full(SHAPE, 2.0)}, {"scale": None}],
     "mask": [{"mask": np.arange(20) < np.full((16, 1), 15)}, {"mask": None}],
 }
 
@@ -264,7 +273,7 @@ CHANGES = {
 @pytest.mark.parametrize(("name", "number"), [(name, k) for name in CHANGES for k in range(len(CHANGES[name]))])
 def test_a_digest_changes_with_its_array_and_with_nothing_else(name, number):
     before, after = digests(), digests(**CHANGES[name][number])
-    assert all(before.values()) and after[name] != before[name]
+    assert all(before[one] for one in CHANGES) and after[name] != before[name]
     # hard data are of the training image's type
     kept = [other for other in DIGESTS if other != name and not (number == 2 and other == "hard_data")]
     assert [after[other] for other in kept] == [before[other] for other in kept]
@@ -317,8 +326,108 @@ def test_without_xarray_a_sentence_says_what_to_install(monkeypatch):
         simulate()
 
 
+def test_cells_outside_of_the_region_take_no_part():
+    region = np.ones(SHAPE, bool)
+    region[:4, :6] = region[7, 3:] = False
+    known = region & (holed() > 0)
+    data, outside = np.where(known, 1.0, np.nan), np.repeat(~region[None], 2, 0)
+    for training, missing in ((FLOATS, np.nan), (TRAINING, 255)):
+        found = simulate(training, region=region, known=data, source=True)
+        values, row = found.simulation.values, found.source_row.values
+        assert np.array_equal(found.region, region) and found.region.dims == ("y", "x")
+        assert np.array_equal(np.isnan(values) if np.isnan(missing) else values == missing, outside)
+        assert np.array_equal(row < 0, outside | known)
+        assert found.attrs.get("missing") == (None if np.isnan(missing) else missing)
+        assert np.array_equal(np.isnan(found.simulation.where(found.region)), outside)
+    other = simulate(FLOATS, region=region).attrs
+    assert "hard_data" not in other and "region" in other
+
+
+def test_a_narrow_region_is_simulated_to_its_end():
+    region = np.zeros(SHAPE, bool)
+    region[5, 3:9] = region[2, 2] = True
+    found = simulate(CATEGORIES, region=region, categorical=True, levels=2)
+    assert np.isin(found.values[:, region], CATEGORIES).all() and (found.values[:, ~region] == 255).all()
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_the_source_map_of_every_realisation(several):
+    training = np.arange(16 * 20, dtype=np.int32).reshape(16, 20)
+    data = holed()
+    options = {"known": np.where(data > 0, 7, np.nan), "finish": 0.0}
+    found = simulate([training, -training] if several else training, source=True, **options)
+    assert set(found.data_vars) == {"simulation", "source_row", "source_column"} | (
+        {"source_image"} if several else set()
+    )
+    assert found.attrs == found.simulation.attrs and found.source_row.dims == ("realisation", "y", "x")
+    taken, known = (found.source_row >= 0).values, data > 0
+    assert np.array_equal(taken, ~known | np.zeros((2, 1, 1), bool))
+    signs = np.where(found.source_image == 1, -1, 1)[taken] if several else 1
+    assert (signs * training[found.source_row.values[taken], found.source_column.values[taken]]).tolist() == (
+        found.simulation.values[taken].tolist()
+    )
+    alone = simulate([training, -training] if several else training, **options)
+    xarray.testing.assert_identical(alone, found.simulation)
+
+
+def test_a_stopped_simulation_goes_on_with_its_source_maps(tmp_path):
+    path, whole = tmp_path / "run.ckpt", simulate(n=3, source=True)
+
+    def stop(progress):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        simulate(n=3, source=True, jobs=1, checkpoint=path, callback=stop)
+    with pytest.raises(ValueError, match="source"):
+        simulate(n=3, checkpoint=path)
+    with pytest.raises(ValueError, match="region"):
+        simulate(n=3, source=True, checkpoint=path, region=np.arange(14) < np.full((12, 1), 9))
+    xarray.testing.assert_identical(simulate(n=3, source=True, checkpoint=path), whole)
+
+
+def test_the_size_is_that_of_a_map():
+    assert simulate(n=1, shape=None, rotation=np.zeros((7, 9))).shape == (1, 7, 9)
+    assert simulate(n=1, shape=None, image_map=np.ones((1, 7, 9))).shape == (1, 7, 9)
+
+
+def test_a_table_of_probabilities(tmp_path):
+    path = tmp_path / "soft.csv"
+    path.write_text("x,y,none,some,more\n3,4,0,0,1\n7,2,1,0,0\n5,5,,,\n")
+    found = simulate(CATEGORIES, categorical=True, probabilities=path)
+    assert (found.values[:, 4, 3] == 7).all() and (found.values[:, 2, 7] == 0).all()
+    table = np.full((3, *SHAPE), np.nan)
+    table[:, 4, 3], table[:, 2, 7] = [0, 0, 1], [1, 0, 0]
+    same = simulate(CATEGORIES, categorical=True, probabilities=table)
+    assert_same_bits(found.values, same.values)
+    assert_same_bits(
+        simulate(CATEGORIES, categorical=True, probabilities=np.ma.masked_invalid(table)).values, same.values
+    )
+
+
 NOTHING = np.full(SHAPE, np.nan)
+THIRDS = np.full((3, *SHAPE), 1 / 3)
+NAMED = {"training": CATEGORIES, "categorical": True}
 BAD = {
+    "no categories": ({"probabilities": THIRDS}, ValueError, "are of categories; give categorical=True"),
+    "too few": (NAMED | {"probabilities": THIRDS[:2]}, ValueError, "2x12x14 .* the 3 categories 0, 3, 7; give"),
+    "another size": (NAMED | {"probabilities": THIRDS[:, :5]}, ValueError, "is 3x5x14 and has to be 3x12x14"),
+    "no sum": (NAMED | {"probabilities": THIRDS * 2}, ValueError, "row 0, column 0 are 0.6.*add up to 1"),
+    "below 0": (NAMED | {"probabilities": THIRDS * [[[-1]], [[2]], [[2]]]}, ValueError, "of 0 or more that add up"),
+    "no table": (NAMED | {"probabilities": "nowhere.csv"}, ValueError, "nowhere.csv does not exist"),
+    "words": ({"rotation": np.full(SHAPE, "a")}, TypeError, "rotation holds .* give real numbers"),
+    "scale": ({"scale": np.full(SHAPE, 3.0)}, ValueError, "scale has 3 to 3; give factors of 0.5 to 2"),
+    "infinite": ({"rotation": np.full(SHAPE, np.inf)}, ValueError, "rotation has infinite values"),
+    "no such image": ({"image_map": np.ones(SHAPE)}, ValueError, "image_map has 1 and there is 1 training image;"),
+    "no weight": ({"image_map": np.zeros((1, *SHAPE))}, ValueError, "weights below 0, or 0 alone"),
+    "shares, too": ({"image_map": np.zeros(SHAPE), "shares": (1.0,)}, ValueError, "leave shares out"),
+    "no region": ({"region": np.zeros(SHAPE, bool)}, ValueError, "region is False everywhere"),
+    "numbers": ({"region": np.ones(SHAPE)}, TypeError, "region holds float64 values; give True and False"),
+    "region's size": ({"region": np.ones((3, 4), bool)}, ValueError, "region is 3x4 and the output 12x14"),
+    "data outside": (
+        {"region": np.arange(14) < np.full((12, 1), 3), "known": np.where(NOTHING < 0, 0, 20 + 0 * np.indices(SHAPE)[0])
+         * np.where(np.indices(SHAPE)[1] == 5, 1, np.nan)}, ValueError, "row 0, column 5, outside region; leave"),
+    "no missing value": (
+        {"training": TRAINING > 90, "region": np.arange(14) < np.full((12, 1), 3)}, ValueError, "as int16"),
     "none": ({"n": 0}, ValueError, "n is 0; give 1 or more"),
     "first": ({"first": -1}, ValueError, "first is -1; give 0 or more"),
     "jobs": ({"jobs": 0}, ValueError, "jobs is 0; give 1 or more"),

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // What candidate p costs a site beside its distance, simdtex.ops.costs:
 //
-//   penalty_p + max(0, sum_c (certain (x_c - y_c))^2 - free) + sum_r (hard (x_r - y_r))^2
+//   penalty_p + max(0, sum_c (certain (x_c - y_c))^2 - free) + sum_r (hard (x_r - y_r))^2 + sum_k dear_k[kind_k]
 //
 // the penalty for its use; the difference of their phases where the sample is regular (-D WAVES: cosines and sines);
-// and the differences from data r that lie between the sites of the level (-D SCATTERED: channels of each).
+// the differences from data r that lie between the sites of the level (-D SCATTERED: channels of each); and what its
+// kinds, as its category, cost at the site (-D KINDS: kinds of a candidate).
 #ifndef SIMDTEX_COSTS_H
 #define SIMDTEX_COSTS_H
 #include "common/confidence.h"
@@ -15,9 +16,14 @@
 #ifndef SCATTERED
 #define SCATTERED 0
 #endif
+#ifndef KINDS
+#define KINDS 0
+#endif
 
 // penalty (listed,)        of each candidate
 // waves   (WAVES, listed)  of each candidate
+// kind_   (KINDS, listed)  row of `dear` that each candidate's kinds have
+// dear    (.., area)       what a candidate of a kind costs at each site, 0 or more
 // phases  (WAVES, area)    of each site
 // begin   (area + 1,)      where the data of the site at each pixel index begin
 // reach_  (n,)             pixel offset of each datum in the sample
@@ -28,9 +34,16 @@
     __global const float *restrict penalty, __global const float *restrict waves, const int listed,                    \
         __global const ushort *restrict phases, const int area_, const float certain_, const float free_,              \
         __global const int *restrict begin_, __global const int *restrict reach_, __global const ushort *restrict told, \
-        const float hard_, __global const float *restrict pixels_, const int plane_, __global const int *restrict at_
+        const float hard_, __global const float *restrict pixels_, const int plane_, __global const int *restrict at_, \
+        __global const ushort *restrict kind_, __global const float *restrict dear
 #define PLUS_COSTS(d, p, site)                                                                                         \
-    ((d) + penalty[p] + apart_in_phase(waves + (p), listed, phases + (site), area_, certain_, free_) + MISFIT(p, site))
+    ((d) + penalty[p] + apart_in_phase(waves + (p), listed, phases + (site), area_, certain_, free_) +                 \
+     MISFIT(p, site) + OF_KIND(p, site))
+#if KINDS
+#define OF_KIND(p, site) of_kind(kind_ + (p), listed, dear + (site), area_)
+#else
+#define OF_KIND(p, site) 0.0f
+#endif
 #if SCATTERED
 #define MISFIT(p, site)                                                                                                \
     misfit(begin_[site], begin_[(site) + 1], reach_, told, hard_, pixels_ + at_[p], plane_)
@@ -47,6 +60,14 @@ inline float apart_in_phase(__global const float *y, const int listed, __global 
         d = fma(e, e, d);
     }
     return fmax(d - free, 0.0f);
+}
+
+inline float of_kind(__global const ushort *kind, const int listed, __global const float *dear, const int area)
+{
+    float d = 0.0f;
+    for (int k = 0; k < KINDS; ++k)
+        d += dear[kind[k * listed] * area];
+    return d;
 }
 
 inline float misfit(const int begin, const int end, __global const int *reach, __global const ushort *told,

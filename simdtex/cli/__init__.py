@@ -22,6 +22,8 @@ GROUPS = {
     },
     "Realisations of a training image": {
         "simulate": "Simulate what TRAINING_IMAGE shows: realisations that look like it and honour data.",
+        "estimate": "Estimate what data say of each cell: probabilities of categories, or mean and variance, from "
+        "TRAINING_IMAGE.",
     },
     "Runs that were stopped": {
         "resume": "Go on with the run whose state is in FILE, and write what its command writes.",

@@ -19,6 +19,10 @@ TABLES = (".csv", ".tsv", ".txt", ".dat")
 """How the name of a table of known values ends; a file of any other name is a picture."""
 
 
+MAPS = ("region", "probabilities", "image_map", "rotation", "scale")
+"""The maps of a simulation, which have files of their own."""
+
+
 class Material(NamedTuple):
     """Pictures of one type: ``paths``, and their ``pixels``, which all have the axes of the first.
 
@@ -229,6 +233,22 @@ def check_source_map(path: Path | None, samples: Material, *, everywhere: bool =
     if path.suffix.lower() == ".png" and (far or not everywhere):
         what = "positions over 65535" if far else "pixels that are from no sample"
         raise ValueError(f"{path} cannot hold {what}; end its name in .npz instead")
+
+
+def read_map(name: str, path: Path) -> HardData | NDArray[Any]:
+    """Read a map of `MAPS`: of probabilities a table, too; any other a picture or a grid, with channels in front."""
+    from simdtex.io import grids, image
+    from simdtex.io.hard_data import read_hard_data
+
+    if name == "probabilities" and (path.suffix.lower() in TABLES or grids.kind_of(path) == "points"):
+        return read_hard_data(path)
+    if name == "region" and grids.kind_of(path) is None:
+        return image.read_mask(path, image.read(path).pixels.shape)
+    pixels, _ = read_pixels(path)
+    if channels(pixels) == 1:
+        pixels = pixels.reshape(pixels.shape[:2])
+        return pixels > 0 if name == "region" else pixels
+    return np.moveaxis(pixels, -1, 0)
 
 
 def read_known(path: Path, like: NDArray[Any], deep: bool = False) -> HardData | np.ma.MaskedArray[Any, Any]:

@@ -174,6 +174,37 @@ GUIDE = option(
     help="mrf: take each pixel from places whose sample guide equals the output guide there: two pictures of labels or "
     "numbers. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples.",
 )
+PLACES = (
+    option(
+        "--origin",
+        metavar="X,Y[,Z]",
+        group=DATA,
+        help="Begin at this centre of the first cell, in the units of the table of --known.  [that of a grid "
+        "TRAINING_IMAGE, else 0,0]",
+    ),
+    option(
+        "--cell",
+        metavar="DX,DY[,DZ]",
+        group=DATA,
+        help="Make cells of this size, in the same units.  [that of a grid TRAINING_IMAGE, else 1,1]",
+    ),
+    option(
+        "--several",
+        words=("refuse", "mean", "most"),
+        group=DATA,
+        help="Take this for data of a table that lie in one cell and differ: an error, their mean, or the most "
+        "frequent.  [refuse]",
+    ),
+)
+
+
+def places(command: Command) -> Command:
+    """Add the options that say where cells and data lie."""
+    for one in reversed(PLACES):
+        command = one(command)
+    return command
+
+
 SOURCE_MAP = option(
     "--source-map",
     group=OUTPUTS,

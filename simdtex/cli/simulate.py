@@ -12,11 +12,11 @@ from typing import Any
 import click
 import numpy as np
 
-from simdtex.cli.command import DATA, DEVICE_GROUP
+from simdtex.cli.command import DATA, DEVICE_GROUP, OUTPUTS
 from simdtex.cli.guides import read_data
-from simdtex.cli.inputs import Material, output_shape, read_material
+from simdtex.cli.inputs import MAPS, Material, output_shape, read_map, read_material
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import GUIDE, KNOWN, SAMPLE_MASK, given, numbers, option, report_option, size_option
+from simdtex.cli.options import GUIDE, KNOWN, SAMPLE_MASK, given, numbers, option, places, report_option, size_option
 from simdtex.cli.places import EITHER, READ
 
 
@@ -38,30 +38,54 @@ from simdtex.cli.places import EITHER, READ
 )
 @click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
 @click.option("--first", default=0, show_default=True, type=int, help="Begin with the realisation of this number.")
-@size_option("that of --known, else of TRAINING_IMAGE", "realisations")
-@option(
-    "--origin",
-    metavar="X,Y[,Z]",
-    group=DATA,
-    help="Begin at this centre of the first cell, in the units of the table of --known.  [that of a grid "
-    "TRAINING_IMAGE, else 0,0]",
-)
-@option(
-    "--cell",
-    metavar="DX,DY[,DZ]",
-    group=DATA,
-    help="Make cells of this size, in the same units.  [that of a grid TRAINING_IMAGE, else 1,1]",
-)
-@option(
-    "--several",
-    words=("refuse", "mean", "most"),
-    group=DATA,
-    help="Take this for data of a table that lie in one cell and differ: an error, their mean, or the most frequent.  "
-    "[refuse]",
-)
+@size_option("that of --known or of a map, else of TRAINING_IMAGE", "realisations")
+@places
 @KNOWN
 @SAMPLE_MASK
 @GUIDE
+@option(
+    "--region",
+    type=READ,
+    metavar="FILE",
+    group=DATA,
+    help="Make cells only where this picture or grid of the size of a realisation is white, or above 0 in a grid.",
+)
+@option(
+    "--probabilities",
+    type=READ,
+    metavar="FILE",
+    group=DATA,
+    help="Follow these probabilities of the categories, in ascending order: a table of x, y and one for each, or a "
+    ".npy, .tif or grid with one channel for each; NaN where nothing is said.",
+)
+@option(
+    "--image-map",
+    type=READ,
+    metavar="FILE",
+    group=DATA,
+    help="Take each cell from the TRAINING_IMAGE of this number, from 0 on; or, with a channel for each, follow these "
+    "weights.",
+)
+@option(
+    "--rotation",
+    type=READ,
+    metavar="FILE",
+    group=DATA,
+    help="Draw each cell from TRAINING_IMAGE turned by so many degrees from x to y, in eighths of a turn.",
+)
+@option(
+    "--scale",
+    type=READ,
+    metavar="FILE",
+    group=DATA,
+    help="Draw each cell from TRAINING_IMAGE enlarged by this factor, 0.5 to 2, in powers of the square root of 2.",
+)
+@option(
+    "--source",
+    is_flag=True,
+    group=OUTPUTS,
+    help="Write where in TRAINING_IMAGE each cell is from, too: .zarr, .nc or .npz.",
+)
 @option(
     "--jobs",
     group=DEVICE_GROUP,
@@ -78,6 +102,7 @@ def simulate(
     origin: str | None,
     cell: str | None,
     several: str | None,
+    source: bool,
     **options: Any,
 ) -> Task:
     """Simulate what TRAINING_IMAGE shows: realisations that look like it and honour data.
@@ -93,18 +118,23 @@ def simulate(
     pixels = material.pixels[0]
     data = read_data(material, options)
     known = data["known"]
-    shape = output_shape(size, pixels, known, pixels, axes=2 + material.deep)
-    lies = _lies(material, origin, cell)
+    files = {name: options.pop(name) for name in MAPS}
+    maps = {name: read_map(name, path) for name, path in files.items() if path}
+    layers = [one[0] if one.ndim == 3 else one for one in maps.values() if isinstance(one, np.ndarray)]
+    shape = output_shape(size, pixels, known, *layers, pixels, axes=2 + material.deep)
+    lies = lies_of(material, origin, cell)
     place = lies | ({} if several is None else {"several": several})
-    if check_realisations_path(output) in SUFFIXES:
+    if check_realisations_path(output, source=source) in SUFFIXES:
         check_grid(output, material.pixels, **lies)
     writers: list[Any] = [lambda made, run: write_realisations(output, made)]
     if report:
+        if source or "region" in maps:
+            raise ValueError("--report is of values of all cells alone; leave --source and --region out")
         _check_report(report, material, shape, getattr(known, "values", known))
         rows = partial(_rows, known, shape, place)
         flat = known is not None and not material.deep
         writers.append(lambda made, run: _report(report, pixels, made, rows() if flat else None))
-    inputs = data | given(options) | {"shape": shape} | place
+    inputs = data | given(options) | {"shape": shape, "source": source} | maps | place
 
     def make(full_output: bool, **call: Any) -> tuple[Any, Output]:
         made = simulate(material.array, number, **inputs, **call)
@@ -118,7 +148,7 @@ def simulate(
     )
 
 
-def _lies(material: Material, origin: str | None, cell: str | None) -> dict[str, Any]:
+def lies_of(material: Material, origin: str | None, cell: str | None) -> dict[str, Any]:
     """Return the origin and the size of cells: as given, else of a training image that is a grid, else None."""
     options = (("--origin", origin), ("--cell", cell))
     found: list[Any] = [None if text is None else numbers(name, text) for name, text in options]

@@ -21,7 +21,7 @@ from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable,
 from simdtex.io.grids import SUFFIXES, write_grid
 
 if TYPE_CHECKING:
-    from xarray import DataArray
+    from xarray import DataArray, Dataset
 
 __all__ = ["check_realisations_path", "write_realisations"]
 
@@ -34,19 +34,21 @@ _NEEDED: dict[str, tuple[str, ...]] = {
 """The libraries that each suffix needs."""
 
 
-def check_realisations_path(path: PathLike) -> str:
+def check_realisations_path(path: PathLike, *, source: bool = False) -> str:
     """Check before a long simulation that its realisations can be written; return the suffix in lower case.
 
     Raises
     ------
     ValueError
-        The suffix is unknown, the folder is missing or not writable, `path` is something else than what would be
-        replaced, or a library is not installed.
+        The suffix is unknown, or is of a grid and there is a source map; the folder is missing or not writable, `path`
+        is something else than what would be replaced, or a library is not installed.
     """
     target = Path(path)
     suffix = target.suffix.lower()
     if suffix not in _NEEDED:
         raise ValueError(f"{target} names no format of realisations: end its name in one of {', '.join(_NEEDED)}")
+    if source and suffix in SUFFIXES:
+        raise ValueError(f"{target} is a grid, which holds no source map: end its name in .zarr, .nc or .npz")
     for library in _NEEDED[suffix]:
         if find_spec(library) is None:
             raise ValueError(f"{library} is not installed; pip install 'simdtex[simulate]'")
@@ -61,7 +63,7 @@ def check_realisations_path(path: PathLike) -> str:
     return suffix
 
 
-def write_realisations(path: PathLike, array: DataArray) -> None:
+def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
     """Write realisations in the format of the suffix, atomically.
 
     Parameters
@@ -71,10 +73,13 @@ def write_realisations(path: PathLike, array: DataArray) -> None:
         or ``.npz`` for ``numpy.load``: ``values``, each coordinate under its name, and ``attributes``, a JSON text.
         ``.gslib`` (text) and ``.sgems`` are grids of which each realisation is a variable, called by the array's name,
         ``__real`` and its number, as SGeMS does: `simdtex.write_grid`; they keep origin and size of cells, and no
-        attributes. An existing file or Zarr store is replaced.
-    array : DataArray, (realisation, y, x) or (realisation, y, x, variable)
+        attributes, and cells outside of the coordinate ``region`` are unknown values there. An existing file or Zarr
+        store is replaced.
+    array : DataArray, (realisation, y, x) or (realisation, y, x, variable), or Dataset
         What `simdtex.simulate` returns; attributes are texts and numbers. A grid may have layers, (realisation, z, y,
-        x), and its coordinates must be evenly spaced and ascend. ``.zarr`` and ``.nc`` alone need xarray.
+        x), and its coordinates must be evenly spaced and ascend. ``.zarr`` and ``.nc`` alone need xarray. A Dataset is
+        that of ``source=True``: ``xarray.open_dataset`` reads it, an ``.npz`` has its variables by name, and a grid
+        cannot hold it.
 
     Raises
     ------
@@ -85,21 +90,26 @@ def write_realisations(path: PathLike, array: DataArray) -> None:
     """
     if not hasattr(array, "coords"):
         raise TypeError(f"the realisations are of type {type(array).__name__}: give an xarray.DataArray")
-    suffix = check_realisations_path(path)
+    source = hasattr(array, "data_vars")
+    suffix = check_realisations_path(path, source=source)
     if suffix in SUFFIXES:
         origin, cell = zip(*(_axis(array, axis) for axis in "xyz"), strict=True)
         write_grid(path, dict(_variables(array)), origin=origin, cell=cell)
         return
     if suffix == ".npz":
         coordinates: dict[str, Any] = {str(name): np.asarray(one.values) for name, one in array.coords.items()}
+        variables: Any = array.data_vars if source else {"values": array}
+        coordinates |= {name: one.values for name, one in variables.items()}
         attributes = np.array(json.dumps(array.attrs))
         with atomic_path(path) as temporary, temporary.open("wb") as file:
-            np.savez_compressed(file, values=array.values, attributes=attributes, **coordinates)
+            np.savez_compressed(file, attributes=attributes, **coordinates)
         return
-    named = array.rename(array.name or "realisations")
+    named: Any = array
+    named = named if source else named.rename(named.name or "realisations")
     if suffix == ".nc":
         # in memory first, since HDF5 does not survive a full disk
-        data = named.to_netcdf(engine="h5netcdf", encoding={named.name: {"zlib": True}})
+        packed = {name: {"zlib": True} for name in (named.data_vars if source else [named.name])}
+        data = named.to_netcdf(engine="h5netcdf", encoding=packed)
         with atomic_path(path) as temporary:
             temporary.write_bytes(data)
         return
@@ -108,13 +118,15 @@ def write_realisations(path: PathLike, array: DataArray) -> None:
         named.to_zarr(store, mode="w", zarr_format=3)
 
 
-def _variables(array: DataArray) -> Iterator[tuple[str, Any]]:
+def _variables(array: Any) -> Iterator[tuple[str, Any]]:
     """Yield the name and the values, (z, y, x) or (y, x), of every variable of every realisation."""
     dims = [str(dim) for dim in array.dims]
     wanted: list[str] = [dim for dim in ("realisation", "variable", "z", "y", "x") if dim in dims]
     if sorted(dims) != sorted(wanted) or wanted[-2:] != ["y", "x"]:
         raise ValueError(f"the realisations have the dimensions {', '.join(dims)}: give realisation, y and x")
     planes = np.asarray(array.values).transpose([dims.index(dim) for dim in wanted])
+    if "region" in array.coords:
+        planes = np.ma.masked_array(planes, np.broadcast_to(~array.coords["region"].values, planes.shape))
     names = [str(array.name or "realisations")]
     for dim, joint in (("variable", "_"), ("realisation", "__real")):
         if dim in dims:
@@ -125,7 +137,7 @@ def _variables(array: DataArray) -> Iterator[tuple[str, Any]]:
     yield from zip(names, planes.reshape(-1, *sides), strict=True)
 
 
-def _axis(array: DataArray, axis: str) -> tuple[float, float]:
+def _axis(array: Any, axis: str) -> tuple[float, float]:
     """Return the first coordinate along an axis and the size of a cell, which is that of the attribute if there is."""
     if axis not in array.coords:
         return 0.0, float(array.attrs.get(f"cell_{axis}", 1.0))

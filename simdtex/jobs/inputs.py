@@ -37,8 +37,8 @@ class Inputs(NamedTuple):
 
     def identity(self) -> dict[str, Any]:
         """Return all arrays by the names of the arguments, as the identity of a run."""
-        given = self.given
-        values = given and (np.where(given.known, given.values, 0), given.known)
+        given = self.given if self.given and self.given.told.any() else None
+        values = given and (np.where(given.told, given.values, 0), given.told)
         return {
             **{"sample": (self.pictures.pixels, self.pictures.known), "mask": self.pictures.usable, "known": values},
             **{"known_source": given and given.place, "guide": self.guide},
@@ -109,20 +109,20 @@ def is_several(sample: Any, channel_axis: int | None) -> bool:
     return (2 if channel_axis is None else 3) in axes and min(axes) >= 2
 
 
-def check_mask(mask: Any, shape: tuple[int, ...]) -> Mask:
+def check_mask(mask: Any, shape: tuple[int, ...], name: str = "mask", of: str = "the picture") -> Mask:
     """Return a mask as a bool array of a shape."""
-    found = _unmasked("mask", mask)
+    found = _unmasked(name, mask)
     if found.dtype != np.bool_:
-        raise TypeError(f"mask holds {found.dtype} values; give True and False")
-    _check_size("mask", found.shape, "the picture", shape)
+        raise TypeError(f"{name} holds {found.dtype} values; give True and False")
+    _check_size(name, found.shape, of, shape)
     return found
 
 
-def as_known(known: Any) -> HardData | NDArray[Any]:
+def as_known(known: Any, name: str = "known") -> HardData | NDArray[Any]:
     """Return known values as a table, which a path is read to, or as an array."""
     if isinstance(known, (str, os.PathLike)):
         return read_hard_data(known)
-    return known if isinstance(known, HardData) else as_array("known", known)
+    return known if isinstance(known, HardData) else as_array(name, known)
 
 
 def check_known(

@@ -12,18 +12,20 @@ from importlib.metadata import version
 from math import prod
 from queue import SimpleQueue
 from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from simdtex.checkpoint import Checkpoint, Checkpointing, digest, opened
 from simdtex.driver import check_sides, drive, restored
-from simdtex.io.grids import frame
+from simdtex.io.grids import Frame, frame
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.jobs.inputs import Inputs, as_known, check_inputs, check_samples
+from simdtex.jobs.maps import Maps, check_region, missing_value
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
+from simdtex.model.soft import Soft
 from simdtex.options import resolve, whole, within_32_bits
 from simdtex.run import Callback, Simulating
 
@@ -32,6 +34,14 @@ if TYPE_CHECKING:
 
 AT_ONCE = 4
 """Realisations that a processor works on at once, at most: each has a queue of its own."""
+
+
+@overload
+def simulate(training: ArrayLike, n: int, *, source: Literal[True], **options: Any) -> xarray.Dataset: ...
+
+
+@overload
+def simulate(training: ArrayLike, n: int, *, source: Literal[False] = ..., **options: Any) -> xarray.DataArray: ...
 
 
 def simulate(
@@ -45,6 +55,12 @@ def simulate(
     cell: Sequence[float] | None = None,
     guide: tuple[Any, Any] | None = None,
     mask: ArrayLike | None = None,
+    region: ArrayLike | None = None,
+    probabilities: ArrayLike | HardData | str | os.PathLike[str] | None = None,
+    image_map: ArrayLike | None = None,
+    rotation: ArrayLike | None = None,
+    scale: ArrayLike | None = None,
+    source: bool = False,
     first: int = 0,
     jobs: int | None = None,
     channel_axis: int | None = None,
@@ -53,7 +69,7 @@ def simulate(
     callback: Callback | None = None,
     checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
-) -> xarray.DataArray:
+) -> xarray.DataArray | xarray.Dataset:
     """Simulate realisations that look like a training image and honour data: multiple-point simulation.
 
     Parameters
@@ -64,8 +80,8 @@ def simulate(
     n : int
         How many realisations, 1 or more.
     shape : (int, int) or (int, int, int), optional
-        Rows and columns of each, or layers, rows and columns. None: those of `known`, where that is an array, else of
-        the training image.
+        Rows and columns of each, or layers, rows and columns. None: those of `known`, or of the first map below, where
+        that is an array, else of the training image.
     known : array, HardData or path, optional
         What is known: a masked array, or floats with NaN where nothing is known, of `shape`; or a table ``x,y,value``
         (`simdtex.read_hard_data`) or its file. Every realisation has these values, to the bit.
@@ -80,6 +96,23 @@ def simulate(
     guide, mask
         As in `simdtex.synthesize`: secondary data of the training image and of the realisations, and what of the
         training image may be used.
+    region : (rows, cols) bool array, optional
+        True where cells are simulated. The others take no part, and have no value: NaN in floats, else the attribute
+        ``missing``.
+    probabilities : (categories, rows, cols) array, or table or its path, optional
+        Soft data: how probable each category, in ascending order, of the first variable is at each cell, adding up to
+        1; NaN where nothing is said. A table has the columns x, y, and one for each category. See `soft_weight`.
+    image_map : (rows, cols) or (training images, rows, cols) array, optional
+        The number of the training image, from 0 on, that each cell is from, or the weight of each training image there.
+        NaN: any.
+    rotation : (rows, cols) array, optional
+        How far the training image is turned at each cell, in degrees from x to y (from columns to rows), rounded to
+        eighths of a turn. NaN: as anywhere else.
+    scale : (rows, cols) array, optional
+        By which factor the training image is enlarged at each cell, 1/2 to 2, rounded to powers of the square root of
+        2. NaN likewise.
+    source : bool
+        Return where in the training image each cell of each realisation is from, too.
     first : int
         Number of the first realisation.
     jobs : int, optional
@@ -102,11 +135,18 @@ def simulate(
     xarray.DataArray
         Dimensions ``realisation``, ``z`` of a volume, ``y`` (row 0 is the smallest y), ``x`` and, with `channel_axis`,
         ``variable``, in the training image's type. The coordinates ``z``, ``y`` and ``x`` are those of the centres of
-        cells; of a picture, a third number of `origin` and `cell` is the coordinate ``z``. The coordinate ``seed`` is
-        that of each realisation: with it `simdtex.synthesize` gives the same picture. Attributes: ``seed``, ``options``
-        (a JSON text), ``version``, ``device``, SHA-256 digests of the arrays ``training_image``, ``hard_data``,
-        ``guide`` and ``mask`` that are given, and with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``.
-        All are texts and numbers, so that ``to_netcdf`` and ``to_zarr`` of xarray write them.
+        cells; of a picture, a third number of `origin` and `cell` is ``z``. The coordinate ``seed`` is that of each:
+        `simdtex.synthesize` with it gives the same, but for what `simulate` alone has: `region` and what follows it.
+        Attributes: ``seed``, ``options`` (a JSON text), ``version``, ``device``, SHA-256 digests of the arrays
+        ``training_image``, ``hard_data``, ``guide``, ``mask`` and those from `region` to `scale` that are given, and
+        with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. All are texts and numbers, so that
+        ``to_netcdf`` and ``to_zarr`` of xarray write them. With `region` there is a coordinate ``region`` (y, x) and,
+        where values are no floats, the attribute ``missing``.
+    xarray.Dataset
+        With `source`: that array is the variable ``simulation``, and ``source_row`` and ``source_column`` (realisation,
+        y, x), int32, are the row and the column, counted from 0, of the training image that each cell is from, with
+        ``source_layer`` of a volume and, of several training images, ``source_image`` the number of the training image; -1 where from nowhere, as data are. The dataset has
+        the attributes, too.
 
     Raises
     ------
@@ -115,7 +155,10 @@ def simulate(
 
     Notes
     -----
-    Cost: n times that of `simdtex.synthesize`, and of memory n results.
+    Cost: n times that of `simdtex.synthesize`, and of memory n results. Every combination of training image, eighth of
+    a turn and size that `rotation`, `scale` and `image_map` name is a training image of its own, 64 at most: the memory
+    of each is that of a further training image and 4 bytes per cell, and the coarsest level, which weighs every
+    candidate, takes as many times longer.
 
     Examples
     --------
@@ -126,7 +169,7 @@ def simulate(
     >>> dict(found.sizes)
     {'realisation': 2, 'y': 32, 'x': 40}
     """
-    xr = _xarray()
+    xr = require_xarray()
     whole("n", n, 1)
     whole("first", first, 0)
     if jobs is not None:
@@ -138,32 +181,52 @@ def simulate(
     lies = frame(origin, cell)
     pictures = check_samples(training, channel_axis, mask, axes)
     known = None if known is None else as_known(known)
-    size = check_sides(pictures.pixels[0].shape[:-1] if shape is None else shape, sides)
+    given = {"region": region, "probabilities": probabilities, "image_map": image_map, "rotation": rotation}
+    given["scale"] = scale
+    if axes > 2 and (asked := [name for name, one in given.items() if one is not None]):
+        raise ValueError(f"{asked[0]} is for training images of two axes; leave it out for a volume")
+    maps = Maps(**{name: as_known(one, name) for name, one in given.items() if one is not None})
+    size = check_sides((maps.shape or pictures.pixels[0].shape[:-1]) if shape is None else shape, sides)
     if shape is None and isinstance(known, np.ndarray) and known.ndim == axes + (channel_axis is not None):
         size = known.shape if channel_axis is None else np.moveaxis(known, channel_axis, -1).shape[:-1]
+    flat = size[-2], size[-1]
     place = partial(place_hard_data, origin=origin, cell=cell, several=several)
     inputs = check_inputs(pictures, size, channel_axis, None, known, None, guide, place)
+    inputs = inputs if region is None else check_region(maps.region, flat, inputs)
+    missing: Any = None if region is None else missing_value(pictures.pixels)
     chosen = resolve(mrf.Options, "simulate" if axes == 2 else "simulate 3-D", options)
-    plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
-    pixels = inputs.pictures.pixels[0]
-    each = 2 * prod((*size, pixels.shape[-1])) * pixels.dtype.itemsize  # they are copied once
+    copies = maps.of_images(pictures, flat)
+    if copies and chosen.shares:
+        raise ValueError("shares are those of the maps of training images, rotation and scale; leave shares out")
+    categories = chosen.of(pictures).categories(0)
+    soft = Soft(maps.of_categories(categories, flat, place), copies.probability if copies else None)
+    sample, guides = inputs.pictures, inputs.guide
+    if copies:
+        sample = copies.pictures(sample)
+        guides = guides and (tuple(one.of(guides[0]) for one in copies.copies), guides[1])
+    plan = mrf.plan(sample, size, chosen, inputs.given, guides, soft=soft if soft.rows else None)
+    pixels = pictures.pixels[0]
+    columns = (axes + (len(pictures.pixels) > 1)) if source else 0
+    each = 2 * prod(size) * (pixels.shape[-1] * pixels.dtype.itemsize + 4 * columns)  # they are copied once
     memory.require_host(n * (each + 64))
     made = np.empty((n, *size, pixels.shape[-1]), pixels.dtype)
+    sources = np.empty((n, *size, columns), np.int32)
     machines = _machines(device, jobs, n)
     finished: list[int] = []
     lock = Lock()
 
     def identity() -> dict[str, Any]:
-        return {"shape": size, "n": n, "first": first, "options": chosen, **inputs.identity()}
+        call = {"shape": size, "n": n, "first": first, "options": chosen, "source": source}
+        return {**call, **inputs.identity(), **maps.digests()}
 
     def state() -> dict[str, Any]:
-        return {"numbers": list(finished), "pictures": made[finished]}
+        return {"numbers": list(finished), "pictures": made[finished], "sources": sources[finished]}
 
     with opened(checkpoint, "simulate", rng, identity, machines[0].name) as (seed, checkpointing):
         seeds = np.array([realisation_seed(seed, first + k) for k in range(n)], np.uint64)
         if checkpointing.found is not None:
             finished += checkpointing.found["numbers"]
-            made[finished] = checkpointing.found["pictures"]
+            made[finished], sources[finished] = checkpointing.found["pictures"], checkpointing.found["sources"]
 
         def offer_finished(info: Any, tree: Callable[[], Any]) -> None:
             if isinstance(checkpoint, Checkpoint) and checkpoint.stopping:  # a realisation has no state of its own
@@ -171,9 +234,14 @@ def simulate(
                     checkpointing.offer(info, state)
 
         def one(number: int, machine: Machine) -> None:
-            picture, _ = drive(plan, machine, int(seeds[number]), None, Checkpointing(None, offer_finished))
+            picture, output = drive(plan, machine, int(seeds[number]), None, Checkpointing(None, offer_finished))
+            if inputs.given and inputs.given.outside is not None:
+                picture[inputs.given.outside] = missing
             with lock:
                 made[number] = picture
+                if source:
+                    place: Any = output.source
+                    sources[number] = copies.sources(place, columns == 3) if copies else place
                 finished.append(number)
                 checkpointing.offer(None, state)
                 if callback:
@@ -189,15 +257,35 @@ def simulate(
     dims, arrays = ["realisation", *"zyx"[-axes:], "variable"], made
     if channel_axis is None:
         dims, arrays = dims[:-1], made[..., 0]
-    coordinates: dict[str, Any] = {"realisation": np.arange(first, first + n), "seed": ("realisation", seeds)}
-    coordinates |= {axis: np.arange(side) for axis, side in zip("zyx"[-axes:], size, strict=True)}
-    attributes = _attributes(seed, chosen, machines[0].name, inputs)
+    lying = grid_coordinates(size, lies if origin is not None or cell is not None else None)
+    coordinates: dict[str, Any] = {
+        "realisation": np.arange(first, first + n),
+        **lying,
+        "seed": ("realisation", seeds),
+    }
+    attributes = _attributes(seed, chosen, machines[0].name, inputs) | maps.digests()
+    if inputs.given and inputs.given.outside is not None:
+        coordinates["region"] = (("y", "x"), ~inputs.given.outside)
+        attributes |= {} if pixels.dtype.kind == "f" else {"missing": missing.item()}
     if origin is not None or cell is not None:
-        for axis, at, side in zip("xyz", *lies, strict=False):
-            coordinates[axis] = at + side * coordinates[axis] if axis in coordinates else at
-            attributes[f"cell_{axis}"] = side
+        attributes |= {f"cell_{axis}": side for axis, side in zip("xyz", lies.cell, strict=False)}
     result: xarray.DataArray = xr.DataArray(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
-    return result
+    if not source:
+        return result
+    names = (*(("layer",) if axes > 2 else ()), "row", "column", "image")
+    lattice = dims[: 1 + axes]
+    places = {f"source_{name}": (lattice, sources[..., k]) for k, name in enumerate(names[:columns])}
+    both: xarray.Dataset = xr.merge([result, xr.Dataset(places)]).assign_attrs(attributes)
+    return both
+
+
+def grid_coordinates(size: tuple[int, ...], lies: Frame | None) -> dict[str, Any]:
+    """Return the coordinates y, x and, if cells have it, z; rows and columns if nothing is said of the ground."""
+    axes = "zyx"[-len(size) :]
+    found: dict[str, Any] = {axis: np.arange(side) for axis, side in zip(axes, size, strict=True)}
+    for axis, at, side in zip("xyz", *(lies or ((), ())), strict=False):
+        found[axis] = at + side * found[axis] if axis in found else at
+    return found
 
 
 def realisation_seed(seed: int, number: int) -> int:
@@ -242,8 +330,8 @@ def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) ->
     found: dict[str, Any] = {"seed": seed, "version": version("simdtex"), "device": device, "options": text}
     pictures = inputs.pictures  # whose pixels are completed where they are unknown
     found["training_image"] = digest(*pictures.pixels, *(pictures.known or ()))
-    if inputs.given:
-        found["hard_data"] = digest(np.where(inputs.given.known, inputs.given.values, 0), inputs.given.known)
+    if inputs.given and inputs.given.told.any():
+        found["hard_data"] = digest(np.where(inputs.given.told, inputs.given.values, 0), inputs.given.told)
     if inputs.guide:
         found["guide"] = digest(*inputs.guide[0], inputs.guide[1])
     if pictures.usable:
@@ -251,7 +339,8 @@ def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) ->
     return found
 
 
-def _xarray() -> Any:
+def require_xarray() -> Any:
+    """Return the module xarray; raise if it is not installed."""
     try:
         import xarray
     except ModuleNotFoundError:

@@ -58,6 +58,7 @@ class MrfOptions(Common, total=False):
     shares: tuple[float, ...] | list[float] | None
     proportions: tuple[float, ...] | list[float] | None
     data_weight: float
+    soft_weight: float
     guide_weight: float
     labels: bool | None
 

@@ -39,17 +39,30 @@ class Given:
     suggests : bool
         Whether sites that are from the sample suggest how to go on. Where all that they could suggest is unknown
         itself, they are hard data instead, of which every channel is known.
+    outside : (H, W) bool array, optional
+        Sites that take no part. They are known, nothing is compared with their values, and the output shows these.
     """
 
     values: NDArray[Any]
     known: NDArray[np.bool_]
     place: NDArray[np.int32] | None = None
     suggests: bool = True
+    outside: NDArray[np.bool_] | None = None
 
     @cached_property
     def whole(self) -> NDArray[np.bool_]:
         """Sites of which everything is given, (H, W)."""
         return np.asarray(self.known.all(-1))
+
+    @property
+    def told(self) -> NDArray[np.bool_]:
+        """Which values are given at sites that take part, (H, W, C)."""
+        return self.known if self.outside is None else self.known & ~self.outside[..., None]
+
+    @property
+    def data(self) -> NDArray[np.bool_]:
+        """Sites that take part of which everything is given, (H, W)."""
+        return self.whole if self.outside is None else self.whole & ~self.outside
 
     @cached_property
     def partly(self) -> bool:
@@ -155,12 +168,17 @@ class Planes(NamedTuple):
     """What is given as a run's field has it, on the host.
 
     ``values`` (C, H, W) uint16, `UNKNOWN` where a channel is not; ``source`` (H, W) int32, -1 where from nowhere;
-    ``known`` (H, W) bool.
+    ``known`` (H, W) bool. A site that takes no part is known, and all its channels are `UNKNOWN`, which have no weight.
     """
 
     values: NDArray[np.uint16]
     source: NDArray[np.int32]
     known: NDArray[np.bool_]
+
+    @property
+    def data(self) -> NDArray[np.bool_]:
+        """Known sites that take part, (H, W)."""
+        return np.asarray(self.known & (self.values != UNKNOWN).any(0))
 
 
 def planes(given: Given, sample: Sample) -> Planes:
@@ -168,9 +186,8 @@ def planes(given: Given, sample: Sample) -> Planes:
     shape = given.whole.shape
     values = np.full((sample.channels, *shape), UNKNOWN, np.uint16)
     source = np.full(shape, -1, np.int32) if given.place is None else sample.index(given.place)
-    source = np.where(given.whole, source, np.int32(-1))
-    known = given.values[given.whole]
-    values[: sample.shown, given.whole] = sample.scale.levels(known)
+    source = np.where(given.data, source, np.int32(-1))
+    values[: sample.shown, given.data] = sample.scale.levels(given.values[given.data])
     values[:, source >= 0] = sample.working[: sample.channels, source[source >= 0]]
     if not given.suggests:
         source[:] = -1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What a candidate costs a site beside its distance: its use, its place on a lattice, and data between the sites."""
+"""What a candidate costs a site beside its distance: use, place on a lattice, data between the sites, and kind."""
 
 from __future__ import annotations
 
@@ -69,29 +69,52 @@ class Scattered(NamedTuple):
         return d
 
 
+class Kinds(NamedTuple):
+    """What candidates of each kind cost at each site: soft data (`simdtex.model.soft`).
+
+    ``candidates`` (kinds of a candidate, n rounded up to blocks) uint16 by number: rows of ``sites``, (rows, H, W)
+    float32 of 0 or more.
+    """
+
+    candidates: Array
+    sites: Array
+
+    def cost(self, numbers: NDArray[np.integer], sites: NDArray[np.int32]) -> NDArray[np.float32]:
+        """Return what the candidates of these numbers, (slots, S or 1), cost at sites (S,) for their kinds."""
+        d = np.zeros((len(numbers), sites.size), np.float32)
+        for kind in self.candidates:
+            d += self.sites.reshape(len(self.sites), -1)[kind[np.maximum(numbers, 0)], sites]
+        return d
+
+
 class Costs(NamedTuple):
-    """All costs: the ``penalty`` (n or more,) float32 of `simdtex.ops.use`, ``phased`` and ``scattered``."""
+    """All costs: the ``penalty`` (n or more,) float32 of `simdtex.ops.use`, ``phased``, ``scattered`` and ``kinds``."""
 
     penalty: Array
     phased: Phased | None = None
     scattered: Scattered | None = None
+    kinds: Kinds | None = None
 
     @property
     def defines(self) -> dict[str, int]:
         """-D constants of kernels: kernels/common/costs.h."""
         waves = {"WAVES": len(self.phased.candidates)} if self.phased else {}
-        return waves | ({"SCATTERED": self.scattered.values.shape[1]} if self.scattered else {})
+        kinds = {"KINDS": len(self.kinds.candidates)} if self.kinds else {}
+        return waves | kinds | ({"SCATTERED": self.scattered.values.shape[1]} if self.scattered else {})
 
     def arguments(self, machine: Launcher, candidates: Candidates) -> tuple[Any, ...]:
         """Return the arguments ``COSTS`` of kernels."""
         nothing = machine.constant(np.zeros((1, 1), np.int32))
         phased = self.phased or Phased(nothing, nothing, np.float32(0), np.float32(0))
         scattered = self.scattered or Scattered(nothing, nothing, nothing, np.float32(0))
-        area, plane = prod(phased.sites.shape[1:]), candidates.rows * candidates.cols
+        kinds = self.kinds or Kinds(nothing, nothing)
+        listed = max(phased.candidates.shape[1], kinds.candidates.shape[1])  # both are as long, where there are both
+        area = max(prod(phased.sites.shape[1:]), prod(kinds.sites.shape[1:]))
         return (
-            *(self.penalty, phased.candidates, np.int32(phased.candidates.shape[1]), phased.sites, np.int32(area)),
+            *(self.penalty, phased.candidates, np.int32(listed), phased.sites, np.int32(area)),
             *(phased.certain, phased.free, scattered.begin, scattered.reach, scattered.values, scattered.certain),
-            *(candidates.pixels, np.int32(plane), candidates.positions),
+            *(candidates.pixels, np.int32(candidates.rows * candidates.cols), candidates.positions),
+            *kinds,
         )
 
     def added(
@@ -105,4 +128,6 @@ class Costs(NamedTuple):
         d = d + self.penalty[np.maximum(numbers, 0)]
         if self.phased:
             d = d + self.phased.cost(numbers, sites)
-        return d + self.scattered.cost(numbers, sites, candidates) if self.scattered else d
+        if self.scattered:
+            d = d + self.scattered.cost(numbers, sites, candidates)
+        return d + self.kinds.cost(numbers, sites) if self.kinds else d

@@ -78,7 +78,7 @@ class Run(Lattices):
         """Return the picture ([layers,] rows, cols, channels) in the sample's type, and the rest of the output."""
         grid, given = self.grid(0), self.plan.given
         source = grid.view(self.machine.get(state.source))
-        known = given.whole if given and given.whole.any() else None
+        known = given.data if given and given.data.any() else None
         image = finished(self, grid, state.field, known, source)
         return given.shown(image, grid) if given else image, output(self, state, source, observer)
 
@@ -155,7 +155,9 @@ def rule(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
         discount=level.discount,
         novelty=level.novelty,
         confidences=level.confidences,
-        costs=Costs(level.machine.put(np.pad(penalty, (0, -penalty.size % BLOCK))), level.phased, level.scattered),
+        costs=Costs(
+            level.machine.put(np.pad(penalty, (0, -penalty.size % BLOCK))), level.phased, level.scattered, level.kinds
+        ),
         choice=level.choice,  # 6.2.2.2 a draw from it, or its mode
         xi=level.xi,  # 6.2.2.3 the temperature, equation (13)
         seed=level.setting.seed,

@@ -107,7 +107,7 @@ class Conditioning(Conditions):
         """Return the conditioning data between the sites of a level; None if there are none."""
         if self.planes is None or not number:
             return None
-        place = between(self.planes.known, Grid.of(self._shape, 2**number, self.torus))
+        place = between(self.planes.data, Grid.of(self._shape, 2**number, self.torus))
         values = self.planes.values[(slice(None), *place.T)].T
         return Data(place, np.ascontiguousarray(values)) if len(place) else None
 

@@ -3,18 +3,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Machine
 from simdtex.model.lattice import Grid
-from simdtex.model.sample import Sample
+from simdtex.model.sample import BLOCK, Sample
 from simdtex.ops import lcpdf
+from simdtex.ops.charge import charge
+from simdtex.ops.costs import Costs, Scattered
 from simdtex.ops.histogram import histogram
 from simdtex.ops.neighbourhood import Field, neighbourhood
 
 AT_ONCE = 4096
 """Sites whose tables are made in one go."""
+
+PAIRS = 2**22
+"""Pairs of sites and data, or of sites and kinds, that are looked at in one go."""
 
 
 def lcpdf_at(
@@ -64,3 +72,78 @@ def _shares(counts: NDArray[np.uint32], sites: NDArray[np.int32], grid: Grid) ->
         )
     shares: NDArray[np.float64] = counts / total
     return shares
+
+
+class Data(NamedTuple):
+    """Data of an image: ``place`` (n, 2) int row and column, and ``values`` (n, C) uint16 working levels."""
+
+    place: NDArray[np.integer]
+    values: NDArray[np.uint16]
+
+
+def near(
+    sites: NDArray[np.integer], place: NDArray[np.integer], most: int, reach: int
+) -> tuple[NDArray[np.intp], NDArray[np.int64]]:
+    """Return the nearest data of sites (S, 2): numbers (S, m) into ``place`` (n, 2), and the number of each site, (S,).
+
+    At most ``most`` data count, and none farther away than ``reach``; of equals the first. Numbers past that of a site
+    mean nothing.
+    """
+    squared = ((sites[:, None] - place[None]).astype(np.int64) ** 2).sum(-1)
+    key = squared * len(place) + np.arange(len(place))
+    most = min(most, len(place))
+    found = np.argpartition(key, range(most), 1)[:, :most] if most else np.zeros((len(sites), 0), np.intp)
+    return found, (np.take_along_axis(squared, found, 1) <= reach**2).sum(1)
+
+
+def given_data(
+    machine: Machine,
+    sample: Sample,
+    of: NDArray[np.integer],
+    data: Data,
+    sites: NDArray[np.integer],
+    nearest: int,
+    bandwidth: float,
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.float64]]]:
+    """Yield the LCPDF of sites given data alone, equations (6), (7) and (12): numbers of sites, and rows for these.
+
+    A neighbour that is no datum has t = 1, and no weight. Each datum is compared at its own offset, so the sample's
+    margin is how far they reach. ``of`` (n,) is the kind of each candidate, 0 up, and a row holds the probability of
+    each kind and adds up to 1; ``sites`` (S, 2) row and column; ``bandwidth`` is h in units of h_opt, equation (8), for
+    as many data as the site has.
+    """
+    places = sample.places(np.zeros((1, 2), np.int32), 1)
+    candidates = sample.candidates(machine, places)
+    kinds, size = int(of.max()) + 1, candidates.size
+    kind = np.zeros((1, sample.rows * sample.cols), np.float32)
+    kind[0, places.positions] = of
+    counted = candidates._replace(pixels=machine.put(kind))
+    free = machine.put(np.zeros(candidates.positions.shape[0] + BLOCK, np.float32))
+    itself = machine.put(np.zeros((1, 2), np.int32))  # which is no neighbour
+    step = max(1, min(machine.chunk(size, 1, sample.channels), AT_ONCE, PAIRS // kinds))
+    together = max(1, PAIRS // max(1, len(data.place)))
+    for first in range(0, len(sites), together):
+        part = sites[first : first + together]
+        numbers, counts = near(part, data.place, nearest, sample.margin)
+        for count in np.unique(counts).tolist():
+            h = bandwidth * lcpdf.optimal_bandwidth(sample.variance, size, sample.channels * (count + 1))
+            window = lcpdf.window(h, sample.top)._replace(gauss=np.ones(1, np.float32), radius=0, top=kinds - 1)
+            those = np.flatnonzero(counts == count)
+            for begin in range(0, those.size, step):
+                here = those[begin : begin + step]
+                told = numbers[here, :count]
+                apart = (data.place[told] - part[here][:, None]) @ np.array([sample.cols, 1])
+                scattered = Scattered(
+                    machine.put(np.arange(here.size + 1, dtype=np.int32) * np.int32(count)),
+                    machine.put(np.append(apart.ravel(), 0).astype(np.int32)),
+                    machine.put(np.append(data.values[told.ravel()], data.values[:1], 0)),
+                    np.float32(1),
+                )
+                numbered = machine.put(np.arange(here.size, dtype=np.int32))
+                values, plane = np.zeros((sample.channels, 1, here.size), np.uint16), np.zeros((1, here.size), np.int32)
+                field = Field(machine.put(values), machine.put(plane), machine.put(plane.astype(np.uint16)))
+                nobody = neighbourhood(machine, numbered, field, itself, Grid(1, here.size, 1, torus=False))
+                distances = lcpdf.distance(machine, nobody, candidates)  # 0 so far
+                distances = charge(machine, distances, candidates, numbered, Costs(free, scattered=scattered))
+                mass = machine.get(lcpdf.density(machine, distances, counted, window)).astype(np.float64)
+                yield first + here, mass / np.cumsum(mass, 1)[:, -1:]

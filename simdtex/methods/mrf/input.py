@@ -12,6 +12,7 @@ from simdtex import schedules
 from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given, Planes
 from simdtex.model.sample import Sample
+from simdtex.model.soft import Soft
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,8 @@ class Input:
 
     ``sample`` is Y with its structure channel and guides, ``shape`` (rows, cols) or (layers, rows, cols) of X, the
     output, ``offsets`` (N, 2) the neighbourhood, ``options`` as they are executed, and ``levels`` M of Algorithm 1.
-    ``given`` are conditioning data, sites of X that keep their values, and ``planes`` the same in working levels.
+    ``given`` are conditioning data, sites of X that keep their values, and ``planes`` the same in working levels;
+    ``soft`` are soft data.
     """
 
     sample: Sample
@@ -31,3 +33,4 @@ class Input:
     levels: int
     given: Given | None = None
     planes: Planes | None = None
+    soft: Soft | None = None

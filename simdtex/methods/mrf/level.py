@@ -21,7 +21,7 @@ from simdtex.model.lattice import Grid
 from simdtex.model.regularity import WAVES
 from simdtex.model.sample import Candidates, Places
 from simdtex.ops import active, lcpdf
-from simdtex.ops.costs import Phased, Scattered
+from simdtex.ops.costs import Kinds, Phased, Scattered
 from simdtex.ops.lcpdf import Choice
 from simdtex.ops.nearest import TAIL, strip_of
 from simdtex.ops.neighbourhood import Confidences, Field
@@ -173,6 +173,7 @@ class Lattices:
             movable=self.conditions.movable(machine, number, grid),
             phased=level.phased and level.phased._replace(sites=self._phases(grid)),
             scattered=self._scattered(number, grid),
+            kinds=level.kinds and level.kinds._replace(sites=self._soft(number, grid)),
         )
 
     def _level(self, number: int) -> Level:
@@ -212,7 +213,24 @@ class Lattices:
             movable=self.conditions.movable(machine, number, grid),
             phased=self._phased(number, proposal.candidates),
             scattered=self._scattered(number, grid),
+            kinds=self._kinds_of(number, proposal.candidates),
         )
+
+    def _kinds_of(self, number: int, candidates: Candidates) -> Kinds | None:
+        """Return the kinds of candidates that soft data know, and what they cost; None without soft data."""
+        if self.plan.soft is None:
+            return None
+        those = self.plan.soft.kinds(self.sample, self.machine.get(candidates.positions))
+        those = np.pad(those, ((0, 0), (0, TAIL)))  # as many as `Phased` has
+        return Kinds(self.machine.put(those), self._soft(number, self.grid(number)))
+
+    def _soft(self, number: int, grid: Grid) -> Array:
+        """Return what each kind costs at the sites of a lattice, or of a window of it, (kinds, H, W)."""
+        assert self.plan.soft
+        found = self.plan.soft.costs(self.sample, 2**number, self.options.soft_weight * self.usual)
+        planes = np.zeros((len(found), grid.height, grid.width), np.float32)
+        grid.view(planes)[...] = grid.cut(found)
+        return self.machine.put(planes)
 
     def _phased(self, number: int, candidates: Candidates) -> Phased | None:
         waves = self.sample.waves
@@ -325,6 +343,8 @@ class Level:
         The phases of a regular sample and of the output.
     scattered : Scattered, optional
         Conditioning data between the sites.
+    kinds : Kinds, optional
+        Soft data: what candidates of each kind cost.
     """
 
     number: int
@@ -346,6 +366,7 @@ class Level:
     movable: Array | None = None
     phased: Phased | None = None
     scattered: Scattered | None = None
+    kinds: Kinds | None = None
 
     @property
     def machine(self) -> Machine:

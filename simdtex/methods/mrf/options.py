@@ -300,6 +300,14 @@ class Options:
         jobs={"fill": 4.0, "extend": 4.0},
         shown=("fill", "extend", "simulate"),
     )
+    soft_weight: float = data(
+        1.0,
+        Number(0),
+        "Follow probabilities, and weights of training images, with this strength",
+        more="A kind of probability p and share q of the sample costs its candidates w N C sigma^2 / 16 "
+        "(m - ln(p / q)): w is the soft weight, and m the greatest ln(p / q) of the cell. With 0, only zeros count.",
+        shown=("simulate",),
+    )
     guide_weight: float = data(
         10.0,
         Number(0),

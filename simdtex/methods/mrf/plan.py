@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import prod
 from typing import Any
 
@@ -23,6 +24,7 @@ from simdtex.model.lattice import neighbourhood_offsets
 from simdtex.model.pictures import Pictures, unknown_in
 from simdtex.model.regularity import Phases, parse_lattice, phases
 from simdtex.model.sample import NothingUsable, Sample
+from simdtex.model.soft import Soft
 from simdtex.ops.finish import around
 from simdtex.options import SMALLER, within_32_bits
 
@@ -45,15 +47,16 @@ class Plan(Input):
         14 channels + 159 per pixel of the sample with its margin, and the machine's scratch memory or, if
         that is more, 65 per candidate. On the host, which includes a CPU's device memory: 84 per output pixel (100
         with ``block``) and 10 + 1.5 n for each of its channels, n the bytes of a value of the sample, and 64 per pixel
-        of the sample (benchmarks/memory.py).
+        of the sample (benchmarks/memory.py). Soft data: 4 per output pixel and kind on the device, and 32 on the host.
         """
         copies = 2 if self.schedule.tile else 1
         pixels, channels = prod(self.shape), len(self.sample.working)
         within_32_bits(self.shape, channels * copies, TILED)
         field, held = copies * (6 + 2 * channels), self.sample.rows * self.sample.cols
         each = 68 + 16 * copies + channels * (10 + 3 * self.sample.pixels.dtype.itemsize // 2)
-        device = pixels * (12 + field) + held * (14 * channels + 159)
-        memory.require(machine, device, pixels * each + 64 * held, TILED)
+        kinds = self.soft.rows if self.soft else 0
+        device = pixels * (12 + field + 4 * kinds) + held * (14 * channels + 159)
+        memory.require(machine, device, pixels * (each + 32 * kinds) + 64 * held, TILED)
         return Run(self, machine, seed)
 
 
@@ -64,6 +67,7 @@ def plan(
     given: Given | None = None,
     guide: GuidePair | Surroundings | None = None,
     most: int | None = None,
+    soft: Soft | None = None,
 ) -> Plan:
     """Validate the input of a run, and lay its sample out.
 
@@ -80,14 +84,19 @@ def plan(
         Which label, number or colour belongs where in Y and in X.
     most : int, optional
         The most levels, if the options leave their number open.
+    soft : Soft, optional
+        Which category, and which picture of Y, is how probable where in X.
     """
     pictures = options.of(pictures)
-    check_categories(pictures, given, options)
+    check_categories(pictures, given, options.proportions)
     options = options.resolved(pictures)
     if pictures.deep:
         check_volume(pictures, options, guide)
     offsets = neighbourhood_offsets(options.order, len(shape))
-    levels = number_of_levels([picture.shape[:-1] for picture in pictures.pixels], offsets, shape, options)  # 1
+    sides = [picture.shape[:-1] for picture in pictures.pixels]
+    if soft and soft.images is not None:  # each picture has to do for the sites that it is wanted at
+        pictures, sides = replace(pictures, shares=soft.shares), [min(sides, key=min)]
+    levels = number_of_levels(sides, offsets, shape, options)  # 1
     levels = levels if most is None or options.levels is not None else min(levels, most)
     guides: list[AnyGuide] = []
     if guide:
@@ -96,7 +105,7 @@ def plan(
         if options.pixel == "density":
             raise ValueError('sites that are known in part choose among pixels of the sample; give pixel="source"')
         guides.append(given.colocated(pictures.pixels))
-    known = (given.values, given.whole, given.place) if given and given.whole.any() else None
+    known = (given.values, given.data, given.place) if given and given.data.any() else None
     lattice = parse_lattice(options.lattice)
     torus = options.boundary == "torus"
     regular = None if lattice is None else phases(pictures, (shape[0], shape[1]), torus, lattice, known)
@@ -104,8 +113,8 @@ def plan(
     heavy = max(1.0, options.data_weight, len(offsets) / 4) if given or guides else 1.0  # in sums of squares
     values = round(heavy * (channels * len(offsets) + len(guides)))
     levels, sample = sampled(pictures, levels, offsets, values, options, guides, regular)
-    held = planes(given, sample) if given and known else None
-    return Plan(sample, shape, offsets, options, schedules.get(options.schedule), levels, given, held)
+    held = planes(given, sample) if given and given.whole.any() else None
+    return Plan(sample, shape, offsets, options, schedules.get(options.schedule), levels, given, held, soft)
 
 
 def sampled(
@@ -149,14 +158,14 @@ def check_volume(pictures: Pictures, options: Options, guide: GuidePair | Surrou
         raise ValueError("the guide of a volume has NaN; give a number everywhere")
 
 
-def check_categories(pictures: Pictures, given: Given | None, options: Options) -> None:
+def check_categories(pictures: Pictures, given: Given | None, proportions: Sequence[float] | None = None) -> None:
     """Raise if a known value or a proportion is of a category that the sample lacks."""
     for variable in range(pictures.pixels[0].shape[-1]):
         categories = pictures.categories(variable)
         if categories is None:
             continue
         if given:
-            asked = np.unique(given.values[given.known[..., variable], variable])
+            asked = np.unique(given.values[given.told[..., variable], variable])
             strange = asked[~np.isin(asked, categories)]
             if strange.size:
                 raise ValueError(
@@ -166,13 +175,13 @@ def check_categories(pictures: Pictures, given: Given | None, options: Options) 
             raise ValueError(
                 f"a variable has {len(categories)} categories; give {MOST} or fewer, or leave categorical out"
             )
-    if options.proportions:
+    if proportions:
         found = pictures.categories(0)
         if found is None or pictures.pixels[0].shape[-1] > 1:
             raise ValueError("proportions are of one variable of categories; give categorical=True, or leave them out")
-        if len(found) != len(options.proportions):
+        if len(found) != len(proportions):
             raise ValueError(
-                f"there are {len(options.proportions)} proportions and {len(found)} categories, {_listed(found)}; "
+                f"there are {len(proportions)} proportions and {len(found)} categories, {_listed(found)}; "
                 "give one for each"
             )
 

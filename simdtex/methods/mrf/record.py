@@ -169,7 +169,7 @@ def output(run: Lattices, state: State, source: NDArray[np.int32], record: Recor
         statistics["use"] = effective_use(place[taken][None], run.sample.pictures.pixels[0].shape).as_dict()
     given = run.plan.given
     if given and given.place is not None:
-        place = np.where(given.whole[..., None], given.place, place)
+        place = np.where(given.data[..., None], given.place, place)
     return Output(place, t / 1024, record.stages, statistics)
 
 

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex estimate``: what data say of each cell."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from simdtex.cli.command import DATA, command
+from simdtex.cli.inputs import output_shape, read_known, read_masks, read_material
+from simdtex.cli.options import DEVICE, KNOWN, SAMPLE_MASK, option, places, size_option
+from simdtex.cli.places import EITHER, READ
+from simdtex.cli.simulate import lies_of
+
+
+@command(
+    ("estimate facies.png -o probabilities.nc --known wells.csv --categorical", "Of each category, and the entropy."),
+    ("estimate facies.gslib -o probabilities.sgems --known wells.csv --categorical", "The same from a grid to a grid."),
+)
+@click.argument("training_image", nargs=-1, required=True, type=READ)
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    type=EITHER,
+    help="Write the maps here: .zarr, .nc or .npz, or as variables of a grid: .gslib or .sgems.",
+)
+@size_option("that of --known, else of TRAINING_IMAGE", "maps")
+@KNOWN
+@places
+@SAMPLE_MASK
+@option("--categorical", is_flag=True, group=DATA, help="Take values for names of categories.")
+@option("--nearest", default=8, show_default=True, type=int, help="Look at this many data of each cell, the nearest.")
+@option("--reach", type=int, help="Look at data so many cells away.  [an eighth of the smaller side of TRAINING_IMAGE]")
+@option("--bandwidth", default=1.0, show_default=True, type=float, help="Give the Parzen kernel this width, in h_opt.")
+@DEVICE
+@click.option("-q", "--quiet", is_flag=True, help="Show no summary.")
+def estimate(
+    training_image: tuple[Path, ...],
+    output: Path,
+    size: str | None,
+    known: Path | None,
+    quiet: bool,
+    **options: Any,
+) -> None:
+    """Estimate what data say of each cell: probabilities of categories, or mean and variance, from TRAINING_IMAGE.
+
+    No realisation is drawn, so nothing is noise.
+    """
+    from simdtex import estimate
+    from simdtex.io.grids import SUFFIXES, check_grid, write_grid
+    from simdtex.io.realisations import check_realisations_path, write_realisations
+
+    began, material = time.perf_counter(), read_material(training_image)
+    if material.channel_axis is not None:
+        raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
+    masks = read_masks(options.pop("sample_mask"), material)
+    data = None if known is None else read_known(known, material.pixels[0])
+    shape = output_shape(size, material.pixels[0], data, material.pixels[0])
+    if data is None:
+        raise ValueError("there is nothing to estimate from; give --known")
+    lies = lies_of(material, options.pop("origin"), options.pop("cell"))
+    grid = check_realisations_path(output) in SUFFIXES
+    if grid:
+        check_grid(output, material.pixels, **lies)
+    given = {name: value for name, value in options.items() if value is not None} | lies
+    mask = masks and (masks if material.several else masks[0])
+    made = estimate(material.array, known=data, shape=(shape[0], shape[1]), mask=mask, **given)
+    if grid:
+        variables = {str(name): one.values for name, one in made.data_vars.items() if name != "probability"}
+        if "probability" in made:
+            names = made.category.values.tolist()
+            variables |= {f"probability_{name}": made.probability.values[k] for k, name in enumerate(names)}
+        write_grid(output, variables, **lies)
+    else:
+        write_realisations(output, made)
+    if not quiet:
+        seconds = time.perf_counter() - began
+        click.echo(f"{output}: maps of {shape[1]}x{shape[0]} in {seconds:.1f} s on {made.attrs['device']}")

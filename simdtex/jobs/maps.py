@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The maps of a simulation, each checked once: region, probabilities, training images, rotation and scale."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import prod
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.checkpoint import digest
+from simdtex.io.hard_data import HardData
+from simdtex.io.image import as_array
+from simdtex.jobs.inputs import Inputs, Placing, check_mask
+from simdtex.model.given import Given
+from simdtex.model.pictures import Pictures
+from simdtex.model.turned import HALVES, Turned, turned
+
+ONE = 1e-3
+"""How far the sum of probabilities may be from 1; they are divided by it."""
+
+
+class Maps(NamedTuple):
+    """The maps of a simulation as arrays or tables, see `simdtex.simulate`; None where one is not given."""
+
+    region: NDArray[Any] | HardData | None = None
+    probabilities: NDArray[Any] | HardData | None = None
+    image_map: NDArray[Any] | HardData | None = None
+    rotation: NDArray[Any] | HardData | None = None
+    scale: NDArray[Any] | HardData | None = None
+
+    @property
+    def shape(self) -> tuple[int, ...] | None:
+        """Rows and columns of the first that is an array."""
+        shapes = (np.shape(one)[-2:] for one in self if one is not None and not isinstance(one, HardData))
+        return next((shape for shape in shapes if len(shape) == 2), None)
+
+    def digests(self) -> dict[str, str]:
+        """Return the SHA-256 digest of each, by name."""
+        arrays = {
+            name: (one.points, one.values)
+            if isinstance(one, HardData)
+            else (np.ma.getdata(one), np.ma.getmaskarray(one))
+            for name, one in self._asdict().items()
+            if one is not None
+        }
+        return {name: digest(*those) for name, those in arrays.items()}
+
+    def of_images(self, pictures: Pictures, shape: tuple[int, int]) -> Turned | None:
+        """Return the copies of training images that are wanted; None without maps of these."""
+        if self.image_map is self.rotation is self.scale is None:
+            return None
+        rotation = None if self.rotation is None else _numbers("rotation", self.rotation, shape)
+        scale = None if self.scale is None else _numbers("scale", self.scale, shape)
+        most = 2.0 ** (HALVES / 2)
+        if scale is not None and ((scale < 1 / most) | (scale > most)).any():
+            raise ValueError(f"scale has {scale.min():g} to {scale.max():g}; give factors of {1 / most:g} to {most:g}")
+        return turned(pictures, self._images(pictures, shape), rotation, scale)
+
+    def _images(self, pictures: Pictures, shape: tuple[int, int]) -> NDArray[np.float64]:
+        """Return the probability of each training image, (training images, H, W)."""
+        areas, count = [float(prod(one.shape[:2])) for one in pictures.pixels], len(pictures.pixels)
+        if self.image_map is None:
+            return np.broadcast_to(np.array(areas)[:, None, None] / sum(areas), (count, *shape))
+        given = as_array("image_map", self.image_map)
+        if given.ndim == 3:
+            each = _numbers("image_map", given, (count, *shape))
+            if (each < 0).any() or (each.sum(0) == 0).any():
+                raise ValueError("image_map has weights below 0, or 0 alone; give 0 or more, and NaN where any will do")
+            return np.asarray(each / each.sum(0))
+        number = _numbers("image_map", given, shape)
+        told = number[~np.isnan(number)]
+        if not (np.isin(told, np.arange(count))).all():
+            wrong = told[~np.isin(told, np.arange(count))][0]
+            raise ValueError(
+                f"image_map has {wrong:g} and there {'is 1' if count == 1 else f'are {count}'} training "
+                f"image{'s' * (count > 1)}; give numbers from 0 on, or weights (training images, rows, cols)"
+            )
+        weights: NDArray[np.float64] = (number == np.arange(count)[:, None, None]).astype(np.float64)
+        weights[:, np.isnan(number)] = np.nan
+        return weights
+
+    def of_categories(
+        self, categories: NDArray[Any] | None, shape: tuple[int, int], place: Placing
+    ) -> NDArray[np.float64] | None:
+        """Return the probability of each category, (categories, H, W), NaN where nothing is said; None without."""
+        if self.probabilities is None:
+            return None
+        if categories is None:
+            raise ValueError("probabilities are of categories; give categorical=True, or leave them out")
+        given, names = self.probabilities, ", ".join(map(str, categories[:10]))
+        if isinstance(given, HardData):
+            if len(given.names) != len(categories):
+                raise ValueError(
+                    f"the table of probabilities has {len(given.names)} values in a row and the training image the "
+                    f"{len(categories)} categories {names}; give x, y and one for each, in this order"
+                )
+            placed = place(given, shape, np.float64).reshape(*shape, len(categories))
+            given = np.moveaxis(placed.filled(np.nan), -1, 0)
+        found = as_array("probabilities", given)
+        if found.ndim != 3 or len(found) != len(categories):
+            raise ValueError(
+                f"probabilities are {'x'.join(map(str, found.shape))} and the training image has the {len(categories)} "
+                f"categories {names}; give (categories, rows, cols), in this order"
+            )
+        found = _numbers("probabilities", found, (len(categories), *shape))
+        unknown = np.isnan(found).any(0)
+        total = found.sum(0)
+        off = ~unknown & ((found < 0).any(0) | (abs(total - 1) > ONE))
+        if off.any():
+            row, col = np.argwhere(off)[0]
+            raise ValueError(
+                f"the probabilities of row {row}, column {col} are {', '.join(f'{p:g}' for p in found[:, row, col])}; "
+                "give numbers of 0 or more that add up to 1, or NaN"
+            )
+        found[:, unknown] = np.nan
+        return np.asarray(found / total)
+
+
+def check_region(region: Any, shape: tuple[int, int], inputs: Inputs) -> Inputs:
+    """Return the inputs of a simulation whose cells outside of a region, where it is False, take no part."""
+    inside = check_mask(region, shape, "region", "the output")
+    if not inside.any():
+        raise ValueError("region is False everywhere; set it True where cells are to be simulated")
+    pixels = inputs.pictures.pixels[0]
+    sides = (*shape, pixels.shape[2])
+    given = inputs.given or Given(np.zeros(sides, pixels.dtype), np.zeros(sides, bool))
+    if (given.known & ~inside[..., None]).any():
+        row, col = np.argwhere(given.known.any(-1) & ~inside)[0]
+        raise ValueError(f"known has a value at row {row}, column {col}, outside region; leave it out, or widen region")
+    return inputs._replace(given=replace(given, known=given.known | ~inside[..., None], outside=~inside))
+
+
+def missing_value(pixels: Sequence[NDArray[Any]]) -> Any:
+    """Return what stands for no value in arrays of the training images' type: NaN, or a number that none of them has.
+
+    That is the largest of a type of integers, or else the smallest.
+    """
+    dtype = pixels[0].dtype
+    if dtype.kind == "f":
+        return dtype.type(np.nan)
+    if dtype.kind in "iu":
+        for number in (np.iinfo(dtype).max, np.iinfo(dtype).min):
+            if not any((one == number).any() for one in pixels):
+                return dtype.type(number)
+    raise ValueError(f"{dtype} has no number that says that a cell is outside region; give the training image as int16")
+
+
+def _numbers(name: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Return a map as floats, NaN where it is masked."""
+    array = as_array(name, values)
+    if array.dtype.kind not in "buif":
+        raise TypeError(f"{name} holds {array.dtype} values; give real numbers")
+    if array.shape != shape:
+        sides = ["x".join(map(str, one)) for one in (array.shape, shape)]
+        raise ValueError(f"{name} is {sides[0]} and has to be {sides[1]}, as the output; give one size")
+    found = np.where(np.ma.getmaskarray(array), np.nan, np.ma.getdata(array)).astype(np.float64)
+    if np.isinf(found).any():
+        raise ValueError(f"{name} has infinite values; give numbers, or NaN where nothing is said")
+    return found

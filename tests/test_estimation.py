@@ -1,0 +1,144 @@
+"""What data say of each cell is the LCPDF of equations (6), (7) and (12), datum by datum in plain loops."""
+
+from math import exp, log2
+
+import numpy as np
+import pytest
+from cases import assert_same_bits, texture
+
+import simdtex
+
+TRAINING = (np.add.outer(np.arange(20) // 3, np.arange(24) // 5) % 3).astype(np.uint8) * 4
+SHAPE = (9, 11)
+
+
+def data(values, shape=SHAPE, share=0.12, seed=3):
+    rng = np.random.default_rng(seed)
+    found = np.full(shape, np.nan)
+    there = rng.random(shape) < share
+    found[there] = rng.choice(np.unique(values), there.sum())
+    return found
+
+
+def within(i, n):
+    """Mirrored at the border, whose pixels are not repeated."""
+    i = abs(i)
+    return i if i < n else 2 * (n - 1) - i
+
+
+def weights(training, known, cell, nearest, reach, bandwidth, differs, variance, channels):
+    """w_p of every position p: exp(-sum_r (x_r - y_r)^2 / 2h^2) over the nearest data."""
+    place = [tuple(at) for at in np.argwhere(~np.isnan(known)).tolist()]
+    far = {at: (at[0] - cell[0]) ** 2 + (at[1] - cell[1]) ** 2 for at in place}
+    near = sorted((at for at in place if far[at] <= reach**2), key=lambda at: (far[at], at))[:nearest]
+    n, d = training.size, channels * (len(near) + 1)
+    h = bandwidth * variance**0.5 * (4 / (n * (2 * d + 1))) ** (1 / (d + 4))
+    found = np.zeros(training.shape)
+    for p in np.ndindex(*training.shape):
+        total = 0.0
+        for at in near:
+            there = [within(p[k] + at[k] - cell[k], training.shape[k]) for k in (0, 1)]
+            total += differs(known[at], training[tuple(there)])
+        found[p] = exp(-total / (2 * h * h))
+    return found
+
+
+@pytest.mark.parametrize("how", [{}, {"nearest": 3}, {"nearest": 0}, {"reach": 5, "bandwidth": 0.6}], ids=str)
+@pytest.mark.parametrize("kinds", [2, 3])
+def test_probabilities_are_those_of_plain_loops(how, kinds):
+    training = TRAINING if kinds == 3 else (TRAINING > 3).astype(np.uint8)
+    known, names = data(training), np.unique(training)
+    found = simdtex.estimate(training, known=known, categorical=True, device="reference", **how)
+    assert found.probability.dims == ("category", "y", "x") and found.category.values.tolist() == names.tolist()
+    # channels that are 0 or 1 where one category is or not; two of them differ between two categories of three
+    channels = 1 if kinds == 2 else 3
+    shares = [(training == name).mean() for name in names[-channels:]]
+    variance = sum(share * (1 - share) for share in shares) / channels
+    settings = {"nearest": 8, "reach": 2, "bandwidth": 1.0} | how
+    for cell in np.ndindex(*SHAPE):
+        if not np.isnan(known[cell]):
+            assert (found.probability.values[:, *cell] == (names == known[cell])).all()
+            continue
+        w = weights(
+            training, known, cell, **settings, variance=variance, channels=channels,
+            differs=lambda a, b: (1 if channels == 1 else 2) * (a != b),
+        )  # fmt: skip
+        expected = [w[training == name].sum() / w.sum() for name in names]
+        np.testing.assert_allclose(found.probability.values[:, *cell], expected, atol=2e-5)
+        entropy = -sum(p * log2(p) for p in expected if p)
+        assert found.entropy.values[cell] == pytest.approx(entropy, abs=1e-3)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float64])
+def test_mean_and_variance_are_those_of_plain_loops(dtype):
+    training = texture((16, 18), dtype=dtype)
+    known = data(training)
+    found = simdtex.estimate(training, known=known, nearest=4, reach=6, device="reference")
+    exact = training.astype(float)
+    for cell in np.ndindex(*SHAPE):
+        mean, variance = found["mean"].values[cell], found["variance"].values[cell]
+        if not np.isnan(known[cell]):
+            assert (mean, variance) == (known[cell], 0)
+            continue
+        w = weights(
+            exact, known, cell, nearest=4, reach=6, bandwidth=1.0, variance=exact.var(), channels=1,
+            differs=lambda a, b: (a - b) ** 2,
+        )  # fmt: skip
+        expected = (w * exact).sum() / w.sum()
+        assert mean == pytest.approx(expected, abs=0.02 * exact.std())
+        assert variance == pytest.approx((w * (exact - expected) ** 2).sum() / w.sum(), abs=0.05 * exact.var())
+
+
+def test_a_device_has_the_references_bits(cl_device):
+    for options in ({"categorical": True}, {"reach": 7}):
+        known = data(TRAINING, (13, 12))
+        both = [
+            simdtex.estimate(TRAINING, known=known, device=device, **options)
+            for device in ("reference", str(cl_device.index))
+        ]
+        for name in both[0].data_vars:
+            assert_same_bits(both[1][name].values, both[0][name].values)
+
+
+def test_far_from_data_it_is_the_share_of_the_training_image():
+    known = np.full((40, 9), np.nan)
+    known[0, 0] = 4
+    found = simdtex.estimate(TRAINING, known=known, categorical=True, device="reference", reach=4)
+    shares = [(name == TRAINING).mean() for name in (0, 4, 8)]
+    np.testing.assert_allclose(found.probability[:, 20], np.repeat(shares, 9).reshape(3, 9), atol=1e-6)
+    assert found.entropy.values[0, 0] == 0 and not np.signbit(found.entropy.values).any()
+
+
+def test_tables_ground_masks_and_several_training_images(tmp_path):
+    path = tmp_path / "wells.csv"
+    path.write_text("x,y,value\n1035,2025,4\n1045,2035,8\n")
+    options = {"shape": SHAPE, "categorical": True, "device": "reference"}
+    found = simdtex.estimate(TRAINING, known=path, origin=(1005, 2005), cell=(10, 10), **options)
+    assert found.probability.sel(category=4, x=1035, y=2025) == 1
+    rows = np.full(SHAPE, np.nan)
+    rows[2, 3], rows[3, 4] = 4, 8
+    assert_same_bits(found.probability.values, simdtex.estimate(TRAINING, known=rows, **options).probability.values)
+    two = simdtex.estimate([TRAINING, TRAINING[:12]], known=rows, **options)
+    usable = [np.ones((20, 24), bool), np.zeros((12, 24), bool)]
+    one = simdtex.estimate([TRAINING, TRAINING[:12]], known=rows, mask=usable, **options)
+    assert not np.array_equal(two.probability, one.probability)
+    assert set(found.attrs) == {
+        *("version", "device", "nearest", "reach", "bandwidth", "training_image", "hard_data", "cell_x", "cell_y")
+    }
+
+
+BAD = {
+    "nearest": ({"nearest": 65}, "nearest is 65; give 64 or fewer"),
+    "reach": ({"reach": 20}, "reach is 20; give 19 or fewer"),
+    "bandwidth": ({"bandwidth": 0}, "bandwidth is 0; give"),
+    "category": ({"known": data(TRAINING + 1)}, "known has the category [159] and the sample has 0, 4, 8"),
+    "shape": ({"shape": (8, 9)}, "known is 9x11x1 and the output 8x9x1"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_refused_with_a_remedy(case):
+    change, words = BAD[case]
+    with pytest.raises(ValueError, match=words) as caught:
+        simdtex.estimate(TRAINING, **{"known": data(TRAINING), "categorical": True, "device": "reference"} | change)
+    assert "\n" not in str(caught.value)
