@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Simulation in three dimensions: time, proportions, variograms and connectivity of channels in a volume.
 
-    python benchmarks/volumes.py [--size 100x100x30] [--data 0,200] [--number 2] [--order 12] [--out DIR] [--device TEXT]
+    python benchmarks/volumes.py [--size 100x100x30] [--data 0,200] [--number 2] [--order 12] [--out DIR]
+                                 [--device TEXT]
 
 The training image and the truth that data are read off are two draws of one model: sinuous channels of elliptic cross
 section, along x, at random depths. Prints a line for each number of data: seconds of a realisation, the share of

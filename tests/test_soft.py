@@ -89,10 +89,17 @@ def test_what_is_impossible_is_not_there(search, weight):
 
 
 def test_what_is_more_probable_is_more_frequent():
-    found = [
-        (simulate(probabilities=of([(1 - p) / 2, p, (1 - p) / 2])).values == 4).mean() for p in (0.05, 0.3, 0.6, 0.95)
-    ]
-    assert found == sorted(found) and found[0] < 0.15 < 0.9 < found[-1]
+    asked = (0.05, 0.3, 0.6, 0.95)
+    found = {
+        weight: [
+            (simulate(probabilities=of([(1 - p) / 2, p, (1 - p) / 2]), soft_weight=weight).values == 4).mean()
+            for p in asked
+        ]
+        for weight in (1.0, 2.0)
+    }
+    assert all(one == sorted(one) for one in found.values())
+    assert np.abs(np.array(found[2.0]) - asked).max() < 0.08
+    assert found[1.0][0] > found[2.0][0] and found[1.0][-1] < found[2.0][-1]
 
 
 def test_each_cell_is_from_the_training_image_of_its_number():

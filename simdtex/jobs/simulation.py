@@ -145,8 +145,8 @@ def simulate(
     xarray.Dataset
         With `source`: that array is the variable ``simulation``, and ``source_row`` and ``source_column`` (realisation,
         y, x), int32, are the row and the column, counted from 0, of the training image that each cell is from, with
-        ``source_layer`` of a volume and, of several training images, ``source_image`` the number of the training image; -1 where from nowhere, as data are. The dataset has
-        the attributes, too.
+        ``source_layer`` of a volume and, of several training images, ``source_image`` the number of the training image;
+        -1 where from nowhere, as data are. The dataset has the attributes, too.
 
     Raises
     ------
