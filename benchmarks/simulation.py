@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Simulates with and without hard data: prints what it takes, and how like the training image it is.
 
-python benchmarks/simulation.py [--side 250] [-n 50] [--data 0 50 200 500] [--images channels network lenses] [--jobs N]
+python benchmarks/simulation.py [--side 250] [-n 50] [--data 0 50 200 500] [--images channels network lenses] [--runs 9]
 
-    [--options NAME=VALUE,NAME=VALUE] [--before NAME=VALUE,NAME=VALUE] [--device TEXT] [--pictures DIR]
+    [--options NAME=VALUE,NAME=VALUE] [--before NAME=VALUE,NAME=VALUE] [--jobs N] [--device TEXT] [--pictures DIR]
 
 The training images are those of ``training.py``; the data are read off another one of the same kind, at random places.
 The row *others* is of five more of the same kind, and dead ends of the training image stand behind the stroke.
 ``--options`` are those of `simdtex.simulate` that differ from its defaults. The time is that of a single realisation,
-the median of nine; *ratio* is over that of one without data, and *before* over that of one with the same data and the
-options ``--before``, all in turn in one process.
+the median of ``--runs`` (0: no times); *ratio* is over that of one without data, and *before* over that of one with the
+same data and the options ``--before``, all in turn in one process.
 """
 
 import argparse
@@ -53,7 +53,7 @@ def specks(image):
     return 1e4 * (sizes <= SPECK).sum() / image.size
 
 
-def seconds(image, cases, settings, device, runs=9):
+def seconds(image, cases, settings, device, runs):
     """Seconds of a realisation: {(data, setting): median}, for data by their number and options by their name."""
     machine, taken = simdtex.open_machine(device), {}
     settings = {
@@ -103,6 +103,7 @@ def main():
     parser.add_argument("-n", type=int, default=50)
     parser.add_argument("--data", type=int, nargs="+", default=[0, 50, 200, 500])
     parser.add_argument("--images", nargs="+", default=list(IMAGES), choices=list(IMAGES))
+    parser.add_argument("--runs", type=int, default=9)
     parser.add_argument("--jobs", type=int)
     parser.add_argument("--options", type=parsed, default={})
     parser.add_argument("--before", type=parsed)
@@ -115,15 +116,15 @@ def main():
     for name in options.images:
         image, truth = IMAGES[name](shape, 1), IMAGES[name](shape, 1001)
         others = np.stack([IMAGES[name](shape, 1002 + k) for k in range(OTHERS)])
-        print(line(name, "others", f"{'':19}", others, image, truth, None), flush=True)
+        print(line(name, "others", f"{'':20}", others, image, truth, None), flush=True)
         cases = {count: hard_data(truth, count, 1) for count in dict.fromkeys([0, *options.data])}
-        taken = seconds(image, cases, settings, options.device)
+        taken = seconds(image, cases, settings, options.device, options.runs) if options.runs else {}
         for count in options.data:
             job = {"known": cases[count], "categorical": True, "rng": 1, "device": options.device, "jobs": options.jobs}
             made = simdtex.simulate(image, options.n, shape=shape, **(job | options.options)).values
-            now = taken[count, "now"]
-            before = f"{now / taken[count, 'before']:6.2f}" if options.before is not None else f"{'':6}"
-            times = f"{now:6.3f}s {now / taken[0, 'now']:5.2f} {before}"
+            now, without, before = (taken.get(case) for case in ((count, "now"), (0, "now"), (count, "before")))
+            times = f"{now:6.3f}s {now / without:5.2f} " if now else f"{'':14}"
+            times += f"{now / before:6.2f}" if before else f"{'':6}"
             print(line(name, count, times, made, image, truth, cases[count]), flush=True)
             if options.pictures:
                 options.pictures.mkdir(parents=True, exist_ok=True)

@@ -43,7 +43,7 @@ def copies(ensemble: ArrayLike, training: ArrayLike, *, side: int = WINDOW) -> N
     Windows are compared exactly: those of the training image are numbered, equal ones alike, side by side of 1, 2, 4
     and more pixels, each from the numbers of the parts, and those of a realisation are looked up (Karp, Miller and
     Rosenberg, "Rapid identification of repeated patterns in strings, trees and arrays", 1972). The cost is 2 log2(side)
-    look-ups for every pixel, about 40 ms for 250 x 250 pixels, and the memory 50 bytes for every pixel of the training
+    look-ups for every pixel, about 20 ms for 250 x 250 pixels, and the memory 50 bytes for every pixel of the training
     image and of one realisation, beside the result.
     """
     array, image = as_ensemble(ensemble), as_image(training, "training image")
