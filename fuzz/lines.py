@@ -44,7 +44,7 @@ SIZES = (
 MODEST = {
     **dict.fromkeys(("order",), (1, 2, 4)),
     **dict.fromkeys(("levels", "orientations", "iterations", "free_sweeps", "split"), (1, 2, 4)),
-    **dict.fromkeys(("chance", "overview"), (0, 1, 4, 64)),
+    **dict.fromkeys(("chance", "coarse_chance", "overview"), (0, 1, 4, 64)),
     **dict.fromkeys(("left", "right", "top", "bottom", "band", "reach"), (0, 1, 3)),
     **dict.fromkeys(("seeds", "sweeps"), (2, 3)),
     **dict.fromkeys(("burn_in", "number", "jobs", "first"), (0, 1, 2)),

@@ -37,7 +37,7 @@ DEFAULTS = {
     **{"balance": 0.5, "structure": 2.0, "novelty": 1.0, "finish": None, "xi": -1.0},
     **{"lattice": "auto"},
     **{"free_sweeps": 2, "pixel": "source", "phases": "decimated", "edges": "auto"},
-    **{"schedule": "coloring", "boundary": "torus", "search": "auto", "chance": 4},
+    **{"schedule": "coloring", "boundary": "torus", "search": "auto", "chance": 4, "coarse_chance": 0},
     **{"categorical": False, "weights": None, "shares": None, "proportions": None},
     **{"data_weight": 16.0, "guide_weight": 10.0, "labels": None, "soft_weight": 1.0},
 }
@@ -392,7 +392,8 @@ def candidates_of(level, X, s, near, turn):
     favoured = len(found)
     found.append(level.number_of.get(tuple(X.source[level.pixel(s)].tolist())))
     found = list(dict.fromkeys(p for p in found if p is not None))
-    for k in range(max(o.chance, not found)):
+    chance = max(o.chance, o.coarse_chance) if level.spacing >= 4 else o.chance
+    for k in range(max(chance, not found)):
         word = words(level.seed, level.number, turn, level.index(s), random.SEARCH, k // 4)[k % 4]
         found.append(word * len(level.places) >> 32)
     found = list(dict.fromkeys(found))

@@ -62,6 +62,13 @@ CASES = {
     "few-three-levels": ((13, 14), None, np.uint8, (11, 10), FEW | {"levels": 3, "edges": "reflect"}),
     "few-exhaustive": ((13, 14), None, np.float32, (9, 10), FEW | {"levels": 3}),
     "few-gibbs": ((12, 11), None, np.uint16, (8, 9), FEW | {"relaxation": "gibbs", "bandwidth": 0.5}),
+    "few-coarse-chance": (
+        (12, 13),
+        None,
+        np.uint8,
+        (9, 10),
+        FEW | {"order": 1, "levels": 4, "phases": "all", "coarse_chance": 7},
+    ),
     "few-gibbs-density": ((10, 9), 2, np.uint8, (7, 8), FEW | {"relaxation": "gibbs", "pixel": "density", "chance": 6}),
     "all-of-many": ((35, 31), None, np.float32, (5, 6), BARE | {"order": 2, "levels": 1}),
     "seam": ((9, 9), None, np.uint8, (7, 11), BARE | {"search": "exact", "order": 5, "levels": 1, "xi": -8.0}),
@@ -244,6 +251,7 @@ CHANGES = {
         ({"order": 2, "levels": 2, "relaxation": "gibbs"}, "auto", "coherent"),
         ({"order": 2, "levels": 2, "coherence": 1.0}, "coherent", "exact"),
     ],
+    "coarse_chance": [(FEW | {"order": 1, "levels": 4, "phases": "all", "chance": 2}, 0, 9)],
     "chance": [(FEW, 4, 0), (FEW, 4, 5), (FEW | {"relaxation": "gibbs"}, 4, 0)],
 }
 

@@ -191,6 +191,7 @@ def test_summary_puts_everything_together():
     np.testing.assert_array_equal(found.maps[1], images.mean(0))
     p = found.maps.clip(1e-300)
     np.testing.assert_allclose(found.open, -(p * np.log2(p)).sum(0), atol=1e-12)
+    np.testing.assert_array_equal(found.copied, ensemble.copied(ensemble.copies(images, training)))
     misses = [sum(int(one[y, x] != value) for x, y, value in data) for one in images]
     assert found.misses.tolist() == misses and misses[0] == 0
 
@@ -243,6 +244,7 @@ IMAGE, FEW = np.zeros((20, 20), int), np.zeros((2, 20, 20), int)
         (lambda: ensemble.summary(np.full((1, 2, 2), np.nan), IMAGE), "not finite"),
         (lambda: ensemble.dead_ends(IMAGE[:16], 0), "a side of 16 pixels: give more than 16"),
         (lambda: ensemble.dead_ends(FEW, 0), "the image has the shape"),
+        (lambda: ensemble.copies(FEW, IMAGE, side=21), "side is 21: give 1 to 20"),
         (lambda: ensemble.anodi(FEW, IMAGE + 1), "the ensemble holds 0, which is no category"),
         (lambda: ensemble.anodi(FEW, IMAGE[:2]), "there are no patterns of 4 x 4"),
         (lambda: ensemble.summary(FEW, IMAGE, data=[(1, 2)]), "give rows of x, y and value"),
@@ -259,3 +261,33 @@ def test_bad_input_is_refused_in_a_sentence(call, words):
 def test_other_types_are_refused():
     with pytest.raises(TypeError, match="holds complex128"):
         ensemble.summary(np.ones((1, 2, 2), complex), IMAGE)
+
+
+@pytest.mark.parametrize("side", [1, 2, 5, 8])
+def test_copies_against_plain_loops(side):
+    training, made = noise(5, (1, 14, 17), 3)[0], noise(6, (2, 12, 15), 4)  # 3 is nowhere in the training image
+    made[0, 1:12, 2:13] = training[3:14, 4:15]
+    made[1, :9, :9] = 2
+    found = ensemble.copies(made, training, side=side)
+    assert found.shape == (2, 13 - side, 16 - side)
+    plain = 0
+    for n, i, j in np.ndindex(*found.shape):
+        window = made[n, i : i + side, j : j + side]
+        corners = np.ndindex(15 - side, 18 - side)
+        same = [at for at in corners if (training[at[0] : at[0] + side, at[1] : at[1] + side] == window).all()]
+        expected = same[0][0] * 17 + same[0][1] if same else -1
+        assert found[n, i, j] == (-2 if (window == window[0, 0]).all() else expected)
+        plain += found[n, i, j] == -2
+    assert plain > 0
+    shares = [(one >= 0).sum() / (one != -2).sum() if (one != -2).any() else np.nan for one in found]
+    np.testing.assert_array_equal(ensemble.copied(found), shares)
+
+
+def test_copies_of_the_image_itself_and_of_floats():
+    training, hidden = ensemble.channels()
+    assert ensemble.copied(ensemble.copies(training[np.newaxis], training)) == 1
+    assert ensemble.copied(ensemble.copies(hidden[np.newaxis], training)) == pytest.approx(0.159, abs=1e-3)
+    values = np.random.default_rng(1).normal(size=(20, 20))
+    places = ensemble.copies(values[np.newaxis, 2:19, 3:20], values)
+    assert places.tolist() == [[[43, 44], [63, 64]]]
+    assert (ensemble.copies(np.nextafter(values, 9)[np.newaxis], values) == -1).all()

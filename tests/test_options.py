@@ -51,7 +51,7 @@ def test_any_value_of_an_option_is_taken_or_refused_in_one_sentence(method, name
 
 
 NUMBERS = ("order", "bandwidth", "coherence", "balance", "structure", "novelty", "finish", "xi", "data_weight")
-COUNTS = ("levels", "overview", "free_sweeps", "chance")
+COUNTS = ("levels", "overview", "free_sweeps", "chance", "coarse_chance")
 TOO_MUCH = {
     **{f"mrf {name}": ("mrf", {name: 2**31}) for name in (*NUMBERS[:-1], *COUNTS)},
     **{f"mrf {name} 1e308": ("mrf", {name: 1e308}) for name in (*NUMBERS[1:7], "guide_weight")},
@@ -73,7 +73,7 @@ def test_what_is_beyond_a_range_is_refused(case):
 LARGEST = {
     "mrf": {
         **{name: GREATEST for name in ("bandwidth", "coherence", "balance", "structure", "novelty", "data_weight")},
-        **{"finish": 16, "chance": 4096, "overview": MOST},
+        **{"finish": 16, "chance": 4096, "coarse_chance": 4096, "overview": MOST},
         **{"xi": -GREATEST, "guide_weight": GREATEST, "weights": (GREATEST,), "shares": (GREATEST,)},
     },
     "multires": {"alpha": 1e308, "beta": GREATEST, "orientations": 64},
@@ -183,13 +183,13 @@ def test_a_near_miss_is_named():
 def test_the_users_values_win_over_the_preset_over_the_job_over_the_method():
     def values(job, **given):
         found = resolve(mrf.Options, job, given)
-        return found.novelty, found.boundary, found.order
+        return found.balance, found.boundary, found.order
 
-    assert values("synth") == (1.0, "torus", 18)
-    assert values("simulate") == (0.25, "open", 18)
-    assert values("simulate", preset="default") == (0.25, "open", 18)
+    assert values("synth") == (0.5, "torus", 18)
+    assert values("simulate") == (1.0, "open", 18)
+    assert values("simulate", preset="default") == (1.0, "open", 18)
     assert values("simulate", preset="paper") == (0.0, "open", 18)
-    assert values("simulate", preset="paper", novelty=0.5, boundary="torus", order=8) == (0.5, "torus", 8)
+    assert values("simulate", preset="paper", balance=0.5, boundary="torus", order=8) == (0.5, "torus", 8)
     assert resolve(mrf.Options, "schedules", {}).search == "exact"
     assert resolve(mrf.Options, "synth", {"weights": [1, 2.5]}).weights == (1, 2.5)
     with pytest.raises(ValueError, match=r"^unknown preset 'papers'; choose one of: default, paper$"):

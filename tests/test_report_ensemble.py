@@ -9,6 +9,7 @@ from test_page import assert_needs_nothing_else, read_page
 from simdtex.experiments import ensemble
 from simdtex.report import ensemble as report
 from simdtex.report.ensemble import write_ensemble
+from simdtex.report.tables import number_text
 
 ALWAYS = {
     "index.html",
@@ -18,6 +19,7 @@ ALWAYS = {
     "entropy.png",
     "variograms.png",
 }
+COPIES = {"copies.png"}  # where images hold a window
 OF_CATEGORIES = {"connectivity.png"}
 
 
@@ -27,7 +29,7 @@ def test_a_report_of_categories(tmp_path):
     training = training[:64, :56]
     data = [(10, 20, images[0, 20, 10]), (59, 47, images[0, 47, 59])]
     write_ensemble(tmp_path / "r", training, images, data=data, command="simdtex simulate <ti>")
-    assert {path.name for path in (tmp_path / "r").iterdir()} == ALWAYS | OF_CATEGORIES
+    assert {path.name for path in (tmp_path / "r").iterdir()} == ALWAYS | COPIES | OF_CATEGORIES
     page = read_page(tmp_path / "r" / "index.html")
     assert_needs_nothing_else(page)
     assert "3 realisations of 60 x 48 pixels, 2 categories, and a training image of 56 x 64" in page.text
@@ -41,12 +43,29 @@ def test_a_report_of_categories(tmp_path):
     words = f"{missed / 6:.1%} are missed on average" if missed else "keeps the 2 hard data"
     assert words in page.text
     assert f"{training.mean():.3f}" in page.text
+    copied = ensemble.copied(ensemble.copies(images, training))
+    np.testing.assert_allclose(results["copied"], copied)
+    assert f"{number_text(copied.mean(), copied.std(ddof=1))} stand in the training image" in page.text
+
+
+def test_the_index_map_shows_each_copied_pixel_where_it_is_from():
+    training = np.random.default_rng(3).integers(0, 9, (40, 50))
+    image = training.max() + 1 + np.zeros((30, 35), int)
+    image[2:22, 5:30] = training[11:31, 20:45]
+    image[2:22, 30] = training[11:31, 45]
+    image[6, 30] = 99  # in no copied window, and those right of it neither
+    index = report._index_map(ensemble.copies(image[np.newaxis], training)[0], 50)
+    expected = np.full(image.shape, -1)
+    row, col = np.indices(image.shape)
+    inside = (row >= 2) & (row < 22) & (col >= 5) & (col < 30)
+    expected[inside] = ((row + 9) * 50 + col + 15)[inside]
+    np.testing.assert_array_equal(index, expected)
 
 
 def test_a_report_of_continuous_values(tmp_path):
     images = np.random.default_rng(1).normal(size=(2, 20, 24))
     write_ensemble(tmp_path / "r", images[0], images, data=[(3, 4, 0), (9, 1, 0)])
-    assert {path.name for path in (tmp_path / "r").iterdir()} == ALWAYS
+    assert {path.name for path in (tmp_path / "r").iterdir()} == ALWAYS | COPIES
     text = read_page(tmp_path / "r" / "index.html").text
     assert "continuous values" in text and "standard deviation of the realisations" in text
     assert "Not every realisation keeps the 2 hard data" in text

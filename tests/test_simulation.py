@@ -15,7 +15,7 @@ from simdtex.jobs.simulation import realisation_seed
 xarray = pytest.importorskip("xarray")
 
 SHAPE = (12, 14)
-OWN = {"boundary": "open", "novelty": 0.25}
+OWN = {"boundary": "open", "coherence": 0.0, "balance": 1.0, "coarse_chance": 64}
 """The defaults of a simulation that differ from those of a texture."""
 QUICK = {"order": 2, "device": "reference", "rng": 5, "jobs": 1}
 TRAINING = texture((16, 20))
@@ -95,7 +95,7 @@ def test_the_preset_wins_over_the_defaults_of_a_simulation():
         TRAINING, SHAPE, rng=int(found.seed[0]), preset="paper", boundary="open", order=1, levels=2, device="reference"
     )
     assert_same_bits(found.values[0], own)
-    assert json.loads(found.attrs["options"])["novelty"] == 0
+    assert json.loads(found.attrs["options"])["balance"] == 0
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
@@ -206,7 +206,7 @@ def test_attributes_tell_how():
     assert (found.attrs["seed"], found.attrs["version"]) == (5, simdtex.__version__)
     assert found.attrs["device"].startswith("reference")
     options = json.loads(found.attrs["options"])
-    assert (options["order"], options["levels"], options["novelty"]) == (2, 1, 0.25)
+    assert (options["order"], options["levels"], options["balance"]) == (2, 1, 1.0)
     assert len(found.attrs["training_image"]) == 64
 
 

@@ -46,6 +46,7 @@ class MrfOptions(Common, total=False):
     phases: str
     search: str
     chance: int
+    coarse_chance: int
     relaxation: str
     bandwidth: float
     xi: float

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import fields
+from itertools import product
 from typing import Any
 
 import matplotlib
@@ -14,8 +15,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure as Plot
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.experiments.ensemble import Summary, summary
+from simdtex.experiments.ensemble import Summary, copies, summary
+from simdtex.experiments.ensemble.copies import WINDOW
 from simdtex.io.image import to_display
+from simdtex.model.colours import source_colours
 from simdtex.report.page import Figure, Part, Section, check_folder, write_report
 from simdtex.report.plots import FAINT, INK, legend, new_figure, tidy
 from simdtex.report.sheet import contact_sheet
@@ -79,6 +82,7 @@ def write_ensemble(
         Section("Variograms", [_variograms(found)]),
         *([Section("Connectivity of the categories", _connectivity(found))] if categorical else []),
         Section("Variety and likeness", _distances(found)),
+        Section("Copies", _copies(images, own, found)),
     ]
     kind = f"{len(found.categories)} categories" if categorical else "continuous values"
     lead = (
@@ -305,6 +309,45 @@ def _distances(found: Summary) -> list[Part]:
         "below 1 the realisations are more alike than that, or all of them lack something."
     )
     return [words, Table("Distances", rows, note)]
+
+
+def _copies(images: Array, own: Array, found: Summary) -> list[Part]:
+    """Return the share of copied windows, and the index map of the first realisation that is shown."""
+    if not np.isfinite(found.copied).any():
+        return [f"No window of {WINDOW} x {WINDOW} pixels has several values."]
+    words = (
+        f"Of the windows of {WINDOW} x {WINDOW} pixels with more than one value, {_spread(found.copied)} stand in the "
+        "training image, pixel by pixel the same. Where few pixels are in question, as of categories, other images of "
+        "the same kind have some in common, too. Likeness and ratio above reward copies: read them beside this."
+    )
+    places = np.moveaxis(np.indices(own.shape), 0, -1)
+    index = _index_map(copies(images[:1], own)[0], own.shape[1])
+    source = np.where(index[..., np.newaxis] < 0, -1, np.stack([index // own.shape[1], index % own.shape[1]], -1))
+    shown = [("places in the training image", places), ("realisation 0", source)]
+    return [
+        words,
+        Figure(
+            "copies.png",
+            contact_sheet([(label, source_colours(one, own.shape)) for label, one in shown], columns=2),
+            "The index map: a colour for each place in the training image, and the pixels of the first realisation "
+            "that lie in a copied window, in the colours of where it is first found. Black ones lie in none.",
+        ),
+    ]
+
+
+def _index_map(places: NDArray[np.int32], cols: int) -> NDArray[np.int32]:
+    """Return where in a training image of so many columns each pixel is that lies in a copied window; -1 elsewhere.
+
+    ``places`` (rows, cols) are the windows'. Of the windows that a pixel lies in, the one in whose middle it is counts.
+    """
+    rows, wide = places.shape
+    index = np.full((rows + WINDOW - 1, wide + WINDOW - 1), -1, np.int32)
+    middle = (WINDOW - 1) / 2
+    inside = sorted(product(range(WINDOW), repeat=2), key=lambda at: -((at[0] - middle) ** 2 + (at[1] - middle) ** 2))
+    for down, right in inside:
+        here = index[down : down + rows, right : right + wide]
+        here[places >= 0] = places[places >= 0] + down * cols + right
+    return index
 
 
 def _decimal(value: float) -> str:

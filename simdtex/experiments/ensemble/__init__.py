@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from simdtex.experiments.ensemble.arrays import categories_of
 from simdtex.experiments.ensemble.connectivity import Connectivity, connectivity, dead_ends
+from simdtex.experiments.ensemble.copies import copied, copies
 from simdtex.experiments.ensemble.distance import Anodi, anodi
 from simdtex.experiments.ensemble.summary import Summary, summary
 from simdtex.io.image import read
@@ -27,6 +28,8 @@ __all__ = [
     "categories_of",
     "channels",
     "connectivity",
+    "copied",
+    "copies",
     "dead_ends",
     "summary",
 ]

@@ -186,7 +186,7 @@ class Lattices:
             proposal = Everything(every, strip_of(machine, sample, self.places(number)))
         else:
             square = square_of(machine, sample, self.places(number))
-            proposal = Listed(self.candidates(number), square, len(offsets), options.chance)
+            proposal = Listed(self.candidates(number), square, len(offsets), options.chance_at(number))
         dimensions = sample.channels * (len(offsets) + 1)
         variance = sample.variance
         h = options.bandwidth * lcpdf.optimal_bandwidth(variance, count, dimensions)  # (8)

@@ -42,7 +42,10 @@ NARROWEST, WIDEST = 0.01, 16.0
 CHANCE = 4096
 """The most candidates that a coherent search weighs at random."""
 
-SEARCHED = ("search", "chance")
+COARSE = 2
+"""The first level at which it may weigh more of them: there are few sites, and they decide how things connect."""
+
+SEARCHED = ("search", "chance", "coarse_chance")
 """The options that say how candidates are searched for, which makes no difference at the coarsest level."""
 
 
@@ -110,6 +113,7 @@ class Options:
         "Prefer to continue a neighbour's source: more keeps pieces together",
         more="The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence.",
         paper=0.0,
+        jobs={"simulate": 0.0},
         slider=(0, 4, 0.1),
     )
     balance: float = appearance(
@@ -119,7 +123,7 @@ class Options:
         more="A candidate whose surroundings serve more sites than their share costs lambda N C sigma^2 "
         "min(4, u - 1): lambda is the balance, u the use over the fair share.",
         paper=0.0,
-        jobs={"fill": 0.0, "extend": 0.0},
+        jobs={"fill": 0.0, "extend": 0.0, "simulate": 1.0},
         slider=(0, 4, 0.1),
     )
     novelty: float = appearance(
@@ -130,7 +134,7 @@ class Options:
         "neighbour whose source it continues, and four times that for each whose source it is: mu is the novelty. This "
         "holds if sites take pixels of the sample and n is 1024 or less.",
         paper=0.0,
-        jobs={"fill": 0.0, "extend": 0.0, "simulate": 0.25},
+        jobs={"fill": 0.0, "extend": 0.0},
         slider=(0, 4, 0.25),
     )
     finish: float | None = appearance(
@@ -206,6 +210,16 @@ class Options:
         "Weigh this many more candidates at random, in a coherent search",
         jobs={"fill": 16, "extend": 16},
         slider=(0, 32, 1),
+        shown=(),
+    )
+    coarse_chance: int = searching(
+        0,
+        Whole(0, CHANCE),
+        "Weigh this many at random where sites are 4 pixels apart or more, if that is more than chance",
+        more="More connects better what bends around data, and copies less of the sample; the finest two levels, which "
+        "take most of the time, are left as they are.",
+        jobs={"simulate": 64},
+        slider=(0, 128, 4),
         shown=(),
     )
     relaxation: str = sampling(
@@ -333,6 +347,10 @@ class Options:
             raise ValueError('categories and weights go with pixels of the sample; give pixel="source"')
         if self.categorical and self.finish:
             raise ValueError(f"finish={self.finish:g} takes means, and of categories there are none; leave it out")
+
+    def chance_at(self, level: int) -> int:
+        """Return how many candidates at random a coherent search weighs at a level."""
+        return max(self.chance, self.coarse_chance) if level >= COARSE else self.chance
 
     def of(self, pictures: Pictures) -> Pictures:
         """Return the pictures of a sample with their kinds, weights and shares by these options."""

@@ -204,7 +204,7 @@ def expected_work(run: Lattices) -> dict[int, tuple[float, float]]:
         sweeps = min(1024, 1 - 0.6 * len(run.offsets) / options.xi) if coarsest else 6 * 0.75
         candidates = run.places(number).positions.size
         if not run.exhaustive(number):
-            candidates = min(candidates, most_listed(len(run.offsets), options.chance))
+            candidates = min(candidates, most_listed(len(run.offsets), options.chance_at(number)))
         sites = grid.size * candidates
         work[number] = (sites * sweeps, float(sites * options.free_sweeps))
     return work
