@@ -113,7 +113,7 @@ class Options:
         "Prefer to continue a neighbour's source: more keeps pieces together",
         more="The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence.",
         paper=0.0,
-        jobs={"simulate": 0.0},
+        jobs={"simulate": 0.0, "simulate 3-D": 0.5},
         slider=(0, 4, 0.1),
     )
     balance: float = appearance(
@@ -123,7 +123,7 @@ class Options:
         more="A candidate whose surroundings serve more sites than their share costs lambda N C sigma^2 "
         "min(4, u - 1): lambda is the balance, u the use over the fair share.",
         paper=0.0,
-        jobs={"fill": 0.0, "extend": 0.0, "simulate": 1.0},
+        jobs={"fill": 0.0, "extend": 0.0, "simulate": 1.0, "simulate 3-D": 0.5},
         slider=(0, 4, 0.1),
     )
     novelty: float = appearance(
@@ -134,7 +134,7 @@ class Options:
         "neighbour whose source it continues, and four times that for each whose source it is: mu is the novelty. This "
         "holds if sites take pixels of the sample and n is 1024 or less.",
         paper=0.0,
-        jobs={"fill": 0.0, "extend": 0.0},
+        jobs={"fill": 0.0, "extend": 0.0, "simulate 3-D": 0.25},
         slider=(0, 4, 0.25),
     )
     finish: float | None = appearance(
@@ -218,7 +218,7 @@ class Options:
         "Weigh this many at random where sites are 4 pixels apart or more, if that is more than chance",
         more="More connects better what bends around data, and copies less of the sample; the finest two levels, which "
         "take most of the time, are left as they are.",
-        jobs={"simulate": 64},
+        jobs={"simulate": 64, "simulate 3-D": 0},
         slider=(0, 128, 4),
         shown=(),
     )
