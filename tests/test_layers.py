@@ -185,11 +185,23 @@ def guided(shape=(8, 14, 15)):
     }
 
 
+def sloping(shape=(8, 14, 15)):
+    """A probability that rises from the first layer to the last."""
+    return np.broadcast_to(np.linspace(0, 1, shape[0])[:, None, None], shape)
+
+
 GIVEN = {
     "data": {"known": data()},
     "data-exact": {"known": data((6, 9, 10)), "search": "exact", "order": 2},
     "data-levels": {"known": data((9, 18, 20)), "levels": 3},
     "guide": guided(),
+    "soft": {"probabilities": np.stack([1 - sloping(), sloping()]), "shape": (8, 14, 15)},
+    "soft-exact": {
+        "probabilities": np.stack([1 - sloping((6, 8, 9)), sloping((6, 8, 9))]),
+        "search": "exact",
+        "order": 2,
+    },
+    "region": {"region": np.indices((8, 14, 15)).sum(0) > 12},
     "masked": {"training": np.ma.MaskedArray(facies(), np.indices((9, 20, 22))[2] < 3), "shape": (6, 9, 10)},
 }
 
@@ -211,6 +223,19 @@ def test_data_are_honoured_and_pixels_are_the_samples():
     assert (found[~known.mask] == known.data[~known.mask]).all()
     assert set(np.unique(found)) <= {0, 1}
     assert found.shape == known.shape
+
+
+def test_soft_data_and_a_region_have_layers():
+    found = simulated(**GIVEN["soft"])
+    assert (found[0] == 0).all() and (found[-1] == 1).all() and found[:4].mean() < 0.4 < 0.6 < found[4:].mean()
+    inside = np.indices((8, 14, 15)).sum(0) > 12
+    maps = simdtex.simulate(
+        facies(), 1, region=inside, source=True, categorical=True, order=3, rng=7, device="reference"
+    )
+    assert (maps.region.values == inside).all() and set(np.unique(maps.simulation.values[0, ~inside])) == {255}
+    names = ("source_layer", "source_row", "source_column")
+    place = np.stack([maps[name].values[0][inside] for name in names])
+    assert (facies()[tuple(place)] == maps.simulation.values[0][inside]).all()
 
 
 def test_the_shares_are_those_of_the_training_image():
@@ -255,6 +280,8 @@ def test_a_callback_sees_volumes():
         ),
         ({"known": np.full((4, 4), np.nan)}, "known is 2-dimensional; give .layers, rows, cols."),
         ({"guide": (guided()["guide"][0], np.full((9, 20, 22), np.nan))}, "the guide of a volume has NaN"),
+        ({"rotation": np.zeros((9, 20, 22))}, "rotation is for training images of two axes; leave it out for a volume"),
+        ({"probabilities": np.full((2, 9, 20, 22), 0.4)}, "the probabilities of layer 0, row 0, column 0 are 0.4, 0.4"),
     ],
 )
 def test_what_only_pictures_have_is_refused(options, words):

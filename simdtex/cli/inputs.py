@@ -235,18 +235,18 @@ def check_source_map(path: Path | None, samples: Material, *, everywhere: bool =
         raise ValueError(f"{path} cannot hold {what}; end its name in .npz instead")
 
 
-def read_map(name: str, path: Path) -> HardData | NDArray[Any]:
+def read_map(name: str, path: Path, deep: bool = False) -> HardData | NDArray[Any]:
     """Read a map of `MAPS`: of probabilities a table, too; any other a picture or a grid, with channels in front."""
     from simdtex.io import grids, image
     from simdtex.io.hard_data import read_hard_data
 
     if name == "probabilities" and (path.suffix.lower() in TABLES or grids.kind_of(path) == "points"):
         return read_hard_data(path)
-    if name == "region" and grids.kind_of(path) is None:
+    if name == "region" and grids.kind_of(path) is None and not deep:
         return image.read_mask(path, image.read(path).pixels.shape)
-    pixels, _ = read_pixels(path)
-    if channels(pixels) == 1:
-        pixels = pixels.reshape(pixels.shape[:2])
+    pixels, _ = read_pixels(path, deep)
+    if pixels.ndim == 2 or pixels.shape[-1] == 1:
+        pixels = pixels if pixels.ndim == 2 else pixels[..., 0]
         return pixels > 0 if name == "region" else pixels
     return np.moveaxis(pixels, -1, 0)
 

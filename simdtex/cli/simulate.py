@@ -119,9 +119,9 @@ def simulate(
     data = read_data(material, options)
     known = data["known"]
     files = {name: options.pop(name) for name in MAPS}
-    maps = {name: read_map(name, path) for name, path in files.items() if path}
-    layers = [one[0] if one.ndim == 3 else one for one in maps.values() if isinstance(one, np.ndarray)]
-    shape = output_shape(size, pixels, known, *layers, pixels, axes=2 + material.deep)
+    maps = {name: read_map(name, path, material.deep) for name, path in files.items() if path}
+    cells = [one[0] if one.ndim == 3 + material.deep else one for one in maps.values() if isinstance(one, np.ndarray)]
+    shape = output_shape(size, pixels, known, *cells, pixels, axes=2 + material.deep)
     lies = lies_of(material, origin, cell)
     place = lies | ({} if several is None else {"several": several})
     if check_realisations_path(output, source=source) in SUFFIXES:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from simdtex.checkpoint import digest
 from simdtex.io.hard_data import HardData
-from simdtex.io.image import as_array
+from simdtex.io.image import AXES, as_array
 from simdtex.jobs.inputs import Inputs, Placing, check_mask
 from simdtex.model.given import Given
 from simdtex.model.pictures import Pictures
@@ -32,11 +32,10 @@ class Maps(NamedTuple):
     rotation: NDArray[Any] | HardData | None = None
     scale: NDArray[Any] | HardData | None = None
 
-    @property
-    def shape(self) -> tuple[int, ...] | None:
-        """Rows and columns of the first that is an array."""
-        shapes = (np.shape(one)[-2:] for one in self if one is not None and not isinstance(one, HardData))
-        return next((shape for shape in shapes if len(shape) == 2), None)
+    def shape(self, axes: int) -> tuple[int, ...] | None:
+        """Return the sides of the first that is an array: rows and columns or, of 3 ``axes``, layers too."""
+        shapes = (np.shape(one)[-axes:] for one in self if one is not None and not isinstance(one, HardData))
+        return next((shape for shape in shapes if len(shape) == axes), None)
 
     def digests(self) -> dict[str, str]:
         """Return the SHA-256 digest of each, by name."""
@@ -84,9 +83,9 @@ class Maps(NamedTuple):
         return weights
 
     def of_categories(
-        self, categories: NDArray[Any] | None, shape: tuple[int, int], place: Placing
+        self, categories: NDArray[Any] | None, shape: tuple[int, ...], place: Placing
     ) -> NDArray[np.float64] | None:
-        """Return the probability of each category, (categories, H, W), NaN where nothing is said; None without."""
+        """Return the probability of each category, (categories, *shape), NaN where nothing is said; None without."""
         if self.probabilities is None:
             return None
         if categories is None:
@@ -101,36 +100,42 @@ class Maps(NamedTuple):
             placed = place(given, shape, np.float64).reshape(*shape, len(categories))
             given = np.moveaxis(placed.filled(np.nan), -1, 0)
         found = as_array("probabilities", given)
-        if found.ndim != 3 or len(found) != len(categories):
+        if found.ndim != 1 + len(shape) or len(found) != len(categories):
             raise ValueError(
                 f"probabilities are {'x'.join(map(str, found.shape))} and the training image has the {len(categories)} "
-                f"categories {names}; give (categories, rows, cols), in this order"
+                f"categories {names}; give (categories, {AXES[len(shape)][1:]}, in this order"
             )
         found = _numbers("probabilities", found, (len(categories), *shape))
         unknown = np.isnan(found).any(0)
         total = found.sum(0)
         off = ~unknown & ((found < 0).any(0) | (abs(total - 1) > ONE))
         if off.any():
-            row, col = np.argwhere(off)[0]
+            at = np.argwhere(off)[0]
+            told = ", ".join(f"{p:g}" for p in found[(slice(None), *at)])
             raise ValueError(
-                f"the probabilities of row {row}, column {col} are {', '.join(f'{p:g}' for p in found[:, row, col])}; "
-                "give numbers of 0 or more that add up to 1, or NaN"
+                f"the probabilities of {_cell(at)} are {told}; give numbers of 0 or more that add up to 1, or NaN"
             )
         found[:, unknown] = np.nan
         return np.asarray(found / total)
 
 
-def check_region(region: Any, shape: tuple[int, int], inputs: Inputs) -> Inputs:
+def _cell(at: NDArray[np.integer]) -> str:
+    """Return where a cell is, in words."""
+    names = ("layer", "row", "column")[-len(at) :]
+    return ", ".join(f"{name} {n}" for name, n in zip(names, at, strict=True))
+
+
+def check_region(region: Any, shape: tuple[int, ...], inputs: Inputs) -> Inputs:
     """Return the inputs of a simulation whose cells outside of a region, where it is False, take no part."""
     inside = check_mask(region, shape, "region", "the output")
     if not inside.any():
         raise ValueError("region is False everywhere; set it True where cells are to be simulated")
     pixels = inputs.pictures.pixels[0]
-    sides = (*shape, pixels.shape[2])
+    sides = (*shape, pixels.shape[-1])
     given = inputs.given or Given(np.zeros(sides, pixels.dtype), np.zeros(sides, bool))
     if (given.known & ~inside[..., None]).any():
-        row, col = np.argwhere(given.known.any(-1) & ~inside)[0]
-        raise ValueError(f"known has a value at row {row}, column {col}, outside region; leave it out, or widen region")
+        at = np.argwhere(given.known.any(-1) & ~inside)[0]
+        raise ValueError(f"known has a value at {_cell(at)}, outside region; leave it out, or widen region")
     return inputs._replace(given=replace(given, known=given.known | ~inside[..., None], outside=~inside))
 
 

@@ -183,23 +183,23 @@ def simulate(
     known = None if known is None else as_known(known)
     given = {"region": region, "probabilities": probabilities, "image_map": image_map, "rotation": rotation}
     given["scale"] = scale
-    if axes > 2 and (asked := [name for name, one in given.items() if one is not None]):
+    flat = ("image_map", "rotation", "scale")
+    if axes > 2 and (asked := [name for name in flat if given[name] is not None]):
         raise ValueError(f"{asked[0]} is for training images of two axes; leave it out for a volume")
     maps = Maps(**{name: as_known(one, name) for name, one in given.items() if one is not None})
-    size = check_sides((maps.shape or pictures.pixels[0].shape[:-1]) if shape is None else shape, sides)
+    size = check_sides((maps.shape(axes) or pictures.pixels[0].shape[:-1]) if shape is None else shape, sides)
     if shape is None and isinstance(known, np.ndarray) and known.ndim == axes + (channel_axis is not None):
         size = known.shape if channel_axis is None else np.moveaxis(known, channel_axis, -1).shape[:-1]
-    flat = size[-2], size[-1]
     place = partial(place_hard_data, origin=origin, cell=cell, several=several)
     inputs = check_inputs(pictures, size, channel_axis, None, known, None, guide, place)
-    inputs = inputs if region is None else check_region(maps.region, flat, inputs)
+    inputs = inputs if region is None else check_region(maps.region, size, inputs)
     missing: Any = None if region is None else missing_value(pictures.pixels)
     chosen = resolve(mrf.Options, "simulate" if axes == 2 else "simulate 3-D", options)
-    copies = maps.of_images(pictures, flat)
+    copies = maps.of_images(pictures, (size[-2], size[-1]))
     if copies and chosen.shares:
         raise ValueError("shares are those of the maps of training images, rotation and scale; leave shares out")
     categories = chosen.of(pictures).categories(0)
-    soft = Soft(maps.of_categories(categories, flat, place), copies.probability if copies else None)
+    soft = Soft(maps.of_categories(categories, size, place), copies.probability if copies else None)
     sample, guides = inputs.pictures, inputs.guide
     if copies:
         sample = copies.pictures(sample)
@@ -265,7 +265,7 @@ def simulate(
     }
     attributes = _attributes(seed, chosen, machines[0].name, inputs) | maps.digests()
     if inputs.given and inputs.given.outside is not None:
-        coordinates["region"] = (("y", "x"), ~inputs.given.outside)
+        coordinates["region"] = (dims[1 : 1 + axes], ~inputs.given.outside)
         attributes |= {} if pixels.dtype.kind == "f" else {"missing": missing.item()}
     if origin is not None or cell is not None:
         attributes |= {f"cell_{axis}": side for axis, side in zip("xyz", lies.cell, strict=False)}

@@ -52,7 +52,7 @@ class Soft:
 
     Parameters
     ----------
-    categories : (categories, H, W) float64 array, optional
+    categories : (categories, H, W) or (categories, D, H, W) float64 array, optional
         The probability of each category of the first variable, in ascending order.
     images : (training images, H, W) float64 array, optional
         The probability of each training image.
@@ -85,15 +85,18 @@ class Soft:
         return np.stack(found).astype(np.uint16)
 
     def costs(self, sample: Sample, step: int, rate: float) -> NDArray[np.float32]:
-        """Return what each kind costs at the sites (step i, step j), (rows, sites' rows, sites' columns).
+        """Return what each kind costs at the sites (step i, step j), (kinds, sites' rows, sites' columns).
+
+        Those of a volume have layers, too.
 
         ``rate`` is w N C sigma^2. What counts at a coarse level is the probability at the site itself.
         """
         found = []
         for kind in self._all(sample, np.zeros(0, np.intp)):
-            p = kind.probability[:, ::step, ::step]
+            sites = (slice(None, None, step),) * (kind.probability.ndim - 1)
+            p = kind.probability[(slice(None), *sites)]
             with np.errstate(divide="ignore", invalid="ignore"):  # of 0 and of NaN
-                said = np.log(p) - np.log(kind.shares)[:, None, None]
+                said = np.log(p) - np.log(kind.shares).reshape(-1, *[1] * len(sites))
                 cost = rate * UNIT * np.rint((said.max(0) - said) * STEPS) / STEPS
             cost = np.where(p > 0, np.minimum(cost, EXCLUDED), EXCLUDED)
             found.append(np.where(np.isnan(p), 0, cost).astype(np.float32))
@@ -105,8 +108,7 @@ class Soft:
         if self.categories is not None:
             categories = sample.pictures.categories(0)
             assert categories is not None
-            row, col = np.divmod(np.concatenate([source, inside]), sample.cols)
-            of = np.searchsorted(categories, sample.pixels[row - sample.margin, col - sample.margin, 0])
+            of = np.searchsorted(categories, sample.own(np.concatenate([source, inside]))[:, 0])
             yield Kind(of[: source.size], _shares(of[source.size :], len(categories)), self.categories)
         if self.images is not None:
             shares = _shares(sample.picture_of(inside), len(self.images))

@@ -228,8 +228,8 @@ class Lattices:
         """Return what each kind costs at the sites of a lattice, or of a window of it, (kinds, H, W)."""
         assert self.plan.soft
         found = self.plan.soft.costs(self.sample, 2**number, self.options.soft_weight * self.usual)
-        planes = np.zeros((len(found), grid.height, grid.width), np.float32)
-        grid.view(planes)[...] = grid.cut(found)
+        planes = np.zeros((len(found), *grid.pixels), np.float32)
+        grid.view(planes)[...] = grid.cut(found) if grid.part else found
         return self.machine.put(planes)
 
     def _phased(self, number: int, candidates: Candidates) -> Phased | None:
