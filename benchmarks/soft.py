@@ -3,8 +3,8 @@
 
     python benchmarks/soft.py [--weights 0,0.5,1,2] [--number 12] [--size 120] [--device TEXT]
 
-The training image is that of the pages on simulation. Probabilities of channels rise from 0.02 at the left to 0.98 at the
-right; a line gives the shares in six strips, the means over the realisations. Weight 0 is a run without soft data.
+The training image is that of the pages on simulation. Probabilities of channels rise from 0.02 at the left to 0.98 at
+the right; a line gives the shares in six strips, the means over the realisations. Weight 0 is a run without soft data.
 """
 
 import argparse

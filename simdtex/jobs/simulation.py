@@ -96,15 +96,15 @@ def simulate(
     guide, mask
         As in `simdtex.synthesize`: secondary data of the training image and of the realisations, and what of the
         training image may be used.
-    region : (rows, cols) bool array, optional
+    region : (rows, cols) or (layers, rows, cols) bool array, optional
         True where cells are simulated. The others take no part, and have no value: NaN in floats, else the attribute
         ``missing``.
-    probabilities : (categories, rows, cols) array, or table or its path, optional
+    probabilities : (categories, *shape) array, or table or its path, optional
         Soft data: how probable each category, in ascending order, of the first variable is at each cell, adding up to
         1; NaN where nothing is said. A table has the columns x, y, and one for each category. See `soft_weight`.
     image_map : (rows, cols) or (training images, rows, cols) array, optional
         The number of the training image, from 0 on, that each cell is from, or the weight of each training image there.
-        NaN: any.
+        NaN: any. This and the next two are of pictures alone.
     rotation : (rows, cols) array, optional
         How far the training image is turned at each cell, in degrees from x to y (from columns to rows), rounded to
         eighths of a turn. NaN: as anywhere else.
