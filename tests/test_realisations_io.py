@@ -10,7 +10,7 @@ import pytest
 import xarray
 
 from simdtex.io.grids import read_grid
-from simdtex.io.realisations import check_realisations_path, write_realisations
+from simdtex.io.realisations import check_realisations_path, read_netcdf, write_realisations
 
 SUFFIXES = [".zarr", ".nc", ".npz"]
 GRIDS = [".gslib", ".sgems"]
@@ -69,7 +69,7 @@ import sys
 sys.modules["xarray"] = None
 from types import SimpleNamespace
 import numpy as np
-from simdtex.io.realisations import check_realisations_path, write_realisations
+from simdtex.io.realisations import check_realisations_path, read_netcdf, write_realisations
 coords = {"x": SimpleNamespace(values=np.arange(3))}
 check_realisations_path(sys.argv[1])
 write_realisations(sys.argv[1], SimpleNamespace(values=np.ones((2, 3, 3)), coords=coords, attrs={"seed": 1}))
@@ -178,3 +178,35 @@ def test_what_is_no_data_array_is_refused(tmp_path):
         with pytest.raises(TypeError):
             write_realisations(tmp_path / f"a{suffix}", some().assign_attrs(a=object()))
     assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("layers", [None, 3])
+def test_a_grid_is_read_from_netcdf(tmp_path, layers):
+    path, dims = tmp_path / "grid.nc", ("z", "y", "x")[layers is None :]
+    shape = (3, 5, 4)[layers is None :]
+    values = np.arange(np.prod(shape), dtype=np.int16).reshape(shape)
+    coords = {"x": np.arange(4) * 10.0 + 105, "y": np.arange(5) * 20.0 + 7} | (
+        {"z": np.arange(3) - 9.5} if layers else {}
+    )
+    grid = xarray.Dataset(
+        {"rock": (dims, values), "other": ("x", np.zeros(4)), "b": (dims[::-1], values.T / 2)}, coords
+    )
+    grid.to_netcdf(path, engine="h5netcdf")
+    found = read_netcdf(path)
+    assert list(found.values) == ["rock", "b"] and found.values["rock"].dtype == np.int16
+    for name, wanted in (("rock", values), ("b", values / 2)):
+        assert (found.values[name] == wanted).all() and found.values[name].shape == (layers or 1, 5, 4)
+    assert found.origin == (105, 7, -9.5 if layers else 0) and found.cell == (10, 20, 1)
+
+
+def test_a_netcdf_that_is_no_grid_gets_one_sentence(tmp_path):
+    path = tmp_path / "grid.nc"
+    xarray.Dataset({"rock": ("t", np.zeros(4))}).to_netcdf(path, engine="h5netcdf")
+    with pytest.raises(ValueError, match="has no variable with the axes y and x, or z, y and x"):
+        read_netcdf(path)
+    path.write_bytes(path.read_bytes()[:200])
+    with pytest.raises(ValueError, match="cannot be read as NetCDF"):
+        read_netcdf(path)
+    some().isel(realisation=0, drop=True).to_netcdf(path, engine="h5netcdf")
+    with pytest.raises(ValueError, match=r"grid\.nc "):
+        read_netcdf(path, max_pixels=4)

@@ -104,7 +104,8 @@ def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | N
     """
     from simdtex.io import grids, image
 
-    if grids.kind_of(path) is None:
+    netcdf = deep and path.suffix.lower() == ".nc"
+    if grids.kind_of(path) is None and not netcdf:
         if deep:
             from simdtex.io import volume  # whose libraries take long to load
 
@@ -112,7 +113,12 @@ def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | N
                 values = volume.read(path)
                 return values if len(values) > 1 else values[0], None
         return image.read(path).pixels, None
-    grid = grids.read_grid(path)
+    if netcdf:
+        from simdtex.io.realisations import read_netcdf
+
+        grid = read_netcdf(path)
+    else:
+        grid = grids.read_grid(path)
     values = np.stack(list(grid.values.values()), -1)
     if len(values) > 1 and not deep:
         raise ValueError(f"{path} has {len(values)} layers: give a grid with nz = 1")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Writing the realisations of a simulation: by xarray's own writers, as plain NumPy arrays, or as a grid.
+"""Writing the realisations of a simulation, and reading NetCDF: by xarray, as plain NumPy arrays, or as a grid.
 
 Realisations are an `xarray.DataArray`, as `simdtex.simulate` returns. The extra ``simulate`` installs the libraries:
 ``pip install 'simdtex[simulate]'``.
@@ -18,12 +18,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable, check_target
-from simdtex.io.grids import SUFFIXES, write_grid
+from simdtex.io.grids import SUFFIXES, CartesianGrid, write_grid
+from simdtex.io.limits import TooLarge, check_array, check_file, max_pixels_or_default
 
 if TYPE_CHECKING:
     from xarray import DataArray, Dataset
 
-__all__ = ["check_realisations_path", "write_realisations"]
+__all__ = ["check_realisations_path", "read_netcdf", "write_realisations"]
 
 PathLike = str | os.PathLike[str]
 
@@ -116,6 +117,52 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
     with atomic_folder(path) as store, warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Consolidated metadata")  # not yet in the specification, but read by xarray
         named.to_zarr(store, mode="w", zarr_format=3)
+
+
+def read_netcdf(path: PathLike, *, max_pixels: int | None = None) -> CartesianGrid:
+    """Read the variables of a NetCDF 4 file that have the axes y and x, or z, y and x, as a grid.
+
+    Parameters
+    ----------
+    path : path
+        Coordinates z, y and x, if there are any, are evenly spaced and ascend.
+    max_pixels : int, optional
+        The most values of a variable that are read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
+
+    Returns
+    -------
+    CartesianGrid
+        Values (nz, ny, nx) in the file's types, of the variables with the axes of the first; the centre of the first
+        cell, and the size of a cell.
+
+    Raises
+    ------
+    ValueError
+        The file is missing, damaged, too large, or has no such variable, or a library is not installed.
+    """
+    name, most = os.fspath(path), max_pixels_or_default(max_pixels)
+    check_file(name, "the grid", most)
+    for library in _NEEDED[".nc"]:
+        if find_spec(library) is None:
+            raise ValueError(f"{library} is not installed; pip install 'simdtex[simulate]'")
+    import xarray
+
+    try:
+        with xarray.open_dataset(name, engine="h5netcdf") as data:
+            found = [one for one in data.data_vars.values() if set(one.dims) in ({"x", "y"}, {"x", "y", "z"})]
+            found = [one for one in found if set(one.dims) == set(found[0].dims)]
+            for one in found:
+                check_array(one.shape, one.dtype.itemsize, most)
+            arrays = [one.transpose(..., "y", "x").load() for one in found]
+    except TooLarge as error:
+        raise ValueError(f"{name} {error}") from None
+    except Exception as error:  # each library has errors of its own for a damaged file
+        raise ValueError(f"{name} cannot be read as NetCDF ({error}): save it again") from None
+    if not arrays:
+        raise ValueError(f"{name} has no variable with the axes y and x, or z, y and x: rename its dimensions")
+    origin, cell = zip(*(_axis(arrays[0], axis) for axis in "xyz"), strict=True)
+    values = {str(one.name): one.values.reshape(-1, *one.shape[-2:]) for one in arrays}
+    return CartesianGrid(values, origin, cell)
 
 
 def _variables(array: Any) -> Iterator[tuple[str, Any]]:
