@@ -27,7 +27,7 @@ def plainly(p, sd):
         if a * a + b * b <= (2.5 * sd) ** 2
     }
     source, (rows, cols) = p.source() - p.sample.margin, p.field.source.shape
-    shown = p.sample.levels[: p.sample.shown].astype(int)
+    shown = p.sample.levels[0][: p.sample.shown].astype(int)
     found = np.zeros((p.sample.shown, rows, cols), int)
     for i in range(rows):
         for j in range(cols):

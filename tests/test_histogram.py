@@ -57,7 +57,7 @@ def estimate(p, machine, sites=None):
     where = p.where() if sites is None else sites
     return simdtex.lcpdf(
         p.field.values[0],
-        p.sample.levels[0],
+        p.sample.levels[0][0],
         np.array(where),
         order=p.order,
         greys=GREYS,

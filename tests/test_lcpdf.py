@@ -77,7 +77,7 @@ def test_distances_and_the_least_of_what_is_given_have_the_references_bits(machi
 def test_the_optimal_bandwidth_is_equation_8(seed, order, channels):
     p = problem(seed, order=order, channels=channels)
     _, h = p.window()
-    formula = plain.optimal_bandwidth(p.sample.levels, len(p.positions()), len(p.offsets))
+    formula = plain.optimal_bandwidth(p.sample.levels[0], len(p.positions()), len(p.offsets))
     assert h == pytest.approx(formula, rel=1e-12)
 
 
@@ -288,7 +288,7 @@ def test_a_draw_of_a_source_follows_the_weights(case, seed):
 def test_the_draw_of_a_vector_follows_the_density_in_each_channel():
     """P(x) of one channel is the mixture with one factor of the kernel; legal vectors only, so far from the ends."""
     p = problem(6, order=1, channels=2, temperatures="zero", shape=(7, 8))
-    levels = (p.sample.levels // 4 + 100).astype(np.uint16)
+    levels = (p.sample.levels[0] // 4 + 100).astype(np.uint16)
     p.sample._lay([levels], p.sample.margin)
     p = p._replace(field=p.field._replace(values=p.sample.working[:, p.field.source]))
     win, h = p.window(1.0)
@@ -338,7 +338,7 @@ def test_a_device_has_the_references_bits(machine, p, bandwidth, strength):
 def test_draws_near_the_ends_of_the_levels_have_the_references_bits(machine):
     """A wide kernel around black and white pixels."""
     p = problem(8, order=1, channels=3, shape=(9, 9))
-    extremes = np.where(p.sample.levels > 127, 255, 0).astype(np.uint16)
+    extremes = np.where(p.sample.levels[0] > 127, 255, 0).astype(np.uint16)
     p.sample._lay([extremes], 0)
     win = lcpdf.window(90.0, 255)
 

@@ -40,8 +40,8 @@ def test_the_reference_is_the_rule(case):
         assert p == positions[((int(hi) << 32 | int(lo)) * len(positions)) >> 64]
         row, col = divmod(p, sample.cols)
         inside = (row - sample.margin, col - sample.margin)
-        assert all(0 <= i < n for i, n in zip(inside, sample.levels.shape[1:], strict=True))
-        assert values.reshape(sample.channels, -1)[:, site].tolist() == sample.levels[:, *inside].tolist()
+        assert all(0 <= i < n for i, n in zip(inside, sample.levels[0].shape[1:], strict=True))
+        assert values.reshape(sample.channels, -1)[:, site].tolist() == sample.levels[0][:, *inside].tolist()
 
 
 @given(case=starts())
