@@ -261,7 +261,7 @@ def place_hard_data(
 
     Returns
     -------
-    MaskedArray, of `shape` or, with several variables, (*shape, variables)
+    MaskedArray, of `shape`, with several variables an axis more
         The known values; unknown ones are masked. A single variable has no last axis. ``filled()`` replaces unknown
         values by NaN, or by 0 if the type is not of floats.
 

@@ -99,9 +99,10 @@ def simulate(
     region : (rows, cols) or (layers, rows, cols) bool array, optional
         True where cells are simulated. The others take no part, and have no value: NaN in floats, else the attribute
         ``missing``.
-    probabilities : (categories, *shape) array, or table or its path, optional
-        Soft data: how probable each category, in ascending order, of the first variable is at each cell, adding up to
-        1; NaN where nothing is said. A table has the columns x, y, and one for each category. See `soft_weight`.
+    probabilities : (categories, rows, cols) array, or table or its path, optional
+        Soft data, of a volume (categories, layers, rows, cols): how probable each category, in ascending order, of the
+        first variable is at each cell, adding up to 1; NaN where nothing is said. A table has the columns x, y, and one
+        for each category. See `soft_weight`.
     image_map : (rows, cols) or (training images, rows, cols) array, optional
         The number of the training image, from 0 on, that each cell is from, or the weight of each training image there.
         NaN: any. This and the next two are of pictures alone.
