@@ -30,7 +30,7 @@ Array = NDArray[Any]
 PathLike = str | os.PathLike[str]
 
 SUFFIXES = (".gslib", ".sgems")
-"""How the name of a grid that is written ends; what a file is that is read is told by its first lines."""
+"""How the name of a grid that is written ends; a file that is read is recognised by its first lines."""
 
 MISSING = (-999.0, -9999.0, -997799.0, -9966699.0, -9999999.0)
 """Numbers that stand for an unknown value: those of GSLIB, grids of maps, MPSlib, SGeMS, and DeeSse."""
@@ -122,7 +122,7 @@ def kind_of(path: PathLike) -> str | None:
 
 
 def read_grid(path: PathLike, *, missing: Iterable[float] = MISSING, max_pixels: int | None = None) -> CartesianGrid:
-    """Read a grid of GSLIB or Geo-EAS (text) or of SGeMS (binary), which are told apart by their content.
+    """Read a grid of GSLIB or Geo-EAS (text) or of SGeMS (binary), recognised by its content.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ ONE = 1e-3
 
 
 class Maps(NamedTuple):
-    """The maps of a simulation as arrays or tables, see `simdtex.simulate`; None where one is not given."""
+    """The maps of a simulation as arrays or tables, see `simdtex.simulate`; None if not given."""
 
     region: NDArray[Any] | HardData | None = None
     probabilities: NDArray[Any] | HardData | None = None

@@ -142,8 +142,8 @@ def given_data(
                 numbered = machine.put(np.arange(here.size, dtype=np.int32))
                 values, plane = np.zeros((sample.channels, 1, here.size), np.uint16), np.zeros((1, here.size), np.int32)
                 field = Field(machine.put(values), machine.put(plane), machine.put(plane.astype(np.uint16)))
-                nobody = neighbourhood(machine, numbered, field, itself, Grid(1, here.size, 1, torus=False))
-                distances = lcpdf.distance(machine, nobody, candidates)  # all are 0
+                unknown = neighbourhood(machine, numbered, field, itself, Grid(1, here.size, 1, torus=False))
+                distances = lcpdf.distance(machine, unknown, candidates)  # all are 0
                 distances = charge(machine, distances, candidates, numbered, Costs(free, scattered=scattered))
                 mass = machine.get(lcpdf.density(machine, distances, counted, window)).astype(np.float64)
                 yield first + here, mass / np.cumsum(mass, 1)[:, -1:]
