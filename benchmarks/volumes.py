@@ -21,6 +21,7 @@ import numpy as np
 import simdtex
 from simdtex.experiments.ensemble import connectivity
 from simdtex.io.image import write
+from simdtex.report.volumes import variogram
 
 SHARE = 0.3
 
@@ -44,16 +45,10 @@ def model(shape, seed):
     return found.astype(np.uint8)
 
 
-def variogram(volume, axis, most):
-    """Half the mean squared difference at lags 1 to ``most`` along an axis."""
-    values = np.moveaxis(volume.astype(np.float64), axis, 0)
-    return np.array([((values[lag:] - values[:-lag]) ** 2).mean() / 2 for lag in range(1, most + 1)])
-
-
 def figures(volume, training):
     """Mean absolute differences of variograms and of connectivity functions, over the axes."""
     most = [min(n, 90) // 3 for n in training.shape]
-    apart = [abs(variogram(volume, a, m) - variogram(training, a, m)).mean() for a, m in enumerate(most)]
+    apart = [abs(variogram(volume, a, m) - variogram(training, a, m))[1:].mean() for a, m in enumerate(most)]
     found, wanted = (connectivity(one, 1, min(most)).function for one in (volume, training))
     return np.mean(apart), np.nanmean(abs(found - wanted))
 

@@ -5,16 +5,23 @@ A volume is indexed [layer, row, column]; the loops here share no code with the 
 
 import functools
 import hashlib
+import json
 from itertools import product
 from math import isqrt
+from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 from cases import assert_same_bits
+from click.testing import CliRunner
 from scipy.ndimage import gaussian_filter
 
 import simdtex
 from simdtex import schedules
+from simdtex.cli import main
+from simdtex.experiments.ensemble import connectivity
+from simdtex.io import volume
 from simdtex.methods import mrf
 from simdtex.model.given import around, between
 from simdtex.model.lattice import Grid, coloring_of_layers, neighbourhood_offsets, parts_of
@@ -292,3 +299,43 @@ def test_a_callback_sees_volumes():
 def test_what_only_pictures_have_is_refused(options, words):
     with pytest.raises(ValueError, match=words):
         simulated(**options)
+
+
+@pytest.mark.parametrize("suffix", [".sgems", ".nc", ".nrrd"])
+def test_the_command_takes_a_volume_and_writes_a_report(tmp_path, monkeypatch, suffix):
+    """The same bytes as in Python, with coordinates; the report has the training image's own figures."""
+    monkeypatch.chdir(tmp_path)
+    training = facies((9, 14, 15))
+    if suffix == ".sgems":
+        simdtex.write_grid("ti.sgems", {"facies": training}, origin=(5, 7, -9), cell=(10, 10, 1))
+    elif suffix == ".nc":
+        coords = {"z": np.arange(9) - 9.0, "y": np.arange(14) * 10.0 + 7, "x": np.arange(15) * 10.0 + 5}
+        xarray.DataArray(training, coords, ("z", "y", "x"), name="facies").to_netcdf("ti.nc", engine="h5netcdf")
+    else:
+        volume.write("ti.nrrd", training)
+    Path("wells.csv").write_text("x,y,z,facies\n15,27,-8,1\n" if suffix != ".nrrd" else "x,y,z,facies\n1,2,1,1\n")
+    words = [f"ti{suffix}", "-o", "out.nc", "-n", "2", "--categorical", "--known", "wells.csv", "--size", "12x13x8"]
+    result = CliRunner().invoke(
+        main, ["simulate", *words, "--order", "3", "--seed", "7", "--device", "reference", "--report", "page"]
+    )
+    assert result.exit_code == 0, result.output
+    found = xarray.open_dataarray("out.nc")
+    place = {} if suffix == ".nrrd" else {"origin": (5, 7, -9), "cell": (10, 10, 1)}
+    given = {"known": "wells.csv", "shape": (8, 13, 12), "order": 3, "rng": 7, "device": "reference", **place}
+    assert_same_bits(found.values, simdtex.simulate(training, 2, categorical=True, **given).values)
+    assert (found.values[:, 1, 2, 1] == 1).all()
+    assert found.y.values[0] == (0 if suffix == ".nrrd" else 7)
+    results = json.loads(Path("page/results.json").read_text())
+    own = results["variograms"][0]
+    assert own[1][2] == pytest.approx(np.mean(training[:, 2:] != training[:, :-2]) / 2)
+    assert results["connectivity"][0] == connectivity(training, 1, len(own[0]) - 1).function.tolist()
+    assert {"slices.png", "variograms.png", "connectivity.png", "index.html"} <= set(results["files"])
+
+
+def test_a_size_of_a_volume_has_three_sides(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    volume.write("ti.nrrd", facies())
+    for size, words in (("12x13", "is not WIDTHxHEIGHTxDEPTH"), ("0x4x4", "is not WIDTHxHEIGHTxDEPTH")):
+        result = CliRunner().invoke(main, ["simulate", "ti.nrrd", "-o", "out.npz", "--size", size])
+        assert result.exit_code == 2 and words in result.output
+    assert not Path("out.npz").exists()

@@ -137,3 +137,36 @@ def test_write_checks_its_array(tmp_path):
         with pytest.raises(ValueError, match=re.escape(str(shape))):
             volume.write(tmp_path / "a.npy", np.zeros(shape))
     assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("suffix", [".nrrd", ".tif", ".npy"])
+@pytest.mark.parametrize("dtype", ["uint8", "int16", "float32"])
+def test_a_volume_is_read_as_it_was_written(tmp_path, suffix, dtype):
+    path, values = tmp_path / f"block{suffix}", noise((4, 3, 5, 1), dtype)
+    volume.write(path, values)
+    assert volume.is_volume(path)
+    back = volume.read(path)
+    assert back.dtype == values.dtype
+    np.testing.assert_array_equal(back, values)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "values"), [(".tif", np.ones((1, 5, 6))), (".npy", np.ones((3, 5, 6))), (".npy", np.ones((5, 6)))]
+)
+def test_what_may_be_a_picture_is_no_volume(tmp_path, suffix, values):
+    path = tmp_path / f"picture{suffix}"
+    np.save(path, values) if suffix == ".npy" else volume.write(path, values)
+    assert not volume.is_volume(path)
+
+
+@pytest.mark.parametrize("suffix", [".nrrd", ".tif", ".npy"])
+def test_a_damaged_or_large_volume_gets_one_sentence(tmp_path, suffix):
+    path = tmp_path / f"block{suffix}"
+    volume.write(path, noise((4, 30, 50, 1), "uint16"))
+    with pytest.raises(ValueError, match=re.escape(str(path))):
+        volume.read(path, max_pixels=10)
+    path.write_bytes(path.read_bytes()[:-2000])
+    with pytest.raises(ValueError, match=re.escape(str(path))):
+        volume.read(path)
+    with pytest.raises(ValueError, match="does not exist"):
+        volume.read(tmp_path / f"none{suffix}")

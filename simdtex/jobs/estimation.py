@@ -113,8 +113,7 @@ def estimate(
     mrf.check_categories(pictures, given)
     sample, machine = Sample(pictures, pictures.channels * (nearest + 1), reach), open_machine(device)
     positions = sample.places(np.zeros((1, 2), np.int32), 1).positions
-    row, col = np.divmod(positions, sample.cols) - np.full((2, 1), sample.margin)
-    own = sample.pixels[row, col, 0]
+    own = sample.own(positions)[:, 0]
     names, of = np.unique(own if categorical else sample.working[0, positions], return_inverse=True)
     memory.require(machine, 0, 8 * prod(size) * ((len(names) if categorical else 0) + 4))
     data = Data(np.argwhere(given.whole), sample.scale.levels(given.values[given.whole]).T)

@@ -154,7 +154,7 @@ def around(
         near = ((apart**2).sum(1) <= order * step**2) & (abs(apart).max(1) <= reach * step)
         site = (site - first) % sides if grid.torus else site - first
         near &= ((site >= 0) & (site < grid.shape)).all(1)
-        found[0].append(np.ravel_multi_index(tuple(site[near].T * grid.spacing), grid.pixels).astype(np.int64))
+        found[0].append(grid.pixel_of(site[near].T))
         found[1].append(np.flatnonzero(near))
         found[2].append(apart[near])
     site, datum, apart = (np.concatenate(parts) for parts in found)

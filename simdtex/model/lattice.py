@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import isqrt, prod
@@ -224,6 +225,10 @@ class Grid:
         layer = np.arange(self.size // (self.rows * self.cols), dtype=np.int32)[:, None, None]
         sites: NDArray[np.int32] = layer * np.int32(self.height * self.width) + row + col
         return (sites * np.int32(self.spacing)).ravel()
+
+    def pixel_of(self, place: Sequence[NDArray[Any]]) -> NDArray[np.int64]:
+        """Return the pixel indices of sites by their row and column, or layer, row and column, each (n,)."""
+        return np.ravel_multi_index(tuple(line * self.spacing for line in place), self.pixels).astype(np.int64)
 
     def places(self, sites: NDArray[np.integer[Any]]) -> NDArray[np.int64]:
         """Return the pixel indices in the whole picture of sites of this grid; they key random numbers."""

@@ -60,7 +60,7 @@ def write_volumes(
         for axis, n in enumerate(one.shape)
     ]
     most = max(1, min(*training.shape, *ensemble.shape[1:]) // 3)
-    variograms = [_variogram(one, most) for one in fields]
+    variograms = [np.array([variogram(one, axis, most) for axis in range(3)]) for one in fields]
     sections = [
         Section(
             "Slices",
@@ -107,14 +107,11 @@ def write_volumes(
     write_report(folder, "Realisations of a volume", lead, sections, results, command)
 
 
-def _variogram(field: NDArray[np.float64], most: int) -> NDArray[np.float64]:
-    """Return half the mean squared difference at the lags 0 to ``most`` along each axis, (3, lags)."""
-    found = np.zeros((field.ndim, most + 1))
-    for axis in range(field.ndim):
-        along = np.moveaxis(field, axis, 0)
-        for lag in range(1, most + 1):
-            found[axis, lag] = ((along[lag:] - along[:-lag]) ** 2).mean() / 2
-    return found
+def variogram(field: NDArray[Any], axis: int, most: int) -> NDArray[np.float64]:
+    """Return half the mean squared difference at the lags 0 to ``most`` along an axis of a volume."""
+    along = np.moveaxis(np.asarray(field, np.float64), axis, 0)
+    n = len(along)
+    return np.array([((along[lag:] - along[: n - lag]) ** 2).mean() / 2 for lag in range(most + 1)])
 
 
 def _lagged(file: str, tables: list[NDArray[np.float64]], caption: str) -> Figure:

@@ -457,11 +457,8 @@ def number_of_levels(
         spacing = 2 ** (levels - 1)
         margin = 0 if options.edges != "whole" else 2 * radius * spacing
         apart = spacing if step == 2 else 1
-        layers = [-(-max(0, n - margin) // apart) for sample in samples for n in sample[:-2] or (1 + margin,)]
-        return sum(
-            thick * prod(max(0, n - margin) // apart for n in sample[-2:])
-            for sample, thick in zip(samples, layers, strict=True)
-        )
+        sides = [[max(0, n - margin) for n in sample] for sample in samples]
+        return sum(prod(-(-n // apart) for n in one[:-2]) * prod(n // apart for n in one[-2:]) for one in sides)
 
     most = 1 + int(log2(min(*shape[-2:], *(side for sample in samples for side in sample[-2:]))))
     while most > 1 and not candidates(most):
