@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from simdtex.experiments import quality
     from simdtex.io.grids import read_grid, write_grid
     from simdtex.io.hard_data import place_hard_data, read_hard_data
+    from simdtex.jobs.classification import TextureClassifier, classify
     from simdtex.jobs.estimation import estimate
     from simdtex.jobs.filling import extend, fill
     from simdtex.jobs.simulation import simulate
@@ -29,6 +30,8 @@ __all__ = [
     "Live",
     "Output",
     "Progress",
+    "TextureClassifier",
+    "classify",
     "devices",
     "estimate",
     "extend",
@@ -52,6 +55,8 @@ _HOMES = {
     "Live": "simdtex.live.widget",
     "Output": "simdtex.run",
     "Progress": "simdtex.run",
+    "TextureClassifier": "simdtex.jobs.classification",
+    "classify": "simdtex.jobs.classification",
     "devices": "simdtex.machine.devices",
     "estimate": "simdtex.jobs.estimation",
     "extend": "simdtex.jobs.filling",

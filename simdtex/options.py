@@ -223,6 +223,11 @@ def check(options: Any) -> None:
         one.check(name, getattr(options, name))
 
 
+def has_presets(own: Mapping[str, Option]) -> bool:
+    """Return whether a paper has other values than the defaults of a table of options."""
+    return any(one.paper is not UNSET for one in own.values())
+
+
 def preset_values(options: Any, preset: str) -> dict[str, Any]:
     """Return the values of a preset of a class of options."""
     one_of("preset", preset, PRESETS)
@@ -238,7 +243,7 @@ def resolve(options: type[T], job: str, given: Mapping[str, Any]) -> T:
     valid.
     """
     own = table(options)
-    known = ["preset", *own]
+    known = ["preset"] * has_presets(own) + [*own]
     for name in given:
         if name not in known:
             near = get_close_matches(name, known, 1, 0.75)

@@ -215,6 +215,25 @@ class Tiling(Progress):
         return f"{what}, tile {self.tile} of {self.tiles}"
 
 
+@dataclass(frozen=True, kw_only=True)
+class Labelling(Progress):
+    """The progress of `simdtex.classify`, after every step.
+
+    All is at level 0; the picture has the labels so far, 1 the first class.
+
+    Attributes
+    ----------
+    work : str
+        What was done last: rows compared with the classes, or a sweep of the field.
+    """
+
+    work: str
+
+    @property
+    def doing(self) -> str:  # noqa: D102
+        return self.work
+
+
 Callback = Callable[[Any], Any]
 
 
@@ -266,6 +285,11 @@ class Output:
         (``row``, ``col``) and its size (``rows``, ``cols``), pixels. ``lattice`` of ``mrf`` is None unless the sample
         repeats: the two ``vectors`` of the output's lattice, (row, column) in pixels, the ``deformation`` that fits the
         sample's to the output, 0 if it is none, and ``fitting``, the rows and columns of an output that needs less.
+    fit : (rows, cols, classes) float32 array or None
+        `simdtex.classify`: the probability that a texture of each class differs from its samples as much as the picture
+        does around each pixel, within its segment.
+    probability : (rows, cols, classes) float32 array or None
+        `simdtex.classify`: of each class by the field of labels, given the labels around; the sum is 1.
     made : (rows, cols, channels) or (depth, rows, cols, channels) array or None
         The result, channels last whatever axes the sample has; notebooks show it.
 
@@ -296,6 +320,8 @@ class Output:
     temperature: NDArray[Any] | None = None
     stages: list[Stage] = field(default_factory=list)
     statistics: dict[str, Any] = field(default_factory=dict)
+    fit: NDArray[np.float32] | None = None
+    probability: NDArray[np.float32] | None = None
     made: NDArray[Any] | None = None
 
     def __repr__(self) -> str:

@@ -10,7 +10,19 @@ from click.testing import CliRunner
 
 import simdtex
 from simdtex.cli.job import Task, job
-from simdtex.options import Choice, Number, Numbers, Other, Switch, Whole, documented, option, resolve, table
+from simdtex.options import (
+    Choice,
+    Number,
+    Numbers,
+    Other,
+    Switch,
+    Whole,
+    documented,
+    has_presets,
+    option,
+    resolve,
+    table,
+)
 
 FILE = Path(simdtex.__file__).with_name("methods") / "typed_options.py"
 TABLES = {
@@ -18,6 +30,7 @@ TABLES = {
     "MultiresOptions": ("multires", "Common"),
     "PyramidOptions": ("pyramid", "Common"),
     "SolidOptions": ("pyramid.solid", "PyramidOptions"),
+    "ClassifierOptions": ("classifier", "Common"),
 }
 """The method and the base of each class."""
 
@@ -76,7 +89,7 @@ def typed():
         found = table(import_module(f"simdtex.methods.{method}").Options)
         known = table(import_module("simdtex.methods.pyramid").Options) if base == "PyramidOptions" else {}
         lines += [f"\nclass {name}({base}, total=False):", f'    """The options of the method ``{method}``."""', ""]
-        lines += [] if known else ["    preset: str"]
+        lines += ["    preset: str"] if has_presets(found) and not known else []
         lines += [f"    {option}: {type_of(one)}" for option, one in found.items() if option not in known] + [""]
     return "\n".join(lines) + ANY
 

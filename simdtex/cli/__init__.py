@@ -25,6 +25,9 @@ GROUPS = {
         "estimate": "Estimate what data say of each cell: probabilities of categories, or mean and variance, from "
         "TRAINING_IMAGE.",
     },
+    "What is where": {
+        "classify": "Label each pixel of PICTURE with the texture around it, or as unknown.",
+    },
     "Runs that were stopped": {
         "resume": "Go on with the run whose state is in FILE, and write what its command writes.",
     },

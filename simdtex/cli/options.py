@@ -13,7 +13,7 @@ from click.shell_completion import CompletionItem
 
 from simdtex.cli.command import DATA, DEVICE_GROUP, FIRST, JOB, OUTPUTS, RUNS
 from simdtex.cli.places import FOLDER, READ, READ_PAIR, WRITE, WRITE_PAIR
-from simdtex.options import PRESET, Choice, Number, Numbers, Other, Switch, Whole, is_flag, table
+from simdtex.options import PRESET, Choice, Number, Numbers, Other, Switch, Whole, has_presets, is_flag, table
 from simdtex.options import Option as Declared
 
 Command = Callable[..., Any]
@@ -22,6 +22,7 @@ METHODS = {
     "synth": ("mrf", "multires", "pyramid"),
     "mix": ("pyramid",),
     "solid": ("pyramid.solid",),
+    "classify": ("classifier",),
 }
 """The methods of a command, in `simdtex.methods`; any other has ``mrf``."""
 
@@ -59,7 +60,7 @@ def job_options(job: str) -> Callable[[Command], Command]:
         path.partition(".")[0]: table(import_module(f"simdtex.methods.{path}").Options)
         for path in METHODS.get(job, ("mrf",))
     }
-    found: dict[str, dict[str, Declared]] = {"preset": {"": PRESET}}
+    found: dict[str, dict[str, Declared]] = {"preset": {"": PRESET}} if any(map(has_presets, tables.values())) else {}
     for method, options in tables.items():
         for name, one in options.items():
             if job in one.shown:

@@ -34,12 +34,15 @@ class Place(click.Path):
 
 
 class Pair(click.types.StringParamType):
-    """A text ``A=B`` or ``A0,A1=B``: files that are read, and on the right one to ``"read"`` or to ``"write"``."""
+    """A text ``A=B`` or ``A0,A1=B``: files that are read, and on the right one to ``"read"`` or to ``"write"``.
+
+    Or, with ``named``, a name and files that are read: ``NAME=B`` or ``NAME=B0,B1``.
+    """
 
     name = "text"
 
-    def __init__(self, role: str) -> None:
-        self.role = role
+    def __init__(self, role: str, named: bool = False) -> None:
+        self.role, self.named = role, named
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
         """Return the text itself, which its reader takes apart; fail if it is empty."""
@@ -50,7 +53,7 @@ class Pair(click.types.StringParamType):
 
 READ, ENTER, WRITE, FOLDER, EITHER = (Place(role) for role in ("read", "enter", "write", "folder", "either"))
 READING = ("read", "enter")
-READ_PAIR, WRITE_PAIR = Pair("read"), Pair("write")
+READ_PAIR, WRITE_PAIR, READ_NAMED = Pair("read"), Pair("write"), Pair("read", named=True)
 
 
 class _Named(NamedTuple):
@@ -102,6 +105,7 @@ def _named(context: click.Context) -> Iterator[_Named]:
                 yield _Named(Path(one), kind.role)
             elif isinstance(kind, Pair):
                 left, _, right = str(one).partition("=")
+                left, right = (right, "") if kind.named else (left, right)
                 # how many files the left names depends on the samples; a file that is not there harms nothing
                 for text in {left, *(part.strip() for part in left.split(","))} - {""}:
                     yield _Named(Path(text), "read")

@@ -446,6 +446,36 @@ def encode(path: Path, suffix: str, pixels: Array) -> None:
         path.write_bytes(pillow_bytes(PIL.Image.fromarray(pixels), kind, **_OPTIONS.get(suffix, {})))
 
 
+def write_labels(path: PathLike, labels: NDArray[np.uint8], colours: NDArray[np.uint8]) -> None:
+    """Write labels (rows, cols) as the values of a picture; a PNG has them as indices of colours (labels, 3) uint8."""
+    if Path(path).suffix.lower() != ".png":
+        write(path, labels)
+        return
+    check_writable(path)
+    picture = PIL.Image.fromarray(labels)
+    picture.putpalette(colours.tobytes())
+    content = pillow_bytes(picture, "PNG")
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def read_labels(path: PathLike) -> NDArray[Any]:
+    """Read a picture of labels, (rows, cols) of an integer type: its values or, with a palette, the indices.
+
+    Raises ValueError if it is no such picture.
+    """
+    try:
+        with PIL.Image.open(path) as picture:
+            if picture.mode == "P":
+                return np.asarray(picture)
+    except (OSError, ValueError):  # no format of Pillow, or not a picture: `read` says so
+        pass
+    pixels = read(path).pixels
+    if pixels.dtype.kind not in "iu" or (pixels.ndim == 3 and pixels.shape[2] > 1):
+        raise ValueError(f"{os.fspath(path)} is no picture of labels; save it grey or with a palette, 0, 1, 2...")
+    return pixels.reshape(pixels.shape[:2])
+
+
 def pillow_bytes(picture: PIL.Image.Image, kind: str, **options: Any) -> bytes:
     """Return a picture in a format of Pillow, which does not notice that a full disk has taken only a part."""
     buffer = io.BytesIO()

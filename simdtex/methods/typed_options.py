@@ -99,5 +99,21 @@ class SolidOptions(PyramidOptions, total=False):
     slices: str
 
 
+class ClassifierOptions(Common, total=False):
+    """The options of the method ``classifier``."""
+
+    order: int
+    levels: int
+    exemplars: int
+    temperature: float
+    typical: float
+    coupling: float
+    weight: float
+    sweeps: int
+    schedule: str | Schedule
+    unknown: float
+    window: float
+
+
 class AnyOptions(MrfOptions, MultiresOptions, PyramidOptions, total=False):
     """The options of all methods."""

@@ -58,6 +58,14 @@ def use_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
     return temperature_colours(uses / (uses.max() or 1.0))
 
 
+def label_colours(count: int) -> Picture:
+    """Return colours for labels 0 to count - 1, (count, 3) uint8: black for 0, the others far apart."""
+    number = np.arange(1, count)
+    hue = number * np.pi * (3 - np.sqrt(5))  # the golden angle: neighbours in number are far apart
+    lightness = 0.62 + 0.16 * (number % 3 - 1)
+    return np.concatenate([np.zeros((1, 3), np.uint8), _srgb(lightness, 0.13 * np.cos(hue), 0.13 * np.sin(hue))])
+
+
 def _srgb(lightness: NDArray[Any], a: NDArray[Any], b: NDArray[Any]) -> Picture:
     # OKLab to sRGB, B. Ottosson, "A perceptual color space for image processing", 2020
     long = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3

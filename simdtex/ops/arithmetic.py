@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""float32 arithmetic with the bits that a device gives: the twins of fma() and of kernels/common/exp.h."""
+"""float32 arithmetic with the bits that a device gives: the twins of fma(), kernels/common/exp.h and log.h."""
 
 from __future__ import annotations
 
@@ -39,3 +39,15 @@ def exp32(x: Any) -> NDArray[np.float32]:
         p = fma32(p, r, np.float32(coefficient))
     result: NDArray[np.float32] = (p.view(np.int32) + (k.astype(np.int32) << 23)).view(np.float32)
     return result
+
+
+def log32(x: Any) -> NDArray[np.float32]:
+    """log(x) for 1 <= x < 2**24, bit for bit as on the device; absolute error below 1.2e-6."""
+    bits = np.asarray(x, np.float32).view(np.int32)
+    k = (bits - np.int32(0x3F3504F3)) >> 23
+    r = (bits - (k << 23)).view(np.float32) - np.float32(1)
+    p = np.asarray(0.0873511881, np.float32)
+    for coefficient in (-0.144429281, 0.14979136, -0.165521428, 0.199536145, -0.250025034, 0.333342254, -0.499999821):
+        p = fma32(p, r, np.float32(coefficient))
+    e = k.astype(np.float32)
+    return fma32(e, np.float32(0.693145752), fma32(p, r * r, fma32(e, np.float32(1.42860677e-6), r)))

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""``simdtex classify``: which texture is where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.cli.command import DATA, OUTPUTS
+from simdtex.cli.inputs import Material, channels, check_alike, read_material, read_pixels, size
+from simdtex.cli.job import Task, command_line, job
+from simdtex.cli.options import given, option, report_option
+from simdtex.cli.places import READ, READ_NAMED, WRITE
+
+FITS = (".tif", ".tiff", ".npy")
+
+UNLABELLED = 255
+"""Where the truth is not known."""
+
+
+@job(
+    (
+        "classify photo.png --texture brick=brick.png --texture grass=grass.png -o labels.png",
+        "Two classes, or unknown.",
+    ),
+    ("classify photo.png --strokes strokes.png -o labels.png", "Classes painted on the picture itself."),
+    profile=True,
+)
+@click.argument("picture", type=READ)
+@click.option("-o", "--output", required=True, type=WRITE, help="Write the labels here, 0 where unknown, 1, 2...")
+@option(
+    "--texture",
+    "textures",
+    type=READ_NAMED,
+    multiple=True,
+    metavar="NAME=FILE",
+    group=DATA,
+    help="Label what looks like this sample; once for each class. Give NAME=FILE0,FILE1 for several samples. What is "
+    "transparent is not used.",
+)
+@option(
+    "--strokes",
+    type=READ,
+    metavar="FILE",
+    group=DATA,
+    help="Learn classes where this picture, of the size of PICTURE, is 1, 2..., instead of from samples.",
+)
+@option(
+    "--validation",
+    type=READ_NAMED,
+    multiple=True,
+    metavar="NAME=FILE",
+    group=DATA,
+    help="Judge by this picture of a class how much it differs from its samples.",
+)
+@option(
+    "--truth",
+    type=READ,
+    metavar="FILE",
+    group=DATA,
+    help="Compare with these labels; 255 where they are not known.",
+)
+@option(
+    "--confidence",
+    type=WRITE,
+    metavar="FILE",
+    group=OUTPUTS,
+    help="Write how well each class fits each pixel, 0 to 1, a band for each: .tif or .npy.",
+)
+@report_option("labels, fits and, with --truth, the confusion matrix")
+def classify(
+    picture: Path,
+    output: Path,
+    textures: tuple[str, ...],
+    strokes: Path | None,
+    validation: tuple[str, ...],
+    truth: Path | None,
+    confidence: Path | None,
+    report: Path | None,
+    **options: Any,
+) -> Task:
+    """Label each pixel of PICTURE with the texture around it, or as unknown.
+
+    `simdtex classify photo.png --texture brick=brick.png --texture grass=grass.png -o labels.png` writes 1 where there
+    is brick, 2 where there is grass, and 0 where there is neither.
+    """
+    from simdtex import classify
+    from simdtex.io import image
+    from simdtex.model.colours import label_colours
+
+    if bool(textures) == bool(strokes):
+        raise ValueError("give --texture once for each class, or --strokes")
+    whole = read_material([picture])
+    pixels: NDArray[Any] = whole.array
+    more: dict[str, Any] = {"channel_axis": whole.channel_axis}
+    known: Any
+    if strokes:
+        known = image.read_labels(strokes)
+        names = tuple(str(label) for label in np.unique(known[known > 0]))
+    else:
+        known = _read_samples("--texture", textures, whole)
+        more |= {"validation": _read_samples("--validation", validation, whole)}
+        names = tuple(known)
+    image.check_writable(output, np.uint8, 1)
+    if confidence:
+        image.check_writable(confidence, suffixes=FITS)
+    true = None if truth is None else _read_truth(truth, whole, len(names))
+    writers: list[Any] = [lambda made, run: image.write_labels(output, made, label_colours(len(names) + 1))]
+    if confidence:
+        writers.append(lambda made, run: image.write(confidence, run.fit))
+    if report:
+        from simdtex.report.classification import write_classification
+        from simdtex.report.page import check_folder
+
+        check_folder(report)
+        writers.append(lambda made, run: write_classification(report, pixels, made, run, true, command_line()))
+    run = partial(classify, pixels, known, **more, **given(options))
+    return Task(run, partial(_summary, names, true), str(output), writers)
+
+
+def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[str, list[NDArray[Any]]]:
+    """Read the samples of classes, ``NAME=FILE`` or ``NAME=FILE0,FILE1``, masked where they are transparent."""
+    from simdtex.io.image import split_alpha
+
+    found: dict[str, list[NDArray[Any]]] = {}
+    for text in texts:
+        name, equals, files = text.partition("=")
+        if not (equals and name and files):
+            raise ValueError(f"{flag} {text} must be NAME=FILE")
+        if name in found:
+            raise ValueError(f"{flag} names {name} twice; give {name}=FILE0,FILE1 for several samples of a class")
+        found[name] = []
+        for file in files.split(","):
+            pixels, _ = read_pixels(Path(file))
+            gone = np.zeros(pixels.shape[:2], bool)
+            if channels(pixels) == channels(picture.array) + 1:
+                pixels, gone = split_alpha(pixels)
+            check_alike(Path(file), pixels, picture.paths[0], picture.array)
+            pixels = pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:])
+            hidden = np.broadcast_to(gone.reshape(*gone.shape, *[1] * (pixels.ndim - 2)), pixels.shape)
+            found[name].append(np.ma.MaskedArray(pixels, hidden))
+    return found
+
+
+def _read_truth(path: Path, picture: Material, classes: int) -> NDArray[Any]:
+    """Read the labels that are to be found; raise if they have another size, or labels of no class."""
+    from simdtex.io.image import read_labels
+
+    true, pixels = read_labels(path), picture.array
+    if true.shape != pixels.shape[:2]:
+        raise ValueError(f"{path} is {size(true)} and {picture.paths[0]} {size(pixels)}; give labels of its size")
+    strange = np.setdiff1d(true, [*range(classes + 1), UNLABELLED])
+    if strange.size:
+        raise ValueError(
+            f"{path} has the label {strange[0]}; give 0 to {classes}, and {UNLABELLED} where it is not known"
+        )
+    return true
+
+
+def _summary(names: Sequence[str], true: NDArray[Any] | None, labels: NDArray[Any]) -> str:
+    """Return the share of each class and, if the truth is known, how much of it was found."""
+    counts = np.bincount(labels.ravel(), minlength=len(names) + 1)
+    text = ", ".join(
+        f"{name} {count / labels.size:.1%}" for name, count in zip(("unknown", *names), counts, strict=True)
+    )
+    if true is not None:
+        there = true != UNLABELLED
+        text += f"; {(labels == true)[there].mean():.1%} as in --truth"
+    return text

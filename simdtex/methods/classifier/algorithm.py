@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The classifier as a program for the array: distances to every class, a Potts field, and a test for the unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import prod
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex import schedules
+from simdtex.checkpoint import like
+from simdtex.machine import Machine, memory
+from simdtex.machine.interface import Array
+from simdtex.methods.classifier.model import UNITS, Model, Region, learn, prepared, windowed
+from simdtex.methods.classifier.options import Options
+from simdtex.model.lattice import Grid, neighbourhood_offsets
+from simdtex.model.pictures import Mask
+from simdtex.ops.exemplars import exemplars
+from simdtex.ops.features import features
+from simdtex.ops.potts import WEIGHTS, potts
+from simdtex.ops.window import gaussian, window
+from simdtex.options import within_32_bits
+from simdtex.run import Callback, Labelling, Output
+
+WORK = 2**32
+"""Multiply-adds of a step, about."""
+
+STEPS = 64
+"""Steps to a sweep, at most: each takes a pass over the picture."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A classification before it has a machine and a seed.
+
+    Attributes
+    ----------
+    pixels : (rows, cols, B) array
+    unknown : (rows, cols) bool array
+        Pixels without a value, which are labelled 0.
+    classes : sequence of sequences of Region, or Model
+        What there is of each class; or the model that was learned from it.
+    names : tuple of str
+    options : Options
+    """
+
+    pixels: NDArray[Any]
+    unknown: Mask
+    classes: Sequence[Sequence[Region]] | Model
+    names: tuple[str, ...]
+    options: Options
+
+    def on(self, machine: Machine, seed: int) -> Run:
+        """Learn the classes on a machine; raise if the memory does not suffice."""
+        shape, count = self.pixels.shape[:2], len(self.names)
+        within_32_bits(shape, count)
+        levels = self.options.levels
+        bands = self.pixels.shape[-1]
+        device = prod(shape) * (12 * count + 2 * levels * bands + 8 + 4 * count * levels)
+        memory.require(machine, device, prod(shape) * (count * (4 * levels + 24) + 16 * bands))
+        model = self.classes
+        if not isinstance(model, Model):
+            model = learn(machine, model, self.names, self.options, seed)
+        return Run(machine, self, model, seed)
+
+
+class State(NamedTuple):
+    """The state between two steps.
+
+    ``done`` rows that were compared; ``logs`` (E, classes, rows, cols) uint16 logarithms of distances; ``labels``
+    (rows, cols) uint8, 0 the first class; ``schedule`` its state; ``changed`` the labels that each sweep changed. The
+    next step writes into the arrays.
+    """
+
+    done: int
+    logs: NDArray[np.uint16]
+    labels: NDArray[np.uint8]
+    schedule: Any
+    changed: tuple[int, ...] = ()
+
+
+class Info(NamedTuple):
+    """What a step did: ``fraction`` of the work that is done, ``doing`` in words, and the ``labels``."""
+
+    fraction: float
+    doing: str
+    labels: NDArray[np.uint8]
+
+
+class Run:
+    """A classification on a machine: rows are compared with the classes, then labels are relaxed, sweep by sweep."""
+
+    def __init__(self, machine: Machine, plan: Plan, model: Model, seed: int) -> None:
+        self.machine, self.plan, self.model, self.options = machine, plan, model, plan.options
+        self.grid = Grid.of(plan.pixels.shape[:2], torus=False)
+        self.schedule = schedules.get(plan.options.schedule)
+        self._setting = schedules.Setting(machine, self.grid, neighbourhood_offsets(1), 1, seed, 0)
+        self._check_schedule()
+        self._levels = prepared(machine, model.scale, plan.pixels, model.experts[-1].level + 1)
+
+    def _check_schedule(self) -> None:
+        _, info = self.schedule.step(self._setting, self.schedule.init(self._setting), schedules.Masked(self.grid))
+        if info.sites.size / len(info.ranges) * STEPS < self.grid.size:
+            raise ValueError(
+                f"the schedule {self.schedule.name} takes more than {STEPS} steps to a sweep, and each takes a pass "
+                "over the picture; choose synchronous, checkerboard, coloring or random-subset"
+            )
+
+    def begin(self) -> State:
+        """Return the state in which nothing was compared."""
+        shape = self.plan.pixels.shape[:2]
+        logs = np.zeros((len(self.model.experts), len(self.plan.names), *shape), np.uint16)
+        return State(0, logs, np.zeros(shape, np.uint8), self.schedule.init(self._setting))
+
+    def step(self, state: State, watch: Callable[..., None]) -> tuple[State, Info]:
+        """Compare the next rows with the exemplars of every class; after the last, relax labels in a sweep."""
+        after = self._compared(state) if state.done < self.grid.rows else self._swept(state)
+        compared = after.done / self.grid.rows
+        sweeps = len(after.changed) / max(1, self.options.sweeps)
+        doing = f"sweep {len(after.changed)}" if after.changed else f"compared {100 * compared:.0f} %"
+        return after, Info(0.9 * compared + 0.1 * sweeps, doing, after.labels)
+
+    def _compared(self, state: State) -> State:
+        machine, cols = self.machine, self.grid.cols
+        each = sum(known.doubled.size for known in self.model.exemplars)
+        end = min(self.grid.rows, state.done + max(1, WORK // (each * cols)))
+        sites = machine.put(np.arange(state.done * cols, end * cols, dtype=np.int32))
+        for e, (expert, known) in enumerate(zip(self.model.experts, self.model.exemplars, strict=True)):
+            offsets = machine.put(expert.offsets)
+            values = features(machine, self._levels[expert.level], sites, offsets, expert.contrast)
+            found = machine.get(exemplars(machine, values, known))
+            state.logs[e, :, state.done : end] = found.reshape(len(found), -1, cols)
+        state.labels[state.done : end] = self._evidence(state.logs[:, :, state.done : end]).argmax(0)
+        return state._replace(done=end)
+
+    def _evidence(self, logs: NDArray[np.uint16]) -> NDArray[np.int32]:
+        """Return the evidence of each class, (classes, ...) int32 in 2**-18: equation (6) by the nearest neighbour."""
+        total = np.zeros(logs.shape[1:], np.int64)
+        for expert, one in zip(self.model.experts, logs, strict=True):
+            total -= expert.factor * one.astype(np.int64)
+        shape = (-1,) + (1,) * (total.ndim - 1)
+        return (total + self.model.offsets.reshape(shape)).astype(np.int32)
+
+    @cached_property
+    def _classes(self) -> Array:
+        return self.machine.put(np.arange(len(self.plan.names), dtype=np.int32))
+
+    def _votes(self, labels: Array) -> Array:
+        """Return the votes of the labels around each site for every class."""
+        return window(self.machine, labels, self._classes, self.machine.put(gaussian(self.options.coupling)))
+
+    def _swept(self, state: State) -> State:
+        machine, weight = self.machine, round(WEIGHTS * self.options.weight)
+        evidence, labels = machine.put(self._evidence(state.logs)), machine.put(state.labels)
+        kept, everywhere, last = state.schedule, schedules.Masked(self.grid), False
+        while not last:
+            kept, chosen = self.schedule.step(self._setting, kept, everywhere)
+            for one in chosen.apart(machine):
+                if one.sites.size:
+                    sites = machine.put(one.sites.astype(np.int32))
+                    labels = potts(machine, sites, evidence, self._votes(labels), weight, labels)
+            last = chosen.last
+        found = machine.get(labels)
+        changed = int(np.count_nonzero(found != state.labels))
+        return State(state.done, state.logs, found, kept, (*state.changed, changed))
+
+    def ended(self, state: State) -> bool:
+        """Return whether all is compared, and the last sweep changed no label or no sweep is left."""
+        settled = len(state.changed) >= self.options.sweeps or 0 in state.changed[-1:]
+        return state.done == self.grid.rows and settled
+
+    def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
+        """Return labels (rows, cols, 1) uint8, 0 unknown and 1 the first class; fits and probabilities."""
+        fit, rejected = self._fits(state)
+        labels = np.where(rejected | self.plan.unknown, 0, state.labels + 1).astype(np.uint8)
+        energy = self._evidence(state.logs) / UNITS
+        votes = self.machine.get(self._votes(self.machine.put(state.labels)))
+        energy += self.options.weight * votes / UNITS
+        chance = np.exp(energy - energy.max(0))
+        names, shares = self.plan.names, np.bincount(labels.ravel(), minlength=len(self.plan.names) + 1) / labels.size
+        statistics: dict[str, Any] = {
+            "options": vars(self.options)
+            | {"levels": self.model.experts[-1].level + 1, "schedule": self.schedule.name},
+            "classes": [
+                {"label": c, "name": name, "share": float(shares[c])} for c, name in enumerate(("unknown", *names))
+            ],
+            "changed": list(state.changed),
+        }
+        for c, one in enumerate(statistics["classes"][1:]):
+            one |= {"exemplars": self.model.counts[c], "own": float(self.model.own[c].mean())}
+        return labels[..., None], Output(
+            None,
+            statistics=statistics,
+            fit=np.moveaxis(fit, 0, -1),
+            probability=np.moveaxis(chance / chance.sum(0), 0, -1).astype(np.float32),
+        )
+
+    def _fits(self, state: State) -> tuple[NDArray[np.float32], Mask]:
+        """Return how well each class fits each site, (classes, rows, cols), and where the site's own is rejected.
+
+        The fit is the probability that a texture of the class differs as much from its exemplars, on average over the
+        window within the site's segment: by Hotelling's test, whose covariance has few degrees of freedom.
+        """
+        from scipy.special import fdtrc, fdtri
+
+        experts, classes = state.logs.shape[:2]
+        fit = np.zeros((classes, *state.labels.shape), np.float32)
+        rejected = np.zeros(state.labels.shape, bool)
+        taps, freedom = gaussian(self.options.window), self.model.freedom
+        limit = fdtri(experts, freedom, 1 - self.options.unknown) if self.options.unknown else np.inf
+        for label in np.unique(state.labels):
+            box = _around(state.labels == label, len(taps) // 2)
+            own = state.labels[box] == label
+            for c, null in enumerate(self.model.nulls):
+                logs = np.ascontiguousarray(state.logs[:, c][(slice(None), *box)])
+                means = windowed(self.machine, logs, own.astype(np.uint8), taps)[:, own]
+                distance = null.distance(means)
+                fit[c][box][own] = fdtrc(experts, freedom, distance)
+                if c == label:
+                    rejected[box][own] = distance > limit
+        return fit, rejected
+
+    def save(self, state: State) -> dict[str, Any]:
+        """Return a copy of the state that needs no machine."""
+        return state._replace(logs=state.logs.copy(), labels=state.labels.copy())._asdict()
+
+    def load(self, saved: dict[str, Any]) -> State:
+        """Return the state that `save` copied."""
+        kept = like(self.schedule.init(self._setting), saved["schedule"])
+        return State(**saved | {"schedule": kept, "changed": tuple(saved["changed"])})
+
+    def observer(self, callback: Callback | None) -> Record:
+        """Return what watches this run."""
+        return Record(callback)
+
+
+def _around(mask: Mask, margin: int) -> tuple[slice, slice]:
+    """Return rows and columns of the box around a mask, with a margin."""
+    row, col = (np.flatnonzero(mask.any(axis)) for axis in (1, 0))
+    return (
+        slice(max(0, int(row[0]) - margin), int(row[-1]) + margin + 1),
+        slice(max(0, int(col[0]) - margin), int(col[-1]) + margin + 1),
+    )
+
+
+class Record:
+    """The progress of a classification: ``callback`` is called with a `simdtex.run.Labelling` after every step."""
+
+    def __init__(self, callback: Callback | None) -> None:
+        self._callback = callback
+
+    def part(self, *seen: Any) -> None:
+        """See nothing: steps are short."""
+
+    def step(self, state: State, info: Info) -> None:
+        """Report a step."""
+        if self._callback:
+            labels = info.labels + np.uint8(1)
+            now: dict[str, Any] = {
+                "level": 0,
+                "levels": 1,
+                "fraction": info.fraction,
+                "image": lambda: labels[..., None],
+            }
+            self._callback(Labelling(work=info.doing, **now))
+
+    def save(self) -> None:
+        """Return nothing: all is in the state."""
+
+    def load(self, saved: None) -> None:
+        """Go on from nothing."""

@@ -1,0 +1,370 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What a classifier knows of its classes: exemplars, how far they are from themselves, and how far they drift."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isqrt, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from simdtex import random
+from simdtex.machine import Machine
+from simdtex.machine.interface import Array
+from simdtex.methods.classifier.options import Options
+from simdtex.model.lattice import neighbourhood_offsets
+from simdtex.model.pictures import Mask, Pictures
+from simdtex.model.scale import Scale
+from simdtex.ops.exemplars import LOGS, Exemplars, exemplars, stacked
+from simdtex.ops.features import SIXTEENTHS, features
+from simdtex.ops.window import gaussian, window
+
+SMOOTHING = (0.0, 0.8, 1.8, 3.6, 7.2)
+"""Standard deviations of the Gaussians that levels are smoothed by, pixels."""
+
+SIDE = 32
+"""Pixels a side of a sample at level 0, at least, and twice as many with each level."""
+
+LEAST = 16
+"""Neighbourhoods of a class at a level, at least."""
+
+BANDS = 14
+"""Bands of a picture at most: sums of products of raw neighbourhoods are below 2**24."""
+
+CLASSES = 254
+"""Classes at most: labels are bytes, and 0 is unknown."""
+
+BOX = 128
+"""Rows and columns of a part of a sample that is judged by the other parts, at most."""
+
+UNITS = 2**18
+"""Units of evidence, and of votes, to 1."""
+
+MEANS = 16
+"""Units of a mean logarithm over a window to one of its logarithms."""
+
+OWN, DRIFTS, FLOOR = 0.7, 2.0, 0.01
+"""Covariance of a class: its own share, the rest pooled; how many times the drift between parts; and at least this."""
+
+
+class Expert(NamedTuple):
+    """One way to compare neighbourhoods: ``offsets`` (N, 2) int32 in pixels of a level, whether contrast is compressed.
+
+    ``reach`` is the furthest offset, in pixels, and ``factor`` what a unit of its logarithms is in `UNITS` of evidence.
+    """
+
+    level: int
+    contrast: bool
+    offsets: NDArray[np.int32]
+    reach: int
+    factor: int
+
+
+def experts_of(options: Options, levels: int) -> list[Expert]:
+    """Return the experts of so many levels: raw and contrast-compressed neighbourhoods at each, the finest first.
+
+    An expert of level l has the weight 2**-l; the weights add up to 1 / temperature.
+    """
+    total = 2 * sum(2.0**-level for level in range(levels))
+    found = []
+    for level in range(levels):
+        factor = round(UNITS / LOGS * 2.0**-level / total / options.temperature)
+        for contrast, order in ((False, options.order), (True, 2 * options.order)):
+            near = neighbourhood_offsets(order) * 2**level
+            offsets = np.concatenate([np.zeros((1, 2), np.int32), near]).astype(np.int32)
+            found.append(Expert(level, contrast, offsets, isqrt(order) * 2**level, factor))
+    return found
+
+
+class Region(NamedTuple):
+    """Sites of a picture that are of one class.
+
+    ``pixels`` (rows, cols, B); ``sites`` (rows, cols) bool; ``whole`` whether neighbourhoods must lie within them, or
+    only their centres; ``judged`` whether they only say how the class differs from its exemplars.
+    """
+
+    pixels: NDArray[Any]
+    sites: Mask
+    whole: bool = True
+    judged: bool = False
+
+
+@dataclass(frozen=True)
+class Null:
+    """How much a class differs from its own exemplars: the distribution of mean logarithms over a window.
+
+    ``mean`` (E,) and ``inverse`` (E, E), that of the covariance, in logarithms, for E experts.
+    """
+
+    mean: NDArray[np.float64]
+    inverse: NDArray[np.float64]
+
+    def distance(self, means: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return the squared Mahalanobis distance over E of means (E, n) in 1 / (`MEANS` `LOGS`)."""
+        gap = means / float(MEANS * LOGS) - self.mean[:, None]
+        total = np.zeros(gap.shape[1])
+        for i, j in np.ndindex(self.inverse.shape):  # one order of summation everywhere
+            total += self.inverse[i, j] * gap[i] * gap[j]
+        return total / len(self.mean)
+
+
+@dataclass(frozen=True)
+class Model:
+    """A trained classifier.
+
+    ``exemplars`` one for each expert, with all classes; ``offsets`` (classes,) int64, what is added to the evidence of
+    each class; ``nulls`` one for each class; ``freedom`` degrees of freedom of their covariances; ``own`` (classes, E)
+    the mean logarithm of distances of a class to itself; ``counts`` its exemplars.
+    """
+
+    scale: Scale
+    experts: list[Expert]
+    exemplars: list[Exemplars]
+    offsets: NDArray[np.int64]
+    nulls: list[Null]
+    freedom: int
+    own: NDArray[np.float64]
+    counts: list[int]
+
+
+def prepared(machine: Machine, scale: Scale, pixels: NDArray[Any], levels: int) -> list[Array]:
+    """Return the levels of a picture (rows, cols, B) on a machine, each (B, rows, cols) uint16 in sixteenths of 0..255.
+
+    Level 0 is the picture, and the others are smoothed by `SMOOTHING`, mirrored beyond the border.
+    """
+    planes = scale.levels(pixels).astype(np.int64) * (SIXTEENTHS if scale.top == 255 else 1)
+    found = [machine.put(planes.astype(np.uint16))]
+    for level in range(1, levels):
+        smooth = planes.astype(np.float64)  # which holds the whole numbers of both sums
+        taps = gaussian(SMOOTHING[level]).astype(np.float64)
+        for axis in (1, 2):
+            smooth = ndimage.correlate1d(smooth, taps, axis, mode="mirror")
+        found.append(machine.put((smooth.astype(np.int64) + UNITS // 2 >> 18).astype(np.uint16)))
+    return found
+
+
+def learn(
+    machine: Machine, classes: Sequence[Sequence[Region]], names: Sequence[str], options: Options, seed: int
+) -> Model:
+    """Return the model of classes, each given by regions of pictures of one type.
+
+    Raises ValueError if a class has fewer than `LEAST` neighbourhoods.
+    """
+    regions = [region for one in classes for region in one]
+    scale = Scale(Pictures(tuple(region.pixels for region in regions)), 512)  # values of up to 12 bits
+    levels = _levels_of(options, classes, names)
+    experts = experts_of(options, levels)
+    taught = [_Class(machine, scale, experts, one) for one in classes]
+    drawn = [[one.draw(machine, e, options.exemplars, seed, c) for e in experts] for c, one in enumerate(taught)]
+    selves = [one.judge(machine, experts, options, seed, c) for c, one in enumerate(taught)]
+    own, bands = np.array([one.mean for one in selves]), regions[0].pixels.shape[-1]
+    counts = [min(map(len, one)) for one in drawn]
+    offsets = []
+    for c, count in enumerate(counts):
+        typical = sum(expert.factor * options.typical * own[c, e] * LOGS for e, expert in enumerate(experts))
+        fewer = 2 * np.log(count / max(counts)) * LOGS  # equation (6) divides by the number of neighbourhoods
+        shift = sum(expert.factor * fewer / (len(expert.offsets) * bands) for expert in experts)
+        offsets.append(round(typical - shift))
+    nulls, freedom = _nulls(selves)
+    pooled = [stacked(machine, [one[e] for one in drawn]) for e in range(len(experts))]
+    return Model(scale, experts, pooled, np.array(offsets, np.int64), nulls, freedom, own, counts)
+
+
+def _levels_of(options: Options, classes: Sequence[Sequence[Region]], names: Sequence[str]) -> int:
+    """Return the number of levels that all classes have enough sites for; raise if there is none."""
+    regions = [region for one in classes for region in one]
+    side = min(min(region.sites.shape) for region in regions)
+    levels = max(1, sum(side >= SIDE << level for level in range(options.levels)))
+    while True:
+        reach = experts_of(options, levels)[-1].reach
+        counts = [sum(int(_centres(region, reach).sum()) for region in one if not region.judged) for one in classes]
+        if min(counts) >= LEAST:
+            return int(levels)
+        if levels == 1:
+            few = int(np.argmin(counts))
+            raise ValueError(
+                f"class {names[few]!r} has {counts[few]} whole neighbourhoods of {2 * reach + 1}x{2 * reach + 1} "
+                f"pixels, and {LEAST} are needed; give a larger sample of it"
+            )
+        levels -= 1
+
+
+def _centres(region: Region, reach: int) -> Mask:
+    """Return the sites whose neighbourhoods of this reach are whole."""
+    rows, cols = region.sites.shape
+    inside = np.zeros((rows, cols), bool)
+    inside[reach : rows - reach, reach : cols - reach] = True
+    if not region.whole or region.sites.all():
+        return inside & region.sites
+    found: Mask = inside & ndimage.minimum_filter(region.sites, 2 * reach + 1, mode="nearest")
+    return found
+
+
+class _Part(NamedTuple):
+    """A part of a class that the others judge: the number of its region, and its sites there."""
+
+    region: int
+    sites: Mask
+
+
+class Self(NamedTuple):
+    """What the parts of a class are to the rest of it.
+
+    ``mean`` (E,) of the logarithms in natural units; ``windows`` (E, n) int64 mean logarithms over windows; ``parts``
+    (parts, E) float64, of each part.
+    """
+
+    mean: NDArray[np.float64]
+    windows: NDArray[np.int64]
+    parts: NDArray[np.float64]
+
+
+class _Class:
+    """The regions of a class on a machine."""
+
+    def __init__(self, machine: Machine, scale: Scale, experts: list[Expert], regions: Sequence[Region]) -> None:
+        self.regions = list(regions)
+        self._levels = [prepared(machine, scale, region.pixels, experts[-1].level + 1) for region in regions]
+
+    def draw(
+        self, machine: Machine, expert: Expert, most: int, seed: int, number: int, without: _Part | None = None
+    ) -> NDArray[np.float32]:
+        """Return neighbourhoods of the class drawn at random, (n, K); none of a part that is to be judged."""
+        masks = []
+        for place, region in enumerate(self.regions):
+            mask = _centres(region, expert.reach) & (not region.judged)
+            masks.append(mask & ~without.sites if without and without.region == place else mask)
+        pool = np.concatenate([mask.ravel() for mask in masks])
+        sites = np.flatnonzero(pool)
+        if len(sites) < TOO_FEW and without:  # a small region: what is left says nothing
+            return self.draw(machine, expert, most, seed, number)
+        if len(sites) > most:
+            words = random.draw4(seed, expert.level, number, sites, random.SEARCH)[0]
+            sites = np.sort(sites[np.argsort(words, kind="stable")[:most]])
+        found, first = [], 0
+        for mask, levels in zip(masks, self._levels, strict=True):
+            own = sites[(sites >= first) & (sites < first + mask.size)] - first
+            first += mask.size
+            if own.size:
+                found.append(self._features(machine, levels, expert, own).T)
+        return np.concatenate(found)
+
+    def _features(
+        self, machine: Machine, levels: list[Array], expert: Expert, sites: NDArray[np.intp]
+    ) -> NDArray[np.float32]:
+        placed, offsets = machine.put(sites.astype(np.int32)), machine.put(expert.offsets)
+        values: NDArray[np.float32] = machine.get(
+            features(machine, levels[expert.level], placed, offsets, expert.contrast)
+        )
+        return values
+
+    def judge(self, machine: Machine, experts: list[Expert], options: Options, seed: int, number: int) -> Self:
+        """Return how far the parts of the class are from the rest of it, by each expert."""
+        taps = gaussian(options.window)
+        windows, parts = [], []
+        for place, region in enumerate(self.regions):
+            logs = np.zeros((len(experts), *region.sites.shape), np.uint16)
+            judged = np.zeros(region.sites.shape, bool)
+            for sites in _quarters(region.sites):
+                part = _Part(place, sites)
+                shown = np.flatnonzero(_boxed(sites))
+                for e, expert in enumerate(experts):
+                    rest = self.draw(machine, expert, options.exemplars, seed, number, part)
+                    values = machine.put(self._features(machine, self._levels[place], expert, shown))
+                    logs[e].reshape(-1)[shown] = machine.get(exemplars(machine, values, stacked(machine, [rest])))[0]
+                judged.reshape(-1)[shown] = True
+                parts.append(logs.reshape(len(experts), -1)[:, shown].sum(1, dtype=np.int64) / (len(shown) * LOGS))
+            windows.append(windowed(machine, logs, judged.astype(np.uint8), taps)[:, judged])
+        means = np.concatenate(windows, 1)
+        return Self(np.array(parts).mean(0), means, np.array(parts))
+
+
+TOO_FEW = 8
+"""Neighbourhoods that are too few to judge a part by."""
+
+
+def _quarters(sites: Mask) -> list[Mask]:
+    """Return sites in four parts, as near equal as rows and columns allow: above and below, each left and right."""
+    row, col = np.nonzero(sites)
+    middle = np.median(row)
+    found = []
+    for half in (row <= middle, row > middle):
+        if not half.any():
+            continue
+        centre = np.median(col[half])
+        for side in (half & (col <= centre), half & (col > centre)):
+            if side.any():
+                part = np.zeros_like(sites)
+                part[row[side], col[side]] = True
+                found.append(part)
+    return found
+
+
+def _boxed(sites: Mask) -> Mask:
+    """Return the sites within a box of `BOX` pixels around their middle."""
+    row, col = np.nonzero(sites)
+    top, left = (max(0, int(np.median(axis)) - BOX // 2) for axis in (row, col))
+    found = np.zeros_like(sites)
+    found[top : top + BOX, left : left + BOX] = sites[top : top + BOX, left : left + BOX]
+    return found
+
+
+def windowed(
+    machine: Machine, logs: NDArray[np.uint16], labels: NDArray[np.uint8], taps: NDArray[np.uint32], label: int = 1
+) -> NDArray[np.int64]:
+    """Return the mean of planes (P, rows, cols) over the window of each site, of sites with a label alone.
+
+    In 1 / `MEANS` of the planes' units, (P, rows, cols); 0 where the window has no such site.
+    """
+    placed, weights = machine.put(labels), machine.put(taps)
+    counts = machine.get(window(machine, placed, machine.put(np.array([label], np.int32)), weights))[0].astype(np.int64)
+    owner = machine.put(np.full(len(logs), label, np.int32))
+    sums = machine.get(window(machine, placed, owner, weights, machine.put(logs))).astype(np.int64)
+    means: NDArray[np.int64] = (MEANS * sums + counts // 2) // np.maximum(counts, 1)
+    return means
+
+
+def _nulls(selves: Sequence[Self]) -> tuple[list[Null], int]:
+    """Return the distribution of each class, and the degrees of freedom of their covariances.
+
+    The covariance is that of the class between windows, shrunk to the mean of all classes, plus the drift between parts
+    of a sample, which is pooled because a class has few parts.
+    """
+    within = [_covariance(one.windows / float(MEANS * LOGS)) for one in selves]
+    pooled: NDArray[np.float64] = np.add.accumulate(within)[-1] / len(within)
+    several = [one.parts.T for one in selves if len(one.parts) > 1]
+    drift = sum((_covariance(parts) for parts in several), np.zeros_like(pooled)) / max(1, len(several))
+    least = FLOOR * np.eye(len(pooled))
+    nulls = []
+    for one, own in zip(selves, within, strict=True):
+        mean = one.windows.sum(1) / float(one.windows.shape[1] * MEANS * LOGS)
+        nulls.append(Null(mean, _inverse(OWN * own + (1 - OWN) * pooled + DRIFTS * drift + least)))
+    return nulls, max(1, sum(parts.shape[1] - 1 for parts in several))
+
+
+def _covariance(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the covariance of values (E, n), with sums in one order everywhere."""
+    gap = values - np.array([np.add.accumulate(line)[-1] for line in values])[:, None] / values.shape[1]
+    products = [[np.add.accumulate(a * b)[-1] for a in gap] for b in gap]
+    found: NDArray[np.float64] = np.array(products) / max(1, values.shape[1] - 1)
+    return found
+
+
+def _inverse(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the inverse of a symmetric positive definite matrix, with the same bits everywhere (Cholesky)."""
+    n = len(matrix)
+    lower = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            rest = matrix[i, j] - sum(float(lower[i, k] * lower[j, k]) for k in range(j))
+            lower[i, j] = sqrt(rest) if i == j else rest / lower[j, j]
+    inverted = np.zeros((n, n))
+    for column in range(n):
+        for i in range(column, n):
+            rest = float(i == column) - sum(float(lower[i, k] * inverted[k, column]) for k in range(column, i))
+            inverted[i, column] = rest / lower[i, i]
+    return np.array([[sum(float(a * b) for a, b in zip(p, q, strict=True)) for q in inverted.T] for p in inverted.T])

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The least squared distance of a neighbourhood to the exemplars of each class."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.machine.interface import Array, Launcher, Machine, Operation
+from simdtex.ops.arithmetic import log32
+
+TOGETHER = 4
+"""A class has a multiple of so many exemplars (kernels/exemplars.cl)."""
+
+LOGS = 256
+"""Units of a logarithm of a distance."""
+
+PART = 2**14
+"""Sites that the twin compares at a time."""
+
+
+class Exemplars(NamedTuple):
+    """Neighbourhoods y that stand for classes: ``doubled`` (M, K) float32 are -2 y, ``squares`` (M,) float32 |y|^2.
+
+    ``starts`` (classes + 1,) int32 is where each class begins among them.
+    """
+
+    doubled: Array
+    squares: Array
+    starts: Array
+
+
+def stacked(machine: Machine, classes: list[NDArray[np.float32]]) -> Exemplars:
+    """Return the exemplars of classes, each (n, K), on a machine."""
+    filled = [np.concatenate([one, np.repeat(one[-1:], -len(one) % TOGETHER, 0)]) for one in classes]
+    y = np.concatenate(filled)
+    starts = np.cumsum([0, *map(len, filled)]).astype(np.int32)
+    return Exemplars(machine.put(-2 * y), machine.put((y * y).sum(1)), machine.put(starts))
+
+
+@Operation
+def exemplars(machine: Launcher | None, features: Array, known: Exemplars) -> Array:
+    """Return log(d^2 + 1) of the nearest exemplar of each class, (classes, S) uint16 in 1/256.
+
+    ``features`` (K, S) float32 are whole numbers of which no sum of products reaches 2^24. Cost: S M K multiply-adds.
+    """
+    count, classes = features.shape[1], known.starts.shape[0] - 1
+    if machine is None:
+        own = (features * features).sum(0)
+        least = np.empty((classes, count), np.float32)
+        for c, (begin, end) in enumerate(zip(known.starts, known.starts[1:], strict=False)):
+            for s in range(0, count, PART):
+                products = known.doubled[begin:end] @ features[:, s : s + PART]
+                least[c, s : s + PART] = (products + known.squares[begin:end, None]).min(0)
+        return np.rint(log32(least + own + np.float32(1)) * np.float32(LOGS)).astype(np.uint16)
+    logs = machine.empty((classes, count), np.uint16)
+    machine.launch(
+        machine.kernel("exemplars", "exemplars", K=features.shape[0], V=machine.vector),
+        (-(-count // machine.vector),),
+        *(features, np.int32(count), *known, np.int32(classes), logs),
+    )
+    return logs

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The report of a classification: labels, how well each class fits, and what was confused with what."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.io.image import to_display
+from simdtex.model.colours import label_colours, temperature_colours
+from simdtex.report.page import Figure, Section, write_report
+from simdtex.report.sheet import contact_sheet
+from simdtex.report.tables import Table
+from simdtex.run import Output
+
+UNTOLD = np.full((1, 3), 128, np.uint8)
+"""The colour of pixels whose true label is not known."""
+
+
+def write_classification(
+    folder: str | os.PathLike[str],
+    image: NDArray[Any],
+    labels: NDArray[np.uint8],
+    output: Output,
+    truth: NDArray[Any] | None = None,
+    command: str = "",
+) -> None:
+    """Write the report of a classification: ``index.html``, PNG pictures, ``results.json``.
+
+    Parameters
+    ----------
+    folder : path
+        See `simdtex.report.page.check_folder`.
+    image : (rows, cols[, bands]) array
+    labels : (rows, cols) uint8 array
+        0 unknown, 1 the first class.
+    output : simdtex.run.Output
+        Of `simdtex.classify`.
+    truth : (rows, cols) array of integers, optional
+        The labels that are right; any number beyond the classes where that is not known.
+    command : str
+        The command line, if there is one.
+    """
+    statistics, fit = output.statistics, output.fit
+    assert fit is not None
+    classes = statistics["classes"]
+    names, colours, count = [one["name"] for one in classes], label_colours(len(classes)), len(classes)
+    picture = to_display(image)
+    shown = picture[..., :3] if picture.shape[-1] > 2 else np.repeat(picture[..., :1], 3, 2)
+    sheet = [("the picture", shown), ("the labels", colours[labels])]
+    if truth is not None:
+        sheet.append(("the truth", np.concatenate([colours, UNTOLD])[np.minimum(truth, count)]))
+    legend = [
+        {"Label": str(c), "Class": name, "Colour": _hex(colour), "Share": f"{one['share']:.1%}"}
+        for c, (name, colour, one) in enumerate(zip(names, colours, classes, strict=True))
+    ]
+    pictures = contact_sheet(sheet, columns=len(sheet))
+    caption = "The picture and its labels. Black is unknown; grey is where the truth is not known."
+    fits = [(name, temperature_colours(fit[..., c])) for c, name in enumerate(names[1:])]
+    limit = statistics["options"]["unknown"]
+    meaning = (
+        "The fit of each class, from 0 (near black) to 1 (pale yellow). It is the probability that a texture of the "
+        "class differs from its samples as much as the picture does around a pixel, within its segment. Where that of "
+        f"the label is below {limit:g}, the pixel is unknown."
+    )
+    sections = [
+        Section("The labels", [Figure("labels.png", pictures, caption), Table("The classes", legend)]),
+        Section(
+            "How well each class fits",
+            [Figure("fit.png", contact_sheet(fits, columns=min(4, len(fits))), meaning)],
+        ),
+    ]
+    results: dict[str, Any] = {"shape": labels.shape, "statistics": statistics}
+    if truth is not None:
+        confusion = confusion_matrix(labels, truth, count)
+        rows = [
+            {"True class": name, **{other: str(n) for other, n in zip(names, line, strict=True)}}
+            for name, line in zip(names, confusion, strict=True)
+            if line.any()
+        ]
+        right = float(np.trace(confusion) / max(1, confusion.sum()))
+        note = f"Pixels of each true class by their label; {right:.1%} are right."
+        sections.append(Section("Confusion", [Table("The confusion matrix", rows, note)]))
+        results |= {"confusion": confusion, "accuracy": right}
+    job = {"seed": statistics["seed"], "seconds": f"{statistics['seconds']:.2f}", **statistics["options"]}
+    settings = [{"What": k, "Value": str(v)} for k, v in job.items()]
+    sections.append(Section("The job", [Table("The run and its options", settings)]))
+    lead = f"{labels.shape[1]} x {labels.shape[0]} pixels and {count - 1} classes, on {statistics['device']}."
+    write_report(folder, "Which texture is where", lead, sections, results, command)
+
+
+def _hex(colour: NDArray[np.uint8]) -> str:
+    return "#" + bytes(colour).hex()
+
+
+def confusion_matrix(labels: NDArray[Any], truth: NDArray[Any], count: int) -> NDArray[np.int64]:
+    """Return how many pixels of each true label (rows) have each label (columns), (count, count).
+
+    Pixels whose true label is ``count`` or more are left out.
+    """
+    known = truth < count
+    pairs = truth[known].astype(np.int64) * count + labels[known]
+    return np.bincount(pairs, minlength=count * count).reshape(count, count)
