@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from simdtex import schedules
 from simdtex.checkpoint import like
@@ -213,13 +214,17 @@ class Run:
         rejected = np.zeros(state.labels.shape, bool)
         taps, freedom = gaussian(self.options.window), self.model.freedom
         limit = fdtri(experts, freedom, 1 - self.options.unknown) if self.options.unknown else np.inf
+        reach = max(expert.reach for expert in self.model.experts)
         for label in np.unique(state.labels):
             box = _around(state.labels == label, len(taps) // 2)
             own = state.labels[box] == label
+            inner = ndimage.minimum_filter(own, 2 * reach + 1, mode="nearest")  # no neighbour beyond the segment
             for c, null in enumerate(self.model.nulls):
                 logs = np.ascontiguousarray(state.logs[:, c][(slice(None), *box)])
-                means = windowed(self.machine, logs, own.astype(np.uint8), taps)[:, own]
-                distance = null.distance(means)
+                means, found = windowed(self.machine, logs, inner, taps)
+                if not found[own].all():  # a narrow segment
+                    means = np.where(found, means, windowed(self.machine, logs, own, taps)[0])
+                distance = null.distance(means[:, own])
                 fit[c][box][own] = fdtrc(experts, freedom, distance)
                 if c == label:
                     rejected[box][own] = distance > limit

@@ -278,7 +278,7 @@ class _Class:
                     logs[e].reshape(-1)[shown] = machine.get(exemplars(machine, values, stacked(machine, [rest])))[0]
                 judged.reshape(-1)[shown] = True
                 parts.append(logs.reshape(len(experts), -1)[:, shown].sum(1, dtype=np.int64) / (len(shown) * LOGS))
-            windows.append(windowed(machine, logs, judged.astype(np.uint8), taps)[:, judged])
+            windows.append(windowed(machine, logs, judged, taps)[0][:, judged])
         means = np.concatenate(windows, 1)
         return Self(np.array(parts).mean(0), means, np.array(parts))
 
@@ -314,18 +314,17 @@ def _boxed(sites: Mask) -> Mask:
 
 
 def windowed(
-    machine: Machine, logs: NDArray[np.uint16], labels: NDArray[np.uint8], taps: NDArray[np.uint32], label: int = 1
-) -> NDArray[np.int64]:
-    """Return the mean of planes (P, rows, cols) over the window of each site, of sites with a label alone.
+    machine: Machine, logs: NDArray[np.uint16], sites: Mask, taps: NDArray[np.uint32]
+) -> tuple[NDArray[np.int64], Mask]:
+    """Return the mean of planes (P, rows, cols) over the sites in the window of each site, and where there are any.
 
-    In 1 / `MEANS` of the planes' units, (P, rows, cols); 0 where the window has no such site.
+    Means are in 1 / `MEANS` of the planes' units, (P, rows, cols).
     """
-    placed, weights = machine.put(labels), machine.put(taps)
-    counts = machine.get(window(machine, placed, machine.put(np.array([label], np.int32)), weights))[0].astype(np.int64)
-    owner = machine.put(np.full(len(logs), label, np.int32))
-    sums = machine.get(window(machine, placed, owner, weights, machine.put(logs))).astype(np.int64)
-    means: NDArray[np.int64] = (MEANS * sums + counts // 2) // np.maximum(counts, 1)
-    return means
+    labels, weights = machine.put(sites.astype(np.uint8)), machine.put(taps)
+    ones = machine.put(np.ones(len(logs), np.int32))
+    counts = machine.get(window(machine, labels, machine.put(np.ones(1, np.int32)), weights))[0].astype(np.int64)
+    sums = machine.get(window(machine, labels, ones, weights, machine.put(logs))).astype(np.int64)
+    return (MEANS * sums + counts // 2) // np.maximum(counts, 1), counts > 0
 
 
 def _nulls(selves: Sequence[Self]) -> tuple[list[Null], int]:
