@@ -40,7 +40,7 @@ def test_there_are_not_too_many_options():
     assert len({max(one.opts, key=len) for _, one in OPTIONS} | {"--help", "--version"}) <= 90, "each of them is needed"
 
 
-@pytest.mark.parametrize("name", ["synth", "fill", "extend", "simulate", "schedules", "mix", "solid"])
+@pytest.mark.parametrize("name", ["synth", "fill", "extend", "simulate", "schedules", "mix", "solid", "classify"])
 def test_a_command_has_the_options_of_the_tables_that_it_shows(name):
     params = {one.name: one for one in load(name).params if getattr(one, "kind", None)}
     tables = [table(import_module(f"simdtex.methods.{method}").Options) for method in METHODS.get(name, ("mrf",))]
