@@ -45,14 +45,14 @@ def halves(rows=36):
 
 
 def test_every_level_has_two_experts_whose_weights_halve_and_add_up():
-    found = experts_of(Options(temperature=2.0), 3)
+    found = experts_of(Options(), 3)
     assert [(one.level, one.contrast, len(one.offsets)) for one in found] == [
         (level, contrast, 13 if contrast else 9) for level in range(3) for contrast in (False, True)
     ]
     assert [one.reach for one in found] == [1, 2, 2, 4, 4, 8]
     weights = np.array([one.factor for one in found]) * 256 / 2**18
-    assert weights.sum() == pytest.approx(0.5, abs=2e-3)
-    assert weights == pytest.approx(np.repeat([4, 2, 1], 2) / 28, abs=2e-3)
+    assert weights.sum() == pytest.approx(2, abs=2e-3)
+    assert weights == pytest.approx(np.repeat([4, 2, 1], 2) / 7, abs=2e-3)
     assert (found[0].offsets[0] == 0).all() and abs(found[-1].offsets).max() == 8
 
 
@@ -97,7 +97,7 @@ def test_labels_without_a_field_are_those_of_the_greatest_evidence():
             0,
         )
         count = learned.counts[c] / max(learned.counts)
-        energy.append(-(mean + 2 * np.log(count) * np.mean([1 / 9, 1 / 13])) / plan.options.temperature)
+        energy.append(-(mean + 2 * np.log(count) * np.mean([1 / 9, 1 / 13])) / model.TEMPERATURE)
     gap = energy[1] - energy[0]
     clear = abs(gap) > 0.05  # logarithms are rounded to 1/256, and divided by the temperature
     assert clear.mean() > 0.9

@@ -205,8 +205,8 @@ class Run:
         """Return how well each class fits each site, (classes, rows, cols), and where the site's own is rejected.
 
         The fit is the probability that a texture of the class differs as much from its exemplars, on average over the
-        window within the site's segment: by Hotelling's test, whose covariance has few degrees of freedom. What was copied
-        from the samples is left out, since it has no distance to them, and fits where there is nothing else.
+        window within the site's segment: by Hotelling's test, whose covariance has few degrees of freedom. What was
+        copied from the samples is left out, since it has no distance to them; it fits where there is nothing else.
         """
         from scipy.special import fdtrc, fdtri
 

@@ -29,6 +29,9 @@ SMOOTHING = (0.0, 0.8, 1.8, 3.6, 7.2)
 SIDE = 32
 """Pixels a side of a sample at level 0, at least, and twice as many with each level."""
 
+TEMPERATURE = 0.5
+"""Evidence is the mean logarithm of squared distances over this."""
+
 LEAST = 16
 """Neighbourhoods of a class at a level, at least."""
 
@@ -67,12 +70,12 @@ class Expert(NamedTuple):
 def experts_of(options: Options, levels: int) -> list[Expert]:
     """Return the experts of so many levels: raw and contrast-compressed neighbourhoods at each, the finest first.
 
-    An expert of level l has the weight 2**-l; the weights add up to 1 / temperature.
+    An expert of level l has the weight 2**-l; the weights add up to 1 / `TEMPERATURE`.
     """
     total = 2 * sum(2.0**-level for level in range(levels))
     found = []
     for level in range(levels):
-        factor = round(UNITS / LOGS * 2.0**-level / total / options.temperature)
+        factor = round(UNITS / LOGS * 2.0**-level / total / TEMPERATURE)
         for contrast, order in ((False, options.order), (True, 2 * options.order)):
             near = neighbourhood_offsets(order) * 2**level
             offsets = np.concatenate([np.zeros((1, 2), np.int32), near]).astype(np.int32)
