@@ -223,7 +223,9 @@ def test_means_over_a_window_are_of_the_sites_alone():
     rng = np.random.default_rng(0)
     logs, sites = rng.integers(0, 4000, (2, 12, 15)).astype(np.uint16), rng.random((12, 15)) < 0.5
     taps = gaussian(2.0)
-    means, found = windowed(REFERENCE, logs, sites, taps)
+    everywhere = np.ones_like(sites)
+    means, found = windowed(REFERENCE, logs, sites, taps, everywhere)
+    assert (windowed(REFERENCE, logs, sites, taps, sites)[0] == means.reshape(2, 12, 15)[:, sites]).all()
 
     def summed(plane):
         for axis in (0, 1):
@@ -233,10 +235,10 @@ def test_means_over_a_window_are_of_the_sites_alone():
     weight = summed(sites)
     assert found.all()
     for mean, plane in zip(means, logs, strict=True):
-        assert abs(mean - MEANS * summed(plane * sites) / weight).max() <= 0.5
+        assert abs(mean.reshape(12, 15) - MEANS * summed(plane * sites) / weight).max() <= 0.5
     alone = np.zeros((40, 40), bool)
     alone[0, 0] = True
-    near = windowed(REFERENCE, np.full((1, 40, 40), 9, np.uint16), alone, taps)
+    near = windowed(REFERENCE, np.full((1, 40, 40), 9, np.uint16), alone, taps, np.ones_like(alone))
     assert (near[0][0] == np.where(near[1], 9 * MEANS, 0)).all() and 1 < near[1].sum() < 1600
 
 

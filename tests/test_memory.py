@@ -103,6 +103,7 @@ JOBS = {
     "mix": lambda: simdtex.mix([SAMPLE, SAMPLE], (9000, 9000), device="reference", rng=1),
     "extend": lambda: simdtex.extend(SAMPLE, right=9000, bottom=9000, order=1, device="reference", rng=1),
     "simulate": lambda: simdtex.simulate(SAMPLE, 10**6, shape=(99, 99), device="reference", rng=1),
+    "classify": lambda: simdtex.classify(np.zeros((6000, 6000), np.uint8), {"a": SAMPLE}, device="reference", rng=1),
     "ising": lambda: ising(Reference(), (64, 64), [2.0], "coloring", sweeps=2**27),
 }
 
