@@ -42,7 +42,7 @@ def reporting() -> Iterator[None]:
     except (ValueError, TypeError, OSError) as error:
         settle(error)
     except MemoryError:
-        click.echo("simdtex: the memory does not suffice for this; give a smaller size", err=True)
+        note("the memory does not suffice for this; give a smaller size")
         sys.exit(2)
     except KeyboardInterrupt as signalled:
         give_up(context, signalled.args[0] if signalled.args else signal.SIGINT)
@@ -54,7 +54,7 @@ def give_up(context: click.Context, number: int) -> NoReturn:
     path: Path | None = context.meta.get(RESUME)
     how = f"go on with: simdtex resume {path}" if path and path.exists() else "nothing but stages may have been written"
     warnings.filterwarnings("ignore", "coroutine .* was never awaited")  # which Zarr had begun
-    click.echo(f"simdtex: stopped; {how}", err=True)
+    note(f"stopped; {how}")
     sys.exit(128 + number)
 
 
@@ -121,11 +121,16 @@ def afterwards() -> Iterator[None]:
         click.get_current_context().meta.setdefault(FAILURES, []).append(error)
 
 
+def note(sentence: str) -> None:
+    """Print a sentence on standard error."""
+    click.echo(f"simdtex: {sentence}", err=True)
+
+
 def settle(*errors: Exception) -> None:
     """Exit with code 2 and one sentence if there are errors, or `afterwards` has kept some."""
     failures = [*errors, *click.get_current_context().meta.pop(FAILURES, [])]
     if failures:
-        click.echo(f"simdtex: {'; '.join(_sentence(error) for error in failures)}", err=True)
+        note("; ".join(_sentence(error) for error in failures))
         sys.exit(2)
 
 

@@ -43,7 +43,7 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tupl
 
     paths, out = read_pair("--guide", "SAMPLE-GUIDE=OUTPUT-GUIDE", text, samples)
     own = [read_pixels(path)[0] for path in paths]
-    wanted, lies = read_pixels(out)
+    wanted, lies, _ = read_pixels(out)
     wanted, free = _free(wanted, channels(wanted if lies else own[0]))  # a grid has no alpha
     are_few = few([one.reshape(*one.shape[:2], -1) for one in own])
     colours = all(one.dtype == np.uint8 and channels(one) == channels(wanted) > 1 for one in (*own, wanted))
