@@ -17,7 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from volumes import noise
 
-from simdtex.io import image
+from simdtex.io import image, volume
+from simdtex.io.atomic import atomic_path
 
 ROUND_TRIPS = [
     *[(".png", dtype, c) for dtype in ("uint8", "uint16") for c in (None, 1, 2, 3, 4)],
@@ -427,6 +428,27 @@ def test_written_file_has_the_usual_permissions_and_follows_links(tmp_path):
     assert (tmp_path / "link.png").is_symlink()
     modes = [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("usual", "real.png")]
     assert modes[0] == modes[1]
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o444, 0o666])
+def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path, mode):
+    path, folder = tmp_path / "a.png", tmp_path / "slices"
+    path.touch()
+    folder.mkdir()
+    path.chmod(mode)
+    folder.chmod(mode | 0o300)
+    image.write(path, np.zeros((2, 2), np.uint8))
+    volume.write(folder, np.zeros((2, 2, 2), np.uint8))
+    assert stat.S_IMODE(path.stat().st_mode) == mode
+    assert stat.S_IMODE(folder.stat().st_mode) == mode | 0o300
+
+
+def test_a_file_that_is_replaced_is_read_by_no_others_meanwhile(tmp_path):
+    path = tmp_path / "a.bin"
+    path.touch()
+    path.chmod(0o600)
+    with atomic_path(path) as temporary:
+        assert stat.S_IMODE(temporary.stat().st_mode) == 0o600
 
 
 def test_to_display():

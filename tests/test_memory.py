@@ -114,6 +114,21 @@ def test_a_run_that_does_not_fit_is_refused_before_it_begins(job, monkeypatch):
         JOBS[job]()
 
 
+def test_tiles_are_offered_where_there_are_tiles(monkeypatch):
+    hole = np.zeros(SAMPLE.shape, bool)
+    hole[7, 7] = True
+    monkeypatch.setattr(memory, "available", lambda: memory.TEMPORARY)
+    for job, tiles in (
+        (lambda: simdtex.synthesize(SAMPLE, (9, 9), order=1, device="reference", rng=1), True),
+        (lambda: simdtex.fill(SAMPLE, hole, order=1, device="reference", rng=1), False),
+        (lambda: simdtex.extend(SAMPLE, right=9, order=1, device="reference", rng=1), False),
+        (lambda: simdtex.simulate(SAMPLE, 1, order=1, device="reference", rng=1), False),
+    ):
+        with pytest.raises(simdtex.DeviceError, match="is available; give a smaller size") as said:
+            job()
+        assert ("--tiles" in str(said.value)) == tiles
+
+
 @pytest.mark.parametrize("shape, values", [((20000, 20000), 8), ((40000, 40000), 4)])
 def test_a_limit_of_counting_says_what_is_counted(shape, values):
     method = "pyramid" if values == 8 else "multires"

@@ -42,6 +42,8 @@ GROUPS = {
 
 COMMANDS = {name: sentence for group in GROUPS.values() for name, sentence in group.items()}
 
+WHAT = "More of a texture from a sample of it, by parallel relaxation on any OpenCL device."
+
 EXAMPLES = (
     ("synth gravel.png -o more.png", "More of a texture; it tiles."),
     ("extend photo.png -o tile.png --seamless", "A photo that tiles."),
@@ -52,6 +54,7 @@ EXAMPLES = (
 def load(name: str) -> click.Command:
     """Return the command of a name."""
     command: click.Command = getattr(import_module(f"simdtex.cli.{name}"), name)
+    command.help = command.help or COMMANDS[name]  # python -OO takes docstrings away
     return command
 
 
@@ -89,7 +92,9 @@ def _versions(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     ctx.exit()
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(
+    cls=Commands, help=WHAT, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
 @click.option(
     "--version",
     is_flag=True,
@@ -99,7 +104,7 @@ def _versions(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     help="Show what runs here, and on which device.",
 )
 def main() -> None:
-    """More of a texture from a sample of it, by parallel relaxation on any OpenCL device."""
+    """Run a command."""
     atexit.register(gc.freeze)  # the process ends: what it holds need not be looked through for cycles
 
 

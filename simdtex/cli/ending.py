@@ -13,6 +13,7 @@ from _thread import interrupt_main
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from traceback import walk_tb
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -39,6 +40,10 @@ def reporting() -> Iterator[None]:
         with catch_signals(context):
             check_places(context)
             yield
+    except BrokenPipeError as error:
+        if _printing(error):
+            raise  # the reader has read enough; click ends the process without a word
+        settle(error)
     except (ValueError, TypeError, OSError) as error:
         settle(error)
     except MemoryError:
@@ -128,13 +133,28 @@ def note(sentence: str) -> None:
 
 def settle(*errors: Exception) -> None:
     """Exit with code 2 and one sentence if there are errors, or `afterwards` has kept some."""
-    failures = [*errors, *click.get_current_context().meta.pop(FAILURES, [])]
+    context = click.get_current_context(silent=True)
+    failures = [*errors, *(context.meta.pop(FAILURES, []) if context else [])]
     if failures:
         note("; ".join(_sentence(error) for error in failures))
         sys.exit(2)
 
 
+def _printing(error: BaseException) -> bool:
+    """Return whether an error was raised by a library that prints."""
+    frames = (frame for frame, _ in walk_tb(error.__traceback__))
+    return any(frame.f_globals.get("__name__") in ("click.utils", "rich.console") for frame in frames)
+
+
 def _sentence(error: Exception) -> str:
-    if isinstance(error, OSError) and error.strerror:  # without its number
-        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    return str(error)
+    if not (isinstance(error, OSError) and error.strerror):
+        return str(error)
+    if error.filename:  # without the number of the error
+        return f"{error.filename}: {error.strerror}"
+    if _printing(error):
+        return f"standard output could not be written ({error.strerror}): send it elsewhere"
+    try:
+        os.getcwd()
+    except OSError:
+        return "the working folder does not exist any more: change to another one"
+    return error.strerror

@@ -130,7 +130,8 @@ def command_line() -> str:
     """Return the command line of the running command, so that a reader can give it again."""
     context = click.get_current_context()
     options, arguments = given_words(context, without=("checkpoint",))
-    return shlex.join(["simdtex", str(context.command.name), *arguments, *options])
+    words = shlex.join(["simdtex", str(context.command.name), *arguments, *options])
+    return os.fsencode(words).decode(errors="backslashreplace")  # the name of a file may be no text
 
 
 def given_words(context: click.Context, without: tuple[str, ...] = ()) -> tuple[list[str], list[str]]:
