@@ -44,7 +44,8 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
     A reader of `path` sees the old file or the complete new one. If the block fails, also by Ctrl-C, the temporary file
     is removed and `path` is left as it was. The temporary file has the suffix of `path`; a symbolic link is followed,
     and the new file has the permissions of the old one. Raises ValueError if
-    `check_target` does, and NotWritten if the block or the renaming raises OSError, for example because the disk is full.
+    `check_target` does, and NotWritten if the block or the renaming raises OSError, for example because the disk is
+    full.
     """
     check_target(Path(path))
     target = Path(os.path.realpath(path))
