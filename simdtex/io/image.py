@@ -210,14 +210,19 @@ def as_array(name: str, values: Any) -> Array:
     """Return array-likes as an ndarray, or as a masked array if that is what they are.
 
     The arrays of other libraries, such as xarray and dask, are taken whole, their axes by position. Raises ValueError
-    if rows have unequal lengths.
+    if rows have unequal lengths, and TypeError if NumPy cannot take the array, for example from a GPU.
     """
     if hasattr(values, "compute"):  # dask, which NumPy would convert without its mask
         values = values.compute()
+    if getattr(values, "mode", None) in ("P", "PA"):  # Pillow
+        raise ValueError(f"{name} is an image of palette indices, which are no colours; give image.convert('RGB')")
     try:
-        array = np.asanyarray(values)
+        exchanged = hasattr(values, "__dlpack__") and not hasattr(values, "__array__")
+        array = np.from_dlpack(values) if exchanged else np.asanyarray(values)
     except ValueError:
         raise ValueError(f"{name} is ragged; give rows of equal length") from None
+    except (TypeError, RuntimeError, BufferError) as error:  # as a tensor says
+        raise TypeError(f"{name} is no array that NumPy can take: {error}") from None
     return array if isinstance(array, np.ma.MaskedArray) else np.asarray(array)
 
 
