@@ -148,6 +148,8 @@ def test_a_tiff_says_pixels_per_centimetre_or_nothing(tmp_path):
         tifffile.imwrite(tmp_path / "a.tif", noise((8, 9), np.uint8), resolution=(100, 200), resolutionunit=unit)
         found = image.read(tmp_path / "a.tif").metadata.dpi
         assert (found and tuple(round(v) for v in found)) == dpi
+    PIL.Image.new("CMYK", (9, 8)).save(tmp_path / "a.tif")
+    assert image.read(tmp_path / "a.tif").metadata.dpi is None
 
 
 def test_names_of_profiles():
@@ -205,6 +207,7 @@ def test_other_maps_have_their_own_profiles(folder):
     [
         ("synth", ["srgb.png", "wide.jpg", "--size", "9x8", "--order", 2]),
         ("mix", ["srgb.png", "wide.jpg"]),
+        ("synth", ["srgb.png", "--known", "wide.jpg"]),
         ("fill", ["srgb.png", "--mask", "tall.png", "--sample", "wide.jpg"]),
     ],
 )
@@ -213,6 +216,16 @@ def test_samples_of_different_colours_are_refused(folder, command, args):
     assert result.exit_code == 2 and not (folder / "out.png").exists()
     said = result.output.replace(str(folder), "")
     assert "/wide.jpg has the colour profile Wide" in said and "and /srgb.png sRGB; convert" in said
+
+
+def test_an_array_has_the_colours_of_the_sample(folder):
+    known = np.full((8, 9, 3), np.nan)
+    known[2, 3] = 7
+    np.save(folder / "known.npy", known)
+    args = ["wide.jpg", "--known", folder / "known.npy", "--size", "9x8", "--order", 2]
+    result = run(folder, "synth", *args, "-o", "out.png")
+    assert result.exit_code == 0, result.output
+    assert of_file(folder / "out.png")[0] == WIDE and image.read(folder / "out.png").pixels[2, 3].tolist() == [7, 7, 7]
 
 
 def test_a_sample_without_a_profile_is_srgb(folder):
@@ -246,6 +259,26 @@ def test_that_an_animation_has_more_frames_is_told_once(folder, command):
         result = run(folder, command, name, *more, "-o", "out.png")
         assert result.exit_code == 0, result.output
         assert result.output.count("a.gif has several frames or pages, of which the first is read") == (name == "a.gif")
+
+
+def test_a_second_frame_that_is_damaged_takes_nothing_from_the_first(tmp_path):
+    frames = [PIL.Image.fromarray(noise((24, 20, 3), np.uint8, seed)) for seed in (1, 2)]
+    frames[0].save(tmp_path / "a.gif", save_all=True, append_images=frames[1:])
+    whole = image.read(tmp_path / "a.gif").pixels
+    data = (tmp_path / "a.gif").read_bytes()
+    for share in (0.6, 0.75, 0.9, 0.99):
+        (tmp_path / "a.gif").write_bytes(data[: int(len(data) * share)])
+        np.testing.assert_array_equal(image.read(tmp_path / "a.gif").pixels, whole)
+
+
+def test_a_damaged_resolution_is_left_out(tmp_path):
+    pixels = noise((8, 9), np.uint8)
+    tifffile.imwrite(tmp_path / "a.tif", pixels, resolution=(100, 200), resolutionunit="inch")
+    with tifffile.TiffFile(tmp_path / "a.tif", mode="r+b") as file:
+        file.pages.first.tags[282].overwrite((0, 0))
+    found = image.read(tmp_path / "a.tif")
+    assert found.metadata.dpi is None
+    np.testing.assert_array_equal(found.pixels, pixels)
 
 
 def test_that_a_tiff_has_more_pages_is_known(tmp_path):

@@ -23,7 +23,7 @@ def read_data(samples: Material, options: dict[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {
         "channel_axis": samples.channel_axis,
         "mask": masks and (masks if samples.several else masks[0]),
-        "known": read_known(file, samples.pixels[0], samples.deep) if file else None,
+        "known": read_known(file, samples) if file else None,
         "guide": None,
     }
     if guide is not None:

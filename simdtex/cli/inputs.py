@@ -123,17 +123,15 @@ def read_picture(path: Path) -> Image:
 
 def check_profiles(paths: Sequence[Path], found: Sequence[Metadata | None]) -> None:
     """Raise unless pictures that are used together have the same colour profile; without one it is sRGB."""
+    from simdtex.io.decode import NOTHING
     from simdtex.io.image import profile_name
 
-    profiles = [one and one.profile for one in found]
-    if len(set(profiles)) < 2:
-        return
-    names = [profile_name(one) for one in profiles]
-    for path, profile, name in zip(paths, profiles, names, strict=True):
-        if profile != profiles[0] and (name, names[0]) != ("sRGB", "sRGB"):
-            raise ValueError(
-                f"{path} has the colour profile {name} and {paths[0]} {names[0]}; convert them to one profile"
-            )
+    # grids and arrays hold numbers alone, in whatever colours
+    told = [(path, one.profile) for path, one in zip(paths, found, strict=True) if one and one is not NOTHING]
+    for path, profile in told[1:]:
+        first, own = told[0]
+        if profile != own and (names := [profile_name(profile), profile_name(own)]) != ["sRGB", "sRGB"]:
+            raise ValueError(f"{path} has the colour profile {names[0]} and {first} {names[1]}; convert them to one")
 
 
 def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | None, Metadata | None]:
@@ -304,22 +302,21 @@ def read_map(name: str, path: Path, deep: bool = False) -> HardData | NDArray[An
     return np.moveaxis(pixels, -1, 0)
 
 
-def read_known(path: Path, like: NDArray[Any], deep: bool = False) -> HardData | np.ma.MaskedArray[Any, Any]:
+def read_known(path: Path, samples: Material) -> HardData | np.ma.MaskedArray[Any, Any]:
     """Read the known values of an output: a table, recognised by its name, a point set, a grid or a picture.
 
-    Or, with ``deep``, a volume.
-
-    A picture is unknown where it is transparent, if it has alpha and the sample ``like`` has none.
+    Or, of a volume, a volume. A picture is unknown where it is transparent, if it has alpha and the samples have none.
     """
     from simdtex.io import grids, image
     from simdtex.io.hard_data import read_hard_data
 
     if path.suffix.lower() in TABLES or grids.kind_of(path) == "points":
         return read_hard_data(path)
-    (values, lies, _), gone = read_pixels(path, deep), None
+    (values, lies, metadata), gone = read_pixels(path, samples.deep), None
+    check_profiles([samples.paths[0], path], [samples.metadata, metadata])
     if values.ndim == 4:
         return np.ma.MaskedArray(values[..., 0] if values.shape[-1] == 1 else values)
-    if lies is None and channels(values) == channels(like) + 1:
+    if lies is None and channels(values) == channels(samples.pixels[0]) + 1:
         values, gone = image.split_alpha(values)
     if channels(values) == 1:
         values = values.reshape(values.shape[:2])

@@ -8,7 +8,7 @@ import logging
 import re
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from math import prod
 from threading import Lock
 from typing import Any, NamedTuple
@@ -139,7 +139,6 @@ def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> Array:
 def _read_pillow(data: bytes, most: int) -> Decoded:
     with _opened(data, most) as picture:
         picture.load()
-        orientation, metadata = _metadata(picture)
         transparent = picture.has_transparency_data
         if picture.mode in ("1", "L"):
             mode = "LA" if transparent else "L"
@@ -147,16 +146,17 @@ def _read_pillow(data: bytes, most: int) -> Decoded:
             mode = picture.mode
         else:
             mode = "RGBA" if transparent else "RGB"
-        if picture.mode == "CMYK" and metadata.profile:
-            picture, metadata = _of_print(picture, metadata)
-        pixels = np.asarray(picture.convert(mode))
+        pixels = np.asarray(_in_rgb(picture) if picture.mode == "CMYK" else picture.convert(mode))
+        orientation, metadata = _metadata(picture)
     return _finished(pixels, orientation, mode in ("LA", "RGBA")), metadata
 
 
 def _metadata(picture: PIL.Image.Image) -> tuple[int, Metadata]:
     """Return the orientation of a picture of Pillow, and what its file says beside its pixels."""
-    orientation, exif = 1, None
-    try:
+    orientation, exif, more, profile = 1, None, False, picture.info.get("icc_profile")
+    with suppress(Exception):  # a damaged second frame is no reason to refuse the first
+        more = picture.format != "MPO" and getattr(picture, "is_animated", False)  # MPO is a JPEG with previews
+    with suppress(Exception):  # nor is damaged EXIF
         found, kept = picture.getexif(), PIL.Image.Exif()
         orientation = int(found.get(ORIENTATION, 1))
         for tag in _KEPT:
@@ -166,11 +166,8 @@ def _metadata(picture: PIL.Image.Image) -> tuple[int, Metadata]:
             if values := {tag: value for tag, value in found.get_ifd(ifd).items() if tag not in _SIZE}:
                 kept[ifd] = values
         exif = kept.tobytes() if kept else None
-    except Exception:  # damaged EXIF is no reason to refuse the pixels
-        pass
-    more = picture.format != "MPO" and getattr(picture, "is_animated", False)  # MPO is a JPEG with previews
     dpi = _dpi(picture.info.get("dpi"), orientation)
-    return orientation, Metadata(picture.info.get("icc_profile"), dpi, exif, more)
+    return orientation, Metadata(None if picture.mode in ("CMYK", "LAB") else profile, dpi, exif, more)
 
 
 def _dpi(found: Any, orientation: int) -> tuple[float, float] | None:
@@ -181,16 +178,16 @@ def _dpi(found: Any, orientation: int) -> tuple[float, float] | None:
     return (down, across) if orientation > 4 else (across, down)
 
 
-def _of_print(picture: PIL.Image.Image, metadata: Metadata) -> tuple[PIL.Image.Image, Metadata]:
-    """Return a CMYK picture in sRGB, by its profile if that can be used."""
-    from PIL import ImageCms
+def _in_rgb(picture: PIL.Image.Image) -> PIL.Image.Image:
+    """Return a CMYK picture in sRGB, by its colour profile if it has one that can be used."""
+    converted = None
+    if found := picture.info.get("icc_profile"):
+        from PIL import ImageCms
 
-    try:
-        profile = ImageCms.ImageCmsProfile(io.BytesIO(metadata.profile or b""))
-        converted = ImageCms.profileToProfile(picture, profile, ImageCms.createProfile("sRGB"), outputMode="RGB")
-    except (ImageCms.PyCMSError, OSError):
-        converted = None
-    return converted or picture, metadata._replace(profile=None)
+        with suppress(ImageCms.PyCMSError, OSError):
+            profile = ImageCms.ImageCmsProfile(io.BytesIO(found))
+            converted = ImageCms.profileToProfile(picture, profile, ImageCms.createProfile("sRGB"), outputMode="RGB")
+    return converted or picture.convert("RGB")
 
 
 def _read_png16(data: bytes, most: int) -> Decoded:
@@ -215,8 +212,16 @@ def _read_tiff(data: bytes, most: int) -> Decoded:
         if any(offset + count > len(data) for offset, count in ends):
             raise ValueError("it ends before its last pixel")
         kind, compression = int(page.photometric), int(page.compression)
+        orientation = int(page.tags.valueof(ORIENTATION, 1))
+        metadata = Metadata(page.iccprofile)
+        with suppress(Exception):  # a damaged resolution or second page is no reason to refuse the first
+            told = 282 in page.tags and int(page.resolutionunit) in (2, 3)  # per inch or centimetre
+            dpi = _dpi(page.get_resolution("inch") if told else None, orientation)
+            metadata = metadata._replace(dpi=dpi, more=tiff.pages.is_multipage)
         if kind > 2 or compression in (6, 7):
-            return _read_pillow(data, most)  # JPEG, palettes, and print and video colours, which Pillow converts to RGB
+            # JPEG, palettes, and print and video colours, which Pillow converts to RGB
+            pixels, found = _read_pillow(data, most)
+            return pixels, metadata._replace(profile=found.profile)  # none of print colours
         if compression not in _COMPRESSIONS:
             raise ValueError(f"it is compressed by the method {compression}; save it with Deflate or uncompressed")
         pixels = page.asarray()
@@ -226,10 +231,7 @@ def _read_tiff(data: bytes, most: int) -> Decoded:
             pixels = np.moveaxis(pixels, 0, -1)
         elif page.axes not in ("YX", "YXS"):
             raise ValueError(f"its axes are {page.axes}, not rows, columns and channels")
-        orientation = int(page.tags.valueof(ORIENTATION, 1))
         extra = int(page.extrasamples[-1]) if page.extrasamples else 0  # 1: premultiplied alpha, 2: alpha
-        dpi = page.get_resolution("inch") if int(page.resolutionunit) in (2, 3) else None
-        metadata = Metadata(page.iccprofile, _dpi(dpi, orientation), None, tiff.pages.is_multipage)
     if kind == 0:  # white is zero
         pixels = ~pixels
     if pixels.dtype == bool:
