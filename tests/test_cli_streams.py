@@ -48,9 +48,9 @@ def test_a_full_standard_output_is_one_sentence(folder, words, unbuffered):
     assert (folder / "out.png").exists() == (words is SYNTH)
 
 
-@pytest.mark.parametrize("words", ["--help", "devices"])
+@pytest.mark.parametrize("words", [["--help"], ["devices"], SYNTH], ids=str)
 def test_a_reader_that_has_read_enough_ends_a_command_quietly(folder, words):
-    done = run(folder, [words, "| true"], SIMDTEX_DEVICE="reference")
+    done = run(folder, [*words, "| true"], SIMDTEX_DEVICE="reference")
     assert done.stderr == b""
 
 

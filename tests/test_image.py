@@ -224,6 +224,12 @@ def test_colours_that_were_multiplied_by_alpha_are_divided(tmp_path, dtype, colo
         assert np.abs(found[1:, :, :-1].astype(float) - plain[1:]).max() <= tolerance
 
 
+def test_divided_colours_are_rounded_and_no_more_than_white(tmp_path):
+    values = np.array([[[100, 150], [7, 200], [200, 100], [9, 0]]], np.uint8)
+    tifffile.imwrite(tmp_path / "a.tif", values, photometric="minisblack", extrasamples=["assocalpha"], planarconfig=1)
+    assert image.read(tmp_path / "a.tif").pixels.tolist() == [[[170, 150], [9, 200], [255, 100], [0, 0]]]
+
+
 def test_format_is_told_by_content(tmp_path):
     pixels = noise((5, 4, 3), np.uint16)
     image.write(tmp_path / "a.png", pixels)

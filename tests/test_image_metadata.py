@@ -281,6 +281,14 @@ def test_a_damaged_resolution_is_left_out(tmp_path):
     np.testing.assert_array_equal(found.pixels, pixels)
 
 
+def test_the_previews_of_a_photo_are_no_frames(tmp_path):
+    frames = [PIL.Image.fromarray(noise((24, 20, 3), np.uint8, seed)) for seed in (1, 2)]
+    frames[0].save(tmp_path / "a.jpg", format="MPO", save_all=True, append_images=frames[1:])
+    with PIL.Image.open(tmp_path / "a.jpg") as picture:
+        assert picture.is_animated
+    assert not image.read(tmp_path / "a.jpg").metadata.more
+
+
 def test_that_a_tiff_has_more_pages_is_known(tmp_path):
     for pages in (1, 2):
         tifffile.imwrite(tmp_path / "a.tif", noise((pages, 8, 9), np.uint8), photometric="minisblack", metadata=None)
