@@ -85,6 +85,21 @@ def test_names_that_are_no_text_are_written_and_reported(folder):
         assert r"s\xff.png" in file.read()
 
 
+@pytest.mark.parametrize("words", [["loop.png", "-o", "out.png"], ["sample.png", "-o", "loop.png"]], ids=str)
+def test_links_in_a_circle_are_refused(folder, words):
+    (folder / "loop.png").symlink_to("loop.png")
+    done = run(folder, ["synth", *words, *SYNTH[4:]])
+    assert done.returncode == 2
+    assert done.stderr.count(b"\n") == 1 and b"loop.png cannot be" in done.stderr, done.stderr
+    assert sorted(os.listdir(folder)) == ["loop.png", "sample.png"]
+
+
+def test_a_link_to_nothing_is_written_through(folder):
+    (folder / "out.png").symlink_to("real.png")
+    assert run(folder, SYNTH).returncode == 0
+    assert (folder / "out.png").is_symlink() and image.read(folder / "real.png").pixels.shape == (8, 9)
+
+
 def test_unusual_names(folder):
     for name in ("-dash.png", "new\nline.png", "two words.png", "per%cent.png", "a=b,c.png"):
         (folder / name).write_bytes((folder / "sample.png").read_bytes())
