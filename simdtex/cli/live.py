@@ -48,7 +48,7 @@ def live(picture: Path | None, port: int, host: str, browser: bool, device: str 
     given = None
     if picture:
         found = read_picture(picture)
-        given = Picture(picture.name, found.pixels, found.channel_axis)
+        given = Picture(picture.name, found.pixels, found.channel_axis, found.metadata)
 
     def ready(address: str, machine: Machine) -> None:
         click.echo(f"{address}  (on {machine.name}; Ctrl-C ends it)")
