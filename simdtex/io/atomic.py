@@ -69,9 +69,9 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
 def atomic_folder(path: PathLike) -> Iterator[Path]:
     """Yield a temporary folder in the folder of `path`, and rename it to `path` if the block succeeds.
 
-    An existing folder `path` is replaced as a whole at the end; the caller checks whether it may be. If the block
-    fails, also by Ctrl-C, the temporary folder is removed and `path` is left as it was. Errors are those of
-    `atomic_path`.
+    An existing folder `path` is replaced as a whole at the end, and the new one has its permissions; the caller checks
+    whether it may be. If the block fails, also by Ctrl-C, the temporary folder is removed and `path` is left as it was.
+    Errors are those of `atomic_path`.
     """
     target = Path(os.path.realpath(path))
     temporary = _hidden(target)
