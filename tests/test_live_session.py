@@ -1,14 +1,17 @@
 """The sessions of the live page: command lines that repeat a result, restarts, pauses, frames, and error messages."""
 
+import io
 import shlex
 from types import SimpleNamespace
 
 import numpy as np
+import PIL.Image
 import pytest
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from live import Fake, asked, png, texture
+from PIL import ImageCms
 
 import simdtex
 from simdtex import cli
@@ -120,6 +123,18 @@ def test_categories_and_16_bits_stay(kind):
     assert found.dtype == pixels.dtype and set(np.unique(found)) <= set(np.unique(pixels))
     assert ("--categorical" in shlex.split(result["command"])) is not deep
     page.session.close()
+
+
+def test_a_download_has_the_colours_of_the_picture(page):
+    profile = ImageCms.ImageCmsProfile(ImageCms.createProfile("sRGB")).tobytes()
+    file = io.BytesIO()
+    PIL.Image.fromarray(texture()).save(file, "PNG", icc_profile=profile, dpi=(300, 300))
+    page.ask("picture", file.getvalue(), kind="open", name="photo.png")
+    result = page.result()
+    for name, data in page.package(result["result"]).items():
+        if name in ("photo.png", "texture.png"):
+            found = read_bytes(name, data).metadata
+            assert found.profile == profile and found.dpi == pytest.approx((300, 300), abs=0.01)
 
 
 COARSEST = 2  # of three levels
@@ -380,7 +395,7 @@ def test_what_is_wrong_is_said_in_a_sentence_and_the_session_goes_on(opened):
 
 FILES = [
     (b"", "a.png is empty (0 bytes): give a file with an image in it"),
-    (b"hello", "a.png is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF or .npy file"),
+    (b"hello", "a.png is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF, PPM or .npy file"),
     (png(texture())[:100], "a.png cannot be decoded, it is truncated, damaged or of an unknown kind"),
     (png(texture(50, 48)), "a.png has 2400 pixels and no more than 2000"),
     (bytes(10001), "the file has 10001 bytes and at most 10000 are taken; give a smaller one"),

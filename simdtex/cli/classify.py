@@ -142,7 +142,7 @@ def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[st
             raise ValueError(f"{flag} names {name} twice; give {name}=FILE0,FILE1 for several samples of a class")
         found[name] = []
         for file in files.split(","):
-            pixels, _ = read_pixels(Path(file))
+            pixels = read_pixels(Path(file))[0]
             gone = np.zeros(pixels.shape[:2], bool)
             if channels(pixels) == channels(picture.array) + 1:
                 pixels, gone = split_alpha(pixels)

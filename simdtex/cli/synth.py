@@ -14,6 +14,7 @@ from simdtex.cli.inputs import (
     channels,
     check_source_map,
     last_iteration,
+    note_lossy,
     output_shape,
     read_also,
     read_material,
@@ -98,7 +99,10 @@ def synth(
     others = read_also(also, material)
     if others and known is not None:
         raise ValueError("known pixels are from no sample, and nothing says what a map has there; leave --also out")
-    writers = write_arranged(output, others, source_map)
+    if known is not None:
+        note_lossy(output, pixels)
+    like = material.metadata and material.metadata._replace(exif=None)  # a new picture was taken by no camera
+    writers = write_arranged(output, others, source_map, like)
     if report:
         from simdtex.report.page import check_folder
         from simdtex.report.synthesis import write_synthesis

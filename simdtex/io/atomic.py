@@ -42,19 +42,22 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
     """Yield a temporary file in the folder of `path`, and rename it to `path` if the block succeeds.
 
     A reader of `path` sees the old file or the complete new one. If the block fails, also by Ctrl-C, the temporary file
-    is removed and `path` is left as it was. The temporary file has the suffix of `path`; a symbolic link is followed.
-    Raises ValueError if `check_target` does, and NotWritten if the block or the renaming raises OSError, for example
-    because the disk is full.
+    is removed and `path` is left as it was. The temporary file has the suffix of `path`; a symbolic link is followed,
+    and the new file has the permissions of the old one. Raises ValueError if
+    `check_target` does, and NotWritten if the block or the renaming raises OSError, for example because the disk is
+    full.
     """
     check_target(Path(path))
     target = Path(os.path.realpath(path))
-    temporary = _hidden(target)
+    temporary, replaced = _hidden(target), target.exists()
     try:
         _remove_leftovers(target)
         # not tempfile, which would leave the finished file readable by its owner alone
-        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600 if replaced else 0o666))
         yield temporary
         _sync(temporary)
+        if replaced:
+            shutil.copymode(target, temporary)
         os.replace(temporary, target)
     except OSError as error:
         raise _not_written(path, error) from None
@@ -66,9 +69,9 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
 def atomic_folder(path: PathLike) -> Iterator[Path]:
     """Yield a temporary folder in the folder of `path`, and rename it to `path` if the block succeeds.
 
-    An existing folder `path` is replaced as a whole at the end; the caller checks whether it may be. If the block
-    fails, also by Ctrl-C, the temporary folder is removed and `path` is left as it was. Errors are those of
-    `atomic_path`.
+    An existing folder `path` is replaced as a whole at the end, and the new one has its permissions; the caller checks
+    whether it may be. If the block fails, also by Ctrl-C, the temporary folder is removed and `path` is left as it was.
+    Errors are those of `atomic_path`.
     """
     target = Path(os.path.realpath(path))
     temporary = _hidden(target)
@@ -84,6 +87,7 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
                 _sync(Path(folder, name))
         try:
             if target.exists():
+                shutil.copymode(target, temporary)
                 target.rename(old)
             temporary.rename(target)
         except BaseException:

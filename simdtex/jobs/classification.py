@@ -113,7 +113,7 @@ def classify(
     another one, and strips narrower than the coupling vanish.
 
     Cost: pixels x exemplars x classes x 66 multiply-adds for each band; 512x512 pixels and five classes take some 5 s
-    on two cores. Memory: 32 bytes on the host and 16 on the device for each pixel and class, 90 for each pixel, and 100 MB.
+    on two cores. Memory: 48 bytes for each pixel and class, 90 for each pixel, and 100 MB.
 
     Examples
     --------

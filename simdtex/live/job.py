@@ -15,7 +15,8 @@ import PIL.ImageDraw
 from numpy.typing import NDArray
 
 from simdtex.checkpoint import Checkpointing
-from simdtex.io.image import suitable_suffix
+from simdtex.io.decode import NOTHING
+from simdtex.io.image import Metadata, suitable_suffix
 from simdtex.jobs.filling import extend, fill
 from simdtex.live.words import controls
 from simdtex.machine import Machine
@@ -50,11 +51,12 @@ RESERVED = ("", "texture", "hole", "guide-sample", "guide-texture")
 
 
 class Picture(NamedTuple):
-    """A picture that was given: the name of its file, its pixels, and their channel axis or None."""
+    """A picture that was given: the name of its file, its pixels, channel axis or None, and what the file says."""
 
     name: str
     pixels: Array
     channel_axis: int | None
+    metadata: Metadata = NOTHING
 
 
 class Job:
@@ -75,6 +77,7 @@ class Job:
         self.message = message
         one_of("job", message.get("job"), FUNCTIONS)
         self.kind: str = message["job"]
+        self.metadata = picture.metadata._replace(exif=None)
         self.method: str = message.get("method", "mrf") if self.kind == "synth" else "mrf"
         one_of("method", self.method, METHODS)
         seed: Any = message.get("seed")

@@ -85,8 +85,9 @@ class Result:
             folder = Path(temporary) / "files"
             folder.mkdir()
             wanted = self._pictures | self.job.files
+            coloured = (self.job.output, next(iter(self.job.files)))  # the picture and its sample
             for each in wanted if name == ARCHIVE else wanted.keys() & {name}:
-                write(folder / each, wanted[each])
+                write(folder / each, wanted[each], self.job.metadata if each in coloured else None)
             if self.source is not None and name in (ARRANGEMENT, ARCHIVE):
                 save_source_map(folder / ARRANGEMENT, self.source)
             if name != ARCHIVE:

@@ -342,4 +342,4 @@ def _read(message: Message, buffers: Sequence[Any]) -> Picture:
     if not data:
         raise ValueError(f"{name} is empty (0 bytes): give a file with an image in it")
     found = read_bytes(name, data, max_pixels=MAX_PIXELS)
-    return Picture(name, found.pixels, found.channel_axis)
+    return Picture(name, found.pixels, found.channel_axis, found.metadata)
