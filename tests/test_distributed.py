@@ -1,7 +1,10 @@
 """An output in tiles has the bytes of one that is made at once, whatever the tiles, the workers and their order."""
 
 import json
+import os
+import shutil
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -166,16 +169,14 @@ class Stop(Exception):
 
 def shuffled(store, seed, stop=None):
     """Tiles in any order; an exception after so many of them, over all turns."""
-    order, done = np.random.default_rng(seed), [0]
+    order, done, work = np.random.default_rng(seed), [0], store.work()
 
-    def execute(turn, tiles):
-        tiles = list(tiles)
-        order.shuffle(tiles)
-        for number in tiles:
+    def execute(turn, tasks):
+        for number in order.permutation(tasks).tolist():
             if stop is not None and done[0] == stop:
                 raise Stop
-            done[0] += 1
-            yield do(store.where, store.name, REFERENCE, turn, number)
+            done[0] += not store.done(turn, work, number)
+            yield do(store.where, store.about["name"], REFERENCE, turn, number)
 
     return execute
 
@@ -189,6 +190,7 @@ def created(tmp_path, name="s.zarr", **options):
 def go_on(store, execute):
     """Do all turns that are left."""
     drive(Tiles(store, execute), REFERENCE, 0)
+    store.clean()
 
 
 @pytest.fixture(scope="module")
@@ -210,43 +212,37 @@ def test_a_run_that_is_stopped_after_any_tile_goes_on_to_the_same_bytes(tmp_path
     assert_same_bits(store.root["image"][...], whole)
 
 
-@pytest.mark.parametrize("moment", ["penalty", "attribute", "removal", "tally", "planes"])
-def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeypatch, moment, whole):
-    """Turns are changed in one piece: stopped before or after each of the writes around that, a run goes on."""
-    store, where = created(tmp_path)
-    left = 0
+@pytest.mark.parametrize("after", [False, True])
+@pytest.mark.parametrize("moment", ["replace", "rmtree"])
+def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeypatch, moment, after, whole):
+    """Stopped before or after any file is in its place, or before a folder is removed or when half of it is."""
+    _, where = created(tmp_path)
+    module = {"replace": os, "rmtree": shutil}[moment]
+    real, left = getattr(module, moment), 0
 
-    def stop(kind):
+    def stopping(path, *args, **options):
         nonlocal left
-        left -= kind == moment
-        if kind == moment and left == 0:
+        left -= 1
+        if left == 0:
+            if after and moment == "replace":
+                real(path, *args)
+            elif after:
+                inside = sorted(Path(path).rglob("*"))
+                [one.unlink() for one in inside[: len(inside) // 2] if one.is_file()]
             raise Stop
+        return real(path, *args, **options)
 
-    def create(group, name, **given):
-        stop("penalty" if name.startswith("penalty") else "tally" if name.startswith("tally") else "planes")
-        return real["create_array"](group, name, **given)
-
-    def delete(group, name):
-        stop("removal")
-        return real["__delitem__"](group, name)
-
-    def attributes(group):
-        stop("attribute")
-        return real["attrs"].fget(group)
-
-    patched = {"create_array": create, "__delitem__": delete, "attrs": property(attributes)}
-    real = {name: vars(zarr.Group)[name] for name in patched}
-    for name, one in patched.items():
-        monkeypatch.setattr(zarr.Group, name, one)
+    monkeypatch.setattr(module, moment, stopping)
     for n in range(1, 1000):  # each time a little later
         left = n
         try:
-            go_on(Store(where), shuffled(store, 0))
+            image = distributed.resume(where, device=REFERENCE)
             break
         except Stop:
             pass
     assert n > 2
-    assert_same_bits(store.root["image"][...], whole)
+    assert_same_bits(image.compute(), whole)
+    assert not (Path(where) / "work").exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps nobody off a folder")
@@ -371,18 +367,21 @@ def test_bad_input_is_said_before_anything_is_made(tmp_path, options, words):
 def test_only_stores_of_ones_own_are_gone_on_with(tmp_path, monkeypatch):
     for make in (lambda path: None, lambda path: path.mkdir(), lambda path: path.write_text("no")):
         make(tmp_path / "a.zarr")
-        with pytest.raises(ValueError, match="is no Zarr store; give one that simdtex has begun"):
+        with pytest.raises(ValueError, match="is no Zarr store"):
             distributed.resume(tmp_path / "a.zarr")
         if (tmp_path / "a.zarr").is_dir():
             (tmp_path / "a.zarr").rmdir()
     zarr.open_group(tmp_path / "b.zarr", mode="w")
     with pytest.raises(ValueError, match="is no output in tiles"):
         distributed.resume(tmp_path / "b.zarr")
-    for name, other in (("version", lambda name: "v"), ("FORMAT", 0)):
+    for name, other, words in (
+        ("version", lambda name: "v", "was begun by simdtex v and this is .*; go on with that version, or begin anew"),
+        ("FORMAT", 0, "has format 0 and this simdtex reads .; go on with the code of simdtex .* that began it, or"),
+    ):
         with monkeypatch.context() as patch:
             patch.setattr(store_module, name, other)
             store, where = created(tmp_path, f"{name}.zarr")
-        with pytest.raises(ValueError, match=r"was begun by simdtex .* and this is .*; go on with that version, or"):
+        with pytest.raises(ValueError, match=words):
             distributed.resume(where)
         assert store.turn.number == 1
 

@@ -92,7 +92,7 @@ def synthesize_in_tiles(context: click.Context, sample: Any, shape: tuple[int, i
     options |= {"rng": given["seed"], "device": given["device"]}
     with _progress(output, given["quiet"]) as callback:
         distributed.synthesize(
-            sample, shape, output, tiles=given["tiles"], workers=workers, callback=callback, **options
+            sample, shape, output, tiles=given["tiles"], workers=workers, callback=callback, note=_note, **options
         )
     _done(output, given["quiet"], began)
 
@@ -101,13 +101,17 @@ def resume_tiles(store: Path, workers: str | None, device: str | None, quiet: bo
     """Go on with an output in tiles."""
     from simdtex import distributed
 
-    began = time.perf_counter()
-    if distributed.finished(store):
-        click.echo(f"{store} is finished; there is nothing to go on with")
-        return
+    began, finished = time.perf_counter(), distributed.finished(store)
     with _progress(store, quiet) as callback:
-        distributed.resume(store, workers=workers_of(workers), device=device, callback=callback)
-    _done(store, quiet, began)
+        distributed.resume(store, workers=workers_of(workers), device=device, callback=callback, note=_note)
+    if finished:
+        click.echo(f"{store} is finished; there is nothing to go on with")
+    else:
+        _done(store, quiet, began)
+
+
+def _note(sentence: str) -> None:
+    click.echo(f"simdtex: {sentence}", err=True)
 
 
 @contextmanager

@@ -20,6 +20,9 @@ CHUNK = 512
 TILES = 2**22
 """Tiles of a level, at most: one process counts them."""
 
+TASKS = 2**14
+"""Tasks of a turn, at most: one process hands them out, and reads what each has noted."""
+
 PROCESS = 2**30
 """Bytes of an idle worker: Python, libraries, an OpenCL runtime that compiles kernels for the first time.
 
@@ -61,6 +64,20 @@ class LevelLayout:
     def count(self) -> int:
         """Number of tiles."""
         return self.down * self.across
+
+    @property
+    def together(self) -> int:
+        """Number of tiles of a task, of which the last one may have fewer."""
+        return ceil(self.count / TASKS)
+
+    @property
+    def tasks(self) -> int:
+        """Number of tasks of a turn."""
+        return ceil(self.count / self.together)
+
+    def task(self, number: int) -> range:
+        """Return the numbers of the tiles of a task."""
+        return range(number * self.together, min(self.count, (number + 1) * self.together))
 
     @property
     def lattice(self) -> Grid:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import version
@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from simdtex.checkpoint import warn
 from simdtex.distributed.layout import Layout, planned
 from simdtex.driver import check_shape, drive
-from simdtex.io.atomic import atomic_folder, exclusive
+from simdtex.io.atomic import Damaged, atomic_folder, exclusive
 from simdtex.jobs.inputs import Inputs, check_inputs
 from simdtex.machine import Machine, memory
 from simdtex.machine.reference import Reference
@@ -54,6 +55,7 @@ def synthesize(
     rng: int | np.random.Generator | None = None,
     device: str | Machine | None = None,
     callback: Callback | None = None,
+    note: Callable[[str], None] | None = None,
     **options: Any,
 ) -> Any:
     """Make more of a texture than one machine holds: the bytes of `simdtex.synthesize` with ``method="mrf"``.
@@ -79,6 +81,8 @@ def synthesize(
         As in `simdtex.synthesize`, on every worker.
     callback : callable, optional
         Called with a `simdtex.run.Tiling` after every tile.
+    note : callable, optional
+        Receives a sentence while the run waits for workers. None: a warning.
     **options
         Of the method, see `simdtex.methods.mrf.Options`; only schedules that relax a window as they do the whole.
 
@@ -113,7 +117,7 @@ def synthesize(
     with connected(workers) as client:
         with _made(store) as temporary:
             Store.create(temporary, run, seed, layout, channels=channel_axis is not None, source=source_map)
-        return resume(store, workers=client, channel_axis=channel_axis, device=device, callback=callback)
+        return resume(store, workers=client, channel_axis=channel_axis, device=device, callback=callback, note=note)
 
 
 def resume(
@@ -123,6 +127,7 @@ def resume(
     channel_axis: int | None = -1,
     device: str | Machine | None = None,
     callback: Callback | None = None,
+    note: Callable[[str], None] | None = None,
 ) -> Any:
     """Resume an output that was stopped; the bytes are those of a run that was never stopped.
 
@@ -130,7 +135,7 @@ def resume(
     ----------
     store : path
         As of `synthesize`.
-    workers, device, callback
+    workers, device, callback, note
         As of `synthesize`; they may be others than before.
     channel_axis : int, optional
         Where the channels of the array that is returned are, if it has any.
@@ -143,25 +148,27 @@ def resume(
     Raises
     ------
     ValueError
-        There is no such store, or one of another version, or another process is at work in it.
+        There is no such store, or one of another version, another process is at work in it, or a part of it is
+        damaged; the sentence says how to go on.
     """
     opened = _opened(store)
     from simdtex.distributed.cluster import across, check_workers, connected, here
     from simdtex.distributed.tiling import Tiles
 
     check_workers(workers, device)
-    with exclusive(store), connected(workers) as client:
-        if opened.turn.phase == "done":
-            opened.finish()
-        else:
-            each = here(opened, device) if client is None else across(client, opened, device)
-            drive(Tiles(opened, each), Reference(), 0, callback)
+    with exclusive(store):
+        if not opened.finished:
+            with connected(workers) as client:
+                each = here(opened, device) if client is None else across(client, opened, device, note or warn)
+                with _mending(opened):
+                    drive(Tiles(opened, each), Reference(), 0, callback)
+        opened.clean()
     return _array(opened.where, channel_axis)
 
 
 def finished(store: PathLike) -> bool:
     """Return whether an output is complete; raise ValueError if the store holds none, as `resume` does."""
-    return bool(_opened(store).turn.phase == "done")
+    return bool(_opened(store).finished)
 
 
 def plan(
@@ -214,22 +221,46 @@ def _opened(path: PathLike) -> Any:
     from simdtex.distributed.store import FORMAT, Store
 
     where = os.path.abspath(path)
+    if not os.path.isdir(where):
+        raise ValueError(f"{where} is no Zarr store; give one that simdtex has begun")
     try:
-        if not os.path.isdir(where):
-            raise FileNotFoundError  # Zarr would make it
         store = Store(where)
-    except (OSError, ValueError, KeyError):
-        raise ValueError(f"{where} is no Zarr store; give one that simdtex has begun") from None
-    if "simdtex" not in store.root.attrs and "work" not in store.root:
+    except Damaged:
+        raise ValueError(f"{where} is no Zarr store, or its zarr.json is damaged; give another one") from None
+    if store.finished:
+        return store
+    if not os.path.isdir(os.path.join(where, "work")):
         raise ValueError(f"{where} is no output in tiles; give one that simdtex has begun")
-    if "work" in store.root:
-        about, own = store.root["work"].attrs.get("about", {}), version("simdtex")
-        if about.get("format") != FORMAT or about.get("version") != own:
-            raise ValueError(
-                f"{where} was begun by simdtex {about.get('version', 'of another kind')} and this is {own}; "
-                "go on with that version, or begin anew"
-            )
+    with _mending(store):
+        about, own = store.about, version("simdtex")
+    if about["format"] != FORMAT:
+        raise ValueError(
+            f"{where} has format {about['format']} and this simdtex reads {FORMAT}; "
+            f"go on with the code of simdtex {about['version']} that began it, or begin anew"
+        )
+    if about["version"] != own:
+        raise ValueError(
+            f"{where} was begun by simdtex {about['version']} and this is {own}, whose results may differ; "
+            "go on with that version, or begin anew"
+        )
     return store
+
+
+@contextmanager
+def _mending(store: Any) -> Iterator[None]:
+    """Raise a sentence if a part of a store is damaged, after the store has gone back to where it is not needed."""
+    try:
+        yield
+    except Damaged as error:
+        where, part = store.where, str(error)
+        if not os.path.exists(os.path.join(where, "zarr.json")):
+            raise ValueError(
+                f"{where} was removed or moved while the run went on; put it back, or begin anew"
+            ) from None
+        wrong, again = f"{part} of {where} is missing or damaged", store.back(part)
+        if again is None:
+            raise ValueError(f"{wrong}, and nothing makes it again; remove the store and begin anew") from None
+        raise ValueError(f"{wrong}; {again} with: simdtex resume {where}") from None
 
 
 def _libraries() -> None:
