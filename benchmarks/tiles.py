@@ -18,10 +18,12 @@ import argparse
 import csv
 import hashlib
 import json
+import os
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -47,7 +49,14 @@ def run(given: argparse.Namespace, folder: str) -> None:
     """One way, in this process; prints what it took and a digest of the picture, made row of tiles by row of tiles."""
     pixels = sample(given.sample)
     shape, options = (given.size, given.size), {"rng": 1, "channel_axis": -1 if pixels.ndim == 3 else None}
-    device, turns = given.device, {}
+    device, turns, flushing = given.device, {}, [0.0]
+
+    def fsync(descriptor: int, real: Callable = os.fsync) -> None:
+        since = time.perf_counter()
+        real(descriptor)
+        flushing[0] += time.perf_counter() - since
+
+    os.fsync = fsync
     began = time.perf_counter()
     if given.way == "whole":
         picture = simdtex.synthesize(pixels, shape, device=device, **options)
@@ -65,7 +74,7 @@ def run(given: argparse.Namespace, folder: str) -> None:
     seconds, digest = time.perf_counter() - began, hashlib.sha256()
     for top in range(0, given.size, 2048):
         digest.update(np.ascontiguousarray(np.asarray(picture[top : top + 2048])))
-    print(json.dumps({"seconds": seconds, "digest": digest.hexdigest(), "until": turns}))
+    print(json.dumps({"seconds": seconds, "digest": digest.hexdigest(), "until": turns, "flushing": flushing[0]}))
 
 
 def measured(given: argparse.Namespace, way: str) -> dict:
@@ -129,6 +138,8 @@ def main() -> None:
         print(f"{way:8} {one['seconds']:8.1f} s  {rate:6.3f} Mpixel/s  largest process {one['peak'] / 2**20:6.0f} MiB")
         for name, until in one["until"].items():
             print(f"           {name} ended after {until:.1f} s")
+        if way == "here":
+            print(f"           flushing to the disk took {one['flushing'] / one['seconds']:.1%} of the time")
     if {"here", "workers"} <= set(found):
         ratio = found["here"]["seconds"] / found["workers"]["seconds"]
         print(f"efficiency of {given.workers} workers against one process with all their cores: {ratio:.2f}")

@@ -144,7 +144,9 @@ def test_a_store_that_goes_during_the_run_is_not_made_again(tmp_path):
         if progress.phase == "sweep":
             shutil.rmtree(path)
 
-    with pytest.raises(ValueError, match=r"o\.zarr was removed or moved while the run went on; put it back, or begin anew"):
+    with pytest.raises(
+        ValueError, match=r"o\.zarr was removed or moved while the run went on; put it back, or begin anew"
+    ):
         distributed.synthesize(SAMPLE, SHAPE, path, tiles=12, callback=remove, **OPTIONS)
     assert not path.exists()
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from itertools import islice
+from logging import CRITICAL, getLogger
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
@@ -132,6 +133,7 @@ def connected(workers: int | str | Client | None) -> Iterator[Client | None]:
     except ImportError:
         raise ValueError("distributed is not installed; pip install 'simdtex[distributed]'") from None
     if isinstance(workers, str):
+        getLogger("distributed.client").setLevel(CRITICAL)  # what ends a run is said in one sentence
         try:
             client = distributed.Client(workers, timeout=10, set_as_default=False)
         except (OSError, ValueError) as error:
