@@ -151,7 +151,7 @@ def scaling(device: str | None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         small = planned_run(pictures, (side, side), Options())
         many = planned(small, 1, side // 32)
-        store = Store.create(str(Path(folder, "s.zarr")), small, 1, many, channels=False, source=False)
+        store = Store.create(str(Path(folder, "s.zarr")), small, 1, many, channels=False, source=False, maps={})
         turn, rows = Turn(1, "begin", 0), many.levels[0].tasks
         store.prepare(turn, store.work(), pixels.size)
         for number in range(rows):

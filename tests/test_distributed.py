@@ -24,6 +24,7 @@ from simdtex.methods.mrf.plan import plan as planned_run
 from simdtex.methods.mrf.tiles import Tile, framed
 from simdtex.model.lattice import Grid
 from simdtex.model.pictures import Pictures
+from simdtex.model.source_map import apply_source_map
 from simdtex.ops.coloring import lattice_plan
 from simdtex.ops.neighbourhood import Field
 
@@ -155,7 +156,7 @@ def test_a_sample_and_options_of_every_kind_come_back_from_a_store(tmp_path):
     options = Options(order=2, weights=(1.0, 0.5, 0.1 + 0.2), xi=-1.7)
     plan, seed = planned_run(Pictures((COLOUR,)), (30, 31), options), 2**40 + 1
     layout = planned(plan, seed, 10)
-    store = Store.create(str(tmp_path / "s.zarr"), plan, seed, layout, channels=True, source=False)
+    store = Store.create(str(tmp_path / "s.zarr"), plan, seed, layout, channels=True, source=False, maps={})
     work = store.work()
     assert (work.plan.options, work.seed, work.layout) == (plan.options, seed, layout)
     assert (work.plan.levels, work.plan.shape) == (plan.levels, (30, 31))
@@ -184,7 +185,7 @@ def shuffled(store, seed, stop=None):
 def created(tmp_path, name="s.zarr", **options):
     options = Options(order=1, levels=2, xi=-8.0, **options)
     plan, where = planned_run(Pictures((SAMPLE[..., None],)), (26, 31), options), str(tmp_path / name)
-    return Store.create(where, plan, 11, planned(plan, 11, 12), channels=False, source=False), where
+    return Store.create(where, plan, 11, planned(plan, 11, 12), channels=False, source=False, maps={}), where
 
 
 def go_on(store, execute):
@@ -402,3 +403,33 @@ def test_the_store_is_an_array_that_others_read(tmp_path):
     assert zarr.open_group(path).attrs["simdtex"]["seed"] == 1
     assert sorted(zarr.open_group(path).keys()) == ["image"]
     assert Field._fields == store_module.PLANES
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_further_maps_are_carried_along(tmp_path, several):
+    samples = [SAMPLE, texture((19, 30), seed=8)] if several else SAMPLE
+    normal = [np.stack([one + k for k in (1, 2, 3)], -1) for one in ([SAMPLE, samples[1]] if several else [SAMPLE])]
+    height = [one.astype(np.float32) / 7 for one in ([SAMPLE, samples[1]] if several else [SAMPLE])]
+    maps = {"normal": normal, "height": height} if several else {"normal": normal[0], "height": height[0]}
+    path, options = tmp_path / "o.zarr", {"order": 1, "xi": -8.0, "rng": 2, "device": REFERENCE}
+    distributed.synthesize(samples, (26, 25), path, tiles=13, maps=maps, **options)
+    _, output = simdtex.synthesize(samples, (26, 25), full_output=True, **options)
+    store = zarr.open_group(path)
+    assert sorted(store.keys()) == ["height", "image", "normal"]
+    for name, one in maps.items():
+        assert_same_bits(store[name][...], apply_source_map(output.source, one))
+
+
+@pytest.mark.parametrize(
+    ("maps", "options", "words"),
+    [
+        ({"image": SAMPLE}, {}, "'image' is no name of a map; give a word other than image, source, work"),
+        ({"../a": SAMPLE}, {}, "'../a' is no name of a map"),
+        ({"n": SAMPLE[1:]}, {}, "the other map is 25 x 21 pixels .* and the sample 25 x 22: bring it to the"),
+        ({"n": SAMPLE}, {"known": np.ma.masked_array(np.ones((20, 20)), np.eye(20) < 1)}, "known pixels are from no"),
+    ],
+)
+def test_maps_that_do_not_fit_are_said(tmp_path, maps, options, words):
+    with pytest.raises(ValueError, match=words):
+        distributed.synthesize(SAMPLE, (20, 20), tmp_path / "o.zarr", maps=maps, order=1, **options)
+    assert list(tmp_path.iterdir()) == []

@@ -133,7 +133,8 @@ class Layout:
     memory : int
         Bytes that a worker needs at most, whatever the output's size.
     disk : int
-        Bytes that the store needs at most, uncompressed: two states of the finest level, the output, one level above.
+        Bytes that the store needs at most, uncompressed: two states of the finest level, one of each
+        other level, and the output without a source map and further maps.
     """
 
     levels: tuple[LevelLayout, ...]
@@ -172,7 +173,7 @@ def planned(plan: Plan, seed: int, tile: int) -> Layout:
     window = max(*(one.window for one in levels), min(shown, levels[0].rows) * min(shown, levels[0].cols))
     each, pixel = (fixed + more * channels for fixed, more in (SITE, PIXEL))
     memory = PROCESS + window * each + sample.rows * sample.cols * pixel
-    disk = int(prod(plan.shape) * ((6 + 2 * channels) * 2.25 + sample.shown * sample.pixels.dtype.itemsize))
+    disk = int(prod(plan.shape) * ((6 + 2 * channels) * 7 / 3 + sample.shown * sample.pixels.dtype.itemsize))
     return Layout(levels, channels, memory, disk)
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The Zarr store of an output in tiles: what is made, how far it is, and what a worker needs to go on with it.
 
-    image, source    the output, written tile by tile at the end
+    image, source    the output and its source map, and further maps by their names, written tile by tile at the end
     work/            removed at the end
-        run          the plan (`simdtex.distributed.description`), and the conditioning data between sites of levels
+        run          the plan (`simdtex.distributed.description`), conditioning data between sites of levels, and maps
         turn         the present turn, and the penalty of each candidate during it
         begun0       the turn that began level 0; the same of each coarser level
         given/       values of the output and which are known; held0, held1, ... the conditioning data of each level
@@ -55,6 +55,10 @@ TOGETHER = 2**22
 PLANES = ("values", "source", "temperature")
 
 
+Maps = dict[str, list[NDArray[Any]]]
+"""Further maps of the material, (rows, cols[, channels]), by the names of their arrays."""
+
+
 class Turn(NamedTuple):
     """What is to be done to every tile.
 
@@ -79,7 +83,8 @@ class Work(NamedTuple):
 
     ``confidences``: which channels are guides; ``held``: whether there are conditioning data or guides; ``given``:
     whether there are data; ``scattered``: those between the sites of each level that has such; ``channels``: whether
-    the image has a channel axis; ``source``: whether the source map is written too.
+    the image has a channel axis; ``source``: whether the source map is written too; ``maps``: further maps of the
+    material, for each picture of the sample one.
     """
 
     plan: Plan
@@ -91,6 +96,16 @@ class Work(NamedTuple):
     scattered: dict[str, Data]
     channels: bool
     source: bool
+    maps: Maps
+
+    @property
+    def outputs(self) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+        """The axes after rows and columns, and the types, of the arrays that the output has."""
+        sample = self.plan.sample
+        found = {"image": ((sample.shown,) * self.channels, sample.pixels.dtype)}
+        if self.source:
+            found["source"] = (2 + (len(sample.boxes) > 1),), np.dtype(np.int32)
+        return found | {name: (maps[0].shape[2:], maps[0].dtype) for name, maps in self.maps.items()}
 
 
 class Files(zarr.storage.LocalStore):
@@ -115,7 +130,7 @@ class Checked:
 
     def __init__(self, array: Any, name: str) -> None:
         self._array, self._name = array, name
-        self.shape, self.ndim, self.dtype = array.shape, array.ndim, array.dtype
+        self.shape, self.dtype = array.shape, array.dtype
 
     def __getitem__(self, where: Any) -> NDArray[Any]:
         try:
@@ -153,10 +168,11 @@ class Store:
             self.root = zarr.open_group(Files(where), mode="a")
 
     @staticmethod
-    def create(where: str, plan: Plan, seed: int, layout: Layout, *, channels: bool, source: bool) -> Store:
+    def create(where: str, plan: Plan, seed: int, layout: Layout, *, channels: bool, source: bool, maps: Maps) -> Store:
         """Make a store, ready for its first turn.
 
-        ``channels``: whether the image has a channel axis; ``source``: whether the source map is written too.
+        ``channels``: whether the image has a channel axis; ``source``: whether the source map is written too, and
+        ``maps`` likewise, for each picture of the sample one.
         """
         root: Any = zarr.open_group(Files(where), mode="w")
         root.create_group("work")
@@ -181,7 +197,7 @@ class Store:
             **{"tile": layout.levels[0].side, "confidences": [float(one) for one in conditions.confidences]},
             **{"held": held, "given": given is not None, "channels": channels, "source": source},
         }
-        write_state(store._file("run"), about, [described(plan), scattered])
+        write_state(store._file("run"), about, [described(plan), scattered, maps])
         store.save(first_turn(layout))
         return store
 
@@ -192,14 +208,14 @@ class Store:
 
     def work(self) -> Work:
         """Return the plan and all that belongs to it."""
-        about, (tree, scattered) = self._state("run")
+        about, (tree, scattered, maps) = self._state("run")
         plan, seed = restored(tree), about["seed"]
         guides, own, centre, hard = about["confidences"]
         confidences = Confidences(int(guides), bool(own), np.float32(centre), np.float32(hard))
         layout = planned(plan, seed, about["tile"])
         between = {number: Data(*data) for number, data in scattered.items()}
         held, given, channels, source = (about[name] for name in ("held", "given", "channels", "source"))
-        return Work(plan, seed, layout, confidences, held, given, between, channels, source)
+        return Work(plan, seed, layout, confidences, held, given, between, channels, source, maps)
 
     @property
     def finished(self) -> bool:
@@ -228,13 +244,11 @@ class Store:
 
     def prepare(self, turn: Turn, work: Work, candidates: int) -> None:
         """Make the arrays that a turn writes to, unless they are there."""
-        level, plan = work.layout.levels[turn.level], work.plan
+        level = work.layout.levels[turn.level]
         if turn.phase == "show":
-            sample = plan.sample
-            if self._lacks("image"):
-                self._pixels("image", level, (sample.shown,) * work.channels, sample.pixels.dtype)
-            if work.source and self._lacks("source"):
-                self._pixels("source", level, (2 + (len(sample.boxes) > 1),), np.dtype(np.int32))
+            for name, (after, dtype) in work.outputs.items():
+                if self._lacks(name):
+                    self._pixels(name, level, after, dtype)
         else:
             for name, kind in zip(PLANES, ("uint16", "int32", "uint16"), strict=True):
                 before = (work.layout.channels,) if name == "values" else ()
@@ -294,7 +308,7 @@ class Store:
                 if turn.phase != "show":
                     self.read(level, turn.write, tile)
                     continue
-                for name in ("image", "source")[: 1 + work.source]:
+                for name in work.outputs:
                     self._at(name)[spans(tile)]
         except Damaged:
             return False
@@ -329,12 +343,10 @@ class Store:
         values, known = (self._at(f"work/given/{name}")[spans(tile)] for name in ("values", "known"))
         return values, known
 
-    def show(self, tile: Tile, picture: NDArray[Any], place: NDArray[np.int32] | None) -> None:
-        """Write a tile of the output, and of the source map if there is one."""
-        image = self._at("image")
-        image[spans(tile)] = picture[..., 0] if image.ndim == 2 else picture
-        if place is not None:
-            self._at("source")[spans(tile)] = place
+    def show(self, tile: Tile, arrays: dict[str, NDArray[Any]]) -> None:
+        """Write a tile of the arrays of the output."""
+        for name, array in arrays.items():
+            self._at(name)[spans(tile)] = array
 
     def _file(self, name: str) -> Path:
         return Path(self.where, "work", name)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import warn
 from simdtex.distributed.layout import Layout, planned
@@ -24,6 +24,7 @@ from simdtex.machine.reference import Reference
 from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.plan import plan as planned_run
+from simdtex.model.source_map import apply_source_map
 from simdtex.options import resolve
 from simdtex.random import as_seed
 from simdtex.run import Callback
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
 TILES = 2048
 """Sites to the side of a tile by default."""
 
+TAKEN = ("image", "source", "work")
+"""Names in a store that no map has."""
+
 PathLike = str | os.PathLike[str]
 
 
@@ -47,6 +51,7 @@ def synthesize(
     tiles: int = TILES,
     workers: int | str | Client | None = None,
     source_map: bool = False,
+    maps: dict[str, Any] | None = None,
     channel_axis: int | None = None,
     mask: ArrayLike | Sequence[ArrayLike] | None = None,
     known: ArrayLike | None = None,
@@ -75,6 +80,9 @@ def synthesize(
         Dask scheduler at an address; those of a client. Each opens its own device. None: this process, one by one.
     source_map : bool
         Also write ``source``, for every output pixel the (row, column[, picture]) of the sample pixel it is from.
+    maps : dict, optional
+        Further maps of the material, of the sample's size: written in the same arrangement into arrays of these names.
+        Of several samples a list of such for each name, as in `simdtex.model.source_map.apply_source_map`.
     mask, known, known_source, guide, rng
         As in `simdtex.synthesize`. This process copies known values and guides into the store.
     device : str, optional
@@ -106,7 +114,7 @@ def synthesize(
     size = check_shape(shape)
     inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
     run, seed = _plan(inputs, size, options), as_seed(rng)
-    layout = planned(run, seed, tiles)
+    layout, further = planned(run, seed, tiles), _maps(maps or {}, run)
     _libraries()
     from simdtex.distributed.cluster import check_workers, connected
     from simdtex.distributed.store import Store
@@ -116,7 +124,8 @@ def synthesize(
         memory.require_host(layout.memory * (workers or 1), "give smaller tiles or fewer workers")
     with connected(workers) as client:
         with _made(store) as temporary:
-            Store.create(temporary, run, seed, layout, channels=channel_axis is not None, source=source_map)
+            channels = channel_axis is not None
+            Store.create(temporary, run, seed, layout, channels=channels, source=source_map, maps=further)
         return resume(store, workers=client, channel_axis=channel_axis, device=device, callback=callback, note=note)
 
 
@@ -201,6 +210,22 @@ def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any]) -> Pla
     if not isinstance(chosen.schedule, str):
         raise TypeError("workers know schedules by their names; give schedule the name of one")
     return planned_run(inputs.pictures, size, chosen, inputs.given, inputs.guide)
+
+
+def _maps(maps: dict[str, Any], plan: Plan) -> dict[str, list[NDArray[Any]]]:
+    """Return further maps as lists with one for each picture of the sample; raise if they do not fit."""
+    found, sizes = {}, [picture.shape[:2] for picture in plan.sample.pictures.pixels]
+    if maps and plan.given is not None:
+        raise ValueError("known pixels are from no sample, and nothing says what a map has there; leave the maps out")
+    for name, given in maps.items():
+        if not name.isidentifier() or name in TAKEN:
+            raise ValueError(f"{name!r} is no name of a map; give a word other than {', '.join(TAKEN)}")
+        last = np.array([[(rows - 1, cols - 1, k) for k, (rows, cols) in enumerate(sizes)]])
+        if len(sizes) == 1:
+            last, given = last[..., :2], given[0] if isinstance(given, (list, tuple)) else given
+        apply_source_map(last, given, sizes if len(sizes) > 1 else sizes[0])
+        found[name] = [np.asarray(one) for one in (given if len(sizes) > 1 else [given])]
+    return found
 
 
 @contextmanager

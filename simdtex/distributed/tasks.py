@@ -14,6 +14,7 @@ from simdtex.machine import Machine, open_machine
 from simdtex.methods.mrf import tiles
 from simdtex.methods.mrf.algorithm import Run, finished
 from simdtex.methods.mrf.tiles import Tally, Tile, framed
+from simdtex.model.source_map import apply_source_map
 from simdtex.ops.finish import around
 from simdtex.ops.neighbourhood import Field
 
@@ -96,7 +97,13 @@ def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
     if here.work.given:
         values, given = here.store.given(tile)
         shown = np.where(given, values, shown)
-    here.store.show(tile, shown, run.sample.place(frame.cut(state.source)) if work.source else None)
+    arrays = {"image": shown if work.channels else shown[..., 0]}
+    if work.source or work.maps:
+        place = run.sample.place(frame.cut(state.source))
+        arrays |= {"source": place} if work.source else {}
+        for name, maps in work.maps.items():
+            arrays[name] = apply_source_map(place, maps if len(maps) > 1 else maps[0])
+    here.store.show(tile, arrays)
     return Tally(np.zeros(0, np.int32), 0, 0)
 
 
