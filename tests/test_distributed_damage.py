@@ -9,7 +9,11 @@ from cases import REFERENCE, assert_same_bits, texture
 
 import simdtex
 from simdtex import distributed
+from simdtex.distributed import layout
+from simdtex.distributed.store import Store
 from simdtex.distributed.tasks import forget
+from simdtex.io import atomic
+from simdtex.methods.mrf.tiles import Tally
 
 zarr = pytest.importorskip("zarr")
 
@@ -118,13 +122,11 @@ def test_damage_is_mended_or_said(tmp_path, stopped, whole, phase, part, words, 
 
 
 def test_a_flipped_bit_is_damage(tmp_path, stopped, whole):
-    """Of a chunk in Zarr's own codec, and in the file of the turn."""
     path, sentences = tmp_path / "o.zarr", []
     shutil.copytree(stopped("sweep", 3, 2), path)
     flipped(path / "work/level0/1/source/c/0/0")
-    flipped(path / "work/turn")
     image = gone_on(path, sentences)
-    assert [sentence.split(" of ")[0] for sentence in sentences] == ["work/turn"]  # level 0 then begins again
+    assert [sentence.split(" of ")[0] for sentence in sentences] == ["work/level0/1/source/c/0/0"]
     assert_same_bits(image.compute(), whole)
 
 
@@ -151,6 +153,18 @@ def test_a_store_that_goes_during_the_run_is_not_made_again(tmp_path):
     assert not path.exists()
 
 
+def test_nothing_is_written_where_a_store_was(tmp_path, stopped):
+    path = tmp_path / "o.zarr"
+    shutil.copytree(stopped("sweep", 3, 2), path)
+    store = Store(str(path))
+    turn, work = store.turn, store.work()
+    assert store.done(turn, work, 0)  # which opens the arrays
+    shutil.rmtree(path)
+    with pytest.raises(atomic.Damaged, match=r"zarr\.json"):
+        store.note(turn, 0, Tally(np.zeros(4, np.int64), 0, 0))
+    assert not path.exists()
+
+
 def test_the_working_state_of_a_leader_that_was_killed_while_it_cleaned_is_removed(tmp_path, stopped, whole):
     path = tmp_path / "o.zarr"
     shutil.copytree(stopped("show", 3), path)
@@ -159,3 +173,33 @@ def test_the_working_state_of_a_leader_that_was_killed_while_it_cleaned_is_remov
     assert distributed.finished(path)
     assert_same_bits(distributed.resume(path, device=REFERENCE).compute(), whole)
     assert not (path / "work").exists()
+
+
+def test_a_chunk_and_its_folders_are_on_the_disk_before_its_tile_is_done(tmp_path, monkeypatch):
+    """Flushed in the order: the file, its new folders, and only then the row of the task."""
+    flushed, real = [], atomic._sync
+
+    def sync(path, *flags):
+        flushed.append(str(path.relative_to(tmp_path)) if path.is_dir() else "file")
+        real(path, *flags)
+
+    monkeypatch.setattr(atomic, "_sync", sync)
+    distributed.synthesize(SAMPLE, SHAPE, tmp_path / "o.zarr", tiles=12, **OPTIONS)
+    chunk, row = "o.zarr/work/level0/1/values/c/0/2", "o.zarr/work/tally{}/c/2"
+    turns = [n for n in range(1, 99) if row.format(n) in flushed]
+    at = flushed.index(chunk)
+    assert flushed[at - 1] == "file"
+    assert set(flushed[:at]) > {"o.zarr/work/level0/1/values/c/0", "o.zarr/work/level0/1/values/c"}
+    assert any(flushed.index(row.format(n)) > at for n in turns)
+    assert "." in flushed  # the name of the store itself
+
+
+@pytest.mark.parametrize("tasks", [1, 2, 4])
+def test_several_tiles_are_one_task(tmp_path, whole, monkeypatch, tasks):
+    monkeypatch.setattr(layout, "TASKS", tasks)
+    seen = []
+    given = {"known": KNOWN, "callback": lambda progress: seen.append((progress.level, progress.tile))}
+    image = distributed.synthesize(SAMPLE, SHAPE, tmp_path / "o.zarr", tiles=12, **given, **OPTIONS)
+    assert_same_bits(image.compute(), whole)
+    each = -(-9 // tasks)
+    assert {tile for level, tile in seen if level == 0} == {min(9, each * n) for n in range(1, -(-9 // each) + 1)}
