@@ -161,7 +161,7 @@ def test_nothing_is_written_where_a_store_was(tmp_path, stopped):
     assert store.done(turn, work, 0)  # which opens the arrays
     shutil.rmtree(path)
     with pytest.raises(atomic.Damaged, match=r"zarr\.json"):
-        store.note(turn, 0, Tally(np.zeros(4, np.int64), 0, 0))
+        store.note(turn, 0, Tally(np.zeros(460, np.int64), 0, 0))
     assert not path.exists()
 
 
@@ -203,3 +203,22 @@ def test_several_tiles_are_one_task(tmp_path, whole, monkeypatch, tasks):
     assert_same_bits(image.compute(), whole)
     each = -(-9 // tasks)
     assert {tile for level, tile in seen if level == 0} == {min(9, each * n) for n in range(1, -(-9 // each) + 1)}
+
+
+def test_a_full_disk_is_said_and_the_run_goes_on_later(tmp_path, stopped, whole, monkeypatch):
+    path = tmp_path / "o.zarr"
+    shutil.copytree(stopped("sweep", 3, 2), path)
+    forget()
+    with monkeypatch.context() as patch:
+        patch.setattr(atomic, "_sync", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
+        words = (
+            r"could not be written \(No space left on device\): free some space, and go on with: simdtex resume .*zarr"
+        )
+        with pytest.raises(ValueError, match=words):
+            distributed.resume(path, device=REFERENCE)
+    assert_same_bits(distributed.resume(path, device=REFERENCE).compute(), whole)
+    (path / "image" / "zarr.json").unlink()
+    with pytest.raises(
+        ValueError, match=r"image/zarr.json of .* is missing or damaged; remove the store and begin anew"
+    ):
+        distributed.resume(path, device=REFERENCE)

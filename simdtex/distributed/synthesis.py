@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex.checkpoint import warn
 from simdtex.distributed.layout import Layout, planned
 from simdtex.driver import check_shape, drive
-from simdtex.io.atomic import Damaged, atomic_folder, exclusive
+from simdtex.io.atomic import Damaged, NotWritten, atomic_folder, exclusive
 from simdtex.jobs.inputs import Inputs, check_inputs
 from simdtex.machine import Machine, memory
 from simdtex.machine.reference import Reference
@@ -273,9 +273,14 @@ def _opened(path: PathLike) -> Any:
 
 @contextmanager
 def _mending(store: Any) -> Iterator[None]:
-    """Raise a sentence if a part of a store is damaged, after the store has gone back to where it is not needed."""
+    """Raise a sentence that says how to go on if a part of a store is damaged or cannot be written.
+
+    The store then has gone back to where a damaged part is not needed.
+    """
     try:
         yield
+    except NotWritten as error:
+        raise ValueError(f"{error}, and go on with: simdtex resume {store.where}") from None
     except Damaged as error:
         where, part = store.where, str(error)
         if not os.path.exists(os.path.join(where, "zarr.json")):
@@ -298,5 +303,8 @@ def _libraries() -> None:
 
 def _array(where: str, channel_axis: int | None) -> Any:
     dask: Any = import_module("dask.array")
-    image = dask.from_zarr(where, component="image")
+    try:
+        image = dask.from_zarr(where, component="image")
+    except Exception:  # Zarr's are of many kinds
+        raise ValueError(f"image/zarr.json of {where} is missing or damaged; remove the store and begin anew") from None
     return image if channel_axis is None or image.ndim == 2 else dask.moveaxis(image, -1, channel_axis)
