@@ -4,7 +4,7 @@
     python -m fuzz.stores [--tries 200] [--seed 1]
 
 Each try takes a run in tiles, or one with a checkpoint, that was stopped at a random moment; flips bits of one of its
-files, cuts, empties, swaps or removes it; and goes on. It passes if the picture has its bytes, or a sentence says that
+files, cuts, empties or removes it; and goes on. It passes if the picture has its bytes, or a sentence says that
 the run has to begin anew. Every fault is printed with the try's number.
 """
 
@@ -77,17 +77,15 @@ RUNS = (tiles, go_on_with_tiles, 60), (checkpoint, go_on_with_a_checkpoint, 12)
 def damaged(folder, rng):
     """Damage a file of a folder, and return how and which."""
     files = sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.endswith(".lock"))
-    path, other = (files[k] for k in rng.integers(len(files), size=2))
-    how, data = str(rng.choice(["bit", "bits", "cut", "empty", "remove", "swap"])), bytearray(path.read_bytes())
+    path = files[rng.integers(len(files))]
+    how, data = str(rng.choice(["bit", "bits", "cut", "empty", "remove"])), bytearray(path.read_bytes())
     if how in ("bit", "bits"):
         for _ in range(1 if how == "bit" else 20):
             data[rng.integers(len(data))] ^= 1 << rng.integers(8)
     elif how == "cut":
         data = data[: rng.integers(len(data))]
-    elif how == "swap":
-        data = other.read_bytes()
     path.unlink() if how == "remove" else path.write_bytes(b"" if how == "empty" else data)
-    return f"{how} {path.relative_to(folder)}" + (f" {other.relative_to(folder)}" if how == "swap" else "")
+    return f"{how} {path.relative_to(folder)}"
 
 
 def tried(go_on, folder, expected):

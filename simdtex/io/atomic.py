@@ -89,6 +89,8 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
             temporary.rename(target)
             _sync_folder(target.parent)
         except BaseException:
+            if not temporary.exists():
+                target.rename(temporary)
             if old.exists() and not target.exists():
                 old.rename(target)
             raise
