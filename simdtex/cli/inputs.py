@@ -204,8 +204,8 @@ def read_pair(option: str, form: str, text: str, samples: Material) -> tuple[lis
     return [Path(one) for one in names], Path(out)
 
 
-def read_also(texts: Sequence[str], samples: Material) -> list[Also]:
-    """Read the maps of ``--also MAP=OUT``, and check that they can be carried over and written."""
+def read_also(texts: Sequence[str], samples: Material, *, files: bool = True) -> list[Also]:
+    """Read the maps of ``--also MAP=OUT``, and check that they can be carried over and, as files, be written."""
     from simdtex.io import image
 
     found = []
@@ -218,7 +218,8 @@ def read_also(texts: Sequence[str], samples: Material) -> list[Also]:
                 raise ValueError(
                     f"{path} is {size(pixels)} and {of} {size(sample)}; give --also a map of the sample's size"
                 )
-        image.check_writable(out, maps.pixels[0].dtype, channels(maps.pixels[0]))
+        if files:
+            image.check_writable(out, maps.pixels[0].dtype, channels(maps.pixels[0]))
         found.append(Also(maps, out))
     return found
 

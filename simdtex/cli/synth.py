@@ -92,7 +92,8 @@ def synth(
     shape = output_shape(size, pixels, known, guide and guide[1])
     inputs = data | given(options, without=("tiles", "workers", "dry_run"))
     if options["tiles"] is not None:
-        synthesize_in_tiles(context, material.array, (shape[0], shape[1]), inputs)
+        others = read_also(also, material, files=False)
+        synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, inputs)
         return None
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, material, everywhere=known is None)

@@ -85,12 +85,16 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
         for folder, _, names in os.walk(temporary):
             for name in names:
                 _sync(Path(folder, name))
+            _sync_folder(Path(folder))
         try:
             if target.exists():
                 shutil.copymode(target, temporary)
                 target.rename(old)
             temporary.rename(target)
+            _sync_folder(target.parent)
         except BaseException:
+            if not temporary.exists():
+                target.rename(temporary)
             if old.exists() and not target.exists():
                 old.rename(target)
             raise
@@ -118,11 +122,26 @@ def write_checked(path: PathLike, write: Callable[[BinaryIO], Any]) -> None:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         file.seek(0)
         file.write(_HEADER % digest.encode())
-    if os.name != "nt":  # Windows cannot open a folder
-        try:
-            _sync(Path(os.path.realpath(path)).parent, os.O_RDONLY)
-        except OSError as error:
-            raise _not_written(path, error) from None
+    try:
+        _sync_folder(Path(os.path.realpath(path)).parent)
+    except OSError as error:
+        raise _not_written(path, error) from None
+
+
+def write_durable(path: Path, data: Any) -> None:
+    """Write bytes into a file atomically and make its folders; all of it is on the disk at the end.
+
+    Errors are those of `atomic_path`.
+    """
+    try:
+        made = [folder for folder in path.parents if not folder.exists()]
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(data)
+        for folder in (path.parent, *(one.parent for one in made)):
+            _sync_folder(folder)
+    except OSError as error:
+        raise _not_written(path, error) from None
 
 
 def read_checked(path: PathLike) -> BinaryIO:
@@ -159,6 +178,12 @@ def _sync(path: Path, flags: int = os.O_RDWR) -> None:
             raise
     finally:
         os.close(descriptor)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Flush the names in a folder to the disk."""
+    if os.name != "nt":  # Windows cannot open a folder
+        _sync(folder, os.O_RDONLY)
 
 
 def check_target(target: Path) -> None:
