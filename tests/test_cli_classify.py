@@ -18,8 +18,8 @@ from simdtex.report.classification import confusion_matrix
 LEFT, RIGHT = texture((24, 20), 3, seed=1), texture((24, 20), 3, seed=2)[:, ::-1] // 3
 PICTURE = np.hstack([LEFT, RIGHT])
 TRUTH = np.repeat([1, 2], 20)[None].repeat(24, 0).astype(np.uint8)
-OPTIONS = {"exemplars": 100, "coupling": 2.0, "window": 3.0}
-WORDS = ["--exemplars", 100, "--coupling", 2, "--window", 3, "--seed", 5, "--device", "reference"]
+OPTIONS = {"exemplars": 100, "coupling": 2.0}
+WORDS = ["--exemplars", 100, "--coupling", 2, "--seed", 5, "--device", "reference"]
 SAMPLES = ["--texture", "left=left.png", "--texture", "right=right.png"]
 
 
