@@ -29,7 +29,7 @@ CLASSES = [whole(stripes((40, 40))), whole(stripes((40, 44), True))]
 
 
 def planned(picture, classes=CLASSES, **options):
-    names = tuple(f"class {c}" for c in range(len(classes)))
+    names = {c + 1: f"class {c}" for c in range(len(classes))}
     return Plan(picture[..., None], np.zeros(picture.shape, bool), classes, names, Options(**options))
 
 
@@ -86,7 +86,7 @@ def test_labels_without_a_field_are_those_of_the_greatest_evidence():
     picture = halves(20)[0][:, 20:40]
     plan = planned(picture, weight=0.0, unknown=0.0, levels=1, exemplars=2**14, typical=0.3, sweeps=0)
     labels = drive(plan, REFERENCE, 1)[0][..., 0]
-    learned = learn(REFERENCE, CLASSES, plan.names, plan.options, 1)
+    learned = learn(REFERENCE, CLASSES, list(plan.names.values()), plan.options, 1)
     energy = []
     for c, (region,) in enumerate(CLASSES):
         mean = np.mean(
@@ -269,7 +269,7 @@ def test_the_fit_is_hotellings():
 def test_labels_fits_and_probabilities_have_the_references_bits(machine, dtype, channels):
     pictures = [texture(shape, channels, dtype, seed) for shape, seed in [((20, 22), 0), ((18, 18), 1), ((17, 23), 2)]]
     classes = [whole(pictures[1]), whole(pictures[2][::-1].copy())]
-    plan = Plan(pictures[0], np.zeros((20, 22), bool), classes, ("a", "b"), Options(exemplars=60, coupling=2.0))
+    plan = Plan(pictures[0], np.zeros((20, 22), bool), classes, {1: "a", 2: "b"}, Options(exemplars=60, coupling=2.0))
     found, output = drive(plan, machine, 3)
     expected, theirs = drive(plan, REFERENCE, 3)
     assert (found == expected).all() and found.dtype == np.uint8

@@ -66,7 +66,7 @@ def test_viewers_see_the_colours_of_labels_and_programs_their_numbers(folder):
     assert run("picture.png", *SAMPLES, "-o", "labels.png", "--unknown", 0).exit_code == 0
     labels = image.read_labels("labels.png")
     with PIL.Image.open("labels.png") as shown:
-        assert (np.asarray(shown.convert("RGB")) == label_colours(3)[labels]).all()
+        assert (np.asarray(shown.convert("RGB")) == label_colours(256)[labels]).all()
     assert run("picture.png", *SAMPLES, "-o", "labels.tif", "--unknown", 0).exit_code == 0
     assert (image.read("labels.tif").pixels == labels).all()
 
@@ -140,7 +140,7 @@ BAD = {
     "grey": (["--texture", "left=grey.png"], "grey.png has 1 channel of uint8 and picture.png 3 channels of uint8"),
     "no file": (["--texture", "left=none.png"], "none.png"),
     "truth of another size": ([*SAMPLES, "--truth", "small.png"], "small.png is 40x3 and picture.png 40x24"),
-    "truth of no class": ([*SAMPLES, "--truth", "far.png"], "far.png has the label 9; give 0 to 2, and 255"),
+    "truth of no class": ([*SAMPLES, "--truth", "far.png"], "far.png has the label 9; give those of the classes, 0"),
     "colours for strokes": (["--strokes", "picture.png"], "picture.png is no picture of labels"),
     "fits in a png": ([*SAMPLES, "--confidence", "fit.png"], "fit.png ends in .png: end its name in one of .npy"),
     "an input overwritten": (["--texture", "left=labels.png"], "labels.png is an input and would be overwritten"),

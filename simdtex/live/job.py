@@ -145,15 +145,11 @@ class Job:
         """Return functions that make the layers of the run or, once it has ended, of its result: `frames.layers`."""
         if self.kind != "classify":
             return frames.layers(self.sample, self.shape, image, source, temperature)
-        colours = LABELS[[0, *self.classes]]
-        return {"labels": lambda: frames.overlay(self.sample, image(), colours, plain=not ended)}
+        return {"labels": lambda: frames.overlay(self.sample, image(), LABELS, plain=not ended)}
 
     def shares(self, labels: Array) -> list[tuple[int, float]]:
-        """Return the painted label of each class, 0 of the unknown, and its share of the labels of a result."""
-        if not self.classes:
-            return []
-        counts = np.bincount(labels.ravel(), minlength=len(self.classes) + 1)
-        return list(zip([0, *self.classes], (counts / labels.size).tolist(), strict=True))
+        """Return each label of a result, 0 of the unknown, and its share."""
+        return [(label, float((labels == label).mean())) for label in ([0, *self.classes] if self.classes else [])]
 
     @property
     def command(self) -> str:
@@ -207,7 +203,7 @@ class Job:
             raise Hint(f"label {few} is painted on {counts[few]} pixels; paint {LEAST} or more")
         self.output = "labels.png"
         self.files["strokes.png"] = strokes
-        self.palettes = {self.output: label_colours(len(self.classes) + 1), "strokes.png": LABELS}
+        self.palettes = dict.fromkeys((self.output, "strokes.png"), LABELS)
         self._add("textures", strokes, "--strokes", "strokes.png")
 
     def _fill(self, strokes: Any) -> None:

@@ -49,14 +49,15 @@ class Plan:
         Pixels without a value, which are labelled 0.
     classes : sequence of sequences of Region, or Model
         What there is of each class; or the model that was learned from it.
-    names : tuple of str
+    names : dict of int to str
+        The label of each class, 1 to 254, and its name.
     options : Options
     """
 
     pixels: NDArray[Any]
     unknown: Mask
     classes: Sequence[Sequence[Region]] | Model
-    names: tuple[str, ...]
+    names: dict[int, str]
     options: Options
 
     def on(self, machine: Machine, seed: int) -> Run:
@@ -71,7 +72,7 @@ class Plan:
         )
         model = self.classes
         if not isinstance(model, Model):
-            model = learn(machine, model, self.names, self.options, seed)
+            model = learn(machine, model, list(self.names.values()), self.options, seed)
         return Run(machine, self, model, seed)
 
 
@@ -103,6 +104,7 @@ class Run:
 
     def __init__(self, machine: Machine, plan: Plan, model: Model, seed: int) -> None:
         self.machine, self.plan, self.model, self.options = machine, plan, model, plan.options
+        self.labels = np.array([0, *plan.names], np.uint8)
         self.grid = Grid.of(plan.pixels.shape[:2], torus=False)
         self.schedule = schedules.get(plan.options.schedule)
         self._setting = schedules.Setting(machine, self.grid, neighbourhood_offsets(1), 1, seed, 0)
@@ -183,27 +185,29 @@ class Run:
         return state.done == self.grid.rows and settled
 
     def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
-        """Return labels (rows, cols, 1) uint8, 0 unknown and 1 the first class; fits and probabilities."""
+        """Return labels (rows, cols, 1) uint8, 0 unknown; fits and probabilities."""
         fit, rejected = self._fits(state)
-        labels = np.where(rejected | self.plan.unknown, 0, state.labels + 1).astype(np.uint8)
+        found = np.where(rejected | self.plan.unknown, 0, state.labels + 1)
         energy = self._evidence(state.logs)
         votes = self.machine.get(self._votes(self.machine.put(state.labels))).view(np.int32)
         energy += np.int32(round(WEIGHTS * self.options.weight)) * votes // WEIGHTS
         energy -= energy.max(0)
         chance = np.exp(energy.astype(np.float32) / np.float32(UNITS))
         chance /= chance.sum(0)
-        names, shares = self.plan.names, np.bincount(labels.ravel(), minlength=len(self.plan.names) + 1) / labels.size
+        names = {0: "unknown"} | self.plan.names
+        shares = np.bincount(found.ravel(), minlength=len(names)) / found.size
         statistics: dict[str, Any] = {
             "options": vars(self.options)
             | {"levels": self.model.experts[-1].level + 1, "schedule": self.schedule.name},
             "classes": [
-                {"label": c, "name": name, "share": float(shares[c])} for c, name in enumerate(("unknown", *names))
+                {"label": label, "name": name, "share": float(share)}
+                for (label, name), share in zip(names.items(), shares, strict=True)
             ],
             "changed": list(state.changed),
         }
         for c, one in enumerate(statistics["classes"][1:]):
             one |= {"exemplars": self.model.counts[c], "own": float(self.model.own[c].mean())}
-        return labels[..., None], Output(
+        return self.labels[found][..., None], Output(
             None,
             statistics=statistics,
             fit=np.moveaxis(fit, 0, -1),
@@ -215,7 +219,7 @@ class Run:
 
         The fit is the probability that a texture of the class differs as much from its exemplars, on average over the
         window within the site's segment: by Hotelling's test, whose covariance has few degrees of freedom. What was
-        copied from the samples is left out, since it has no distance to them; it fits where there is nothing else.
+        copied from the samples is left out, since it has no distance to them, and fits.
         """
         from scipy.special import fdtrc, fdtri
 
@@ -246,10 +250,9 @@ class Run:
         """Return Hotelling's statistic of the sites ``at`` of a segment, by its ``inner`` sites if there are any."""
         copied = ndimage.maximum_filter((logs == 0).all(0), self._size, mode="nearest")  # a sample cut from the picture
         means, found = windowed(self.machine, logs, inner & ~copied, self._taps, at)
-        if not found.all():  # a narrow segment, or the sample itself
-            wider, there = windowed(self.machine, logs, own & ~copied, self._taps, at)
-            means, found = np.where(found, means, wider), found | there
-        return np.where(found, null.distance(means), 0)
+        if not (found | copied[at]).all():  # a narrow segment
+            means = np.where(found, means, windowed(self.machine, logs, own & ~copied, self._taps, at)[0])
+        return np.where(copied[at], 0, null.distance(means))
 
     def save(self, state: State) -> dict[str, Any]:
         """Return a copy of the state that needs no machine."""
@@ -262,14 +265,14 @@ class Run:
 
     def observer(self, callback: Callback | None) -> Record:
         """Return what watches this run."""
-        return Record(callback)
+        return Record(self, callback)
 
 
 class Record:
     """The progress of a classification: ``callback`` is called with a `simdtex.run.Labelling` after every step."""
 
-    def __init__(self, callback: Callback | None) -> None:
-        self._callback = callback
+    def __init__(self, run: Run, callback: Callback | None) -> None:
+        self._run, self._callback = run, callback
 
     def part(self, *seen: Any) -> None:
         """See nothing: steps are short."""
@@ -277,7 +280,7 @@ class Record:
     def step(self, state: State, info: Info) -> None:
         """Report a step."""
         if self._callback:
-            labels = info.labels + np.uint8(1)
+            labels = self._run.labels[info.labels + np.uint8(1)]
             labels[state.done :] = 0  # not compared yet
             now: dict[str, Any] = {
                 "level": 0,
