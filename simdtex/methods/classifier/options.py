@@ -46,7 +46,7 @@ class Options:
         slider=(0.1, 2, 0.1),
     )
     typical: float = comparison(
-        0.3,
+        0.25,
         Number(0, 1),
         "Take away this share of the distances that a class has to itself",
         more="At 0 a class of fine grain, whose neighbourhoods are many, loses to a class of few; at 1 every class "
