@@ -36,6 +36,7 @@ JOBS = {
     "pyramid": lambda **how: simdtex.synthesize(COLOUR, (64, 64), method="pyramid", channel_axis=-1, **how),
     "solid": lambda **how: simdtex.synthesize_solid(GREY, (16, 16, 16), **how),
     "fill": lambda **how: simdtex.fill(GREY, HOLE, order=2, levels=1, **how),
+    "classify": lambda **how: simdtex.classify(GREY, {"a": GREY[:12], "b": GREY[8:]}, exemplars=40, **how),
     "simulate": lambda **how: (
         simdtex.simulate(
             GREY, 4, shape=(12, 14), order=2, jobs=2, **{k: how[k] for k in how if k != "full_output"}

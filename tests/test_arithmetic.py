@@ -1,4 +1,4 @@
-"""fma() and exp(): the bits of the NumPy twins against exact arithmetic, and of devices against the twins."""
+"""fma(), exp() and log(): the bits of the NumPy twins against exact arithmetic, and of devices against the twins."""
 
 from fractions import Fraction
 
@@ -10,11 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from simdtex.machine.opencl import kernel_folder
-from simdtex.ops.arithmetic import exp32, fma32
+from simdtex.ops.arithmetic import exp32, fma32, log32
 
 SOURCE = """
 #pragma OPENCL FP_CONTRACT OFF
 #include "common/exp.h"
+#include "common/log.h"
 __kernel void fmas(__global const float *a, __global const float *b, __global const float *c, __global float *out)
 {
     const int i = get_global_id(0);
@@ -24,6 +25,11 @@ __kernel void exps(__global const float *x, __global float *out)
 {
     const int i = get_global_id(0);
     out[i] = exp32(x[i]);
+}
+__kernel void logs(__global const float *x, __global float *out)
+{
+    const int i = get_global_id(0);
+    out[i] = log32(x[i]);
 }
 """
 
@@ -157,3 +163,24 @@ def test_exp32_of_a_device_has_the_twins_bits(build):
     x = grid_of_exponents()
     x = x[(x < -(2.0**-120)) | (x == 0)]
     assert_same_bits(build("exps", x), exp32(x))
+
+
+def numbers_from_1():
+    rng = np.random.default_rng(2)
+    near, whole = 1 + rng.random(100_000), np.arange(1, 2**17)
+    return np.concatenate([near, whole, np.exp(rng.uniform(0, 16.6, 200_000)), [2**24 - 1]]).astype(np.float32)
+
+
+def test_log32_is_as_close_as_stated():
+    x = numbers_from_1()
+    assert abs(log32(x) - np.log(x.astype(np.float64))).max() < tolerances.LOG32
+
+
+def test_log32_of_1_is_0_and_of_2_squared_twice_that_of_2():
+    assert log32(np.float32(1)) == 0
+    assert log32(np.float32(4)) == 2 * log32(np.float32(2)) > 0
+
+
+def test_log32_of_a_device_has_the_twins_bits(build):
+    x = numbers_from_1()
+    assert_same_bits(build("logs", x), log32(x))

@@ -68,7 +68,9 @@ def words(option, text):
 
 def reading(option, text):
     """An option that reads a file; of a pair, on the left."""
-    if isinstance(option.type, Pair):
+    if isinstance(option.type, Pair) and option.type.named:
+        text = f"name={text}"
+    elif isinstance(option.type, Pair):
         text = f"{text}={'new.png' if option.type.role == 'write' else 'map.png'}"
     return words(option, text)
 

@@ -19,7 +19,7 @@ import simdtex
 from simdtex import cli
 from simdtex.cli.options import given
 from simdtex.io.image import write
-from simdtex.methods import mrf, multires, pyramid
+from simdtex.methods import classifier, mrf, multires, pyramid
 from simdtex.methods.pyramid import solid
 from simdtex.options import preset_values, quoted, resolve
 
@@ -29,7 +29,7 @@ PAGES = sorted(path for path in (ROOT / "docs").rglob("*.rst") if not {"_build",
 STORIES = [page for page in PAGES if page.parent.name == "readers"]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 METHODS = {"mrf": mrf, "multires": multires, "pyramid": pyramid}
-OF_COMMANDS = {"mix": METHODS["pyramid"], "solid": solid}
+OF_COMMANDS = {"mix": METHODS["pyramid"], "solid": solid, "classify": classifier}
 REFERENCE = "\n".join(
     (ROOT / "docs" / "reference" / name).read_text(encoding="utf-8") for name in ("command-line.rst", "bench.rst")
 )

@@ -7,6 +7,10 @@ EXP32 = 2.5e-7
 """Relative error of exp32 against float64: the bound that kernels/common/exp.h states. A polynomial of degree 6 on
 |r| <= log(2) / 2 (about 1.2e-7 with its coefficients and steps rounded to float32) after a reduction in two parts."""
 
+LOG32 = 1.2e-6
+"""Absolute error of log32 from 1 to 2**24 against float64: the bound that kernels/common/log.h states. The result is
+below 17, where a float32 is rounded by half of 2**-19, about 1e-6."""
+
 LCPDF = 1e-5
 """Absolute error of a probability of `simdtex.lcpdf` against equations (6) to (8) and (12) in float64, as its docstring
 states. Distances and their product with 1 / 2h^2 are float32 (24 bits), so an exponent of up to 28 is off by up to
@@ -25,6 +29,10 @@ rest is for what another libm rounds otherwise. The centre makes up for the othe
 
 HALF = 0.5 + 1e-6
 """Of an integer against the float64 that it is the closest to. The rest is for float64 itself, at up to 2**30."""
+
+GAIN = 0.005
+"""Of a value with contrast compressed, before it is rounded: up to 180, from a logarithm that is off by 1.2e-6 of 0.18
+or more, an exponential and four float32 roundings."""
 
 UNIT32 = 2.0**-24
 """Relative error of one float32 rounding: n products and sums in a row are off by about n of these at most."""

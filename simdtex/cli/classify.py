@@ -94,9 +94,11 @@ def classify(
     from simdtex.io import image
     from simdtex.model.colours import label_colours
 
+    whole = read_material([picture])
+    true = None if truth is None else _read_truth(truth, whole)
+    held = _read_samples("--validation", validation, whole)
     if bool(textures) == bool(strokes):
         raise ValueError("give --texture once for each class, or --strokes")
-    whole = read_material([picture])
     pixels: NDArray[Any] = whole.array
     more: dict[str, Any] = {"channel_axis": whole.channel_axis}
     known: Any
@@ -105,12 +107,15 @@ def classify(
         names = tuple(str(label) for label in np.unique(known[known > 0]))
     else:
         known = _read_samples("--texture", textures, whole)
-        more |= {"validation": _read_samples("--validation", validation, whole)}
+        more |= {"validation": held}
         names = tuple(known)
     image.check_writable(output, np.uint8, 1)
     if confidence:
         image.check_writable(confidence, suffixes=FITS)
-    true = None if truth is None else _read_truth(truth, whole, len(names))
+    if true is not None and (strange := np.setdiff1d(true, [*range(len(names) + 1), UNLABELLED])).size:
+        raise ValueError(
+            f"{truth} has the label {strange[0]}; give 0 to {len(names)}, and {UNLABELLED} where it is not known"
+        )
     writers: list[Any] = [lambda made, run: image.write_labels(output, made, label_colours(len(names) + 1))]
     if confidence:
         writers.append(lambda made, run: image.write(confidence, run.fit))
@@ -148,18 +153,13 @@ def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[st
     return found
 
 
-def _read_truth(path: Path, picture: Material, classes: int) -> NDArray[Any]:
-    """Read the labels that are to be found; raise if they have another size, or labels of no class."""
+def _read_truth(path: Path, picture: Material) -> NDArray[Any]:
+    """Read the labels that are to be found; raise if they have another size."""
     from simdtex.io.image import read_labels
 
     true, pixels = read_labels(path), picture.array
     if true.shape != pixels.shape[:2]:
         raise ValueError(f"{path} is {size(true)} and {picture.paths[0]} {size(pixels)}; give labels of its size")
-    strange = np.setdiff1d(true, [*range(classes + 1), UNLABELLED])
-    if strange.size:
-        raise ValueError(
-            f"{path} has the label {strange[0]}; give 0 to {classes}, and {UNLABELLED} where it is not known"
-        )
     return true
 
 

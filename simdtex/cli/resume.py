@@ -15,7 +15,7 @@ from simdtex.cli.options import DEVICE, QUIET
 from simdtex.cli.places import ENTER
 from simdtex.cli.tiles import resume_tiles, workers_option
 
-COMMANDS = ("extend", "fill", "mix", "simulate", "solid", "synth")
+COMMANDS = ("classify", "extend", "fill", "mix", "simulate", "solid", "synth")
 """Those that keep checkpoints."""
 
 

@@ -105,7 +105,6 @@ class ClassifierOptions(Common, total=False):
     order: int
     levels: int
     exemplars: int
-    temperature: float
     typical: float
     coupling: float
     weight: float

@@ -205,7 +205,8 @@ class Run:
         """Return how well each class fits each site, (classes, rows, cols), and where the site's own is rejected.
 
         The fit is the probability that a texture of the class differs as much from its exemplars, on average over the
-        window within the site's segment: by Hotelling's test, whose covariance has few degrees of freedom.
+        window within the site's segment: by Hotelling's test, whose covariance has few degrees of freedom. What was
+        copied from the samples is left out, since it has no distance to them; it fits where there is nothing else.
         """
         from scipy.special import fdtrc, fdtri
 
@@ -214,17 +215,19 @@ class Run:
         rejected = np.zeros(state.labels.shape, bool)
         taps, freedom = gaussian(self.options.window), self.model.freedom
         limit = fdtri(experts, freedom, 1 - self.options.unknown) if self.options.unknown else np.inf
-        reach = max(expert.reach for expert in self.model.experts)
+        size = 2 * max(expert.reach for expert in self.model.experts) + 1
         for label in np.unique(state.labels):
             box = _around(state.labels == label, len(taps) // 2)
             own = state.labels[box] == label
-            inner = ndimage.minimum_filter(own, 2 * reach + 1, mode="nearest")  # no neighbour beyond the segment
+            inner = ndimage.minimum_filter(own, size, mode="nearest")  # no neighbour beyond the segment
             for c, null in enumerate(self.model.nulls):
                 logs = np.ascontiguousarray(state.logs[:, c][(slice(None), *box)])
-                means, found = windowed(self.machine, logs, inner, taps)
-                if not found[own].all():  # a narrow segment
-                    means = np.where(found, means, windowed(self.machine, logs, own, taps)[0])
-                distance = null.distance(means[:, own])
+                copied = ndimage.maximum_filter((logs == 0).all(0), size, mode="nearest")  # a sample of the picture
+                means, found = windowed(self.machine, logs, inner & ~copied, taps)
+                if not found[own].all():  # a narrow segment, or the sample itself
+                    wider, there = windowed(self.machine, logs, own & ~copied, taps)
+                    means, found = np.where(found, means, wider), found | there
+                distance = np.where(found[own], null.distance(means[:, own]), 0)
                 fit[c][box][own] = fdtrc(experts, freedom, distance)
                 if c == label:
                     rejected[box][own] = distance > limit

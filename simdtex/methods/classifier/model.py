@@ -29,6 +29,9 @@ SMOOTHING = (0.0, 0.8, 1.8, 3.6, 7.2)
 SIDE = 32
 """Pixels a side of a sample at level 0, at least, and twice as many with each level."""
 
+TEMPERATURE = 0.5
+"""Evidence is the mean logarithm of squared distances over this."""
+
 LEAST = 16
 """Neighbourhoods of a class at a level, at least."""
 
@@ -74,7 +77,7 @@ def experts_of(options: Options, levels: int) -> list[Expert]:
     """Return the experts of so many levels: raw and contrast-compressed neighbourhoods at each, the finest first.
 
     An expert has the weight of its level, in `FINER`, times the share of its kind; the weights add up to
-    1 / temperature.
+    1 / `TEMPERATURE`.
     """
     total = sum(FINER[:levels])
     found = []
@@ -82,7 +85,7 @@ def experts_of(options: Options, levels: int) -> list[Expert]:
         for contrast, order, share in ((False, options.order, RAW), (True, 2 * options.order, 1 - RAW)):
             near = neighbourhood_offsets(order) * 2**level
             offsets = np.concatenate([np.zeros((1, 2), np.int32), near]).astype(np.int32)
-            factor = round(UNITS / LOGS * FINER[level] * share / total / options.temperature)
+            factor = round(UNITS / LOGS * FINER[level] * share / total / TEMPERATURE)
             found.append(Expert(level, contrast, offsets, isqrt(order) * 2**level, factor))
     return found
 

@@ -11,9 +11,9 @@ from simdtex.options import Number, Other, Whole, check, documented, option
 
 ALL = ("classify",)
 
-comparison = partial(option, group="Comparison of neighbourhoods", shown=ALL)
+comparison = partial(option, group="Comparison of neighbourhoods")
 field = partial(option, group="Field of labels", shown=ALL)
-rejection = partial(option, group="Unknown textures", shown=ALL)
+rejection = partial(option, group="Unknown textures")
 
 
 @documented
@@ -27,23 +27,20 @@ class Options:
         "Compare neighbourhoods of this order: all pixels within its square root",
         more="Those with compressed contrast have twice this order.",
         symbol="o of equation (3)",
+        shown=ALL,
     )
     levels: int = comparison(
         3,
         Whole(1, 5),
         "Compare at this many levels, at most: as many as have 32 pixels a side in every sample",
+        shown=ALL,
     )
     exemplars: int = comparison(
         1500,
         Whole(16, 2**16),
         "Keep this many neighbourhoods of each class, drawn at random",
         slider=(100, 4000, 100),
-    )
-    temperature: float = comparison(
-        0.5,
-        Number(0.05, 100),
-        "Divide the mean logarithm of squared distances by this: how much evidence counts beside neighbouring labels",
-        slider=(0.1, 2, 0.1),
+        shown=ALL,
     )
     typical: float = comparison(
         0.25,
@@ -51,6 +48,7 @@ class Options:
         "Take away this share of the distances that a class has to itself",
         more="At 0 a class of fine grain, whose neighbourhoods are many, loses to a class of few; at 1 every class "
         "explains as much as it explains of itself.",
+        shown=(),
     )
     coupling: float = field(
         8.0,
@@ -77,12 +75,14 @@ class Options:
         Number(0, 1),
         "Call a pixel unknown if a texture of its class would look so different with less than this probability",
         slider=(0, 0.5, 0.01),
+        shown=ALL,
     )
     window: float = rejection(
         10.0,
         Number(1, 100),
         "Judge by the mean over this distance, the standard deviation of a Gaussian, within a segment",
         unit="pixels",
+        shown=(),
     )
 
     def __post_init__(self) -> None:

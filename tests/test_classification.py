@@ -1,0 +1,241 @@
+"""`simdtex.classify` and `simdtex.TextureClassifier`: what goes in, what comes out, and what is refused."""
+
+import numpy as np
+import pytest
+from cases import assert_same_bits, texture
+
+import simdtex
+from simdtex import Checkpoint
+
+LEFT, RIGHT = texture((24, 20), seed=1), texture((24, 20), seed=2)[:, ::-1] // 3
+PICTURE = np.hstack([LEFT, RIGHT])
+TEXTURES = {"left": LEFT[:18], "right": RIGHT[6:]}
+QUICK = {"exemplars": 100, "coupling": 2.0, "window": 3.0, "rng": 1, "device": "reference"}
+TRUTH = np.repeat([1, 2], 20)[None].repeat(24, 0)
+STROKES = np.zeros((24, 40), int)
+STROKES[4:20, 4:14], STROKES[4:20, 26:36] = 3, 7
+
+
+def classify(image=PICTURE, textures=TEXTURES, **options):
+    return simdtex.classify(image, textures, **QUICK | options)
+
+
+def colour(image):
+    return np.stack([image, image // 2, 255 - image], -1)
+
+
+def test_labels_are_bytes_and_the_classes_are_numbered_from_1():
+    labels = classify(unknown=0.0)
+    assert (labels.dtype, labels.shape) == (np.uint8, (24, 40))
+    assert (labels == TRUTH).mean() > 0.9
+    swapped = classify(textures=dict(reversed(TEXTURES.items())), unknown=0.0)
+    assert (swapped == 3 - TRUTH).mean() > 0.9
+
+
+def test_the_output_tells_the_classes():
+    labels, output = classify(full_output=True)
+    found = output.statistics["classes"]
+    assert [one["name"] for one in found] == ["unknown", "left", "right"]
+    assert [one["label"] for one in found] == [0, 1, 2]
+    assert sum(one["share"] for one in found) == pytest.approx(1)
+    assert output.fit.shape == output.probability.shape == (24, 40, 2)
+    assert output.statistics["seed"] == 1 and output.made[..., 0] is not None
+    assert "24x40" in repr(output)
+    assert (labels == output.made[..., 0]).all()
+
+
+@pytest.mark.parametrize("axis", [0, -1])
+def test_channels_may_be_on_any_axis(axis):
+    def placed(image):
+        return np.moveaxis(colour(image), -1, axis)
+
+    textures = {name: placed(one) for name, one in TEXTURES.items()}
+    labels = classify(placed(PICTURE), textures, channel_axis=axis, unknown=0.0)
+    assert (labels == TRUTH).mean() > 0.9
+
+
+@pytest.mark.parametrize("dtype", [np.uint16, np.int16, np.float32, np.float64, np.bool_])
+def test_any_real_type(dtype):
+    def converted(image):
+        if dtype == np.bool_:
+            return image > 60
+        return (image.astype(np.float64) * 100 - 50).astype(dtype)
+
+    textures = {name: converted(one) for name, one in TEXTURES.items()}
+    assert (classify(converted(PICTURE), textures, unknown=0.0) == TRUTH).mean() > 0.85
+
+
+def test_several_samples_make_one_class():
+    parts = {"left": [LEFT[:12], LEFT[10:]], "right": [RIGHT]}
+    assert (classify(textures=parts, unknown=0.0) == TRUTH).mean() > 0.9
+    both = {"all": [LEFT, RIGHT]}
+    assert (classify(textures=both, unknown=0.0) == 1).all()
+
+
+def test_masked_parts_of_a_sample_are_not_used():
+    """A sample that shows both textures, with a mask for each."""
+    masks = {"left": TRUTH == 1, "right": TRUTH == 2}
+    labels = classify(textures={"left": PICTURE, "right": PICTURE}, masks=masks, unknown=0.0)
+    assert (labels == TRUTH).mean() > 0.9
+    hidden = {name: np.ma.MaskedArray(PICTURE, ~mask) for name, mask in masks.items()}
+    assert (classify(textures=hidden, unknown=0.0) == labels).mean() > 0.95
+    spoiled = LEFT.astype(np.float32)
+    spoiled[3:6, 3:6] = np.nan
+    textures = {"left": spoiled, "right": RIGHT.astype(np.float32)}
+    assert (classify(PICTURE.astype(np.float32), textures, unknown=0.0) == TRUTH).mean() > 0.9
+
+
+def test_pixels_without_a_value_are_unknown():
+    picture = PICTURE.astype(np.float32)
+    picture[5:8, 30:33] = np.nan
+    textures = {name: one.astype(np.float32) for name, one in TEXTURES.items()}
+    labels = classify(picture, textures, unknown=0.0)
+    assert (labels[5:8, 30:33] == 0).all() and (labels == 0).sum() == 9
+
+
+def test_one_class_is_this_or_unknown():
+    whole = texture((60, 80), seed=1)
+    picture = np.hstack([whole[:, :40], np.random.default_rng(0).integers(0, 256, (60, 40), np.uint8)])
+    labels = classify(picture, {"a": whole[:, 40:]})
+    assert set(np.unique(labels)) == {0, 1}
+    assert (labels[:, 52:] == 0).all() and (labels[:, :28] == 1).mean() > 0.95
+
+
+def test_a_sample_that_was_cut_from_the_picture_is_known_there():
+    """It has no distance to its own exemplars, which no other part of the texture has."""
+    whole = texture((60, 80), seed=1)
+    _, output = classify(whole, {"a": whole[8:52, 4:44]}, full_output=True, exemplars=4000)
+    assert (output.fit[22:38, 18:30] == 1).all() and output.fit.min() < 1
+
+
+def test_training_regions_are_painted_on_the_picture():
+    labels, output = classify(textures=STROKES, unknown=0.0, full_output=True)
+    assert (labels == TRUTH).mean() > 0.9
+    assert [one["name"] for one in output.statistics["classes"]] == ["unknown", "3", "7"]
+
+
+def test_the_seed_decides_and_nothing_else():
+    assert_same_bits(classify(rng=4, unknown=0.0), classify(rng=4, unknown=0.0))
+    fits = [classify(rng=seed, full_output=True, exemplars=20)[1].fit for seed in (4, 5)]
+    assert (fits[0] != fits[1]).any()
+
+
+def test_a_callback_sees_labels():
+    seen = []
+    classify(callback=seen.append)
+    assert [one.fraction for one in seen] == sorted(one.fraction for one in seen)
+    assert seen[0].doing == "compared 100 %" and seen[1].doing == "sweep 1"
+    assert set(np.unique(seen[-1].image())) <= {1, 2}
+
+
+def test_a_run_goes_on_from_its_checkpoint(tmp_path):
+    whole, output = classify(full_output=True, schedule="random-subset")
+    for number in range(1, 5):
+        kept = Checkpoint(tmp_path / f"{number}", every=0)
+        seen = []
+
+        def stop(progress, seen=seen, kept=kept, number=number):
+            seen.append(progress)
+            if len(seen) == number:
+                kept.stop()
+
+        with pytest.raises(KeyboardInterrupt):
+            classify(callback=stop, checkpoint=kept, schedule="random-subset")
+        again = Checkpoint(tmp_path / f"{number}", every=0)
+        labels, theirs = classify(checkpoint=again, full_output=True, schedule="random-subset")
+        assert again.path.exists()
+        assert_same_bits(labels, whole)
+        assert_same_bits(theirs.fit, output.fit)
+    with pytest.raises(ValueError, match=r"another option unknown \(0.05, not 0.5\)"):
+        classify(checkpoint=again.path, unknown=0.5, schedule="random-subset")
+
+
+def test_the_estimator_is_trained_once():
+    found = simdtex.TextureClassifier(**QUICK, unknown=0.0).fit(PICTURE, STROKES)
+    assert found.classes_.tolist() == [3, 7] and found.n_features_in_ == 1
+    labels = found.predict(PICTURE)
+    assert (labels == np.array([0, 3, 7])[classify(textures=STROKES, unknown=0.0)]).all()
+    chance = found.predict_proba(PICTURE[:, ::-1])
+    assert chance.shape == (24, 40, 2) and abs(chance.sum(-1) - 1).max() < 1e-6
+    both = simdtex.TextureClassifier(**QUICK).fit([PICTURE, PICTURE], [STROKES, np.where(STROKES == 3, 3, 0)])
+    assert both.predict(PICTURE).shape == (24, 40)
+
+
+def test_the_estimator_has_the_parameters_of_its_constructor():
+    """As `sklearn.base.clone` needs them."""
+    found = simdtex.TextureClassifier(exemplars=50, rng=3)
+    assert found.get_params() == {"channel_axis": None, "rng": 3, "device": None, "exemplars": 50}
+    twin = type(found)(**found.get_params())
+    assert twin.set_params(rng=4, weight=2.0) is twin
+    assert twin.get_params() == {"channel_axis": None, "rng": 4, "device": None, "exemplars": 50, "weight": 2.0}
+    assert found.get_params()["rng"] == 3
+    clone = pytest.importorskip("sklearn.base").clone
+    assert clone(found).get_params() == found.get_params()
+
+
+BAD = {
+    "no class": ({"textures": {}}, ValueError, "there are 0 classes; give 1 to 254"),
+    "another type": (
+        {"textures": {"a": LEFT.astype(np.float32)}},
+        ValueError,
+        "class 'a' has 1 bands of float32 and the picture 1 bands of uint8; convert them to one type",
+    ),
+    "another number of axes": ({"textures": {"a": colour(LEFT)}}, ValueError, "class 'a': the sample is 3-dimensional"),
+    "an empty sample": ({"textures": {"a": LEFT[:0]}}, ValueError, "class 'a': the sample is empty"),
+    "a tiny sample": ({"textures": {"a": LEFT[:5, :7]}}, ValueError, "class 'a' has 3 whole neighbourhoods of 5x5"),
+    "the name unknown": ({"textures": {"unknown": LEFT}}, ValueError, "'unknown' is no name of a class"),
+    "a name that is no text": ({"textures": {3: LEFT}}, ValueError, "3 is no name of a class"),
+    "a mask of another size": (
+        {"masks": {"left": np.ones((3, 3), bool)}},
+        ValueError,
+        "class 'left': mask is 3x3 and the picture 18x20",
+    ),
+    "a mask for no class": (
+        {"masks": {"lft": LEFT > 0}},
+        ValueError,
+        "masks name the class 'lft', which textures do not",
+    ),
+    "masks too many": ({"masks": {"left": [LEFT[:18] > 0] * 2}}, ValueError, "class 'left' has 1 samples and 2 masks"),
+    "validation of no class": ({"validation": {"x": LEFT}}, ValueError, "validation name the class 'x'"),
+    "strokes and masks": ({"textures": STROKES, "masks": {"a": LEFT}}, ValueError, "belong to samples by name"),
+    "strokes of another shape": ({"textures": STROKES[:3]}, ValueError, r"give integers of the shape \(24, 40\)"),
+    "strokes of floats": ({"textures": STROKES * 0.5}, ValueError, "the training regions are float64"),
+    "negative strokes": ({"textures": STROKES - 1}, ValueError, "have the label -1; give 0 or more"),
+    "a stroke of one pixel": (
+        {"textures": np.where(np.arange(960).reshape(24, 40) == 500, 1, STROKES)},
+        ValueError,
+        "label 1 is painted on 1 pixels; paint 16 or more",
+    ),
+    "no stroke": ({"textures": STROKES * 0}, ValueError, "there are 0 classes"),
+    "too many bands": (
+        {
+            "image": np.zeros((9, 9, 15), np.uint8),
+            "textures": {"a": np.zeros((9, 9, 15), np.uint8)},
+            "channel_axis": -1,
+        },
+        ValueError,
+        "the picture has 15 bands; give 14 at most",
+    ),
+    "an unknown option": ({"orders": 3}, TypeError, "unknown option 'orders' of the method 'classifier' .did you mean"),
+    "a preset": ({"preset": "paper"}, TypeError, "unknown option 'preset'"),
+    "an option out of range": ({"unknown": 2}, ValueError, "unknown is 2; give at most 1"),
+    "a schedule of many steps": ({"schedule": "raster"}, ValueError, "takes more than 64 steps"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_is_wrong_is_said(case):
+    options, kind, words = BAD[case]
+    with pytest.raises(kind, match=words) as caught:
+        classify(**options)
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_the_estimator_says_what_is_wrong():
+    found = simdtex.TextureClassifier(**QUICK)
+    with pytest.raises(ValueError, match="is not trained; call fit first"):
+        found.predict(PICTURE)
+    with pytest.raises(ValueError, match="there are 2 pictures and 1 of labels"):
+        found.fit([PICTURE, PICTURE], [STROKES])
+    with pytest.raises(ValueError, match="1 bands of float64 and 1 bands of uint8"):
+        found.fit(PICTURE, STROKES).predict(PICTURE * 0.5)

@@ -1,0 +1,276 @@
+"""The classifier: what it learns of its classes, the evidence, the field of labels, and the test for the unknown."""
+
+import numpy as np
+import pytest
+from cases import REFERENCE, texture
+from scipy import ndimage
+from scipy.stats import f
+
+from simdtex.driver import drive
+from simdtex.methods.classifier import Options, model
+from simdtex.methods.classifier.algorithm import Plan
+from simdtex.methods.classifier.model import LEAST, MEANS, Region, experts_of, learn, windowed
+from simdtex.model.pictures import Pictures
+from simdtex.model.scale import Scale
+from simdtex.ops.window import gaussian
+
+
+def stripes(shape, turned=False, seed=0):
+    row, col = np.indices(shape)
+    wave = 100 + 60 * np.sin((row if turned else col) * 1.3) + np.random.default_rng(seed).normal(0, 8, shape)
+    return np.clip(np.rint(wave), 0, 255).astype(np.uint8)
+
+
+def whole(*pictures, **more):
+    return [Region(one[..., None] if one.ndim == 2 else one, np.ones(one.shape[:2], bool), **more) for one in pictures]
+
+
+CLASSES = [whole(stripes((40, 40))), whole(stripes((40, 44), True))]
+
+
+def planned(picture, classes=CLASSES, **options):
+    names = tuple(f"class {c}" for c in range(len(classes)))
+    return Plan(picture[..., None], np.zeros(picture.shape, bool), classes, names, Options(**options))
+
+
+def run(picture, classes=CLASSES, machine=REFERENCE, seed=1, **options):
+    labels, output = drive(planned(picture, classes, **options), machine, seed)
+    return labels[..., 0], output
+
+
+def halves(rows=36):
+    """Both stripes side by side, and where which is."""
+    picture = np.hstack([stripes((rows, 30), seed=5), stripes((rows, 30), True, seed=6)])
+    return picture, np.repeat([1, 2], 30)[None].repeat(rows, 0)
+
+
+def test_every_level_has_two_experts_whose_weights_add_up():
+    found = experts_of(Options(), 3)
+    assert [(one.level, one.contrast, len(one.offsets)) for one in found] == [
+        (level, contrast, 13 if contrast else 9) for level in range(3) for contrast in (False, True)
+    ]
+    assert [one.reach for one in found] == [1, 2, 2, 4, 4, 8]
+    weights = np.array([one.factor for one in found]) * 256 / 2**18
+    assert weights.sum() == pytest.approx(2, abs=2e-3)
+    assert weights == pytest.approx(2 * np.outer([1, 0.3, 0.09], [0.35, 0.65]).ravel() / 1.39, abs=2e-3)
+    assert (found[0].offsets[0] == 0).all() and abs(found[-1].offsets).max() == 8
+
+
+def distances(picture, known, expert):
+    """Of every site to the nearest of all whole neighbourhoods of a picture, by formula."""
+
+    def neighbourhoods(one):
+        rows, cols = one.shape
+        values = one * 16.0
+        if expert.level:
+            for axis in (0, 1):
+                taps = gaussian(model.SMOOTHING[expert.level]) / 512
+                values = ndimage.correlate1d(values, taps, axis, mode="mirror")
+            values = np.floor(values + 0.5)
+        pad = np.pad(values, expert.reach, "reflect") / 16
+        y, x = expert.offsets.T + expert.reach
+        found = np.stack([pad[i : i + rows, j : j + cols] for i, j in zip(y, x, strict=True)], -1)
+        if expert.contrast:
+            z = found - found.mean(-1, keepdims=True)
+            size = np.sqrt((z * z).sum(-1, keepdims=True))
+            found = z * 40 * np.log1p(size / 5) / np.maximum(size, 1e-9)
+            return np.rint(found)
+        return np.floor(found + 0.5)
+
+    inside = (slice(expert.reach, -expert.reach),) * 2
+    mine, theirs = neighbourhoods(picture), neighbourhoods(known)[inside].reshape(-1, len(expert.offsets))
+    return ((mine[..., None, :] - theirs) ** 2).sum(-1).min(-1)
+
+
+def test_labels_without_a_field_are_those_of_the_greatest_evidence():
+    picture = halves(20)[0][:, 20:40]
+    plan = planned(picture, weight=0.0, unknown=0.0, levels=1, exemplars=2**14, typical=0.3, sweeps=0)
+    labels = drive(plan, REFERENCE, 1)[0][..., 0]
+    learned = learn(REFERENCE, CLASSES, plan.names, plan.options, 1)
+    energy = []
+    for c, (region,) in enumerate(CLASSES):
+        mean = np.mean(
+            [
+                np.log1p(distances(picture, region.pixels[..., 0], one)) - 0.3 * learned.own[c, e]
+                for e, one in enumerate(learned.experts)
+            ],
+            0,
+        )
+        count = learned.counts[c] / max(learned.counts)
+        energy.append(-(mean + 2 * np.log(count) * np.mean([1 / 9, 1 / 13])) / model.TEMPERATURE)
+    gap = energy[1] - energy[0]
+    clear = abs(gap) > 0.05  # logarithms are rounded to 1/256, and divided by the temperature
+    assert clear.mean() > 0.9
+    assert (labels == np.where(gap > 0, 2, 1))[clear].all()
+
+
+def test_two_textures_are_told_apart_up_to_their_border():
+    picture, truth = halves()
+    labels, output = run(picture, unknown=0.0)
+    assert (labels == truth).mean() > 0.97
+    assert output.probability.shape == output.fit.shape == (*picture.shape, 2)
+    assert abs(output.probability.sum(-1) - 1).max() < 1e-6
+    assert (output.probability.argmax(-1) + 1 == labels).mean() > 0.99
+    shares = [one["share"] for one in output.statistics["classes"]]
+    assert shares == [float((labels == c).mean()) for c in range(3)]
+
+
+def test_a_texture_that_was_not_shown_is_unknown():
+    picture, truth = halves(60)
+    picture[20:, :30] = np.random.default_rng(9).integers(0, 255, (40, 30))
+    labels, output = run(picture, coupling=4.0, window=5.0)
+    inside = np.zeros(picture.shape, bool)
+    inside[26:, :24] = True
+    assert (labels[inside] == 0).all()
+    assert (labels == truth)[~ndimage.binary_dilation(truth * 0 + inside, iterations=14)].mean() > 0.9
+    assert (output.fit[inside].max(-1) < 0.05).all()
+    assert (run(picture, coupling=4.0, window=5.0, unknown=0.0)[0] > 0).all()
+
+
+def test_known_texture_is_rarely_unknown():
+    """Noise does not drift, so the test may call few windows unknown, and the fit is not piled up at 0."""
+    rng = np.random.default_rng(2)
+    noise = [np.clip(rng.normal(120, 30, (64, 64)), 0, 255).astype(np.uint8) for _ in range(3)]
+    labels, output = run(np.hstack(noise[1:]), [whole(noise[0])], unknown=0.1)
+    assert (labels == 0).mean() <= 0.1
+    assert np.median(output.fit) > 0.1
+
+
+@pytest.mark.parametrize("schedule", ["checkerboard", "coloring", "random-subset:0.5"])
+def test_any_schedule_of_few_steps_relaxes_the_labels(schedule):
+    picture, truth = halves()
+    labels, output = run(picture, schedule=schedule, unknown=0.0)
+    assert (labels == truth).mean() > 0.97
+    assert schedule.startswith(output.statistics["options"]["schedule"])
+
+
+@pytest.mark.parametrize("schedule", ["raster", "random-scan"])
+def test_a_schedule_of_many_steps_is_refused(schedule):
+    with pytest.raises(ValueError, match=r"takes more than 64 steps to a sweep.*choose synchronous"):
+        run(halves()[0], schedule=schedule)
+
+
+def test_the_field_ends_when_no_label_changes():
+    changed = run(halves()[0], sweeps=500)[1].statistics["changed"]
+    assert len(changed) < 500 and changed[-1] == 0 and all(changed[:-1])
+    assert run(halves()[0], sweeps=0)[1].statistics["changed"] == []
+
+
+def test_a_small_sample_has_fewer_levels_and_a_tiny_one_is_refused():
+    picture, small = halves()[0], whole(stripes((12, 12)))
+    assert run(picture, [small])[1].statistics["options"]["levels"] == 1
+    assert run(picture)[1].statistics["options"]["levels"] == 1
+    large = whole(stripes((70, 70)))
+    assert run(picture, [large])[1].statistics["options"]["levels"] == 2
+    with pytest.raises(ValueError, match=f"'class 0' has 4 whole neighbourhoods of 5x5 pixels, and {LEAST} are needed"):
+        run(picture, [whole(stripes((6, 6)))])
+
+
+def test_whole_neighbourhoods_lie_within_a_mask_and_centres_of_strokes_alone_do():
+    sites = np.zeros((20, 20), bool)
+    sites[5:12, 4:12] = True
+    region = Region(np.zeros((20, 20, 1), np.uint8), sites)
+    inner = np.zeros_like(sites)
+    inner[7:10, 6:10] = True
+    assert (model._centres(region, 2) == inner).all()
+    assert (model._centres(region._replace(whole=False), 2) == sites).all()
+    edge = region._replace(sites=np.ones((20, 20), bool), whole=False)
+    assert model._centres(edge, 2).sum() == 16 * 16
+
+
+def test_parts_are_disjoint_and_equal():
+    sites = np.zeros((30, 30), bool)
+    sites[3:23, 5:21] = True
+    parts = model._quarters(sites)
+    assert (np.sum(parts, 0) == sites).all()
+    assert [int(part.sum()) for part in parts] == [80] * 4
+    one = np.zeros((5, 5), bool)
+    one[2, 3] = True
+    assert [part.sum() for part in model._quarters(one)] == [1]
+    far = np.zeros((500, 500), bool)
+    far[100:400, 100:400] = True
+    boxed = model._boxed(far)
+    assert boxed.sum() == model.BOX**2 and boxed[250, 250] and not boxed[100, 100]
+
+
+def test_exemplars_of_a_judged_part_and_of_validation_are_not_drawn():
+    values = np.repeat(np.arange(40, dtype=np.uint8), 40).reshape(40, 40) * 3
+    regions = [*whole(values), *whole(np.full((20, 20), 200, np.uint8), judged=True)]
+    options = Options(levels=1)
+    expert = experts_of(options, 1)[0]
+    scale = Scale(Pictures(tuple(one.pixels for one in regions)), 512)
+    known = model._Class(REFERENCE, scale, [expert], regions)
+    upper = np.zeros((40, 40), bool)
+    upper[:20] = True
+    drawn = known.draw(REFERENCE, expert, 2**16, 1, 0)
+    assert len(drawn) == 38 * 38 and drawn.max() < 200
+    assert known.draw(REFERENCE, expert, 2**16, 1, 0, model._Part(0, upper))[:, 0].min() == 60
+    few = known.draw(REFERENCE, expert, 50, 1, 0)
+    assert len(few) == 50
+    assert (few == known.draw(REFERENCE, expert, 50, 1, 0)).all()
+    assert (few != known.draw(REFERENCE, expert, 50, 2, 0)).any()
+
+
+def test_a_validation_picture_widens_what_is_known():
+    picture = stripes((40, 40), seed=4)
+    brighter = np.clip(picture.astype(int) + 25, 0, 255).astype(np.uint8)
+    plain = run(brighter, [whole(stripes((40, 40)))])[1].fit
+    more = [*whole(stripes((40, 40))), *whole(np.clip(stripes((40, 40), seed=7) + 25, 0, 255), judged=True)]
+    assert plain.max() < 0.05 < run(brighter, [more])[1].fit.min()
+
+
+def test_means_over_a_window_are_of_the_sites_alone():
+    rng = np.random.default_rng(0)
+    logs, sites = rng.integers(0, 4000, (2, 12, 15)).astype(np.uint16), rng.random((12, 15)) < 0.5
+    taps = gaussian(2.0)
+    means, found = windowed(REFERENCE, logs, sites, taps)
+
+    def summed(plane):
+        for axis in (0, 1):
+            plane = ndimage.correlate1d(plane.astype(np.float64), taps.astype(np.float64), axis, mode="mirror")
+        return plane
+
+    weight = summed(sites)
+    assert found.all()
+    for mean, plane in zip(means, logs, strict=True):
+        assert abs(mean - MEANS * summed(plane * sites) / weight).max() <= 0.5
+    alone = np.zeros((40, 40), bool)
+    alone[0, 0] = True
+    near = windowed(REFERENCE, np.full((1, 40, 40), 9, np.uint16), alone, taps)
+    assert (near[0][0] == np.where(near[1], 9 * MEANS, 0)).all() and 1 < near[1].sum() < 1600
+
+
+def test_covariance_and_inverse_are_those_of_linear_algebra():
+    values = np.random.default_rng(1).normal(size=(5, 200))
+    found = model._covariance(values)
+    assert found == pytest.approx(np.cov(values), rel=1e-12)
+    assert model._inverse(found) == pytest.approx(np.linalg.inv(found), rel=1e-9)
+
+
+def test_the_fit_is_hotellings():
+    """F of the Mahalanobis distance over the number of experts, with 3 degrees of freedom for each sample."""
+    learned = learn(REFERENCE, CLASSES, ("a", "b"), Options(), 1)
+    assert learned.freedom == 6
+    null = learned.nulls[0]
+    means = np.rint(null.mean[:, None] * 4096 + [[0, 900]]).astype(np.int64)
+    distance = null.distance(means)
+    gap = means[:, 1] / 4096 - null.mean
+    assert distance == pytest.approx([0, gap @ null.inverse @ gap / len(gap)], abs=1e-6)
+    picture = halves()[0]
+    fit = run(picture)[1].fit
+    assert fit.min() >= 0 and fit.max() <= 1
+    assert f.sf(0, 2, 6) == 1  # a texture at the mean fits fully
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+@pytest.mark.parametrize("channels", [1, 3, 14])
+def test_labels_fits_and_probabilities_have_the_references_bits(machine, dtype, channels):
+    pictures = [texture(shape, channels, dtype, seed) for shape, seed in [((20, 22), 0), ((18, 18), 1), ((17, 23), 2)]]
+    classes = [whole(pictures[1]), whole(pictures[2][::-1].copy())]
+    plan = Plan(pictures[0], np.zeros((20, 22), bool), classes, ("a", "b"), Options(exemplars=60, coupling=2.0))
+    found, output = drive(plan, machine, 3)
+    expected, theirs = drive(plan, REFERENCE, 3)
+    assert (found == expected).all() and found.dtype == np.uint8
+    assert (output.fit == theirs.fit).all()
+    assert (output.probability == theirs.probability).all()
+    assert output.statistics["changed"] == theirs.statistics["changed"]
