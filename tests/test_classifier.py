@@ -87,17 +87,14 @@ def test_labels_without_a_field_are_those_of_the_greatest_evidence():
     plan = planned(picture, weight=0.0, unknown=0.0, levels=1, exemplars=2**14, typical=0.3, sweeps=0)
     labels = drive(plan, REFERENCE, 1)[0][..., 0]
     learned = learn(REFERENCE, CLASSES, plan.names, plan.options, 1)
-    energy = []
+    energy, share = [], np.array([0.35, 0.65])
     for c, (region,) in enumerate(CLASSES):
-        mean = np.mean(
-            [
-                np.log1p(distances(picture, region.pixels[..., 0], one)) - 0.3 * learned.own[c, e]
-                for e, one in enumerate(learned.experts)
-            ],
-            0,
-        )
-        count = learned.counts[c] / max(learned.counts)
-        energy.append(-(mean + 2 * np.log(count) * np.mean([1 / 9, 1 / 13])) / model.TEMPERATURE)
+        logs = [
+            np.log1p(distances(picture, region.pixels[..., 0], one)) - 0.3 * learned.own[c, e]
+            for e, one in enumerate(learned.experts)
+        ]
+        fewer = 2 * np.log(learned.counts[c] / max(learned.counts)) / np.array([9, 13])
+        energy.append(-(np.tensordot(share, logs, 1) + share @ fewer) / model.TEMPERATURE)
     gap = energy[1] - energy[0]
     clear = abs(gap) > 0.05  # logarithms are rounded to 1/256, and divided by the temperature
     assert clear.mean() > 0.9
