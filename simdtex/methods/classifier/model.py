@@ -50,6 +50,12 @@ UNITS = 2**18
 MEANS = 16
 """Units of a mean logarithm over a window to one of its logarithms."""
 
+RAW = 0.35
+"""Share of the evidence that raw neighbourhoods have; those with compressed contrast have the rest."""
+
+FINER = (1.0, 0.3, 0.09, 0.027, 0.0081)
+"""Weights of the evidence of levels, the finest first."""
+
 OWN, DRIFTS, FLOOR = 0.7, 2.0, 0.01
 """Covariance of a class: its own share, the rest pooled; how many times the drift between parts; and at least this."""
 
@@ -70,15 +76,16 @@ class Expert(NamedTuple):
 def experts_of(options: Options, levels: int) -> list[Expert]:
     """Return the experts of so many levels: raw and contrast-compressed neighbourhoods at each, the finest first.
 
-    An expert of level l has the weight 2**-l; the weights add up to 1 / `TEMPERATURE`.
+    An expert has the weight of its level, in `FINER`, times the share of its kind; the weights add up to
+    1 / `TEMPERATURE`.
     """
-    total = 2 * sum(2.0**-level for level in range(levels))
+    total = sum(FINER[:levels])
     found = []
     for level in range(levels):
-        factor = round(UNITS / LOGS * 2.0**-level / total / TEMPERATURE)
-        for contrast, order in ((False, options.order), (True, 2 * options.order)):
+        for contrast, order, share in ((False, options.order, RAW), (True, 2 * options.order, 1 - RAW)):
             near = neighbourhood_offsets(order) * 2**level
             offsets = np.concatenate([np.zeros((1, 2), np.int32), near]).astype(np.int32)
+            factor = round(UNITS / LOGS * FINER[level] * share / total / TEMPERATURE)
             found.append(Expert(level, contrast, offsets, isqrt(order) * 2**level, factor))
     return found
 

@@ -43,7 +43,7 @@ class Options:
         shown=ALL,
     )
     typical: float = comparison(
-        0.3,
+        0.25,
         Number(0, 1),
         "Take away this share of the distances that a class has to itself",
         more="At 0 a class of fine grain, whose neighbourhoods are many, loses to a class of few; at 1 every class "
