@@ -175,6 +175,21 @@ def test_whole_neighbourhoods_lie_within_a_mask_and_centres_of_strokes_alone_do(
     assert model._centres(edge, 2).sum() == 16 * 16
 
 
+def test_a_stroke_is_learned_from_what_is_around_it_alone():
+    """Its exemplars are those of the whole picture, whatever lies further away."""
+    picture = texture((90, 100))
+    sites = np.zeros(picture.shape, bool)
+    sites[40:60, 50:70] = True
+    experts = experts_of(Options(), 3)
+    found = []
+    for one in (picture, np.where(ndimage.binary_dilation(sites, np.ones((3, 3)), 13), picture, 255 - picture)):
+        region = Region(one[..., None], sites, whole=False)
+        known = model._Class(REFERENCE, Scale(Pictures((one[..., None],)), 512), experts, [region])
+        found.append([known.draw(REFERENCE, expert, 2**16, 1, 0) for expert in experts])
+        assert known.regions[0].sites.sum() == 400 and known.regions[0].sites.shape == (46, 46)
+    assert all((a == b).all() for a, b in zip(*found, strict=True))
+
+
 def test_parts_are_disjoint_and_equal():
     sites = np.zeros((30, 30), bool)
     sites[3:23, 5:21] = True

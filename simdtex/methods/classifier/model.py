@@ -214,6 +214,15 @@ def _centres(region: Region, reach: int) -> Mask:
     return found
 
 
+def _cropped(region: Region, margin: int) -> Region:
+    """Return the part of a region that holds its sites, and so many pixels around them."""
+    box = tuple(
+        slice(max(0, int(line[0]) - margin), int(line[-1]) + margin + 1)
+        for line in (np.flatnonzero(region.sites.any(axis)) for axis in (1, 0))
+    )
+    return region._replace(pixels=region.pixels[box], sites=region.sites[box])
+
+
 class _Part(NamedTuple):
     """A part of a class that the others judge: the number of its region, and its sites there."""
 
@@ -237,8 +246,9 @@ class _Class:
     """The regions of a class on a machine."""
 
     def __init__(self, machine: Machine, scale: Scale, experts: list[Expert], regions: Sequence[Region]) -> None:
-        self.regions = list(regions)
-        self._levels = [prepared(machine, scale, region.pixels, experts[-1].level + 1) for region in regions]
+        margin = experts[-1].reach + len(gaussian(SMOOTHING[experts[-1].level] or 1)) // 2
+        self.regions = [_cropped(region, margin) for region in regions]
+        self._levels = [prepared(machine, scale, region.pixels, experts[-1].level + 1) for region in self.regions]
 
     def draw(
         self, machine: Machine, expert: Expert, most: int, seed: int, number: int, without: _Part | None = None
