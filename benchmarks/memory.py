@@ -23,8 +23,11 @@ values = numpy.random.default_rng(1).integers(0, 256, (64, 64, channels))
 sample = (values if dtype == "uint8" else values / 255).astype(dtype)
 solid = kind == "solid"
 make = simdtex.synthesize_solid if solid else simdtex.synthesize
+if kind == "classify":
+    textures = {"one": sample, "another": sample[::-1].copy()}
+    make = lambda sample, shape, **given: simdtex.classify(numpy.resize(sample, (*shape, channels)), textures, **given)
 given = {"rng": 1, "channel_axis": -1, "device": simdtex.open_machine(device), "full_output": True} | options
-given |= {} if solid else {"method": kind}
+given |= {} if solid or kind == "classify" else {"method": kind}
 
 def peak():
     with open("/proc/self/status") as file:  # ru_maxrss would count the process that started this one
@@ -52,6 +55,7 @@ CASES = {
     "pyramid, laplacian": ("pyramid", {"iterations": 2, "pyramid": "laplacian"}),
     "pyramid, 6 orientations": ("pyramid", {"iterations": 1, "orientations": 6}),
     "pyramid, lookup": ("pyramid", {"iterations": 1, "match": "lookup"}),
+    "classify": ("classify", {"exemplars": 100}),
     "solid": ("solid", {"iterations": 1}),
     "solid, average": ("solid", {"iterations": 1, "solids": "average"}),
 }

@@ -7,6 +7,12 @@ def main() -> None:
     import os
     import sys
 
+    for name in ("stdin", "stdout", "stderr"):
+        if getattr(sys, name) is None:  # it was closed, and the next file to be opened would get its number
+            setattr(sys, name, open(os.devnull, "r+"))  # noqa: SIM115 - for the whole process
+    if getattr(sys.stdout, "errors", "") == "strict":  # the name of a file may be no text
+        sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+
     def leave(*_: object) -> None:
         os.write(2, b"simdtex: stopped\n")
         os._exit(130)  # a module that is being imported could catch an exception, or print its traceback
@@ -21,6 +27,15 @@ def main() -> None:
         command()
     except KeyboardInterrupt:
         sys.exit(130)
+    except OSError as error:  # of standard output, outside of a command
+        from simdtex.cli.ending import settle
+
+        settle(error)
+    finally:
+        try:
+            sys.stdout.flush()
+        except OSError:  # Python would try again at its end, and end with a code of its own
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 if __name__ == "__main__":

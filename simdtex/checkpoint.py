@@ -37,6 +37,9 @@ FIRST = 1.0
 SHARE = 75
 """Seconds between two writes over the seconds that the last one took: writing takes at most 1/76 of the time."""
 
+LOST = 300.0
+"""Seconds between two writes, at most, also where writing then takes more of the time."""
+
 NAMES = {"job": "call", "shape": "shape of the output"}
 """Names of inputs in messages, if they differ from the input's own."""
 
@@ -66,7 +69,7 @@ class Checkpoint:
         The file; its folder must exist. One process at a time uses it.
     every : float, optional
         Seconds between two writes at least; 0 writes after every step. None: a second, and 75 times what the last write
-        took, so that writing takes less than 2 % of the time.
+        took, so that writing takes less than 2 % of the time; but five minutes at most.
     command : dict, optional
         The command line, for ``simdtex resume``.
     note : callable, optional
@@ -97,7 +100,7 @@ class Checkpoint:
         self.path = Path(os.path.abspath(path))
         check_target(self.path)
         self.running = self.resumed = self.stopping = False
-        self._every, self._command, self._note = every, command, note or _warn
+        self._every, self._command, self._note = every, command, note or warn
         self._failed = self._used = self._saved = False
         self._about: dict[str, Any] = {}
         self._next = time.perf_counter() + (FIRST if every is None else every)
@@ -204,20 +207,14 @@ class Checkpoint:
             return False
         finally:
             ended = time.perf_counter()
-            self._next = ended + (max(FIRST, SHARE * (ended - began)) if self._every is None else self._every)
+            self._next = ended + (
+                min(LOST, max(FIRST, SHARE * (ended - began))) if self._every is None else self._every
+            )
         self._failed, self._saved = False, True
         return True
 
     def _write(self, tree: Any) -> None:
-        text, arrays = pack(tree)
-        about = {"format": FORMAT, **self._about, "tree": text}
-
-        def write(file: BinaryIO) -> None:
-            named: dict[str, Any] = {str(number): array for number, array in enumerate(arrays)}
-            named["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
-            np.savez(file, **named)
-
-        write_checked(self.path, write)
+        write_state(self.path, {"format": FORMAT, **self._about}, tree)
 
 
 @contextmanager
@@ -246,19 +243,40 @@ def read(path: Path) -> tuple[dict[str, Any], Any]:
     Raises ValueError if the file is no checkpoint, is damaged, or of another format.
     """
     try:
-        with read_checked(path) as file, np.load(file, allow_pickle=False) as found:
-            arrays = {name: found[name] for name in found.files}
-        about: dict[str, Any] = json.loads(arrays.pop("about").tobytes())
-    except (Damaged, ValueError, KeyError, BadZipFile):
+        about, tree = read_state(path)
+    except Damaged:
         raise ValueError(f"{path} is no checkpoint, or is damaged; remove it, and run the command again") from None
     except OSError as error:
         raise ValueError(f"{path} cannot be read ({error.strerror}); give another file") from None
     if about.get("format") != FORMAT:
         raise ValueError(
             f"the checkpoint {path} is of format {about.get('format')} and this simdtex reads {FORMAT}; "
-            f"resume with simdtex {about.get('version')}, or give a new file"
+            f"resume with the code of simdtex {about.get('version')} that wrote it, or give a new file"
         )
-    return about, unpack(about.pop("tree"), [arrays[str(number)] for number in range(len(arrays))])
+    return about, tree
+
+
+def write_state(path: Path, about: dict[str, Any], tree: Any) -> None:
+    """Write a description, which JSON holds, and a tree into a file with a checksum, atomically."""
+    text, arrays = pack(tree)
+
+    def write(file: BinaryIO) -> None:
+        named: dict[str, Any] = {str(number): array for number, array in enumerate(arrays)}
+        named["about"] = np.frombuffer(json.dumps(about | {"tree": text}).encode(), np.uint8)
+        np.savez(file, **named)
+
+    write_checked(path, write)
+
+
+def read_state(path: Path) -> tuple[dict[str, Any], Any]:
+    """Return what `write_state` was given; raise Damaged unless the file has that content, and OSError."""
+    try:
+        with read_checked(path) as file, np.load(file, allow_pickle=False) as found:
+            arrays = {name: found[name] for name in found.files}
+        about: dict[str, Any] = json.loads(arrays.pop("about").tobytes())
+        return about, unpack(about.pop("tree"), [arrays[str(number)] for number in range(len(arrays))])
+    except (ValueError, KeyError, BadZipFile):
+        raise Damaged(f"{path} is damaged") from None
 
 
 def _shown(old: Any, new: Any) -> str:
@@ -276,7 +294,8 @@ def value_text(value: Any) -> str:
     return "none" if value is None else str(value)
 
 
-def _warn(sentence: str) -> None:
+def warn(sentence: str) -> None:
+    """Give a sentence to the user as a warning."""
     warnings.warn(sentence, stacklevel=2)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from math import isqrt
@@ -21,13 +22,16 @@ from simdtex.machine import Machine, open_machine
 from simdtex.methods import mrf
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
-from simdtex.options import one_of, real, resolve, unmasked, whole
+from simdtex.options import SMALLER, one_of, real, resolve, unmasked, whole
 from simdtex.run import Callback, Output
 
 if TYPE_CHECKING:
     from typing import Unpack
 
     from simdtex.methods.typed_options import AnyOptions, SolidOptions
+
+TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.distributed"
+"""The remedy if an output of the method ``mrf`` is too large for this machine."""
 
 METHODS = ("mrf", "multires", "pyramid")
 """The packages of `simdtex.methods`; each is loaded when it is asked for first."""
@@ -166,7 +170,7 @@ def synthesize(
     chosen: Any = resolve(table, "synth", with_channels_last(options, channel_axis))
     plan: Plan
     if method == "mrf":
-        plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
+        plan = replace(mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide), remedy=TILED)
     else:
         plan = import_module(f"simdtex.methods.{method}.algorithm").Plan(inputs.pictures.pixels[0], size, chosen)
     call = Call(rng, device, callback, full_output, checkpoint)

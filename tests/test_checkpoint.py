@@ -263,7 +263,7 @@ def test_another_run_is_refused(file):
     ("changes", "words"),
     [
         ({"version": "0.0.1"}, r"is of simdtex 0\.0\.1 and this is .*, whose results may differ; resume with 0\.0\.1"),
-        ({"format": 4}, "is of format 4 and this simdtex reads 3; resume with simdtex"),
+        ({"format": 4}, r"is of format 4 and this simdtex reads 3; resume with the code of simdtex .* that wrote it,"),
     ],
     ids=["version", "format"],
 )
@@ -407,13 +407,15 @@ def test_a_write_waits_75_times_what_the_last_one_took(file, monkeypatch):
         (0.99, 0, False),
         (0.02, 0.2, True),
         (14.9, 0, False),
-        (0.2, 0, True),
+        (0.2, 30, True),
+        (299, 0, False),
+        (2, 0, True),
         (0.9, 0, False),
     ]:
         now[0] += wait
         assert checkpoint.offer(None, lambda seconds=seconds: seconds) == wrote
-    assert writes == [0.2, 0]
-    assert checkpoints.SHARE == 75 and checkpoints.FIRST == 1
+    assert writes == [0.2, 30, 0]
+    assert (checkpoints.SHARE, checkpoints.FIRST, checkpoints.LOST) == (75, 1, 300)
 
 
 def test_a_short_run_writes_no_state(file, monkeypatch):
@@ -472,8 +474,8 @@ def test_identities_tell_inputs_apart():
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are forked")
 def test_a_few_kills_change_nothing():
     environment = os.environ | {"PYTHONPATH": str(Path(simdtex.__file__).parent.parent)}
-    command = [sys.executable, Path(__file__).with_name("killed.py"), "6", "1", "mrf", "simulate"]
+    command = [sys.executable, Path(__file__).with_name("killed.py"), "8", "1", "mrf", "simulate", "tiles"]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
-    assert found["kills"] == 6 and found["wrong"] == []
+    assert found["kills"] == 8 and found["wrong"] == []

@@ -29,7 +29,7 @@ CLASSES = [whole(stripes((40, 40))), whole(stripes((40, 44), True))]
 
 
 def planned(picture, classes=CLASSES, **options):
-    names = tuple(f"class {c}" for c in range(len(classes)))
+    names = {c + 1: f"class {c}" for c in range(len(classes))}
     return Plan(picture[..., None], np.zeros(picture.shape, bool), classes, names, Options(**options))
 
 
@@ -86,7 +86,7 @@ def test_labels_without_a_field_are_those_of_the_greatest_evidence():
     picture = halves(20)[0][:, 20:40]
     plan = planned(picture, weight=0.0, unknown=0.0, levels=1, exemplars=2**14, typical=0.3, sweeps=0)
     labels = drive(plan, REFERENCE, 1)[0][..., 0]
-    learned = learn(REFERENCE, CLASSES, plan.names, plan.options, 1)
+    learned = learn(REFERENCE, CLASSES, list(plan.names.values()), plan.options, 1)
     energy, share = [], np.array([0.35, 0.65])
     for c, (region,) in enumerate(CLASSES):
         logs = [
@@ -220,7 +220,9 @@ def test_means_over_a_window_are_of_the_sites_alone():
     rng = np.random.default_rng(0)
     logs, sites = rng.integers(0, 4000, (2, 12, 15)).astype(np.uint16), rng.random((12, 15)) < 0.5
     taps = gaussian(2.0)
-    means, found = windowed(REFERENCE, logs, sites, taps)
+    everywhere = np.ones_like(sites)
+    means, found = windowed(REFERENCE, logs, sites, taps, everywhere)
+    assert (windowed(REFERENCE, logs, sites, taps, sites)[0] == means.reshape(2, 12, 15)[:, sites]).all()
 
     def summed(plane):
         for axis in (0, 1):
@@ -230,10 +232,10 @@ def test_means_over_a_window_are_of_the_sites_alone():
     weight = summed(sites)
     assert found.all()
     for mean, plane in zip(means, logs, strict=True):
-        assert abs(mean - MEANS * summed(plane * sites) / weight).max() <= 0.5
+        assert abs(mean.reshape(12, 15) - MEANS * summed(plane * sites) / weight).max() <= 0.5
     alone = np.zeros((40, 40), bool)
     alone[0, 0] = True
-    near = windowed(REFERENCE, np.full((1, 40, 40), 9, np.uint16), alone, taps)
+    near = windowed(REFERENCE, np.full((1, 40, 40), 9, np.uint16), alone, taps, np.ones_like(alone))
     assert (near[0][0] == np.where(near[1], 9 * MEANS, 0)).all() and 1 < near[1].sum() < 1600
 
 
@@ -264,7 +266,7 @@ def test_the_fit_is_hotellings():
 def test_labels_fits_and_probabilities_have_the_references_bits(machine, dtype, channels):
     pictures = [texture(shape, channels, dtype, seed) for shape, seed in [((20, 22), 0), ((18, 18), 1), ((17, 23), 2)]]
     classes = [whole(pictures[1]), whole(pictures[2][::-1].copy())]
-    plan = Plan(pictures[0], np.zeros((20, 22), bool), classes, ("a", "b"), Options(exemplars=60, coupling=2.0))
+    plan = Plan(pictures[0], np.zeros((20, 22), bool), classes, {1: "a", 2: "b"}, Options(exemplars=60, coupling=2.0))
     found, output = drive(plan, machine, 3)
     expected, theirs = drive(plan, REFERENCE, 3)
     assert (found == expected).all() and found.dtype == np.uint8

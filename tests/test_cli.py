@@ -202,3 +202,22 @@ def test_the_demo(tmp_path, monkeypatch):
     assert result.exit_code == 0, result.output
     assert listing(tmp_path / "demo") == ["brick.png", "grass.png", "gravel.png", "sheet.png"]
     assert image.read(tmp_path / "demo" / "brick.png").pixels.shape == (12, 16)
+    assert run("demo", "-o", tmp_path / "demo", "--size", "9x8").exit_code == 0, "its own files are replaced"
+    assert image.read(tmp_path / "demo" / "brick.png").pixels.shape == (8, 9)
+
+
+@pytest.mark.parametrize("name", ["brick.png", "sheet.png"])
+@pytest.mark.parametrize("content", ["a picture", "no picture", "a folder"])
+def test_the_demo_replaces_no_file_of_others(tmp_path, name, content):
+    path = tmp_path / name
+    if content == "a picture":
+        image.write(path, np.zeros((3, 4), np.uint8))
+    elif content == "no picture":
+        path.write_bytes(b"my notes")
+    else:
+        path.mkdir()
+    before = path.read_bytes() if path.is_file() else None
+    result = run("demo", "-o", tmp_path, "--size", "16x12", "--device", "reference")
+    assert result.exit_code == 2 and len(result.output.splitlines()) == 1
+    assert f"{name} is not one that this command has made; give another folder" in result.output
+    assert listing(tmp_path) == [name] and (before is None or path.read_bytes() == before)

@@ -18,8 +18,8 @@ from simdtex.report.classification import confusion_matrix
 LEFT, RIGHT = texture((24, 20), 3, seed=1), texture((24, 20), 3, seed=2)[:, ::-1] // 3
 PICTURE = np.hstack([LEFT, RIGHT])
 TRUTH = np.repeat([1, 2], 20)[None].repeat(24, 0).astype(np.uint8)
-OPTIONS = {"exemplars": 100, "coupling": 2.0, "window": 3.0}
-WORDS = ["--exemplars", 100, "--coupling", 2, "--window", 3, "--seed", 5, "--device", "reference"]
+OPTIONS = {"exemplars": 100, "coupling": 2.0}
+WORDS = ["--exemplars", 100, "--coupling", 2, "--seed", 5, "--device", "reference"]
 SAMPLES = ["--texture", "left=left.png", "--texture", "right=right.png"]
 
 
@@ -66,7 +66,7 @@ def test_viewers_see_the_colours_of_labels_and_programs_their_numbers(folder):
     assert run("picture.png", *SAMPLES, "-o", "labels.png", "--unknown", 0).exit_code == 0
     labels = image.read_labels("labels.png")
     with PIL.Image.open("labels.png") as shown:
-        assert (np.asarray(shown.convert("RGB")) == label_colours(3)[labels]).all()
+        assert (np.asarray(shown.convert("RGB")) == label_colours(256)[labels]).all()
     assert run("picture.png", *SAMPLES, "-o", "labels.tif", "--unknown", 0).exit_code == 0
     assert (image.read("labels.tif").pixels == labels).all()
 
@@ -140,7 +140,7 @@ BAD = {
     "grey": (["--texture", "left=grey.png"], "grey.png has 1 channel of uint8 and picture.png 3 channels of uint8"),
     "no file": (["--texture", "left=none.png"], "none.png"),
     "truth of another size": ([*SAMPLES, "--truth", "small.png"], "small.png is 40x3 and picture.png 40x24"),
-    "truth of no class": ([*SAMPLES, "--truth", "far.png"], "far.png has the label 9; give 0 to 2, and 255"),
+    "truth of no class": ([*SAMPLES, "--truth", "far.png"], "far.png has the label 9; give those of the classes, 0"),
     "colours for strokes": (["--strokes", "picture.png"], "picture.png is no picture of labels"),
     "fits in a png": ([*SAMPLES, "--confidence", "fit.png"], "fit.png ends in .png: end its name in one of .npy"),
     "an input overwritten": (["--texture", "left=labels.png"], "labels.png is an input and would be overwritten"),

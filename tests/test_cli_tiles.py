@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 from simdtex.cli import main
 from simdtex.io import image
+from simdtex.model.source_map import load_source_map
 
 zarr = pytest.importorskip("zarr")
 
@@ -56,6 +57,17 @@ def test_tiles_have_the_bytes_of_a_picture(folder, args):
     assert "seed 3; the array is called image" in tiles.stdout
 
 
+def test_the_source_map_and_other_maps_are_arrays_of_the_store(folder):
+    more = ("--source-map", "whole.npz", "--also", "colour.png=whole-colour.png")
+    whole = run("synth", "grey.png", "-o", "whole.png", *more, *OPTIONS)
+    more = ("--source-map", "o.zarr/source", "--also", "colour.png=o.zarr/colour")
+    tiles = run("synth", "grey.png", "-o", "o.zarr", "--tiles", 24, *more, *OPTIONS)
+    assert (whole.exit_code, tiles.exit_code) == (0, 0), whole.output + tiles.output
+    store = zarr.open_group("o.zarr", mode="r")
+    assert_same_bits(store["source"][...], load_source_map("whole.npz"))
+    assert_same_bits(store["colour"][...], image.read("whole-colour.png").pixels)
+
+
 def test_a_dry_run_prints_the_plan_and_makes_nothing(folder):
     before = sorted(os.listdir())
     result = run("synth", "grey.png", "-o", "o.zarr", "--tiles", 16, "--dry-run", "--workers", 2, *OPTIONS)
@@ -78,8 +90,11 @@ def test_a_dry_run_prints_the_plan_and_makes_nothing(folder):
             ["-o", "o.zarr", "--tiles", 16, "--stages", "s"],
             "--stages is of an output at once; leave it out",
         ),
-        (["-o", "o.zarr", "--tiles", 16, "--source-map", "s.npz"], "--source-map is of an output at once"),
-        (["-o", "o.zarr", "--tiles", 16, "--also", "grey.png=x.png"], "--also is of an output at once"),
+        (["-o", "o.zarr", "--tiles", 16, "--source-map", "s.npz"], "of the store; give --source-map o.zarr/source"),
+        (
+            ["-o", "o.zarr", "--tiles", 16, "--also", "grey.png=x.png"],
+            "x.png is no array of the store; end --also in =o.zarr/x",
+        ),
         (["-o", "o.zarr", "--tiles", 16, "--schedule", "raster"], "schedule raster needs the whole output at once"),
         (["-o", "no/o.zarr", "--tiles", 16], "does not exist; make it first"),
         (["-o", "there.zarr", "--tiles", 16], "is there already; remove it, give another name, or go on with"),

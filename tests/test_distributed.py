@@ -1,7 +1,10 @@
 """An output in tiles has the bytes of one that is made at once, whatever the tiles, the workers and their order."""
 
 import json
+import os
+import shutil
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,6 +24,7 @@ from simdtex.methods.mrf.plan import plan as planned_run
 from simdtex.methods.mrf.tiles import Tile, framed
 from simdtex.model.lattice import Grid
 from simdtex.model.pictures import Pictures
+from simdtex.model.source_map import apply_source_map
 from simdtex.ops.coloring import lattice_plan
 from simdtex.ops.neighbourhood import Field
 
@@ -152,7 +156,7 @@ def test_a_sample_and_options_of_every_kind_come_back_from_a_store(tmp_path):
     options = Options(order=2, weights=(1.0, 0.5, 0.1 + 0.2), xi=-1.7)
     plan, seed = planned_run(Pictures((COLOUR,)), (30, 31), options), 2**40 + 1
     layout = planned(plan, seed, 10)
-    store = Store.create(str(tmp_path / "s.zarr"), plan, seed, layout, channels=True, source=False)
+    store = Store.create(str(tmp_path / "s.zarr"), plan, seed, layout, channels=True, source=False, maps={})
     work = store.work()
     assert (work.plan.options, work.seed, work.layout) == (plan.options, seed, layout)
     assert (work.plan.levels, work.plan.shape) == (plan.levels, (30, 31))
@@ -166,16 +170,14 @@ class Stop(Exception):
 
 def shuffled(store, seed, stop=None):
     """Tiles in any order; an exception after so many of them, over all turns."""
-    order, done = np.random.default_rng(seed), [0]
+    order, done, work = np.random.default_rng(seed), [0], store.work()
 
-    def execute(turn, tiles):
-        tiles = list(tiles)
-        order.shuffle(tiles)
-        for number in tiles:
+    def execute(turn, tasks):
+        for number in order.permutation(tasks).tolist():
             if stop is not None and done[0] == stop:
                 raise Stop
-            done[0] += 1
-            yield do(store.where, store.name, REFERENCE, turn, number)
+            done[0] += not store.done(turn, work, number)
+            yield do(store.where, store.about["name"], REFERENCE, turn, number)
 
     return execute
 
@@ -183,12 +185,13 @@ def shuffled(store, seed, stop=None):
 def created(tmp_path, name="s.zarr", **options):
     options = Options(order=1, levels=2, xi=-8.0, **options)
     plan, where = planned_run(Pictures((SAMPLE[..., None],)), (26, 31), options), str(tmp_path / name)
-    return Store.create(where, plan, 11, planned(plan, 11, 12), channels=False, source=False), where
+    return Store.create(where, plan, 11, planned(plan, 11, 12), channels=False, source=False, maps={}), where
 
 
 def go_on(store, execute):
     """Do all turns that are left."""
     drive(Tiles(store, execute), REFERENCE, 0)
+    store.clean()
 
 
 @pytest.fixture(scope="module")
@@ -210,43 +213,37 @@ def test_a_run_that_is_stopped_after_any_tile_goes_on_to_the_same_bytes(tmp_path
     assert_same_bits(store.root["image"][...], whole)
 
 
-@pytest.mark.parametrize("moment", ["penalty", "attribute", "removal", "tally", "planes"])
-def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeypatch, moment, whole):
-    """Turns are changed in one piece: stopped before or after each of the writes around that, a run goes on."""
-    store, where = created(tmp_path)
-    left = 0
+@pytest.mark.parametrize("after", [False, True])
+@pytest.mark.parametrize("moment", ["replace", "rmtree"])
+def test_a_store_survives_a_stop_between_any_two_of_its_writes(tmp_path, monkeypatch, moment, after, whole):
+    """Stopped before or after any file is in its place, or before a folder is removed or when half of it is."""
+    _, where = created(tmp_path)
+    module = {"replace": os, "rmtree": shutil}[moment]
+    real, left = getattr(module, moment), 0
 
-    def stop(kind):
+    def stopping(path, *args, **options):
         nonlocal left
-        left -= kind == moment
-        if kind == moment and left == 0:
+        left -= 1
+        if left == 0:
+            if after and moment == "replace":
+                real(path, *args)
+            elif after:
+                inside = sorted(Path(path).rglob("*"))
+                [one.unlink() for one in inside[: len(inside) // 2] if one.is_file()]
             raise Stop
+        return real(path, *args, **options)
 
-    def create(group, name, **given):
-        stop("penalty" if name.startswith("penalty") else "tally" if name.startswith("tally") else "planes")
-        return real["create_array"](group, name, **given)
-
-    def delete(group, name):
-        stop("removal")
-        return real["__delitem__"](group, name)
-
-    def attributes(group):
-        stop("attribute")
-        return real["attrs"].fget(group)
-
-    patched = {"create_array": create, "__delitem__": delete, "attrs": property(attributes)}
-    real = {name: vars(zarr.Group)[name] for name in patched}
-    for name, one in patched.items():
-        monkeypatch.setattr(zarr.Group, name, one)
+    monkeypatch.setattr(module, moment, stopping)
     for n in range(1, 1000):  # each time a little later
         left = n
         try:
-            go_on(Store(where), shuffled(store, 0))
+            image = distributed.resume(where, device=REFERENCE)
             break
         except Stop:
             pass
     assert n > 2
-    assert_same_bits(store.root["image"][...], whole)
+    assert_same_bits(image.compute(), whole)
+    assert not (Path(where) / "work").exists()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps nobody off a folder")
@@ -371,18 +368,21 @@ def test_bad_input_is_said_before_anything_is_made(tmp_path, options, words):
 def test_only_stores_of_ones_own_are_gone_on_with(tmp_path, monkeypatch):
     for make in (lambda path: None, lambda path: path.mkdir(), lambda path: path.write_text("no")):
         make(tmp_path / "a.zarr")
-        with pytest.raises(ValueError, match="is no Zarr store; give one that simdtex has begun"):
+        with pytest.raises(ValueError, match="is no Zarr store"):
             distributed.resume(tmp_path / "a.zarr")
         if (tmp_path / "a.zarr").is_dir():
             (tmp_path / "a.zarr").rmdir()
     zarr.open_group(tmp_path / "b.zarr", mode="w")
     with pytest.raises(ValueError, match="is no output in tiles"):
         distributed.resume(tmp_path / "b.zarr")
-    for name, other in (("version", lambda name: "v"), ("FORMAT", 0)):
+    for name, other, words in (
+        ("version", lambda name: "v", "was begun by simdtex v and this is .*; go on with that version, or begin anew"),
+        ("FORMAT", 0, "has format 0 and this simdtex reads .; go on with the code of simdtex .* that began it, or"),
+    ):
         with monkeypatch.context() as patch:
             patch.setattr(store_module, name, other)
             store, where = created(tmp_path, f"{name}.zarr")
-        with pytest.raises(ValueError, match=r"was begun by simdtex .* and this is .*; go on with that version, or"):
+        with pytest.raises(ValueError, match=words):
             distributed.resume(where)
         assert store.turn.number == 1
 
@@ -403,3 +403,33 @@ def test_the_store_is_an_array_that_others_read(tmp_path):
     assert zarr.open_group(path).attrs["simdtex"]["seed"] == 1
     assert sorted(zarr.open_group(path).keys()) == ["image"]
     assert Field._fields == store_module.PLANES
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_further_maps_are_carried_along(tmp_path, several):
+    samples = [SAMPLE, texture((19, 30), seed=8)] if several else SAMPLE
+    normal = [np.stack([one + k for k in (1, 2, 3)], -1) for one in ([SAMPLE, samples[1]] if several else [SAMPLE])]
+    height = [one.astype(np.float32) / 7 for one in ([SAMPLE, samples[1]] if several else [SAMPLE])]
+    maps = {"normal": normal, "height": height} if several else {"normal": normal[0], "height": height[0]}
+    path, options = tmp_path / "o.zarr", {"order": 1, "xi": -8.0, "rng": 2, "device": REFERENCE}
+    distributed.synthesize(samples, (26, 25), path, tiles=13, maps=maps, **options)
+    _, output = simdtex.synthesize(samples, (26, 25), full_output=True, **options)
+    store = zarr.open_group(path)
+    assert sorted(store.keys()) == ["height", "image", "normal"]
+    for name, one in maps.items():
+        assert_same_bits(store[name][...], apply_source_map(output.source, one))
+
+
+@pytest.mark.parametrize(
+    ("maps", "options", "words"),
+    [
+        ({"image": SAMPLE}, {}, "'image' is no name of a map; give a word other than image, source, work"),
+        ({"../a": SAMPLE}, {}, "'../a' is no name of a map"),
+        ({"n": SAMPLE[1:]}, {}, "the other map is 25 x 21 pixels .* and the sample 25 x 22: bring it to the"),
+        ({"n": SAMPLE}, {"known": np.ma.masked_array(np.ones((20, 20)), np.eye(20) < 1)}, "known pixels are from no"),
+    ],
+)
+def test_maps_that_do_not_fit_are_said(tmp_path, maps, options, words):
+    with pytest.raises(ValueError, match=words):
+        distributed.synthesize(SAMPLE, (20, 20), tmp_path / "o.zarr", maps=maps, order=1, **options)
+    assert list(tmp_path.iterdir()) == []

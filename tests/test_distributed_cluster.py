@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 
@@ -12,6 +13,7 @@ from skimage import data
 
 import simdtex
 from simdtex import distributed
+from simdtex.machine.devices import DeviceError
 
 dask_distributed = pytest.importorskip("distributed")
 
@@ -70,6 +72,60 @@ def test_a_client_that_ends_leaves_a_store_to_go_on_with(tmp_path, whole):
     with pytest.raises(Stop):
         distributed.synthesize(SAMPLE, (90, 101), path, tiles=40, device="reference", callback=stop, **OPTIONS)
     ours = distributed.resume(path, workers=1, device="reference")
+    assert_same_bits(ours.compute(), whole)
+
+
+@pytest.mark.slow
+def test_a_run_without_workers_says_what_it_waits_for(tmp_path, whole, monkeypatch):
+    monkeypatch.setattr("simdtex.distributed.cluster.WAIT", 0.5)
+    said = []
+
+    def callback(progress):
+        if progress.phase == "sweep" and progress.level == 0 and not said:
+            cluster.scale(0)
+
+    def note(sentence):
+        said.append(sentence)
+        cluster.scale(1)
+
+    with (
+        dask_distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster,
+        dask_distributed.Client(cluster) as client,
+    ):
+        given = {"workers": client, "device": "reference", "callback": callback, "note": note}
+        ours = distributed.synthesize(SAMPLE, (90, 101), tmp_path / "out.zarr", tiles=30, **given, **OPTIONS)
+        where = cluster.scheduler_address
+    assert said == [f"all workers of {where} are gone and the run waits for one; start one with: dask worker {where}"]
+    assert_same_bits(ours.compute(), whole)
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_ends_is_said(tmp_path, whole):
+    """The scheduler and its worker are processes of their own, as on a cluster."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address = f"tcp://127.0.0.1:{port}"
+    program = [sys.executable, "-m"]
+    words = [*program, "distributed.cli.dask_scheduler", "--port", str(port), "--no-dashboard"]
+    one = [*program, "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    with (
+        subprocess.Popen(words, stderr=subprocess.DEVNULL) as scheduler,
+        subprocess.Popen(one, stderr=subprocess.DEVNULL) as worker,
+    ):
+
+        def callback(progress):
+            if progress.phase == "sweep" and progress.level == 0:
+                scheduler.kill()
+
+        given = {"workers": address, "device": "reference", "callback": callback}
+        try:
+            with pytest.raises(DeviceError, match=f"the scheduler {address} is gone; start it and its workers again, "):
+                distributed.synthesize(SAMPLE, (90, 101), tmp_path / "out.zarr", tiles=30, **given, **OPTIONS)
+        finally:
+            scheduler.kill()
+            worker.kill()
+    ours = distributed.resume(tmp_path / "out.zarr", device="reference")
     assert_same_bits(ours.compute(), whole)
 
 

@@ -230,10 +230,10 @@ def test_only_documented_formats_are_tried(tmp_path, monkeypatch):
     for name in ("Popen", "check_call", "check_output", "run", "call"):
         monkeypatch.setattr(subprocess, name, never)
     (tmp_path / "a.png").write_bytes(b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 20 20\n%%EndComments\nshowpage\n")
-    for kind in ("TGA", "ICO", "PPM", "PCX", "SGI", "DDS", "ICNS"):
+    for kind in ("TGA", "ICO", "PCX", "SGI", "DDS", "ICNS"):
         (tmp_path / f"{kind}.png").write_bytes(saved(np.zeros((32, 32, 3), np.uint8), kind))
     for path in sorted(tmp_path.iterdir()):
-        with pytest.raises(ValueError, match=r"is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF or \.npy"):
+        with pytest.raises(ValueError, match=r"is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF, PPM or \.npy"):
             image.read(path)
 
 
@@ -241,8 +241,8 @@ def test_the_documented_formats_are_those_that_are_read(tmp_path):
     assert set(decode.FORMATS) == {"PNG", "JPEG", "TIFF", "BMP", "WEBP", "GIF"}
     for text in (image.read.__doc__, (DOCS / "reference" / "command-line.rst").read_text(encoding="utf-8")):
         words = " ".join(text.split())
-        assert "PNG, JPEG, TIFF" in words and "BMP, WebP, GIF" in words
-    for kind in decode.FORMATS:
+        assert "PNG, JPEG, TIFF" in words and "BMP, WebP, GIF" in words and "PPM" in words
+    for kind in (*decode.FORMATS, "PPM"):
         (tmp_path / "a").write_bytes(saved(np.full((8, 9, 3), 7, np.uint8), kind))
         assert image.read(tmp_path / "a").pixels.shape[:2] == (8, 9)
 

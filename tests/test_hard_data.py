@@ -354,6 +354,15 @@ def test_arguments_that_are_wrong():
         place_hard_data([[0, 0, 1], [0, 1, 1], [0, 0, 2]], (2, 2))
 
 
+def test_a_damaged_header_of_an_array_is_one_sentence(tmp_path):
+    np.save(tmp_path / "a.npy", np.zeros((4, 3)))
+    data = (tmp_path / "a.npy").read_bytes()
+    for damaged in (data.replace(b"}", b"("), data.replace(b"(4", b"((")):
+        (tmp_path / "a.npy").write_bytes(damaged)
+        with pytest.raises(ValueError, match=r"^\S*a\.npy: [^\n]*$"):
+            read_hard_data(tmp_path / "a.npy")
+
+
 def test_the_examples_run():
     result = doctest.testmod(hard_data)
     assert result.attempted

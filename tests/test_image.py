@@ -17,7 +17,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from volumes import noise
 
-from simdtex.io import image
+from simdtex.io import image, volume
+from simdtex.io.atomic import atomic_path
 
 ROUND_TRIPS = [
     *[(".png", dtype, c) for dtype in ("uint8", "uint16") for c in (None, 1, 2, 3, 4)],
@@ -153,6 +154,80 @@ def test_tiff_kinds(tmp_path):
     np.testing.assert_array_equal(image.read(path).pixels, 255 - grey)
     tifffile.imwrite(path, noise((16, 16, 3), np.uint8), photometric="rgb", compression="jpeg")
     assert image.read(path).pixels.shape == (16, 16, 3)
+
+
+def netpbm(kind, pixels, largest):
+    """The bytes of a PGM or PPM, with comments in its header: as text for 2 and 3, binary for 5 and 6."""
+    height, width = pixels.shape[:2]
+    head = f"P{kind} # made by hand\n# of a scanner\n{width} {height}\n{largest}\n".encode()
+    if kind < 4:
+        return head + b"# more\n" + "\n".join(" ".join(map(str, row.ravel())) for row in pixels).encode()
+    return head + pixels.astype(">u2" if largest > 255 else np.uint8).tobytes()
+
+
+@pytest.mark.parametrize("largest", [1, 3, 255, 256, 4095, 65535])
+@pytest.mark.parametrize("channels", [None, 3])
+def test_pgm_and_ppm_have_the_values_of_the_file(tmp_path, largest, channels):
+    shape = (4, 5) if channels is None else (4, 5, channels)
+    pixels = np.random.default_rng(largest).integers(0, largest, shape, endpoint=True)
+    for kind in (2, 5) if channels is None else (3, 6):
+        (tmp_path / "a.pgm").write_bytes(netpbm(kind, pixels, largest))
+        found = image.read(tmp_path / "a.pgm").pixels
+        assert found.dtype == (np.uint8 if largest < 256 else np.uint16)
+        np.testing.assert_array_equal(found, pixels)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"P5 2 2 255 \0\0\0", "cannot be decoded"),
+        (b"P2 2 2 255 1 2 3", "cannot be decoded"),
+        (b"P2 2 2 255 1 2 x 4", "cannot be decoded"),
+        (b"P2 2 2 3 1 2 3 4", "value that is not 0 to 3"),
+        (b"P2 2 2 3 1 2 3 -1", "value that is not 0 to 3"),
+        (b"P5 2 2 3 \0\1\2\4", "value that is not 0 to 3"),
+        (b"P5 2 2 0 \0\0\0\0", "largest value is 0, not 1 to 65535"),
+        (b"P5 2 2 65536 " + bytes(8), "largest value is 65536"),
+        (b"P5 0 2 255 ", "shape"),
+        (b"P5 999999999 999999999 255 ", "no more than"),
+        (b"P5 2 two", "is not an image"),
+    ],
+)
+def test_damaged_pgm(tmp_path, data, words):
+    (tmp_path / "a.pgm").write_bytes(data)
+    with pytest.raises(ValueError, match=rf"a\.pgm.*{words}"):
+        image.read(tmp_path / "a.pgm")
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "float32"])
+@pytest.mark.parametrize("colours", [1, 3])
+def test_colours_that_were_multiplied_by_alpha_are_divided(tmp_path, dtype, colours):
+    full = 1 if dtype == "float32" else np.iinfo(dtype).max
+    rng = np.random.default_rng(1)
+    alpha = np.array([0, full // 2 or 0.5, full, full // 3 or 0.3]).repeat(6).reshape(4, 6, 1)
+    plain = rng.integers(0, full, (4, 6, colours), endpoint=True) if full > 1 else rng.random((4, 6, colours))
+    premultiplied = plain * (alpha / full)
+    premultiplied = premultiplied if full == 1 else np.rint(premultiplied)
+    values = np.concatenate([premultiplied, alpha], -1).astype(dtype)
+    for extra in ("assocalpha", "unassalpha"):
+        photometric = "rgb" if colours == 3 else "minisblack"
+        tifffile.imwrite(tmp_path / "a.tif", values, photometric=photometric, extrasamples=[extra], planarconfig=1)
+        found = image.read(tmp_path / "a.tif").pixels
+        assert found.dtype == dtype
+        np.testing.assert_array_equal(found[..., -1:], alpha.astype(dtype))
+        if extra == "unassalpha":
+            np.testing.assert_array_equal(found, values)
+            continue
+        assert (found[0, :, :-1] == 0).all()
+        np.testing.assert_array_equal(found[2], values[2])
+        tolerance = 2.0 if full > 1 else 1e-6  # of an alpha of a third, and rounded before and after
+        assert np.abs(found[1:, :, :-1].astype(float) - plain[1:]).max() <= tolerance
+
+
+def test_divided_colours_are_rounded_and_no_more_than_white(tmp_path):
+    values = np.array([[[100, 150], [7, 200], [200, 100], [9, 0]]], np.uint8)
+    tifffile.imwrite(tmp_path / "a.tif", values, photometric="minisblack", extrasamples=["assocalpha"], planarconfig=1)
+    assert image.read(tmp_path / "a.tif").pixels.tolist() == [[[170, 150], [9, 200], [255, 100], [0, 0]]]
 
 
 def test_format_is_told_by_content(tmp_path):
@@ -359,6 +434,27 @@ def test_written_file_has_the_usual_permissions_and_follows_links(tmp_path):
     assert (tmp_path / "link.png").is_symlink()
     modes = [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("usual", "real.png")]
     assert modes[0] == modes[1]
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o640, 0o444, 0o666])
+def test_a_file_that_is_replaced_keeps_its_permissions(tmp_path, mode):
+    path, folder = tmp_path / "a.png", tmp_path / "slices"
+    path.touch()
+    folder.mkdir()
+    path.chmod(mode)
+    folder.chmod(mode | 0o300)
+    image.write(path, np.zeros((2, 2), np.uint8))
+    volume.write(folder, np.zeros((2, 2, 2), np.uint8))
+    assert stat.S_IMODE(path.stat().st_mode) == mode
+    assert stat.S_IMODE(folder.stat().st_mode) == mode | 0o300
+
+
+def test_a_file_that_is_replaced_is_read_by_no_others_meanwhile(tmp_path):
+    path = tmp_path / "a.bin"
+    path.touch()
+    path.chmod(0o600)
+    with atomic_path(path) as temporary:
+        assert stat.S_IMODE(temporary.stat().st_mode) == 0o600
 
 
 def test_to_display():

@@ -103,15 +103,44 @@ JOBS = {
     "mix": lambda: simdtex.mix([SAMPLE, SAMPLE], (9000, 9000), device="reference", rng=1),
     "extend": lambda: simdtex.extend(SAMPLE, right=9000, bottom=9000, order=1, device="reference", rng=1),
     "simulate": lambda: simdtex.simulate(SAMPLE, 10**6, shape=(99, 99), device="reference", rng=1),
+    "classify": lambda: simdtex.classify(np.zeros((6000, 6000), np.uint8), {"a": SAMPLE}, device="reference", rng=1),
     "ising": lambda: ising(Reference(), (64, 64), [2.0], "coloring", sweeps=2**27),
 }
+
+
+ASKED = {
+    "mrf": 9952,
+    "multires": 5485,
+    "pyramid": 15745,
+    "solid": 14712,
+    "mix": 15745,
+    "extend": 7907,
+    "simulate": 18755,
+    "ising": 81986,
+}
+"""MiB that are asked for, by the bytes for each pixel that benchmarks/memory.py measures."""
 
 
 @pytest.mark.parametrize("job", JOBS)
 def test_a_run_that_does_not_fit_is_refused_before_it_begins(job, monkeypatch):
     monkeypatch.setattr(memory, "available", lambda: 2**30)
-    with pytest.raises(simdtex.DeviceError, match=r"needs about \d+ MiB .* and 1024 MiB is available"):
+    with pytest.raises(simdtex.DeviceError, match=rf"needs about {ASKED[job]} MiB .* and 1024 MiB is available"):
         JOBS[job]()
+
+
+def test_tiles_are_offered_where_there_are_tiles(monkeypatch):
+    hole = np.zeros(SAMPLE.shape, bool)
+    hole[7, 7] = True
+    monkeypatch.setattr(memory, "available", lambda: memory.TEMPORARY)
+    for job, tiles in (
+        (lambda: simdtex.synthesize(SAMPLE, (9, 9), order=1, device="reference", rng=1), True),
+        (lambda: simdtex.fill(SAMPLE, hole, order=1, device="reference", rng=1), False),
+        (lambda: simdtex.extend(SAMPLE, right=9, order=1, device="reference", rng=1), False),
+        (lambda: simdtex.simulate(SAMPLE, 1, order=1, device="reference", rng=1), False),
+    ):
+        with pytest.raises(simdtex.DeviceError, match="is available; give a smaller size") as said:
+            job()
+        assert ("--tiles" in str(said.value)) == tiles
 
 
 @pytest.mark.parametrize("shape, values", [((20000, 20000), 8), ((40000, 40000), 4)])

@@ -155,17 +155,21 @@ def test_nothing_is_skipped_where_nothing_is_known(cl_device):
     assert_same_bits(run(machine, p), run(REFERENCE, p))
 
 
+@pytest.mark.parametrize("rank", [1, 4])
 @pytest.mark.parametrize("options", FORMS[:2], ids=str)
-def test_a_candidate_just_within_the_bound_is_found(cl_device, options):
-    """Sixteen values to a neighbourhood, so features are all of it; and every site's source is the second nearest."""
+def test_a_candidate_just_within_the_bound_is_found(cl_device, options, rank):
+    """Sixteen values to a neighbourhood, so features are all of it.
+
+    Every site's source is the second nearest, which is the bound; or the fifth, and the second becomes the bound.
+    """
     p = problem(1, order=2, channels=2, sample_shape=(30, 31), shape=(12, 13), temperatures="zero")
     assert len(p.offsets) * 2 == FEATURES and p.strip(REFERENCE).leaves() is not None
     found, candidates = p.distances(REFERENCE)
-    first, second = np.argsort(found.distance, 0, kind="stable")[:2]
+    first, second, last = np.argsort(found.distance, 0, kind="stable")[[0, 1, rank]]
     near, bound = (np.take_along_axis(found.distance, which[None], 0)[0] for which in (first, second))
     assert np.count_nonzero((near < bound) & (near > 0.95 * bound)) > 10
     source = p.field.source.copy()
-    source.ravel()[p.sites] = candidates.positions[second]
+    source.ravel()[p.sites] = candidates.positions[last]
     p = p._replace(field=p.field._replace(source=source))
     choice, _ = run(opencl(cl_device, **options), p, 0.0, dear=0.0)
     assert_same_bits(choice, candidates.positions[first])

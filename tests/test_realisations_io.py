@@ -8,7 +8,9 @@ import sys
 import numpy as np
 import pytest
 import xarray
+import zarr
 
+from simdtex import distributed
 from simdtex.io.grids import read_grid
 from simdtex.io.realisations import check_realisations_path, read_netcdf, write_realisations
 
@@ -146,8 +148,8 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch):
         ("none/many.nc", "the folder .* does not exist"),
         ("none/many.zarr", "the folder .* does not exist"),
         ("folder.nc", "is a folder"),
-        ("empty.zarr", "is a folder and no Zarr store: give a new name"),
-        ("photos.zarr", "is a folder and no Zarr store"),
+        ("empty.zarr", "is a folder and not a store of realisations alone: remove it, or give a new name"),
+        ("photos.zarr", "is a folder and not a store of realisations"),
         ("file.zarr", "is a file"),
     ):
         refused(tmp_path / name, words)
@@ -210,3 +212,31 @@ def test_a_netcdf_that_is_no_grid_gets_one_sentence(tmp_path):
     some().isel(realisation=0, drop=True).to_netcdf(path, engine="h5netcdf")
     with pytest.raises(ValueError, match=r"grid\.nc "):
         read_netcdf(path, max_pixels=4)
+
+
+def _group(path):
+    zarr.open_group(path, mode="w").create_array("depths", data=np.arange(4))
+
+
+def _tiles(path):
+    distributed.synthesize(np.eye(9), (9, 9), path, order=1, rng=1, device="reference")
+
+
+def _readme(path):
+    write_realisations(path, some())
+    (path / "README").write_text("kept")
+
+
+def _more(path):
+    write_realisations(path, some())
+    zarr.open_group(path).create_array("depths", data=np.arange(4))
+
+
+@pytest.mark.parametrize("make", [_group, _tiles, _readme, _more])
+def test_only_a_store_of_ones_own_is_replaced(tmp_path, make):
+    path = tmp_path / "lab.zarr"
+    make(path)
+    before = sorted(path.rglob("*"))
+    with pytest.raises(ValueError, match=r"lab.zarr is a folder and not a store of realisations alone: remove it, or"):
+        write_realisations(path, some())
+    assert sorted(path.rglob("*")) == before

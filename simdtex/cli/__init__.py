@@ -45,6 +45,8 @@ GROUPS = {
 
 COMMANDS = {name: sentence for group in GROUPS.values() for name, sentence in group.items()}
 
+WHAT = "More of a texture from a sample of it, by parallel relaxation on any OpenCL device."
+
 EXAMPLES = (
     ("synth gravel.png -o more.png", "More of a texture; it tiles."),
     ("extend photo.png -o tile.png --seamless", "A photo that tiles."),
@@ -55,6 +57,7 @@ EXAMPLES = (
 def load(name: str) -> click.Command:
     """Return the command of a name."""
     command: click.Command = getattr(import_module(f"simdtex.cli.{name}"), name)
+    command.help = command.help or COMMANDS[name]  # python -OO takes docstrings away
     return command
 
 
@@ -92,7 +95,9 @@ def _versions(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     ctx.exit()
 
 
-@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(
+    cls=Commands, help=WHAT, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
 @click.option(
     "--version",
     is_flag=True,
@@ -102,7 +107,7 @@ def _versions(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     help="Show what runs here, and on which device.",
 )
 def main() -> None:
-    """More of a texture from a sample of it, by parallel relaxation on any OpenCL device."""
+    """Run a command."""
     atexit.register(gc.freeze)  # the process ends: what it holds need not be looked through for cycles
 
 

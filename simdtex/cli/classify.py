@@ -104,19 +104,20 @@ def classify(
     known: Any
     if strokes:
         known = image.read_labels(strokes)
-        names = tuple(str(label) for label in np.unique(known[known > 0]))
+        names = {int(label): str(label) for label in np.unique(known[known > 0])}
     else:
         known = _read_samples("--texture", textures, whole)
         more |= {"validation": held}
-        names = tuple(known)
+        names = dict(enumerate(known, 1))
     image.check_writable(output, np.uint8, 1)
     if confidence:
         image.check_writable(confidence, suffixes=FITS)
-    if true is not None and (strange := np.setdiff1d(true, [*range(len(names) + 1), UNLABELLED])).size:
+    if true is not None and (strange := np.setdiff1d(true, [0, *names, UNLABELLED])).size:
         raise ValueError(
-            f"{truth} has the label {strange[0]}; give 0 to {len(names)}, and {UNLABELLED} where it is not known"
+            f"{truth} has the label {strange[0]}; give those of the classes, 0 for unknown, and {UNLABELLED} "
+            "where it is not known"
         )
-    writers: list[Any] = [lambda made, run: image.write_labels(output, made, label_colours(len(names) + 1))]
+    writers: list[Any] = [lambda made, run: image.write_labels(output, made, label_colours(256))]
     if confidence:
         writers.append(lambda made, run: image.write(confidence, run.fit))
     if report:
@@ -126,7 +127,7 @@ def classify(
         check_folder(report)
         writers.append(lambda made, run: write_classification(report, pixels, made, run, true, command_line()))
     run = partial(classify, pixels, known, **more, **given(options))
-    return Task(run, partial(_summary, names, true), str(output), writers)
+    return Task(run, partial(_summary, true, names), str(output), writers)
 
 
 def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[str, list[NDArray[Any]]]:
@@ -142,7 +143,7 @@ def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[st
             raise ValueError(f"{flag} names {name} twice; give {name}=FILE0,FILE1 for several samples of a class")
         found[name] = []
         for file in files.split(","):
-            pixels, _ = read_pixels(Path(file))
+            pixels = read_pixels(Path(file))[0]
             gone = np.zeros(pixels.shape[:2], bool)
             if channels(pixels) == channels(picture.array) + 1:
                 pixels, gone = split_alpha(pixels)
@@ -163,12 +164,10 @@ def _read_truth(path: Path, picture: Material) -> NDArray[Any]:
     return true
 
 
-def _summary(names: Sequence[str], true: NDArray[Any] | None, labels: NDArray[Any]) -> str:
+def _summary(true: NDArray[Any] | None, names: dict[int, str], labels: NDArray[Any]) -> str:
     """Return the share of each class and, if the truth is known, how much of it was found."""
-    counts = np.bincount(labels.ravel(), minlength=len(names) + 1)
-    text = ", ".join(
-        f"{name} {count / labels.size:.1%}" for name, count in zip(("unknown", *names), counts, strict=True)
-    )
+    shares = ((name, (labels == label).mean()) for label, name in [(0, "unknown"), *names.items()])
+    text = ", ".join(f"{name} {share:.1%}" for name, share in shares)
     if true is not None:
         there = true != UNLABELLED
         text += f"; {(labels == true)[there].mean():.1%} as in --truth"

@@ -13,6 +13,7 @@ from _thread import interrupt_main
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from traceback import walk_tb
 from types import FrameType
 from typing import Any, NoReturn
 
@@ -39,10 +40,14 @@ def reporting() -> Iterator[None]:
         with catch_signals(context):
             check_places(context)
             yield
+    except BrokenPipeError as error:
+        if _printing(error):
+            raise  # the reader has read enough; click ends the process without a word
+        settle(error)
     except (ValueError, TypeError, OSError) as error:
         settle(error)
     except MemoryError:
-        click.echo("simdtex: the memory does not suffice for this; give a smaller size", err=True)
+        note("the memory does not suffice for this; give a smaller size")
         sys.exit(2)
     except KeyboardInterrupt as signalled:
         give_up(context, signalled.args[0] if signalled.args else signal.SIGINT)
@@ -54,7 +59,7 @@ def give_up(context: click.Context, number: int) -> NoReturn:
     path: Path | None = context.meta.get(RESUME)
     how = f"go on with: simdtex resume {path}" if path and path.exists() else "nothing but stages may have been written"
     warnings.filterwarnings("ignore", "coroutine .* was never awaited")  # which Zarr had begun
-    click.echo(f"simdtex: stopped; {how}", err=True)
+    note(f"stopped; {how}")
     sys.exit(128 + number)
 
 
@@ -121,15 +126,35 @@ def afterwards() -> Iterator[None]:
         click.get_current_context().meta.setdefault(FAILURES, []).append(error)
 
 
+def note(sentence: str) -> None:
+    """Print a sentence on standard error."""
+    click.echo(f"simdtex: {sentence}", err=True)
+
+
 def settle(*errors: Exception) -> None:
     """Exit with code 2 and one sentence if there are errors, or `afterwards` has kept some."""
-    failures = [*errors, *click.get_current_context().meta.pop(FAILURES, [])]
+    context = click.get_current_context(silent=True)
+    failures = [*errors, *(context.meta.pop(FAILURES, []) if context else [])]
     if failures:
-        click.echo(f"simdtex: {'; '.join(_sentence(error) for error in failures)}", err=True)
+        note("; ".join(_sentence(error) for error in failures))
         sys.exit(2)
 
 
+def _printing(error: BaseException) -> bool:
+    """Return whether an error was raised by a library that prints."""
+    frames = (frame for frame, _ in walk_tb(error.__traceback__))
+    return any(frame.f_globals.get("__name__") in ("click.utils", "rich.console") for frame in frames)
+
+
 def _sentence(error: Exception) -> str:
-    if isinstance(error, OSError) and error.strerror:  # without its number
-        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    return str(error)
+    if not (isinstance(error, OSError) and error.strerror):
+        return str(error)
+    if error.filename:  # without the number of the error
+        return f"{error.filename}: {error.strerror}"
+    if _printing(error):
+        return f"standard output could not be written ({error.strerror}): send it elsewhere"
+    try:
+        os.getcwd()
+    except OSError:
+        return "the working folder does not exist any more: change to another one"
+    return error.strerror

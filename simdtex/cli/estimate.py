@@ -58,7 +58,7 @@ def estimate(
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
     masks = read_masks(options.pop("sample_mask"), material)
-    data = None if known is None else read_known(known, material.pixels[0])
+    data = None if known is None else read_known(known, material)
     shape = output_shape(size, material.pixels[0], data, material.pixels[0])
     if data is None:
         raise ValueError("there is nothing to estimate from; give --known")

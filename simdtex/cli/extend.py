@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from simdtex.cli.inputs import channels, check_source_map, read_also, read_material, write_arranged
+from simdtex.cli.inputs import channels, check_source_map, note_lossy, read_also, read_material, write_arranged
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import ALSO, SOURCE_MAP, given, option, report_option
 from simdtex.cli.places import READ, WRITE
@@ -83,7 +83,8 @@ def extend(
     others = read_also(also, whole)
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, whole)
-    writers = write_arranged(output, others, source_map)
+    note_lossy(output, pixels)
+    writers = write_arranged(output, others, source_map, whole.metadata)
     if report:
         from simdtex.report.page import check_folder
         from simdtex.report.synthesis import write_synthesis

@@ -11,7 +11,15 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.inputs import channels, check_source_map, read_also, read_material, write_arranged
+from simdtex.cli.inputs import (
+    channels,
+    check_profiles,
+    check_source_map,
+    note_lossy,
+    read_also,
+    read_material,
+    write_arranged,
+)
 from simdtex.cli.job import Task, job
 from simdtex.cli.options import ALSO, SOURCE_MAP, given
 from simdtex.cli.places import READ, WRITE
@@ -69,18 +77,21 @@ def fill(
     whole = read_material([picture])
     pixels, hole = _hole(whole.pixels[0], mask)
     texture = read_material(samples) if samples else None
+    if texture:
+        check_profiles([picture, samples[0]], [whole.metadata, texture.metadata])
     if texture and also:
         raise ValueError("with --sample no pixel comes from the picture, nor from its maps; leave --also out")
     others = read_also(also, whole)
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, texture or whole, everywhere=not texture)
+    note_lossy(output, pixels)
     sample = texture and texture.array
     axis = None if pixels.ndim == 2 else -1
     return Task(
         partial(fill, pixels, hole, sample=sample, reach=reach, channel_axis=axis, **given(options)),
         lambda made: f"{np.count_nonzero(hole)} of {hole.size} pixels filled",
         str(output),
-        write_arranged(output, others, source_map),
+        write_arranged(output, others, source_map, whole.metadata),
     )
 
 

@@ -23,7 +23,7 @@ def read_data(samples: Material, options: dict[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {
         "channel_axis": samples.channel_axis,
         "mask": masks and (masks if samples.several else masks[0]),
-        "known": read_known(file, samples.pixels[0], samples.deep) if file else None,
+        "known": read_known(file, samples) if file else None,
         "guide": None,
     }
     if guide is not None:
@@ -43,7 +43,7 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tupl
 
     paths, out = read_pair("--guide", "SAMPLE-GUIDE=OUTPUT-GUIDE", text, samples)
     own = [read_pixels(path)[0] for path in paths]
-    wanted, lies = read_pixels(out)
+    wanted, lies, _ = read_pixels(out)
     wanted, free = _free(wanted, channels(wanted if lies else own[0]))  # a grid has no alpha
     are_few = few([one.reshape(*one.shape[:2], -1) for one in own])
     colours = all(one.dtype == np.uint8 and channels(one) == channels(wanted) > 1 for one in (*own, wanted))

@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.cli.ending import note
+
 if TYPE_CHECKING:
     from simdtex.io.grids import Frame
     from simdtex.io.hard_data import HardData
+    from simdtex.io.image import Image, Metadata
 
 TABLES = (".csv", ".tsv", ".txt", ".dat")
 """How the name of a table of known values ends; a file of any other name is a picture."""
@@ -26,7 +29,8 @@ MAPS = ("region", "probabilities", "image_map", "rotation", "scale")
 class Material(NamedTuple):
     """Pictures of one type: ``paths``, and their ``pixels``, which all have the axes of the first.
 
-    ``lies`` is where the cells of the first lie, if it is a grid; ``deep`` whether there is one volume.
+    ``lies`` is where the cells of the first lie, if it is a grid; ``deep`` whether there is one volume; ``metadata``
+    what the file of the first says of its pixels.
     """
 
     paths: tuple[Path, ...]
@@ -34,6 +38,7 @@ class Material(NamedTuple):
     channel_axis: int | None
     lies: Frame | None = None
     deep: bool = False
+    metadata: Metadata | None = None
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
@@ -97,12 +102,45 @@ def check_alike(path: Path, pixels: NDArray[Any], other: Path, like: NDArray[Any
         raise ValueError(f"{path} has {kind(pixels)} and {other} {kind(like)}; convert them to one type")
 
 
-def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | None]:
-    """Read a picture, or a grid as one, whose variables are channels; also return where the cells of a grid lie.
+def note_lossy(path: Path, pixels: NDArray[Any]) -> None:
+    """Say so if the format of an output changes pixels that are to stay as they are."""
+    from simdtex.io.image import LOSSY, suitable_suffix
 
-    With ``deep`` a file of several layers is read, too, as a volume (layers, rows, cols, variables).
+    if path.suffix.lower() in LOSSY:
+        suffix = suitable_suffix(pixels.dtype, channels(pixels))
+        note(f"{path}: JPEG changes all pixels a little; end its name in {suffix} to keep the known ones to the bit")
+
+
+def read_picture(path: Path) -> Image:
+    """Read a picture, and say so if its file has more than one."""
+    from simdtex.io import image
+
+    found = image.read(path)
+    if found.metadata.more:
+        note(f"{path} has several frames or pages, of which the first is read")
+    return found
+
+
+def check_profiles(paths: Sequence[Path], found: Sequence[Metadata | None]) -> None:
+    """Raise unless pictures that are used together have the same colour profile; without one it is sRGB."""
+    from simdtex.io.decode import NOTHING
+    from simdtex.io.image import profile_name
+
+    # grids and arrays hold numbers alone, in whatever colours
+    told = [(path, one.profile) for path, one in zip(paths, found, strict=True) if one and one is not NOTHING]
+    for path, profile in told[1:]:
+        first, own = told[0]
+        if profile != own and (names := [profile_name(profile), profile_name(own)]) != ["sRGB", "sRGB"]:
+            raise ValueError(f"{path} has the colour profile {names[0]} and {first} {names[1]}; convert them to one")
+
+
+def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | None, Metadata | None]:
+    """Read a picture, or a grid as one, whose variables are channels.
+
+    Also return where the cells of a grid lie, and what the file of a picture says of it. With ``deep`` a file of
+    several layers is read, too, as a volume (layers, rows, cols, variables).
     """
-    from simdtex.io import grids, image
+    from simdtex.io import grids
 
     netcdf = deep and path.suffix.lower() == ".nc"
     if grids.kind_of(path) is None and not netcdf:
@@ -111,8 +149,9 @@ def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | N
 
             if volume.is_volume(path):
                 values = volume.read(path)
-                return values if len(values) > 1 else values[0], None
-        return image.read(path).pixels, None
+                return values if len(values) > 1 else values[0], None, None
+        found = read_picture(path)
+        return found.pixels, None, found.metadata
     if netcdf:
         from simdtex.io.realisations import read_netcdf
 
@@ -122,18 +161,19 @@ def read_pixels(path: Path, deep: bool = False) -> tuple[NDArray[Any], Frame | N
     values = np.stack(list(grid.values.values()), -1)
     if len(values) > 1 and not deep:
         raise ValueError(f"{path} has {len(values)} layers: give a grid with nz = 1")
-    return values if len(values) > 1 else values[0], grids.Frame(grid.origin, grid.cell)
+    return values if len(values) > 1 else values[0], grids.Frame(grid.origin, grid.cell), None
 
 
 def read_material(paths: Sequence[Path], deep: bool = False) -> Material:
     """Read pictures or grids, or with ``deep`` a volume; one of a single channel gets no axis for it."""
-    pictures, lie = zip(*(read_pixels(path, deep) for path in paths), strict=True)
+    pictures, lie, metadata = zip(*(read_pixels(path, deep) for path in paths), strict=True)
+    check_profiles(paths, metadata)
     volumes = [one.ndim == 4 for one in pictures]
     if len(paths) > 1 and any(volumes):
         raise ValueError(f"{paths[volumes.index(True)]} is a volume, of which one is taken: give it alone")
     pixels = [one[..., 0] if one.shape[-1] == 1 and one.ndim > 2 else one for one in pictures]
     plain = pixels[0].ndim == 2 + volumes[0]
-    return Material(tuple(paths), pixels, None if plain else -1, lie[0], volumes[0])
+    return Material(tuple(paths), pixels, None if plain else -1, lie[0], volumes[0], metadata[0])
 
 
 def read_masks(paths: Sequence[Path], samples: Material) -> list[NDArray[np.bool_]] | None:
@@ -164,8 +204,8 @@ def read_pair(option: str, form: str, text: str, samples: Material) -> tuple[lis
     return [Path(one) for one in names], Path(out)
 
 
-def read_also(texts: Sequence[str], samples: Material) -> list[Also]:
-    """Read the maps of ``--also MAP=OUT``, and check that they can be carried over and written."""
+def read_also(texts: Sequence[str], samples: Material, *, files: bool = True) -> list[Also]:
+    """Read the maps of ``--also MAP=OUT``, and check that they can be carried over and, as files, be written."""
     from simdtex.io import image
 
     found = []
@@ -178,17 +218,23 @@ def read_also(texts: Sequence[str], samples: Material) -> list[Also]:
                 raise ValueError(
                     f"{path} is {size(pixels)} and {of} {size(sample)}; give --also a map of the sample's size"
                 )
-        image.check_writable(out, maps.pixels[0].dtype, channels(maps.pixels[0]))
+        if files:
+            image.check_writable(out, maps.pixels[0].dtype, channels(maps.pixels[0]))
         found.append(Also(maps, out))
     return found
 
 
-def write_arranged(output: Path, others: Sequence[Also], source_map: Path | None) -> list[Callable[[Any, Any], object]]:
-    """Return functions that write a picture, the other maps in its arrangement, and the source map if it has a file."""
+def write_arranged(
+    output: Path, others: Sequence[Also], source_map: Path | None, metadata: Metadata | None
+) -> list[Callable[[Any, Any], object]]:
+    """Return functions that write a picture, the other maps in its arrangement, and the source map if it has a file.
+
+    ``metadata`` is written with the picture.
+    """
     from simdtex.io import image
     from simdtex.model.source_map import save_source_map
 
-    writers: list[Callable[[Any, Any], object]] = [lambda made, run: image.write(output, made)]
+    writers: list[Callable[[Any, Any], object]] = [lambda made, run: image.write(output, made, metadata)]
     for one in others:
         writers.append(partial(_write_map, one))
     if source_map:
@@ -199,7 +245,7 @@ def write_arranged(output: Path, others: Sequence[Also], source_map: Path | None
 def _write_map(other: Also, made: NDArray[Any], run: Any) -> None:
     from simdtex.io import image
 
-    image.write(other.out, other.carried(run.source))
+    image.write(other.out, other.carried(run.source), other.maps.metadata)
 
 
 def output_shape(size: str | None, pixels: Any, *like: Any, axes: int = 2) -> tuple[int, ...]:
@@ -250,29 +296,28 @@ def read_map(name: str, path: Path, deep: bool = False) -> HardData | NDArray[An
         return read_hard_data(path)
     if name == "region" and grids.kind_of(path) is None and not deep:
         return image.read_mask(path, image.read(path).pixels.shape)
-    pixels, _ = read_pixels(path, deep)
+    pixels = read_pixels(path, deep)[0]
     if pixels.ndim == 2 or pixels.shape[-1] == 1:
         pixels = pixels if pixels.ndim == 2 else pixels[..., 0]
         return pixels > 0 if name == "region" else pixels
     return np.moveaxis(pixels, -1, 0)
 
 
-def read_known(path: Path, like: NDArray[Any], deep: bool = False) -> HardData | np.ma.MaskedArray[Any, Any]:
+def read_known(path: Path, samples: Material) -> HardData | np.ma.MaskedArray[Any, Any]:
     """Read the known values of an output: a table, recognised by its name, a point set, a grid or a picture.
 
-    Or, with ``deep``, a volume.
-
-    A picture is unknown where it is transparent, if it has alpha and the sample ``like`` has none.
+    Or, of a volume, a volume. A picture is unknown where it is transparent, if it has alpha and the samples have none.
     """
     from simdtex.io import grids, image
     from simdtex.io.hard_data import read_hard_data
 
     if path.suffix.lower() in TABLES or grids.kind_of(path) == "points":
         return read_hard_data(path)
-    (values, lies), gone = read_pixels(path, deep), None
+    (values, lies, metadata), gone = read_pixels(path, samples.deep), None
+    check_profiles([samples.paths[0], path], [samples.metadata, metadata])
     if values.ndim == 4:
         return np.ma.MaskedArray(values[..., 0] if values.shape[-1] == 1 else values)
-    if lies is None and channels(values) == channels(like) + 1:
+    if lies is None and channels(values) == channels(samples.pixels[0]) + 1:
         values, gone = image.split_alpha(values)
     if channels(values) == 1:
         values = values.reshape(values.shape[:2])

@@ -17,7 +17,7 @@ import click
 from click.core import ParameterSource
 
 from simdtex.cli.command import command
-from simdtex.cli.ending import RESUME, afterwards, settle
+from simdtex.cli.ending import RESUME, afterwards, note, settle
 from simdtex.cli.options import CHECKPOINT, DEVICE, PROFILE, QUIET, SEED, job_options, stages_option
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def _checkpoint(path: Path | None) -> Checkpoint | None:
     options, arguments = given_words(context, without=("checkpoint",))
     line = {"name": context.command.name, "options": options, "arguments": arguments, "folder": os.getcwd()}
     context.meta[RESUME] = path
-    kept = Checkpoint(path, command=line, note=lambda sentence: click.echo(f"simdtex: {sentence}", err=True))
+    kept = Checkpoint(path, command=line, note=note)
     context.obj = kept
     return kept
 
@@ -130,7 +130,8 @@ def command_line() -> str:
     """Return the command line of the running command, so that a reader can give it again."""
     context = click.get_current_context()
     options, arguments = given_words(context, without=("checkpoint",))
-    return shlex.join(["simdtex", str(context.command.name), *arguments, *options])
+    words = shlex.join(["simdtex", str(context.command.name), *arguments, *options])
+    return os.fsencode(words).decode(errors="backslashreplace")  # the name of a file may be no text
 
 
 def given_words(context: click.Context, without: tuple[str, ...] = ()) -> tuple[list[str], list[str]]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from simdtex.cli.command import command
+from simdtex.cli.inputs import read_picture
 from simdtex.cli.options import DEVICE
 from simdtex.cli.places import READ
 from simdtex.machine import Machine
@@ -37,8 +38,6 @@ def live(picture: Path | None, port: int, host: str, browser: bool, device: str 
 
     The page is for this machine alone, and ends with this command.
     """
-    from simdtex.io import image
-
     try:
         from simdtex.live.job import Picture
         from simdtex.live.server import serve
@@ -48,8 +47,8 @@ def live(picture: Path | None, port: int, host: str, browser: bool, device: str 
         raise ValueError(EXTRA.format(error.name)) from None
     given = None
     if picture:
-        found = image.read(picture)
-        given = Picture(picture.name, found.pixels, found.channel_axis)
+        found = read_picture(picture)
+        given = Picture(picture.name, found.pixels, found.channel_axis, found.metadata)
 
     def ready(address: str, machine: Machine) -> None:
         click.echo(f"{address}  (on {machine.name}; Ctrl-C ends it)")

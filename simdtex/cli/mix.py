@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from simdtex.cli.inputs import channels, last_iteration, output_shape
+from simdtex.cli.inputs import channels, check_profiles, last_iteration, output_shape, read_picture
 from simdtex.cli.job import Task, job
 from simdtex.cli.options import given, numbers, size_option
 from simdtex.cli.places import READ, WRITE
@@ -43,7 +43,8 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, average: str 
 
     chosen = {name: sample_number(name, options.pop(name), samples) for name in CHOSEN}
     weights = None if average is None else numbers("--average", average)
-    pictures = [image.read(path) for path in samples]
+    pictures = [read_picture(path) for path in samples]
+    check_profiles(samples, [picture.metadata for picture in pictures])
     arrays = [picture.pixels for picture in pictures]
     shape = output_shape(size, arrays[0])
     axis = -1 if any(picture.channel_axis is not None for picture in pictures) else None
@@ -52,7 +53,7 @@ def mix(samples: tuple[Path, ...], output: Path, size: str | None, average: str 
         partial(mix, arrays, shape, channel_axis=axis, **given(options | chosen | {"average": weights})),
         lambda made: f"{shape[1]}x{shape[0]} from {len(arrays)} {'sample' if len(arrays) == 1 else 'samples'}",
         str(output),
-        [lambda made, run: image.write(output, made)],
+        [lambda made, run: image.write(output, made, pictures[0].metadata._replace(exif=None))],
         (min(float(array.min()) for array in arrays), max(float(array.max()) for array in arrays)),
         lambda statistics: click.echo(last_iteration(statistics)),
     )

@@ -211,7 +211,7 @@ SOURCE_MAP = option(
     group=OUTPUTS,
     type=WRITE,
     metavar="FILE",
-    help="Write where in the sample each pixel is from: .npz, .npy or .png.",
+    help="Write where in the sample each pixel is from: .npz, .npy or .png; with --tiles STORE/source.",
 )
 ALSO = option(
     "--also",
@@ -220,7 +220,7 @@ ALSO = option(
     type=WRITE_PAIR,
     metavar="MAP=OUT",
     help="Carry the arrangement over to another map of the material (normal, height); may be repeated. Give "
-    "MAP0,MAP1=OUT for several samples.",
+    "MAP0,MAP1=OUT for several samples. With --tiles OUT is STORE/NAME.",
 )
 
 

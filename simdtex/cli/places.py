@@ -75,7 +75,8 @@ def check_places(context: click.Context) -> None:
             if _same(out.path, other.path):
                 raise ValueError(f"{out.path} would be written twice; give each output a file of its own")
             for inner, outer in ((out, other), (other, out)):
-                if outer.role != "write" and _within(inner.path, outer.path):
+                array = context.params.get("tiles") is not None and inner.path.parent == outer.path
+                if outer.role != "write" and _within(inner.path, outer.path) and not array:
                     raise ValueError(
                         f"{inner.path} would be written into {outer.path}, which another output has for itself; "
                         "give it another folder"
@@ -87,8 +88,8 @@ def _check_input(out: _Named, one: _Named) -> None:
     if _same(out.path, one.path):
         raise ValueError(f"{out.path} is an input and would be overwritten; give the output another name")
     folder = out.role == "folder" or (out.role == "either" and out.path.is_dir())
-    link = one.path.parent.resolve() / one.path.name  # a link in the folder would be removed
-    if folder and (_within(one.path, out.path) or link.is_relative_to(out.path.resolve())):
+    link = _real(one.path.parent) / one.path.name  # a link in the folder would be removed
+    if folder and (_within(one.path, out.path) or link.is_relative_to(_real(out.path))):
         raise ValueError(f"{one.path} is an input and lies in {out.path}, which is written anew; give another folder")
     if one.role == "enter" and _within(out.path, one.path):
         raise ValueError(f"{out.path} would be written into {one.path}, which is an input; give another folder")
@@ -113,11 +114,16 @@ def _named(context: click.Context) -> Iterator[_Named]:
                     yield _Named(Path(right), kind.role)
 
 
+def _real(path: Path) -> Path:
+    """Return where a path leads by links; of links in a circle, the path itself, which its reader or writer refuses."""
+    return Path(os.path.realpath(path))
+
+
 def _same(a: Path, b: Path) -> bool:
     """Return whether two paths are one file, by name or as links."""
-    return a.resolve() == b.resolve() or (a.exists() and b.exists() and a.samefile(b))
+    return _real(a) == _real(b) or (a.exists() and b.exists() and a.samefile(b))
 
 
 def _within(path: Path, folder: Path) -> bool:
     """Return whether a path is somewhere inside a folder."""
-    return path.resolve() != folder.resolve() and path.resolve().is_relative_to(folder.resolve())
+    return _real(path) != _real(folder) and _real(path).is_relative_to(_real(folder))

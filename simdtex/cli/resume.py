@@ -32,7 +32,7 @@ def resume(path: Path, workers: str | None, device: str | None, quiet: bool) -> 
 
     FILE is that of --checkpoint, or the .zarr store of --tiles.
     """
-    if (path / "zarr.json").is_file():
+    if (path / "zarr.json").is_file() or (path / "work").is_dir():
         resume_tiles(path, workers, device, quiet)
         return
     if workers is not None:

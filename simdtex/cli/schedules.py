@@ -11,6 +11,7 @@ import click
 
 from simdtex.cli.command import command
 from simdtex.cli.ending import afterwards
+from simdtex.cli.inputs import read_picture
 from simdtex.cli.job import command_line, progress_bar
 from simdtex.cli.options import DEVICE, given, job_options
 from simdtex.cli.places import FOLDER, READ
@@ -101,12 +102,10 @@ def schedules(
 
 
 def _sample(path: Path | None) -> tuple[Any, int | None]:
-    from simdtex.io import image
-
     if path is None:
         from skimage import data
 
         brick: Any = data.brick
         return brick()[:128, :128], None
-    picture = image.read(path)
+    picture = read_picture(path)
     return picture.pixels, picture.channel_axis

@@ -14,6 +14,7 @@ from simdtex.cli.inputs import (
     channels,
     check_source_map,
     last_iteration,
+    note_lossy,
     output_shape,
     read_also,
     read_material,
@@ -91,14 +92,18 @@ def synth(
     shape = output_shape(size, pixels, known, guide and guide[1])
     inputs = data | given(options, without=("tiles", "workers", "dry_run"))
     if options["tiles"] is not None:
-        synthesize_in_tiles(context, material.array, (shape[0], shape[1]), inputs)
+        others = read_also(also, material, files=False)
+        synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, inputs)
         return None
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, material, everywhere=known is None)
     others = read_also(also, material)
     if others and known is not None:
         raise ValueError("known pixels are from no sample, and nothing says what a map has there; leave --also out")
-    writers = write_arranged(output, others, source_map)
+    if known is not None:
+        note_lossy(output, pixels)
+    like = material.metadata and material.metadata._replace(exif=None)  # a new picture was taken by no camera
+    writers = write_arranged(output, others, source_map, like)
     if report:
         from simdtex.report.page import check_folder
         from simdtex.report.synthesis import write_synthesis

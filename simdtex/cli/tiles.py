@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -13,10 +13,11 @@ import click
 
 from simdtex.cli.command import RUNS
 from simdtex.cli.ending import RESUME
+from simdtex.cli.inputs import Also
 from simdtex.cli.job import progress_bar
 from simdtex.cli.options import option
 
-ALONE = ("stages", "source_map", "also", "report", "profile", "array")
+ALONE = ("stages", "report", "profile", "array")
 """Options that are of a picture which one process holds."""
 
 
@@ -72,12 +73,16 @@ def check_tiles(context: click.Context) -> None:
             raise ValueError(f"--{name.replace('_', '-')} is of an output at once; leave it out, or --tiles")
     if given["output"].suffix.lower() != ".zarr":
         raise ValueError(f"{given['output']} is no .zarr store, which tiles are written to; end its name in .zarr")
+    if given["source_map"] not in (None, given["output"] / "source"):
+        raise ValueError(f"the source map is an array of the store; give --source-map {given['output'] / 'source'}")
     if given.get("checkpoint"):
         raise ValueError("the store of --tiles is a checkpoint itself; leave --checkpoint out")
 
 
-def synthesize_in_tiles(context: click.Context, sample: Any, shape: tuple[int, int], options: dict[str, Any]) -> None:
-    """Make an output in tiles; ``options`` are keywords of `simdtex.distributed.plan`."""
+def synthesize_in_tiles(
+    context: click.Context, sample: Any, shape: tuple[int, int], others: Sequence[Also], options: dict[str, Any]
+) -> None:
+    """Make an output in tiles and other maps in its arrangement; ``options`` are keywords of `distributed.plan`."""
     from simdtex import distributed
 
     given, began = context.params, time.perf_counter()
@@ -89,10 +94,14 @@ def synthesize_in_tiles(context: click.Context, sample: Any, shape: tuple[int, i
             click.echo(line, err=not given["dry_run"])
     if given["dry_run"]:
         return
-    options |= {"rng": given["seed"], "device": given["device"]}
+    for one in others:
+        if one.out.parent != output:
+            raise ValueError(f"{one.out} is no array of the store; end --also in ={output / one.out.stem}")
+    options |= {"rng": given["seed"], "device": given["device"], "source_map": given["source_map"] is not None}
+    options["maps"] = {one.out.name: one.maps.array for one in others}
     with _progress(output, given["quiet"]) as callback:
         distributed.synthesize(
-            sample, shape, output, tiles=given["tiles"], workers=workers, callback=callback, **options
+            sample, shape, output, tiles=given["tiles"], workers=workers, callback=callback, note=_note, **options
         )
     _done(output, given["quiet"], began)
 
@@ -101,13 +110,17 @@ def resume_tiles(store: Path, workers: str | None, device: str | None, quiet: bo
     """Go on with an output in tiles."""
     from simdtex import distributed
 
-    began = time.perf_counter()
-    if distributed.finished(store):
-        click.echo(f"{store} is finished; there is nothing to go on with")
-        return
+    began, finished = time.perf_counter(), distributed.finished(store)
     with _progress(store, quiet) as callback:
-        distributed.resume(store, workers=workers_of(workers), device=device, callback=callback)
-    _done(store, quiet, began)
+        distributed.resume(store, workers=workers_of(workers), device=device, callback=callback, note=_note)
+    if finished:
+        click.echo(f"{store} is finished; there is nothing to go on with")
+    else:
+        _done(store, quiet, began)
+
+
+def _note(sentence: str) -> None:
+    click.echo(f"simdtex: {sentence}", err=True)
 
 
 @contextmanager

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from itertools import islice
+from logging import CRITICAL, getLogger
+from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from simdtex.distributed.store import Store, Turn
@@ -21,27 +23,33 @@ if TYPE_CHECKING:
     from distributed import Client
 
 AHEAD = 3
-"""Tiles for each worker that the scheduler knows of: one is always ready, and the scheduler's memory is bounded."""
+"""Tasks for each worker that the scheduler knows of: one is always ready, and the scheduler's memory is bounded."""
+
+WAIT = 10.0
+"""Seconds between two looks at whether there are workers."""
 
 
 def here(store: Store, device: str | Machine | None) -> Execute:
-    """Return what does tiles in this process, one after another."""
-    name = store.name
+    """Return what does tasks in this process, one after another."""
+    name = store.about["name"]
 
-    def execute(turn: Turn, tiles: Sequence[int]) -> Iterator[int]:
-        for number in tiles:
+    def execute(turn: Turn, tasks: int) -> Iterator[int]:
+        for number in range(tasks):
             yield do(store.where, name, device, turn, number)
 
     return execute
 
 
-def across(client: Client, store: Store, device: str | Machine | None) -> Execute:
-    """Return what has the workers of a cluster do tiles; a tile that is lost with its worker is done by another."""
-    distributed: Any = import_module("distributed")
-    what = store.where, store.name, None if device is None else str(device)
+def across(client: Client, store: Store, device: str | Machine | None, note: Callable[[str], None]) -> Execute:
+    """Return what has the workers of a cluster do tasks; a task that is lost with its worker is done by another.
 
-    def execute(turn: Turn, tiles: Sequence[int]) -> Iterator[int]:
-        token, todo = os.urandom(8).hex(), iter(tiles)
+    ``note`` receives a sentence when there are no workers.
+    """
+    distributed: Any = import_module("distributed")
+    what = store.where, store.about["name"], None if device is None else str(device)
+
+    def execute(turn: Turn, tasks: int) -> Iterator[int]:
+        token, todo = os.urandom(8).hex(), iter(range(tasks))
 
         def begun(count: int) -> list[Any]:
             return [
@@ -52,21 +60,55 @@ def across(client: Client, store: Store, device: str | Machine | None) -> Execut
         first = begun(AHEAD * max(1, len(client.scheduler_info(n_workers=-1)["workers"])))
         running = distributed.as_completed(first, loop=client.loop)
         try:
-            for future in running:
-                for another in begun(1):
-                    running.add(another)
-                try:
+            with _waiting(client, note):
+                for future in running:
+                    for another in begun(1):
+                        running.add(another)
                     yield future.result()
-                except distributed.KilledWorker:
-                    raise DeviceError(
-                        "the workers that took a tile ended one after another; give smaller tiles, or workers more "
-                        "memory, and go on with simdtex resume"
-                    ) from None
+        except distributed.KilledWorker:
+            raise DeviceError(
+                "the workers that took a tile ended one after another; give smaller tiles, or workers more "
+                f"memory, and go on with: simdtex resume {store.where}"
+            ) from None
+        except distributed.CancelledError:
+            raise DeviceError(
+                f"the scheduler {_address(client)} is gone; start it and its workers again, and go on with: "
+                f"simdtex resume {store.where}"
+            ) from None
         finally:
             cancel: Any = client.cancel
             cancel(list(running.futures))
 
     return execute
+
+
+@contextmanager
+def _waiting(client: Client, note: Callable[[str], None]) -> Iterator[None]:
+    """Note during the block when there are no workers, for which the run then waits."""
+    over = Event()
+
+    def watch() -> None:
+        told = False
+        while not over.wait(WAIT):
+            try:
+                gone = not client.scheduler_info(n_workers=1)["workers"]
+            except OSError:  # the scheduler is gone too
+                return
+            if gone and not told:
+                where = _address(client)
+                note(f"all workers of {where} are gone and the run waits for one; start one with: dask worker {where}")
+            told = gone
+
+    Thread(target=watch, daemon=True).start()
+    try:
+        yield
+    finally:
+        over.set()
+
+
+def _address(client: Client) -> str:
+    scheduler: Any = client.scheduler
+    return str(scheduler.address) if scheduler else ""
 
 
 def check_workers(workers: Any, device: Any) -> None:
@@ -91,6 +133,7 @@ def connected(workers: int | str | Client | None) -> Iterator[Client | None]:
     except ImportError:
         raise ValueError("distributed is not installed; pip install 'simdtex[distributed]'") from None
     if isinstance(workers, str):
+        getLogger("distributed.client").setLevel(CRITICAL)  # what ends a run is said in one sentence
         try:
             client = distributed.Client(workers, timeout=10, set_as_default=False)
         except (OSError, ValueError) as error:

@@ -20,6 +20,9 @@ CHUNK = 512
 TILES = 2**22
 """Tiles of a level, at most: one process counts them."""
 
+TASKS = 2**14
+"""Tasks of a turn, at most: one process hands them out, and reads what each has noted."""
+
 PROCESS = 2**30
 """Bytes of an idle worker: Python, libraries, an OpenCL runtime that compiles kernels for the first time.
 
@@ -61,6 +64,20 @@ class LevelLayout:
     def count(self) -> int:
         """Number of tiles."""
         return self.down * self.across
+
+    @property
+    def together(self) -> int:
+        """Number of tiles of a task, of which the last one may have fewer."""
+        return ceil(self.count / TASKS)
+
+    @property
+    def tasks(self) -> int:
+        """Number of tasks of a turn."""
+        return ceil(self.count / self.together)
+
+    def task(self, number: int) -> range:
+        """Return the numbers of the tiles of a task."""
+        return range(number * self.together, min(self.count, (number + 1) * self.together))
 
     @property
     def lattice(self) -> Grid:
@@ -116,7 +133,8 @@ class Layout:
     memory : int
         Bytes that a worker needs at most, whatever the output's size.
     disk : int
-        Bytes that the store needs at most, uncompressed: two states of the finest level, the output, one level above.
+        Bytes that the store needs at most, uncompressed: two states of the finest level, one of each
+        other level, and the output without a source map and further maps.
     """
 
     levels: tuple[LevelLayout, ...]
@@ -155,7 +173,7 @@ def planned(plan: Plan, seed: int, tile: int) -> Layout:
     window = max(*(one.window for one in levels), min(shown, levels[0].rows) * min(shown, levels[0].cols))
     each, pixel = (fixed + more * channels for fixed, more in (SITE, PIXEL))
     memory = PROCESS + window * each + sample.rows * sample.cols * pixel
-    disk = int(prod(plan.shape) * ((6 + 2 * channels) * 2.25 + sample.shown * sample.pixels.dtype.itemsize))
+    disk = int(prod(plan.shape) * ((6 + 2 * channels) * 7 / 3 + sample.shown * sample.pixels.dtype.itemsize))
     return Layout(levels, channels, memory, disk)
 
 

@@ -1,48 +1,62 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The Zarr store of an output in tiles: what is made, how far it is, and what a worker needs to go on with it.
 
-    image, source    the output, written tile by tile at the end
+    image, source    the output and its source map, and further maps by their names, written tile by tile at the end
     work/            removed at the end
-        input/       the plan's arrays (`simdtex.distributed.description`)
+        run          the plan (`simdtex.distributed.description`), conditioning data between sites of levels, and maps
+        turn         the present turn, and the penalty of each candidate during it
+        begun0       the turn that began level 0; the same of each coarser level
         given/       values of the output and which are known; held0, held1, ... the conditioning data of each level
-        level0/0, 1  values, source, temperature: before a sweep and after it, in turn
-        penalty7     of each candidate during turn 7
-        tally7       a row for each tile that has finished turn 7: 1, active, sum of temperatures, use of each candidate
+        level0/0, 1  values, source, temperature: before a sweep and after it, in turn; of a coarser level the last one
+        tally7       a row for each task that has finished turn 7: active, sum of temperatures, use of each candidate
 
 A turn is one thing done to every tile: begin a level, a sweep, write the picture. Nothing that is written in a turn is
-read in it, so an interrupted turn is completed by its missing tiles. The attribute ``turn`` of ``work`` changes when a
-turn is complete, in one write.
+read in it, so an interrupted turn is completed by its missing tasks. The file ``turn`` changes when a turn is complete,
+in one write.
+
+Every chunk that is read must be there and have its checksum, and the three files have theirs; a chunk is on the disk
+before its task has a row. A level whose state is damaged begins again, from the state of the level above.
 """
 
 from __future__ import annotations
 
+import asyncio
+import re
 import secrets
+import shutil
 from collections.abc import Iterator
 from dataclasses import asdict
 from importlib.metadata import version
-from typing import Any, NamedTuple, cast
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import zarr
 import zarr.codecs
+import zarr.storage
 from numpy.typing import NDArray
 
-from simdtex.checkpoint import pack, unpack
+from simdtex.checkpoint import read_state, write_state
 from simdtex.distributed.description import described, restored
 from simdtex.distributed.layout import Layout, LevelLayout, planned
+from simdtex.io.atomic import Damaged, write_durable
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Data, Held
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.tiles import Tally, Tile
 from simdtex.model.lattice import Grid
 from simdtex.ops.neighbourhood import Confidences, Field
 
-FORMAT = 5
+FORMAT = 6
 """Format of the store; another one is refused."""
 
 TOGETHER = 2**22
 """Numbers of tallies that are read at a time."""
 
 PLANES = ("values", "source", "temperature")
+
+
+Maps = dict[str, list[NDArray[Any]]]
+"""Further maps of the material, (rows, cols[, channels]), by the names of their arrays."""
 
 
 class Turn(NamedTuple):
@@ -68,7 +82,9 @@ class Work(NamedTuple):
     """The ``plan`` of a store, without conditioning data, its ``seed``, and the ``layout`` of its tiles.
 
     ``confidences``: which channels are guides; ``held``: whether there are conditioning data or guides; ``given``:
-    whether there are data.
+    whether there are data; ``scattered``: those between the sites of each level that has such; ``channels``: whether
+    the image has a channel axis; ``source``: whether the source map is written too; ``maps``: further maps of the
+    material, for each picture of the sample one.
     """
 
     plan: Plan
@@ -77,200 +93,318 @@ class Work(NamedTuple):
     confidences: Confidences
     held: bool
     given: bool
+    scattered: dict[str, Data]
+    channels: bool
+    source: bool
+    maps: Maps
+
+    @property
+    def outputs(self) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+        """The axes after rows and columns, and the types, of the arrays that the output has."""
+        sample = self.plan.sample
+        found = {"image": ((sample.shown,) * self.channels, sample.pixels.dtype)}
+        if self.source:
+            found["source"] = (2 + (len(sample.boxes) > 1),), np.dtype(np.int32)
+        return found | {name: (maps[0].shape[2:], maps[0].dtype) for name, maps in self.maps.items()}
+
+
+class Files(zarr.storage.LocalStore):
+    """The files of a store: what is written is on the disk, and a chunk that is read is there."""
+
+    async def get(self, key: str, prototype: Any = None, byte_range: Any = None) -> Any:
+        """Return the content of a file; None if it is missing, but Damaged if it is that of a chunk."""
+        found = await super().get(key, prototype, byte_range)
+        if found is None and "/c/" in key:
+            raise Damaged(key)
+        return found
+
+    async def set(self, key: str, value: Any) -> None:
+        """Write a file; raise Damaged if the store is gone."""
+        if key != "zarr.json" and not (self.root / "zarr.json").exists():
+            raise Damaged("zarr.json")
+        await asyncio.to_thread(write_durable, self.root / key, value.as_buffer_like())
+
+
+class Checked:
+    """An array of a store, which raises Damaged with the name of a chunk that cannot be read."""
+
+    def __init__(self, array: Any, name: str) -> None:
+        self._array, self._name = array, name
+        self.shape, self.dtype = array.shape, array.dtype
+
+    def __getitem__(self, where: Any) -> NDArray[Any]:
+        try:
+            return np.asarray(self._array[where])
+        except Damaged:
+            raise
+        except Exception:  # each codec has errors of its own
+            raise Damaged(self._damaged()) from None
+
+    def __setitem__(self, where: Any, values: Any) -> None:
+        self._array[where] = values
+
+    def _damaged(self) -> str:
+        """Return the name of the first chunk that cannot be read."""
+        for place in np.ndindex(self._array.cdata_shape):
+            try:
+                self._array.get_block_selection(place)
+            except Exception:
+                return "/".join((self._name, "c", *map(str, place)))
+        return f"{self._name}/zarr.json"
 
 
 class Store:
-    """A store: ``where`` is a folder that all workers reach."""
+    """A store: ``where`` is a folder that all workers reach. Methods raise Damaged with the name of a damaged part."""
 
     def __init__(self, where: str) -> None:
         self.where = where
-        self.root: Any = zarr.open_group(where, mode="r+")
-        self._arrays: dict[str, Any] = {}
+        self._arrays: dict[str, Checked] = {}
+        try:
+            self.root: Any = zarr.open_group(Files(where), mode="r+")
+        except Exception:  # of JSON, of its members, of the files
+            if not self._file("run").exists():
+                raise Damaged("zarr.json") from None
+            Path(where, "zarr.json").unlink(missing_ok=True)
+            self.root = zarr.open_group(Files(where), mode="a")
 
     @staticmethod
-    def create(where: str, plan: Plan, seed: int, layout: Layout, *, channels: bool, source: bool) -> Store:
+    def create(where: str, plan: Plan, seed: int, layout: Layout, *, channels: bool, source: bool, maps: Maps) -> Store:
         """Make a store, ready for its first turn.
 
-        ``channels``: whether the image has a channel axis; ``source``: whether the source map is written too.
+        ``channels``: whether the image has a channel axis; ``source``: whether the source map is written too, and
+        ``maps`` likewise, for each picture of the sample one.
         """
-        root, own = zarr.open_group(where, mode="w"), version("simdtex")
-        work = root.create_group("work")
-        tree, arrays = pack(described(plan))
-        for number, array in enumerate(arrays):
-            work.create_array(f"input/{number}", data=np.ascontiguousarray(array))
+        root: Any = zarr.open_group(Files(where), mode="w")
+        root.create_group("work")
         options, given = plan.options, plan.given
         conditions = Conditioning(plan)
-        store, held = Store(where), False
+        store, held, scattered = Store(where), False, {}
         for level in layout.levels:
             grid = Grid.of(plan.shape, 2**level.number, options.boundary == "torus")
             if (here := conditions.at(level.number, grid)) is not None:
                 held = True
                 for name, plane in here._asdict().items():
-                    store._planes(f"given/held{level.number}/{name}", level, plane.shape[:-2], plane.dtype)[:] = plane
+                    store._planes(f"work/given/held{level.number}/{name}", level, plane.shape[:-2], plane.dtype)[:] = (
+                        plane
+                    )
             if (data := conditions.scattered(level.number)) is not None:
-                for name, array in data._asdict().items():
-                    work.create_array(f"scattered{level.number}/{name}", data=array)
-        sample, finest = plan.sample, layout.levels[0]
+                scattered[str(level.number)] = data
         if given is not None:
             for name, array in (("values", given.values), ("known", given.known)):
-                store._pixels(f"work/given/{name}", finest, array.shape[2:], array.dtype)[:] = array
-        store._pixels("image", finest, (sample.shown,) if channels else (), sample.pixels.dtype)
-        if source:
-            store._pixels("source", finest, (2 + (len(sample.boxes) > 1),), np.dtype(np.int32))
-        work.attrs["about"] = {
-            **{"format": FORMAT, "version": own, "name": secrets.token_hex(8), "run": tree, "seed": seed},
+                store._pixels(f"work/given/{name}", layout.levels[0], array.shape[2:], array.dtype)[:] = array
+        about = {
+            **{"format": FORMAT, "version": version("simdtex"), "name": secrets.token_hex(8), "seed": seed},
             **{"tile": layout.levels[0].side, "confidences": [float(one) for one in conditions.confidences]},
-            **{"held": held, "given": given is not None},
+            **{"held": held, "given": given is not None, "channels": channels, "source": source},
         }
+        write_state(store._file("run"), about, [described(plan), scattered, maps])
         store.save(first_turn(layout))
-        root.attrs["simdtex"] = {"version": own, "seed": seed, "options": asdict(options)}
         return store
 
     @property
     def about(self) -> dict[str, Any]:
         """The description of the run, as JSON holds it."""
-        return cast(dict[str, Any], self.root["work"].attrs["about"])
-
-    @property
-    def name(self) -> str:
-        """The store's own name: no other has it."""
-        return str(self.about.get("name")) if "work" in self.root else ""
+        return self._state("run")[0]
 
     def work(self) -> Work:
         """Return the plan and all that belongs to it."""
-        about, inputs = self.about, self.root["work/input"]
-        arrays = [inputs[str(number)][...] for number in range(len(inputs))]
-        plan, seed = restored(unpack(about["run"], arrays)), about["seed"]
+        about, (tree, scattered, maps) = self._state("run")
+        plan, seed = restored(tree), about["seed"]
         guides, own, centre, hard = about["confidences"]
         confidences = Confidences(int(guides), bool(own), np.float32(centre), np.float32(hard))
         layout = planned(plan, seed, about["tile"])
-        return Work(plan, seed, layout, confidences, about["held"], about["given"])
+        between = {number: Data(*data) for number, data in scattered.items()}
+        held, given, channels, source = (about[name] for name in ("held", "given", "channels", "source"))
+        return Work(plan, seed, layout, confidences, held, given, between, channels, source, maps)
+
+    @property
+    def finished(self) -> bool:
+        """Whether the output is complete."""
+        return "simdtex" in self.root.attrs
 
     @property
     def turn(self) -> Turn:
-        """The present turn, as the store has it."""
-        if "work" not in self.root:
-            return Turn(0, "done", 0)
-        work: Any = zarr.open_group(self.where, path="work", mode="r")
-        return Turn(*work.attrs["turn"])
+        """The present turn."""
+        return Turn(*self._state("turn")[1][0])
+
+    def penalty(self, turn: Turn) -> NDArray[np.float32]:
+        """Return the penalty of each candidate during the present turn."""
+        present, penalty = self._state("turn")[1]
+        assert present[0] == turn.number, "a turn that is over"
+        return np.asarray(penalty)
 
     def save(self, turn: Turn, penalty: NDArray[np.float32] | None = None) -> Turn:
         """Go on to a turn, and return it."""
-        work = self.root["work"]
-        if penalty is not None:
-            work.create_array(f"penalty{turn.number}", data=penalty, overwrite=True)
-        work.attrs["turn"] = list(turn)
-        for name in (f"penalty{turn.number - 1}", f"tally{turn.number - 1}"):
-            if name in work:
-                del work[name]
+        state = [list(turn), penalty]
+        if turn.phase in ("begin", "whole"):
+            write_state(self._file(f"begun{turn.level}"), {}, state)
+        write_state(self._file("turn"), {}, state)
+        self._remove(f"tally{turn.number - 1}/")
         return turn
 
-    def prepare(self, turn: Turn, level: LevelLayout, channels: int, candidates: int) -> bool:
-        """Make the arrays that a turn writes to, if they are missing; return whether the turn is new."""
-        work = self.root["work"]
-        if turn.phase != "show" and f"level{level.number}/{turn.write}/temperature" not in work:
+    def prepare(self, turn: Turn, work: Work, candidates: int) -> None:
+        """Make the arrays that a turn writes to, unless they are there."""
+        level = work.layout.levels[turn.level]
+        if turn.phase == "show":
+            for name, (after, dtype) in work.outputs.items():
+                if self._lacks(name):
+                    self._pixels(name, level, after, dtype)
+        else:
             for name, kind in zip(PLANES, ("uint16", "int32", "uint16"), strict=True):
-                before = (channels,) if name == "values" else ()
-                self._planes(f"level{level.number}/{turn.write}/{name}", level, before, np.dtype(kind))
-        if f"tally{turn.number}" in work:
+                before = (work.layout.channels,) if name == "values" else ()
+                if self._lacks(where := f"work/level{level.number}/{turn.write}/{name}"):
+                    self._planes(where, level, before, np.dtype(kind))
+        if self._lacks(where := f"work/tally{turn.number}"):
+            row = 2 + candidates
+            self._array(where, (level.tasks, row), (1, row), np.dtype(np.int64), ("task", "count"))
+
+    def forget(self, level: int, which: int) -> None:
+        """Remove a state of a level."""
+        self._remove(f"level{level}/{which}/")
+
+    def finish(self, work: Work) -> None:
+        """Note that the output is complete, and what it is."""
+        about = {"version": version("simdtex"), "seed": work.seed, "options": asdict(work.plan.options)}
+        self.root.attrs["simdtex"] = about
+
+    def clean(self) -> None:
+        """Remove the working state of a complete output."""
+        self._remove("")
+        for path in Path(self.where).glob("*/c/**/.simdtex-*"):  # of processes that were killed
+            path.unlink(missing_ok=True)
+
+    def back(self, part: str) -> str | None:
+        """Go back to where a damaged part is made, and return what happens then in words; None if nothing makes it."""
+        if part == "work/run" or part.startswith("work/given/"):
+            return None
+        level = re.match(r"work/level(\d+)/", part)
+        if not (level or part == "work/turn"):  # the present turn finds out what is missing
+            return "it is made again"
+        first = int(level[1]) if level else 0
+        for number in range(first, len(self.work().layout.levels)):
+            try:
+                turn = Turn(*self._state(f"begun{number}")[1][0])
+            except Damaged:
+                continue
+            for finer in range(number + 1):
+                self._remove(f"level{finer}/")
+            for path in Path(self.where, "work").glob("tally*"):
+                self._remove(f"{path.name}/")
+            self.save(turn)
+            return f"level {number} begins again"
+        return None
+
+    def note(self, turn: Turn, task: int, tally: Tally) -> None:
+        """Note that a task has finished a turn."""
+        row = np.concatenate([np.array([tally.active, tally.temperature_sum], np.int64), tally.counts])
+        self._at(f"work/tally{turn.number}")[task] = row
+
+    def done(self, turn: Turn, work: Work, task: int) -> bool:
+        """Return whether a task has finished a turn, and all that it wrote can be read."""
+        level = work.layout.levels[turn.level]
+        try:
+            self._at(f"work/tally{turn.number}")[task]
+            for tile in map(level.tile, level.task(task)):
+                if turn.phase != "show":
+                    self.read(level, turn.write, tile)
+                    continue
+                for name in work.outputs:
+                    self._at(name)[spans(tile)]
+        except Damaged:
             return False
-        shape = (level.count, 3 + candidates)
-        work.create_array(f"tally{turn.number}", shape=shape, chunks=(1, shape[1]), dtype=np.int64, fill_value=0)
         return True
 
-    def forget(self, level: int) -> None:
-        """Remove the state of a level."""
-        work = self.root["work"]
-        if f"level{level}" in work:
-            del work[f"level{level}"]
-
-    def finish(self) -> None:
-        """Remove the working state."""
-        if "work" in self.root:
-            del self.root["work"]
-
-    def penalty(self, turn: Turn) -> NDArray[np.float32]:
-        """Return the penalty of each candidate during a turn."""
-        return np.asarray(self.root[f"work/penalty{turn.number}"][...])
-
-    def note(self, turn: Turn, number: int, tally: Tally) -> None:
-        """Note that a tile has finished a turn."""
-        row = np.concatenate([np.array([1, tally.active, tally.temperature_sum], np.int64), tally.counts])
-        self._at(f"tally{turn.number}")[number] = row
-
-    def tally(self, turn: Turn, number: int) -> Tally | None:
-        """Return what was noted of a tile, None before it has finished the turn."""
-        there, active, temperature_sum, *_ = row = self._at(f"tally{turn.number}")[number]
-        return Tally(row[3:], int(active), int(temperature_sum)) if there else None
-
-    def done(self, turn: Turn, count: int) -> NDArray[np.bool_]:
-        """Return which of the tiles have finished a turn."""
-        return np.concatenate([rows[:, 0] > 0 for rows in self._rows(turn, count)])
-
-    def total(self, turn: Turn, count: int) -> Tally:
-        """Return the sum of what was noted of all tiles."""
-        _, active, temperature_sum, *counts = sum(rows.sum(0) for rows in self._rows(turn, count))
-        return Tally(np.array(counts, np.int64), int(active), int(temperature_sum))
-
-    def _rows(self, turn: Turn, count: int) -> Iterator[NDArray[np.int64]]:
-        """Yield what was noted, many tiles at a time: one by one they take longer."""
-        tally = self._at(f"tally{turn.number}")
+    def total(self, turn: Turn) -> Tally:
+        """Return the sum of what was noted of all tasks; many rows are read at a time, one by one they take longer."""
+        tally = self._at(f"work/tally{turn.number}")
         some = max(1, TOGETHER // tally.shape[1])
-        for first in range(0, count, some):
-            yield tally[first : first + some]
+        rows = (tally[first : first + some] for first in range(0, tally.shape[0], some))
+        active, temperature_sum, *counts = sum(part.sum(0) for part in rows)
+        return Tally(np.array(counts, np.int64), int(active), int(temperature_sum))
 
     def read(self, level: LevelLayout, which: int, window: Tile) -> Field:
         """Return the state of a level's sites in a window, which may cross the seam."""
-        here = f"level{level.number}/{which}"
+        here = f"work/level{level.number}/{which}"
         return Field(*(cut(self._at(f"{here}/{name}"), level, window) for name in PLANES))
 
     def write(self, level: LevelLayout, which: int, tile: Tile, field: Field) -> None:
         """Write the state of a tile's sites."""
-        here = f"level{level.number}/{which}"
+        here = f"work/level{level.number}/{which}"
         for name, plane in zip(PLANES, field, strict=True):
             self._at(f"{here}/{name}")[..., *spans(tile)] = plane
 
     def held(self, level: LevelLayout, window: Tile) -> Held:
         """Return the conditioning data of a level's sites in a window."""
-        here = f"given/held{level.number}"
+        here = f"work/given/held{level.number}"
         return Held(*(cut(self._at(f"{here}/{name}"), level, window) for name in Held._fields))
 
     def given(self, tile: Tile) -> tuple[NDArray[Any], NDArray[np.bool_]]:
         """Return the known values of the output in a tile, and where they are known."""
-        values, known = (self._at(f"given/{name}")[spans(tile)] for name in ("values", "known"))
+        values, known = (self._at(f"work/given/{name}")[spans(tile)] for name in ("values", "known"))
         return values, known
 
-    def show(self, tile: Tile, picture: NDArray[Any], place: NDArray[np.int32]) -> None:
-        """Write a tile of the output."""
-        image = self.root["image"]
-        image[spans(tile)] = picture[..., 0] if image.ndim == 2 else picture
-        if "source" in self.root:
-            self.root["source"][spans(tile)] = place
+    def show(self, tile: Tile, arrays: dict[str, NDArray[Any]]) -> None:
+        """Write a tile of the arrays of the output."""
+        for name, array in arrays.items():
+            self._at(name)[spans(tile)] = array
 
-    def _at(self, name: str) -> Any:
-        """Return an array of ``work``, opened once."""
+    def _file(self, name: str) -> Path:
+        return Path(self.where, "work", name)
+
+    def _state(self, name: str) -> tuple[dict[str, Any], Any]:
+        """Return the content of a checked file of ``work``."""
+        try:
+            return read_state(self._file(name))
+        except (Damaged, OSError):
+            raise Damaged(f"work/{name}") from None
+
+    def _remove(self, name: str) -> None:
+        """Remove arrays of ``work``, whatever is left of them."""
+        shutil.rmtree(self._file(name), ignore_errors=True)
+        self._arrays = {path: one for path, one in self._arrays.items() if not path.startswith(f"work/{name}")}
+
+    def _at(self, name: str) -> Checked:
+        """Return an array, opened once."""
         if name not in self._arrays:
             if len(self._arrays) >= 64:  # of turns that are complete
                 self._arrays.clear()
-            self._arrays[name] = self.root[f"work/{name}"]
+            try:
+                with zarr.config.set({"array.write_empty_chunks": True}):  # one that is missing is damage
+                    self._arrays[name] = Checked(self.root[name], name)
+            except Exception:  # of JSON, of its members, of the files
+                raise Damaged(f"{name}/zarr.json") from None
         return self._arrays[name]
 
-    def _planes(self, name: str, level: LevelLayout, before: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
-        shape, chunks = (*before, level.rows, level.cols), (*before, level.chunk, level.chunk)
-        return self._array(f"work/{name}", shape, chunks, dtype, (*("channel",) * len(before), "y", "x"))
+    def _lacks(self, name: str) -> bool:
+        try:
+            self._at(name)
+        except Damaged:
+            return True
+        return False
 
-    def _pixels(self, name: str, level: LevelLayout, after: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
+    def _planes(self, name: str, level: LevelLayout, before: tuple[int, ...], dtype: np.dtype[Any]) -> Checked:
+        shape, chunks = (*before, level.rows, level.cols), (*before, level.chunk, level.chunk)
+        return self._array(name, shape, chunks, dtype, (*("channel",) * len(before), "y", "x"))
+
+    def _pixels(self, name: str, level: LevelLayout, after: tuple[int, ...], dtype: np.dtype[Any]) -> Checked:
         shape, chunks = (level.rows, level.cols, *after), (level.chunk, level.chunk, *after)
         return self._array(name, shape, chunks, dtype, ("y", "x", *("channel",) * len(after)))
 
     def _array(
         self, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: np.dtype[Any], axes: tuple[str, ...]
-    ) -> Any:
+    ) -> Checked:
+        """Make an array, and return it."""
         fast = zarr.codecs.BloscCodec(cname="lz4", clevel=1, shuffle="shuffle")
-        chunks = tuple(max(1, min(pair)) for pair in zip(chunks, shape, strict=True))
-        return self.root.create_array(
-            name, shape=shape, chunks=chunks, dtype=dtype, compressors=fast, dimension_names=axes, overwrite=True
+        shutil.rmtree(Path(self.where, name), ignore_errors=True)
+        self.root.create_array(
+            name,
+            shape=shape,
+            chunks=tuple(max(1, min(pair)) for pair in zip(chunks, shape, strict=True)),
+            dtype=dtype,
+            compressors=(fast, zarr.codecs.Crc32cCodec()),
+            dimension_names=axes,
         )
+        return self._at(name)
 
 
 class Stored(Conditions):
@@ -289,8 +423,7 @@ class Stored(Conditions):
 
     def scattered(self, number: int) -> Data | None:
         """Return the conditioning data between the sites of a level; None if there are none."""
-        work, name = self._store.root["work"], f"scattered{number}"
-        return Data(*(work[name][field][...] for field in Data._fields)) if name in work else None
+        return self._work.scattered.get(str(number))
 
 
 def first_turn(layout: Layout) -> Turn:

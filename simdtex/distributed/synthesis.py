@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import version
@@ -12,17 +12,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from simdtex.checkpoint import warn
 from simdtex.distributed.layout import Layout, planned
 from simdtex.driver import check_shape, drive
-from simdtex.io.atomic import atomic_folder, exclusive
+from simdtex.io.atomic import Damaged, NotWritten, atomic_folder, exclusive
 from simdtex.jobs.inputs import Inputs, check_inputs
 from simdtex.machine import Machine, memory
 from simdtex.machine.reference import Reference
 from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.plan import plan as planned_run
+from simdtex.model.source_map import apply_source_map
 from simdtex.options import resolve
 from simdtex.random import as_seed
 from simdtex.run import Callback
@@ -35,6 +37,9 @@ if TYPE_CHECKING:
 TILES = 2048
 """Sites to the side of a tile by default."""
 
+TAKEN = ("image", "source", "work")
+"""Names in a store that no map has."""
+
 PathLike = str | os.PathLike[str]
 
 
@@ -46,6 +51,7 @@ def synthesize(
     tiles: int = TILES,
     workers: int | str | Client | None = None,
     source_map: bool = False,
+    maps: dict[str, Any] | None = None,
     channel_axis: int | None = None,
     mask: ArrayLike | Sequence[ArrayLike] | None = None,
     known: ArrayLike | None = None,
@@ -54,6 +60,7 @@ def synthesize(
     rng: int | np.random.Generator | None = None,
     device: str | Machine | None = None,
     callback: Callback | None = None,
+    note: Callable[[str], None] | None = None,
     **options: Any,
 ) -> Any:
     """Make more of a texture than one machine holds: the bytes of `simdtex.synthesize` with ``method="mrf"``.
@@ -73,12 +80,17 @@ def synthesize(
         Dask scheduler at an address; those of a client. Each opens its own device. None: this process, one by one.
     source_map : bool
         Also write ``source``, for every output pixel the (row, column[, picture]) of the sample pixel it is from.
+    maps : dict, optional
+        Further maps of the material, of the sample's size: written in the same arrangement into arrays of these names.
+        Of several samples a list of such for each name, as in `simdtex.model.source_map.apply_source_map`.
     mask, known, known_source, guide, rng
         As in `simdtex.synthesize`. This process copies known values and guides into the store.
     device : str, optional
         As in `simdtex.synthesize`, on every worker.
     callback : callable, optional
         Called with a `simdtex.run.Tiling` after every tile.
+    note : callable, optional
+        Receives a sentence while the run waits for workers. None: a warning.
     **options
         Of the method, see `simdtex.methods.mrf.Options`; only schedules that relax a window as they do the whole.
 
@@ -102,7 +114,7 @@ def synthesize(
     size = check_shape(shape)
     inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
     run, seed = _plan(inputs, size, options), as_seed(rng)
-    layout = planned(run, seed, tiles)
+    layout, further = planned(run, seed, tiles), _maps(maps or {}, run)
     _libraries()
     from simdtex.distributed.cluster import check_workers, connected
     from simdtex.distributed.store import Store
@@ -112,8 +124,9 @@ def synthesize(
         memory.require_host(layout.memory * (workers or 1), "give smaller tiles or fewer workers")
     with connected(workers) as client:
         with _made(store) as temporary:
-            Store.create(temporary, run, seed, layout, channels=channel_axis is not None, source=source_map)
-        return resume(store, workers=client, channel_axis=channel_axis, device=device, callback=callback)
+            channels = channel_axis is not None
+            Store.create(temporary, run, seed, layout, channels=channels, source=source_map, maps=further)
+        return resume(store, workers=client, channel_axis=channel_axis, device=device, callback=callback, note=note)
 
 
 def resume(
@@ -123,6 +136,7 @@ def resume(
     channel_axis: int | None = -1,
     device: str | Machine | None = None,
     callback: Callback | None = None,
+    note: Callable[[str], None] | None = None,
 ) -> Any:
     """Resume an output that was stopped; the bytes are those of a run that was never stopped.
 
@@ -130,7 +144,7 @@ def resume(
     ----------
     store : path
         As of `synthesize`.
-    workers, device, callback
+    workers, device, callback, note
         As of `synthesize`; they may be others than before.
     channel_axis : int, optional
         Where the channels of the array that is returned are, if it has any.
@@ -143,25 +157,27 @@ def resume(
     Raises
     ------
     ValueError
-        There is no such store, or one of another version, or another process is at work in it.
+        There is no such store, or one of another version, another process is at work in it, or a part of it is
+        damaged; the sentence says how to go on.
     """
     opened = _opened(store)
     from simdtex.distributed.cluster import across, check_workers, connected, here
     from simdtex.distributed.tiling import Tiles
 
     check_workers(workers, device)
-    with exclusive(store), connected(workers) as client:
-        if opened.turn.phase == "done":
-            opened.finish()
-        else:
-            each = here(opened, device) if client is None else across(client, opened, device)
-            drive(Tiles(opened, each), Reference(), 0, callback)
+    with exclusive(store):
+        if not opened.finished:
+            with connected(workers) as client:
+                each = here(opened, device) if client is None else across(client, opened, device, note or warn)
+                with _mending(opened):
+                    drive(Tiles(opened, each), Reference(), 0, callback)
+        opened.clean()
     return _array(opened.where, channel_axis)
 
 
 def finished(store: PathLike) -> bool:
     """Return whether an output is complete; raise ValueError if the store holds none, as `resume` does."""
-    return bool(_opened(store).turn.phase == "done")
+    return bool(_opened(store).finished)
 
 
 def plan(
@@ -196,6 +212,22 @@ def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any]) -> Pla
     return planned_run(inputs.pictures, size, chosen, inputs.given, inputs.guide)
 
 
+def _maps(maps: dict[str, Any], plan: Plan) -> dict[str, list[NDArray[Any]]]:
+    """Return further maps as lists with one for each picture of the sample; raise if they do not fit."""
+    found, sizes = {}, [picture.shape[:2] for picture in plan.sample.pictures.pixels]
+    if maps and plan.given is not None:
+        raise ValueError("known pixels are from no sample, and nothing says what a map has there; leave the maps out")
+    for name, given in maps.items():
+        if not name.isidentifier() or name in TAKEN:
+            raise ValueError(f"{name!r} is no name of a map; give a word other than {', '.join(TAKEN)}")
+        last = np.array([[(rows - 1, cols - 1, k) for k, (rows, cols) in enumerate(sizes)]])
+        if len(sizes) == 1:
+            last, given = last[..., :2], given[0] if isinstance(given, (list, tuple)) else given
+        apply_source_map(last, given, sizes if len(sizes) > 1 else sizes[0])
+        found[name] = [np.asarray(one) for one in (given if len(sizes) > 1 else [given])]
+    return found
+
+
 @contextmanager
 def _made(store: PathLike) -> Iterator[str]:
     """Yield where to make a store, so that it exists completely or not at all."""
@@ -214,22 +246,51 @@ def _opened(path: PathLike) -> Any:
     from simdtex.distributed.store import FORMAT, Store
 
     where = os.path.abspath(path)
+    if not os.path.isdir(where):
+        raise ValueError(f"{where} is no Zarr store; give one that simdtex has begun")
     try:
-        if not os.path.isdir(where):
-            raise FileNotFoundError  # Zarr would make it
         store = Store(where)
-    except (OSError, ValueError, KeyError):
-        raise ValueError(f"{where} is no Zarr store; give one that simdtex has begun") from None
-    if "simdtex" not in store.root.attrs and "work" not in store.root:
+    except Damaged:
+        raise ValueError(f"{where} is no Zarr store, or its zarr.json is damaged; give another one") from None
+    if store.finished:
+        return store
+    if not os.path.isdir(os.path.join(where, "work")):
         raise ValueError(f"{where} is no output in tiles; give one that simdtex has begun")
-    if "work" in store.root:
-        about, own = store.root["work"].attrs.get("about", {}), version("simdtex")
-        if about.get("format") != FORMAT or about.get("version") != own:
-            raise ValueError(
-                f"{where} was begun by simdtex {about.get('version', 'of another kind')} and this is {own}; "
-                "go on with that version, or begin anew"
-            )
+    with _mending(store):
+        about, own = store.about, version("simdtex")
+    if about["format"] != FORMAT:
+        raise ValueError(
+            f"{where} has format {about['format']} and this simdtex reads {FORMAT}; "
+            f"go on with the code of simdtex {about['version']} that began it, or begin anew"
+        )
+    if about["version"] != own:
+        raise ValueError(
+            f"{where} was begun by simdtex {about['version']} and this is {own}, whose results may differ; "
+            "go on with that version, or begin anew"
+        )
     return store
+
+
+@contextmanager
+def _mending(store: Any) -> Iterator[None]:
+    """Raise a sentence that says how to go on if a part of a store is damaged or cannot be written.
+
+    The store then has gone back to where a damaged part is not needed.
+    """
+    try:
+        yield
+    except NotWritten as error:
+        raise ValueError(f"{error}, and go on with: simdtex resume {store.where}") from None
+    except Damaged as error:
+        where, part = store.where, str(error)
+        if not os.path.exists(os.path.join(where, "zarr.json")):
+            raise ValueError(
+                f"{where} was removed or moved while the run went on; put it back, or begin anew"
+            ) from None
+        wrong, again = f"{part} of {where} is missing or damaged", store.back(part)
+        if again is None:
+            raise ValueError(f"{wrong}, and nothing makes it again; remove the store and begin anew") from None
+        raise ValueError(f"{wrong}; {again} with: simdtex resume {where}") from None
 
 
 def _libraries() -> None:
@@ -242,5 +303,8 @@ def _libraries() -> None:
 
 def _array(where: str, channel_axis: int | None) -> Any:
     dask: Any = import_module("dask.array")
-    image = dask.from_zarr(where, component="image")
+    try:
+        image = dask.from_zarr(where, component="image")
+    except Exception:  # Zarr's are of many kinds
+        raise ValueError(f"image/zarr.json of {where} is missing or damaged; remove the store and begin anew") from None
     return image if channel_axis is None or image.ndim == 2 else dask.moveaxis(image, -1, channel_axis)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The task of a worker: one turn of one tile, read from the store and written to it."""
+"""The task of a worker: one turn of some tiles, read from the store and written to it."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from simdtex.machine import Machine, open_machine
 from simdtex.methods.mrf import tiles
 from simdtex.methods.mrf.algorithm import Run, finished
 from simdtex.methods.mrf.tiles import Tally, Tile, framed
+from simdtex.model.source_map import apply_source_map
 from simdtex.ops.finish import around
 from simdtex.ops.neighbourhood import Field
 
@@ -49,17 +50,18 @@ def forget() -> None:
     _contexts.clear()
 
 
-def do(where: str, name: str, device: str | Machine | None, turn: Turn, number: int) -> int:
-    """Do a turn of one tile, unless it is done; return the tile's number.
+def do(where: str, name: str, device: str | Machine | None, turn: Turn, task: int) -> int:
+    """Do a turn of a task's tiles, unless it is done and what it wrote is whole; return the number of the task.
 
     ``where`` and ``name`` are the store's path and own name, since another store may be there later.
     """
     with _one:
         here = context(where, name, device)
-        if here.store.tally(turn, number) is None:
-            tile = here.work.layout.levels[turn.level].tile(number)
-            here.store.note(turn, number, PHASES[turn.phase](here, turn, tile))
-    return number
+        if not here.store.done(turn, here.work, task):
+            level = here.work.layout.levels[turn.level]
+            tallies = [PHASES[turn.phase](here, turn, level.tile(number)) for number in level.task(task)]
+            here.store.note(turn, task, tiles.together(tallies))
+    return task
 
 
 def _begin(here: Context, turn: Turn, tile: Tile) -> Tally:
@@ -95,7 +97,13 @@ def _show(here: Context, turn: Turn, tile: Tile) -> Tally:
     if here.work.given:
         values, given = here.store.given(tile)
         shown = np.where(given, values, shown)
-    here.store.show(tile, shown, run.sample.place(frame.cut(state.source)))
+    arrays = {"image": shown if work.channels else shown[..., 0]}
+    if work.source or work.maps:
+        place = run.sample.place(frame.cut(state.source))
+        arrays |= {"source": place} if work.source else {}
+        for name, maps in work.maps.items():
+            arrays[name] = apply_source_map(place, maps if len(maps) > 1 else maps[0])
+    here.store.show(tile, arrays)
     return Tally(np.zeros(0, np.int32), 0, 0)
 
 

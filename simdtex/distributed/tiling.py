@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from math import sqrt
@@ -13,15 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.distributed.layout import LevelLayout
-from simdtex.distributed.store import PLANES, Store, Stored, Turn, phase_of
+from simdtex.distributed.store import Store, Stored, Turn, phase_of
 from simdtex.machine import Machine
 from simdtex.methods.mrf.level import Lattices
 from simdtex.methods.mrf.record import expected_work, fraction_done
+from simdtex.methods.mrf.tiles import Tile
 from simdtex.ops.use import use_penalty
 from simdtex.run import Callback, Output, Tiling
 
-Execute = Callable[[Turn, Sequence[int]], Iterator[int]]
-"""Does a turn to tiles, in any order, and yields the number of each tile that is done."""
+Execute = Callable[[Turn, int], Iterator[int]]
+"""Does so many tasks of a turn, in any order, and yields the number of each that is done."""
 
 SHOWN = 1024
 """Sites to the side of the picture that a callback sees, at most."""
@@ -52,12 +53,11 @@ class Run:
         return self.store.turn
 
     def step(self, turn: Turn, watch: Callable[..., None]) -> tuple[Turn, None]:
-        """Do a turn to all tiles that have not finished it, and return the next turn."""
+        """Do a turn to all tiles, and return the next turn; a task that has finished it takes little time."""
         level = self.work.layout.levels[turn.level]
-        new = self.store.prepare(turn, level, self.work.layout.channels, self._candidates(turn))
-        left = list(range(level.count)) if new else np.flatnonzero(~self.store.done(turn, level.count)).tolist()
-        for done, _ in enumerate(self.execute(turn, left), level.count - len(left) + 1):
-            watch(turn, done)
+        self.store.prepare(turn, self.work, self._candidates(turn))
+        for done, _ in enumerate(self.execute(turn, level.tasks), 1):
+            watch(turn, min(level.count, done * level.together))
         return self._complete(turn), None
 
     def ended(self, turn: Turn) -> bool:
@@ -65,8 +65,8 @@ class Run:
         return turn.phase == "done"
 
     def result(self, turn: Turn, observer: Any) -> tuple[NDArray[Any], Output]:
-        """Remove the working state from the store, which holds the picture."""
-        self.store.finish()
+        """Return nothing: the store holds the picture, and notes that it is complete."""
+        self.store.finish(self.work)
         return np.zeros((0, 0, 0)), Output(None)
 
     def save(self, turn: Turn) -> Turn:
@@ -91,7 +91,7 @@ class Run:
         store, lattices, levels = self.store, self.lattices, self.work.layout.levels
         if turn.phase == "show":
             return store.save(turn._replace(number=turn.number + 1, phase="done"))
-        counts, active, temperature_sum = store.total(turn, levels[turn.level].count)
+        counts, active, temperature_sum = store.total(turn)
         cooling = turn.cooling + (turn.phase == "sweep" and turn.active > 0)
         free = turn.free + (turn.phase == "sweep" and turn.active == 0)
         number, read = turn.number + 1, turn.write
@@ -104,8 +104,8 @@ class Run:
             after = store.save(Turn(number, phase_of(levels[turn.level - 1]), turn.level - 1, read))
         else:
             after = store.save(Turn(number, "show", 0, read, read))
-        if turn.phase in ("begin", "whole"):
-            store.forget(turn.level + 1)
+        if after.level < turn.level and turn.phase == "sweep":
+            store.forget(turn.level, turn.read)
         return after
 
 
@@ -160,11 +160,12 @@ class Watch:
 
     def _picture(self, turn: Turn, level: LevelLayout) -> NDArray[Any]:
         """Return every n-th site of the state before the turn, at most about `SHOWN` to the side."""
-        step, state = -(-max(level.rows, level.cols) // SHOWN), self._run.store.root["work"]
-        sample, above = self._run.lattices.sample, turn.phase in ("begin", "whole")
-        where = f"level{turn.level + above}/{turn.read}"
-        if f"{where}/{PLANES[-1]}" not in state:
+        sample, levels = self._run.lattices.sample, self._run.work.layout.levels
+        number, step = turn.level + (turn.phase in ("begin", "whole")), -(-max(level.rows, level.cols) // SHOWN)
+        if number == len(levels):
             return np.zeros((1, 1, sample.shown), sample.pixels.dtype)
-        values, source = (state[f"{where}/{name}"] for name in PLANES[:2])
-        rows = range(0, source.shape[0], step)
-        return np.concatenate([sample.picture(values[:, i, ::step][:, None], source[i, ::step][None]) for i in rows])
+        found = []
+        for row in range(0, levels[number].rows, step):
+            values, source, _ = self._run.store.read(levels[number], turn.read, Tile(row, 0, 1, levels[number].cols))
+            found.append(sample.picture(values[..., ::step], source[:, ::step]))
+        return np.concatenate(found)

@@ -42,19 +42,22 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
     """Yield a temporary file in the folder of `path`, and rename it to `path` if the block succeeds.
 
     A reader of `path` sees the old file or the complete new one. If the block fails, also by Ctrl-C, the temporary file
-    is removed and `path` is left as it was. The temporary file has the suffix of `path`; a symbolic link is followed.
-    Raises ValueError if `check_target` does, and NotWritten if the block or the renaming raises OSError, for example
-    because the disk is full.
+    is removed and `path` is left as it was. The temporary file has the suffix of `path`; a symbolic link is followed,
+    and the new file has the permissions of the old one. Raises ValueError if
+    `check_target` does, and NotWritten if the block or the renaming raises OSError, for example because the disk is
+    full.
     """
     check_target(Path(path))
     target = Path(os.path.realpath(path))
-    temporary = _hidden(target)
+    temporary, replaced = _hidden(target), target.exists()
     try:
         _remove_leftovers(target)
         # not tempfile, which would leave the finished file readable by its owner alone
-        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600 if replaced else 0o666))
         yield temporary
         _sync(temporary)
+        if replaced:
+            shutil.copymode(target, temporary)
         os.replace(temporary, target)
     except OSError as error:
         raise _not_written(path, error) from None
@@ -66,9 +69,9 @@ def atomic_path(path: PathLike) -> Iterator[Path]:
 def atomic_folder(path: PathLike) -> Iterator[Path]:
     """Yield a temporary folder in the folder of `path`, and rename it to `path` if the block succeeds.
 
-    An existing folder `path` is replaced as a whole at the end; the caller checks whether it may be. If the block
-    fails, also by Ctrl-C, the temporary folder is removed and `path` is left as it was. Errors are those of
-    `atomic_path`.
+    An existing folder `path` is replaced as a whole at the end, and the new one has its permissions; the caller checks
+    whether it may be. If the block fails, also by Ctrl-C, the temporary folder is removed and `path` is left as it was.
+    Errors are those of `atomic_path`.
     """
     target = Path(os.path.realpath(path))
     temporary = _hidden(target)
@@ -82,11 +85,16 @@ def atomic_folder(path: PathLike) -> Iterator[Path]:
         for folder, _, names in os.walk(temporary):
             for name in names:
                 _sync(Path(folder, name))
+            _sync_folder(Path(folder))
         try:
             if target.exists():
+                shutil.copymode(target, temporary)
                 target.rename(old)
             temporary.rename(target)
+            _sync_folder(target.parent)
         except BaseException:
+            if not temporary.exists():
+                target.rename(temporary)
             if old.exists() and not target.exists():
                 old.rename(target)
             raise
@@ -114,11 +122,26 @@ def write_checked(path: PathLike, write: Callable[[BinaryIO], Any]) -> None:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         file.seek(0)
         file.write(_HEADER % digest.encode())
-    if os.name != "nt":  # Windows cannot open a folder
-        try:
-            _sync(Path(os.path.realpath(path)).parent, os.O_RDONLY)
-        except OSError as error:
-            raise _not_written(path, error) from None
+    try:
+        _sync_folder(Path(os.path.realpath(path)).parent)
+    except OSError as error:
+        raise _not_written(path, error) from None
+
+
+def write_durable(path: Path, data: Any) -> None:
+    """Write bytes into a file atomically and make its folders; all of it is on the disk at the end.
+
+    Errors are those of `atomic_path`.
+    """
+    try:
+        made = [folder for folder in path.parents if not folder.exists()]
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with atomic_path(path) as temporary:
+            temporary.write_bytes(data)
+        for folder in (path.parent, *(one.parent for one in made)):
+            _sync_folder(folder)
+    except OSError as error:
+        raise _not_written(path, error) from None
 
 
 def read_checked(path: PathLike) -> BinaryIO:
@@ -155,6 +178,12 @@ def _sync(path: Path, flags: int = os.O_RDWR) -> None:
             raise
     finally:
         os.close(descriptor)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Flush the names in a folder to the disk."""
+    if os.name != "nt":  # Windows cannot open a folder
+        _sync(folder, os.O_RDONLY)
 
 
 def check_target(target: Path) -> None:

@@ -5,14 +5,16 @@ from __future__ import annotations
 
 import io
 import logging
+import re
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from math import prod
 from threading import Lock
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import PIL.ExifTags
 import PIL.Image
 from numpy.typing import NDArray
 
@@ -23,21 +25,64 @@ Array = NDArray[Any]
 FORMATS = ("PNG", "JPEG", "TIFF", "BMP", "WEBP", "GIF")
 """The only Pillow readers in use: others start programs, for example that of PostScript."""
 
+ORIENTATION = 0x0112
+"""The EXIF and TIFF tag of the orientation."""
+
+_KEPT = (0x010E, 0x010F, 0x0110, 0x0131, 0x0132, 0x013B, 0x8298)
+"""The EXIF tags that are kept beside exposure and place: description, camera, software, date, author, rights."""
+
+_SIZE = (0xA002, 0xA003)
+"""The EXIF tags of width and height."""
+
+_PNM = re.compile(rb"P([2356])" + 3 * rb"(?:\s|#[^\r\n]*[\r\n])+(\d{1,9})" + rb"\s")
+"""The header of PGM and PPM: the kind, the width, the height and the largest value."""
+
 _COMPRESSIONS = frozenset((1, 2, 3, 4, 5, 8, 32773, 32946, 34925, 50000))
 """TIFF compressions whose decoders stop at the end of a page: none, CCITT, LZW, Deflate, PackBits, LZMA, Zstandard."""
 
 _PILLOW = Lock()
 
 
-def decode(data: bytes, most: int) -> Array:
+class Metadata(NamedTuple):
+    """What a picture file says beside its pixels.
+
+    Attributes
+    ----------
+    profile : bytes, optional
+        The ICC profile, which says what colours the values are.
+    dpi : (float, float), optional
+        Pixels per inch, across and down.
+    exif : bytes, optional
+        Camera, exposure, date, place, author and rights; without the orientation, which is applied, the size and the
+        preview.
+    more : bool
+        Whether the file has further frames or pages, which are not read.
+    """
+
+    profile: bytes | None = None
+    dpi: tuple[float, float] | None = None
+    exif: bytes | None = None
+    more: bool = False
+
+
+NOTHING = Metadata()
+"""What a file says that has pixels alone."""
+
+Decoded = tuple[Array, Metadata]
+
+
+def decode(data: bytes, most: int) -> Decoded:
     """Decode the bytes of a picture file of at most so many pixels; the format is recognised by its content.
 
     Return a (rows, cols) or (rows, cols, channels) array, upright, palettes and print colours as RGB, without a fully
-    opaque alpha channel. Raise TooLarge before anything is decoded, and each decoder's own errors for a damaged file.
+    opaque alpha channel; and what the file says of it. Raise TooLarge before anything is decoded, and each decoder's
+    own errors for a damaged file.
     """
     with _quiet():
         if data.startswith(b"\x93NUMPY"):
-            return read_npy(io.BytesIO(data), len(data), most)
+            return read_npy(io.BytesIO(data), len(data), most), NOTHING
+        if header := _PNM.match(data):
+            return _read_pnm(data, header, most), NOTHING
         if data[:4] in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
             return _read_tiff(data, most)
         if data.startswith(b"\x89PNG\r\n\x1a\n") and data[24:25] == b"\x10":  # bits per sample: 16
@@ -71,10 +116,29 @@ def _opened(data: bytes, most: int) -> PIL.Image.Image:
     return picture
 
 
-def _read_pillow(data: bytes, most: int) -> Array:
+def _read_pnm(data: bytes, header: re.Match[bytes], most: int) -> Array:
+    """Decode PGM or PPM, text or binary, of which Pillow changes the values unless their largest is 255 or 65535."""
+    kind, width, height, largest = (int(word) for word in header.groups())
+    if not 0 < largest < 65536:
+        raise ValueError(f"its largest value is {largest}, not 1 to 65535")
+    shape = (height, width, 3) if kind in (3, 6) else (height, width)
+    dtype = np.dtype(np.uint8 if largest < 256 else ">u2")
+    check_array(shape, dtype.itemsize, most)
+    if kind > 3:
+        pixels = np.frombuffer(data, dtype, prod(shape), header.end())
+    else:
+        text = re.sub(rb"#[^\r\n]*", b"", data[header.end() :])
+        pixels = np.fromstring(text.decode("ascii"), np.int64, prod(shape), sep=" ")
+    if pixels.size < prod(shape):
+        raise ValueError("it ends before its last pixel")
+    if pixels.max(initial=0) > largest or pixels.min(initial=0) < 0:
+        raise ValueError(f"it has a value that is not 0 to {largest}")
+    return pixels.reshape(shape).astype(dtype)
+
+
+def _read_pillow(data: bytes, most: int) -> Decoded:
     with _opened(data, most) as picture:
         picture.load()
-        orientation = int(picture.getexif().get(0x0112, 1))
         transparent = picture.has_transparency_data
         if picture.mode in ("1", "L"):
             mode = "LA" if transparent else "L"
@@ -82,21 +146,61 @@ def _read_pillow(data: bytes, most: int) -> Array:
             mode = picture.mode
         else:
             mode = "RGBA" if transparent else "RGB"
-        pixels = np.asarray(picture.convert(mode))
-    return _finished(pixels, orientation, mode in ("LA", "RGBA"))
+        pixels = np.asarray(_in_rgb(picture) if picture.mode == "CMYK" else picture.convert(mode))
+        orientation, metadata = _metadata(picture)
+    return _finished(pixels, orientation, mode in ("LA", "RGBA")), metadata
 
 
-def _read_png16(data: bytes, most: int) -> Array:
+def _metadata(picture: PIL.Image.Image) -> tuple[int, Metadata]:
+    """Return the orientation of a picture of Pillow, and what its file says beside its pixels."""
+    orientation, exif, more, profile = 1, None, False, picture.info.get("icc_profile")
+    with suppress(Exception):  # a damaged second frame is no reason to refuse the first
+        more = picture.format != "MPO" and getattr(picture, "is_animated", False)  # MPO is a JPEG with previews
+    with suppress(Exception):  # nor is damaged EXIF
+        found, kept = picture.getexif(), PIL.Image.Exif()
+        orientation = int(found.get(ORIENTATION, 1))
+        for tag in _KEPT:
+            if tag in found:
+                kept[tag] = found[tag]
+        for ifd in (PIL.ExifTags.IFD.Exif, PIL.ExifTags.IFD.GPSInfo):
+            if values := {tag: value for tag, value in found.get_ifd(ifd).items() if tag not in _SIZE}:
+                kept[ifd] = values
+        exif = kept.tobytes() if kept else None
+    dpi = _dpi(picture.info.get("dpi"), orientation)
+    return orientation, Metadata(None if picture.mode in ("CMYK", "LAB") else profile, dpi, exif, more)
+
+
+def _dpi(found: Any, orientation: int) -> tuple[float, float] | None:
+    """Return pixels per inch across and down of an upright picture, or None if they are not numbers above 0."""
+    across, down = (float(one) for one in found or (0, 0))
+    if not (0 < across < np.inf and 0 < down < np.inf):
+        return None
+    return (down, across) if orientation > 4 else (across, down)
+
+
+def _in_rgb(picture: PIL.Image.Image) -> PIL.Image.Image:
+    """Return a CMYK picture in sRGB, by its colour profile if it has one that can be used."""
+    converted = None
+    if found := picture.info.get("icc_profile"):
+        from PIL import ImageCms
+
+        with suppress(ImageCms.PyCMSError, OSError):
+            profile = ImageCms.ImageCmsProfile(io.BytesIO(found))
+            converted = ImageCms.profileToProfile(picture, profile, ImageCms.createProfile("sRGB"), outputMode="RGB")
+    return converted or picture.convert("RGB")
+
+
+def _read_png16(data: bytes, most: int) -> Decoded:
     import imagecodecs  # here and below: loaded only for pictures that need it
 
     with _opened(data, most) as picture:  # Pillow has no 16-bit colour, but checks the header and knows EXIF
         check_size(0, 2 * prod(picture.size) * len(picture.getbands()), most)
-        orientation = int(picture.getexif().get(0x0112, 1))
+        orientation, metadata = _metadata(picture)
     pixels: Array = imagecodecs.png_decode(data)
-    return _finished(pixels, orientation, pixels.ndim == 3 and pixels.shape[2] in (2, 4))
+    return _finished(pixels, orientation, pixels.ndim == 3 and pixels.shape[2] in (2, 4)), metadata
 
 
-def _read_tiff(data: bytes, most: int) -> Array:
+def _read_tiff(data: bytes, most: int) -> Decoded:
     import tifffile
 
     with tifffile.TiffFile(io.BytesIO(data)) as tiff:
@@ -108,8 +212,16 @@ def _read_tiff(data: bytes, most: int) -> Array:
         if any(offset + count > len(data) for offset, count in ends):
             raise ValueError("it ends before its last pixel")
         kind, compression = int(page.photometric), int(page.compression)
+        orientation = int(page.tags.valueof(ORIENTATION, 1))
+        metadata = Metadata(page.iccprofile)
+        with suppress(Exception):  # a damaged resolution or second page is no reason to refuse the first
+            told = 282 in page.tags and int(page.resolutionunit) in (2, 3)  # per inch or centimetre
+            dpi = _dpi(page.get_resolution("inch") if told else None, orientation)
+            metadata = metadata._replace(dpi=dpi, more=tiff.pages.is_multipage)
         if kind > 2 or compression in (6, 7):
-            return _read_pillow(data, most)  # JPEG, palettes, and print and video colours, which Pillow converts to RGB
+            # JPEG, palettes, and print and video colours, which Pillow converts to RGB
+            pixels, found = _read_pillow(data, most)
+            return pixels, metadata._replace(profile=found.profile)  # none of print colours
         if compression not in _COMPRESSIONS:
             raise ValueError(f"it is compressed by the method {compression}; save it with Deflate or uncompressed")
         pixels = page.asarray()
@@ -119,13 +231,24 @@ def _read_tiff(data: bytes, most: int) -> Array:
             pixels = np.moveaxis(pixels, 0, -1)
         elif page.axes not in ("YX", "YXS"):
             raise ValueError(f"its axes are {page.axes}, not rows, columns and channels")
-        orientation = int(page.tags.valueof(274, 1))
-        alpha = bool(page.extrasamples) and int(page.extrasamples[-1]) in (1, 2)
+        extra = int(page.extrasamples[-1]) if page.extrasamples else 0  # 1: premultiplied alpha, 2: alpha
     if kind == 0:  # white is zero
         pixels = ~pixels
     if pixels.dtype == bool:
         pixels = pixels * np.uint8(255)
-    return _finished(pixels, orientation, alpha)
+    if extra == 1 and pixels.ndim == 3:
+        pixels = _divided(pixels)
+    return _finished(pixels, orientation, extra in (1, 2)), metadata
+
+
+def _divided(pixels: Array) -> Array:
+    """Return pixels whose colours were multiplied by their alpha with the colours themselves, 0 where alpha is 0."""
+    full = 1.0 if pixels.dtype.kind == "f" else float(np.iinfo(pixels.dtype).max)
+    alpha = pixels[..., -1:].astype(np.float64)
+    colours = pixels[..., :-1] * np.divide(full, alpha, out=np.zeros_like(alpha), where=alpha > 0)
+    if pixels.dtype.kind != "f":
+        colours = np.rint(np.clip(colours, 0, full))
+    return np.concatenate([colours.astype(pixels.dtype), pixels[..., -1:]], -1)
 
 
 def _check_page(page: Any, most: int) -> None:

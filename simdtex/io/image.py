@@ -12,6 +12,7 @@ import io
 import os
 import re
 from collections.abc import Collection, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,12 +22,13 @@ import PIL.Image
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io.atomic import Unbuffered, atomic_path, check_target
-from simdtex.io.decode import decode, native
+from simdtex.io.decode import NOTHING, Metadata, decode, native
 from simdtex.io.limits import TooLarge, check_file, max_pixels_or_default
 from simdtex.options import unmasked
 
 __all__ = [
     "Image",
+    "Metadata",
     "as_array",
     "cast",
     "check_sample",
@@ -55,10 +57,13 @@ class Image:
         The values of the file, in native byte order.
     channel_axis : None or -1
         None for a grey picture of two axes, -1 for one with channels last.
+    metadata : Metadata
+        What the file says beside the pixels: `write` takes it.
     """
 
     pixels: Array
     channel_axis: int | None
+    metadata: Metadata = NOTHING
 
 
 def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
@@ -67,8 +72,8 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
     Parameters
     ----------
     path : path
-        PNG, JPEG, TIFF (first page), BMP, WebP, GIF (first frame), or a NumPy ``.npy`` of shape (rows, cols) or
-        (rows, cols, channels). No other format is tried.
+        PNG, JPEG, TIFF (first page), BMP, WebP, GIF (first frame), PGM, PPM, or a NumPy ``.npy`` of shape (rows, cols)
+        or (rows, cols, channels). No other format is tried.
     max_pixels : int, optional
         The most pixels that are read, with 8 bytes for each. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else
         2**27. The file's header is checked before anything is decoded.
@@ -76,8 +81,10 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
     Returns
     -------
     Image
-        Pixels keep their 8-bit, 16-bit, integer or float values. Palettes and print colours (CMYK) become RGB, 1-bit
-        becomes uint8 0 and 255. A fully opaque alpha channel is dropped; any other is kept as the last channel. The
+        Pixels keep their 8-bit, 16-bit, integer or float values; those of PGM and PPM are the numbers in the file,
+        uint8 if the largest that it allows is below 256, else uint16. Palettes and print colours (CMYK) become RGB, by
+        their colour profile if they have one; 1-bit becomes uint8 0 and 255. A fully opaque alpha channel is dropped;
+        any other is kept as the last channel, and colours that were multiplied by it (TIFF) are divided by it. The
         orientation that a camera noted (EXIF) is applied.
 
     Raises
@@ -105,11 +112,11 @@ def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None) -> Imag
     if not data:
         raise ValueError(f"{name} is empty (0 bytes): give a file with an image in it")
     try:
-        pixels = np.asarray(decode(data, most))
+        found, metadata = decode(data, most)
     except TooLarge as error:
         raise ValueError(f"{name} {error}") from None
     except PIL.UnidentifiedImageError:
-        raise ValueError(f"{name} is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF or .npy file") from None
+        raise ValueError(f"{name} is not an image: give a PNG, JPEG, TIFF, BMP, WebP, GIF, PPM or .npy file") from None
     except MemoryError:
         raise ValueError(f"{name} is too large for the memory: crop it first") from None
     except Exception as error:  # every decoder has its own exceptions for a damaged file
@@ -120,10 +127,10 @@ def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None) -> Imag
             "or TIFF"
         ) from None
     try:
-        pixels = native(_picture(pixels))
+        pixels = native(_picture(found))
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: {error}") from None
-    return Image(pixels, -1 if pixels.ndim == 3 else None)
+    return Image(pixels, -1 if pixels.ndim == 3 else None, metadata)
 
 
 def split_alpha(pixels: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
@@ -204,14 +211,19 @@ def as_array(name: str, values: Any) -> Array:
     """Return array-likes as an ndarray, or as a masked array if that is what they are.
 
     The arrays of other libraries, such as xarray and dask, are taken whole, their axes by position. Raises ValueError
-    if rows have unequal lengths.
+    if rows have unequal lengths, and TypeError if NumPy cannot take the array, for example from a GPU.
     """
     if hasattr(values, "compute"):  # dask, which NumPy would convert without its mask
         values = values.compute()
+    if getattr(values, "mode", None) in ("P", "PA"):  # Pillow
+        raise ValueError(f"{name} is an image of palette indices, which are no colours; give image.convert('RGB')")
     try:
-        array = np.asanyarray(values)
+        exchanged = hasattr(values, "__dlpack__") and not hasattr(values, "__array__")
+        array = np.from_dlpack(values) if exchanged else np.asanyarray(values)
     except ValueError:
         raise ValueError(f"{name} is ragged; give rows of equal length") from None
+    except (TypeError, RuntimeError, BufferError) as error:  # as a tensor says
+        raise TypeError(f"{name} is no array that NumPy can take: {error}") from None
     return array if isinstance(array, np.ma.MaskedArray) else np.asarray(array)
 
 
@@ -355,6 +367,12 @@ _OPTIONS: dict[str, dict[str, Any]] = {
     ".webp": {"lossless": True, "exact": True},
 }
 
+LOSSY = (".jpg", ".jpeg")
+"""The suffixes of a format that changes pixels."""
+
+_MARKER = 65533
+"""The most bytes of EXIF that a JPEG holds."""
+
 _BIG = 2**32 - 2**25
 """Bytes from which on a TIFF must be a BigTIFF."""
 
@@ -400,7 +418,7 @@ def suitable_suffix(dtype: DTypeLike | None, channels: int | None) -> str:
     return next(suffix for suffix in (".png", ".tif", ".npy") if _FORMATS[suffix].holds(dtype, channels))
 
 
-def write(path: PathLike, array: ArrayLike) -> None:
+def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) -> None:
     """Write a picture in the format of the suffix, atomically.
 
     Parameters
@@ -411,6 +429,9 @@ def write(path: PathLike, array: ArrayLike) -> None:
     array : array_like, (rows, cols) or (rows, cols, channels)
         The values are written unchanged, bool as 0 and 255 (as bool in ``.npy``). Two and four channels of a PNG are
         grey and colour with alpha; WebP turns grey into equal RGB.
+    metadata : Metadata, optional
+        What `read` found beside the pixels. PNG, TIFF, JPEG and WebP keep the colour profile, if it is one of as many
+        channels; PNG, JPEG and WebP the EXIF; and all but WebP and ``.npy`` the pixels per inch.
 
     Raises
     ------
@@ -427,23 +448,31 @@ def write(path: PathLike, array: ArrayLike) -> None:
         pixels = pixels * np.uint8(255) if pixels.dtype == bool else pixels
         pixels = native(pixels[..., 0] if channels == 1 and pixels.ndim == 3 else pixels)
     with atomic_path(path) as temporary:
-        encode(temporary, suffix, pixels)
+        encode(temporary, suffix, pixels, metadata or NOTHING)
 
 
-def encode(path: Path, suffix: str, pixels: Array) -> None:
+def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING) -> None:
     """Write pixels in a format that holds them, over an existing file."""
+    metadata = metadata._replace(profile=fitting(metadata.profile, 1 if pixels.ndim == 2 else pixels.shape[2]))
+    beside = {"icc_profile": metadata.profile, "dpi": metadata.dpi, "exif": metadata.exif}
+    if suffix in LOSSY and len(metadata.exif or b"") > _MARKER:
+        del beside["exif"]
+    beside = {name: value for name, value in beside.items() if value}
     if suffix == ".npy":
         with path.open("wb") as file:
             np.save(Unbuffered(file), pixels, allow_pickle=False)
     elif suffix == ".png" and pixels.dtype == np.uint16:
         import imagecodecs  # here and below: loaded only for pictures that need it
 
-        path.write_bytes(imagecodecs.png_encode(pixels))
+        data = imagecodecs.png_encode(pixels)
+        said = pillow_bytes(PIL.Image.new("RGB" if pixels.ndim == 3 else "L", (1, 1)), "PNG", **beside)
+        head = 33  # bytes of the signature and the header; what Pillow says of colours and size follows it
+        path.write_bytes(data[:head] + said[head : said.rindex(b"IDAT") - 4] + data[head:])
     elif suffix in (".tif", ".tiff"):
-        write_tiff(path, [pixels])
+        write_tiff(path, [pixels], metadata)
     else:
         kind = PIL.Image.registered_extensions()[suffix]
-        path.write_bytes(pillow_bytes(PIL.Image.fromarray(pixels), kind, **_OPTIONS.get(suffix, {})))
+        path.write_bytes(pillow_bytes(PIL.Image.fromarray(pixels), kind, **_OPTIONS.get(suffix, {}), **beside))
 
 
 def write_labels(path: PathLike, labels: NDArray[np.uint8], colours: NDArray[np.uint8]) -> None:
@@ -464,13 +493,10 @@ def read_labels(path: PathLike) -> NDArray[Any]:
 
     Raises ValueError if it is no such picture.
     """
-    try:
-        with PIL.Image.open(path) as picture:
-            if picture.mode == "P":
-                return np.asarray(picture)
-    except (OSError, ValueError):  # no format of Pillow, or not a picture: `read` says so
-        pass
-    pixels = read(path).pixels
+    pixels = read(path).pixels  # first: it refuses what is too large or damaged
+    with suppress(OSError, ValueError), PIL.Image.open(path) as picture:
+        if picture.mode == "P":
+            return np.asarray(picture)
     if pixels.dtype.kind not in "iu" or (pixels.ndim == 3 and pixels.shape[2] > 1):
         raise ValueError(f"{os.fspath(path)} is no picture of labels; save it grey or with a palette, 0, 1, 2...")
     return pixels.reshape(pixels.shape[:2])
@@ -483,7 +509,7 @@ def pillow_bytes(picture: PIL.Image.Image, kind: str, **options: Any) -> bytes:
     return buffer.getvalue()
 
 
-def write_tiff(path: Path, pages: Iterable[Array]) -> None:
+def write_tiff(path: Path, pages: Iterable[Array], metadata: Metadata = NOTHING) -> None:
     """Write pictures of one shape as the pages of a TIFF."""
     import tifffile
 
@@ -500,7 +526,29 @@ def write_tiff(path: Path, pages: Iterable[Array]) -> None:
                 extrasamples=(["unassalpha"] if channels in (2, 4) else [0] * (channels - colours)) or None,
                 compression="zlib",
                 metadata=None,
+                iccprofile=metadata.profile,
+                resolution=metadata.dpi,
+                resolutionunit="inch" if metadata.dpi else None,
             )
+
+
+def fitting(profile: bytes | None, channels: int) -> bytes | None:
+    """Return a colour profile if it is one of grey or of RGB and the picture has as many channels, alpha apart."""
+    space = {1: b"GRAY", 2: b"GRAY", 3: b"RGB ", 4: b"RGB "}.get(channels)
+    return profile if profile and profile[16:20] == space else None
+
+
+def profile_name(profile: bytes | None) -> str:
+    """Return the name of a colour profile; without one, colours are taken for sRGB."""
+    if profile is None:
+        return "sRGB"
+    from PIL import ImageCms  # loaded only for pictures that have one
+
+    try:
+        name = ImageCms.getProfileDescription(ImageCms.ImageCmsProfile(io.BytesIO(profile))).strip()
+    except (ImageCms.PyCMSError, OSError):
+        return "an unknown profile"
+    return "sRGB" if name.startswith("sRGB") else name
 
 
 def to_display(array: ArrayLike, limits: tuple[float, float] | None = None) -> NDArray[np.uint8]:

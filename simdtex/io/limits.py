@@ -8,6 +8,7 @@ import stat
 import zipfile
 from collections.abc import Iterable
 from math import prod
+from tokenize import TokenError
 from typing import IO, Any
 
 import numpy as np
@@ -80,12 +81,15 @@ def read_npy(file: IO[bytes], length: int, most: int) -> NDArray[Any]:
     """Read an ``.npy`` array of `length` bytes, header included, if it is within the limits."""
     begin = file.tell()
     version = np.lib.format.read_magic(file)
-    if version == (1, 0):
-        shape, _, dtype = np.lib.format.read_array_header_1_0(file)
-    elif version == (2, 0):
-        shape, _, dtype = np.lib.format.read_array_header_2_0(file)
-    else:
-        raise ValueError("it holds no plain array of numbers")
+    try:
+        if version == (1, 0):
+            shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+        elif version == (2, 0):
+            shape, _, dtype = np.lib.format.read_array_header_2_0(file)
+        else:
+            raise ValueError("it holds no plain array of numbers")
+    except TokenError:
+        raise ValueError("its header is damaged") from None
     if dtype.hasobject:
         raise ValueError("it holds Python objects and no numbers")
     check_array(shape, dtype.itemsize, most)

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 __all__ = ["check_realisations_path", "read_netcdf", "write_realisations"]
 
+MARK = "simdtex_realisations"
+"""Attribute of a Zarr store that was written here, which lists its arrays; only such a store is replaced."""
+
 PathLike = str | os.PathLike[str]
 
 _NEEDED: dict[str, tuple[str, ...]] = {
@@ -54,8 +57,10 @@ def check_realisations_path(path: PathLike, *, source: bool = False) -> str:
         if find_spec(library) is None:
             raise ValueError(f"{library} is not installed; pip install 'simdtex[simulate]'")
     if suffix == ".zarr" and target.is_dir():
-        if not (target / "zarr.json").is_file():
-            raise ValueError(f"{target} is a folder and no Zarr store: give a new name")
+        if not _own(target):
+            raise ValueError(
+                f"{target} is a folder and not a store of realisations alone: remove it, or give a new name"
+            )
         check_folder_writable(target)
         return suffix
     check_target(target)
@@ -74,8 +79,9 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
         or ``.npz`` for ``numpy.load``: ``values``, each coordinate under its name, and ``attributes``, a JSON text.
         ``.gslib`` (text) and ``.sgems`` are grids of which each realisation is a variable, called by the array's name,
         ``__real`` and its number, as SGeMS does: `simdtex.write_grid`; they keep origin and size of cells, and no
-        attributes, and cells outside of the coordinate ``region`` are unknown values there. An existing file or Zarr
-        store is replaced.
+        attributes, and cells outside of the coordinate ``region`` are unknown values there. An existing file is
+        replaced, and a Zarr store if it was written here and nothing was added; its attribute ``simdtex_realisations``
+        lists its arrays.
     array : DataArray, (realisation, y, x) or (realisation, y, x, variable), or Dataset
         What `simdtex.simulate` returns; attributes are texts and numbers. A grid may have layers, (realisation, z, y,
         x), and its coordinates must be evenly spaced and ascend. ``.zarr`` and ``.nc`` alone need xarray. A Dataset is
@@ -114,9 +120,20 @@ def write_realisations(path: PathLike, array: DataArray | Dataset) -> None:
         with atomic_path(path) as temporary:
             temporary.write_bytes(data)
         return
+    whole = named if source else named.to_dataset()
+    whole = whole.assign_attrs({MARK: sorted(map(str, whole.variables))})
     with atomic_folder(path) as store, warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Consolidated metadata")  # not yet in the specification, but read by xarray
-        named.to_zarr(store, mode="w", zarr_format=3)
+        whole.to_zarr(store, mode="w", zarr_format=3)
+
+
+def _own(store: Path) -> bool:
+    """Return whether a folder holds what `write_realisations` wrote, and nothing else."""
+    try:
+        wrote = json.loads((store / "zarr.json").read_text())["attributes"][MARK]
+        return sorted(os.listdir(store)) == sorted([*wrote, "zarr.json"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
 
 
 def read_netcdf(path: PathLike, *, max_pixels: int | None = None) -> CartesianGrid:

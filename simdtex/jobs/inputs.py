@@ -70,7 +70,7 @@ def check_samples(sample: Any, channel_axis: int | None, mask: Any = None, axes:
     With 3 ``axes`` the sample is a volume.
     """
     several = is_several(sample, channel_axis)
-    arrays: list[Any] = list(sample) if several else [sample]
+    arrays: list[Any] = [as_array("a sample", one) for one in sample] if several else [sample]
     if several and len(kinds := {one.ndim for one in arrays}) > 1:
         counts = f"{min(kinds)} and {max(kinds)}"
         raise ValueError(f"the samples have {counts} axes; give samples of one type, grey or colour")
@@ -105,7 +105,7 @@ def is_several(sample: Any, channel_axis: int | None) -> bool:
     """Return whether a sample is a list or tuple of samples, and not one array written as a list."""
     if not isinstance(sample, (list, tuple)):
         return False
-    axes = [getattr(one, "ndim", 0) for one in sample]
+    axes = [0 if isinstance(one, (list, tuple)) else np.ndim(one) for one in sample]
     return (2 if channel_axis is None else 3) in axes and min(axes) >= 2
 
 

@@ -13,6 +13,12 @@ from simdtex.model.use import counts
 
 Picture = NDArray[np.uint8]
 
+OKABE_ITO = (
+    *((0, 0, 0), (230, 159, 0), (86, 180, 233), (0, 158, 115)),
+    *((240, 228, 66), (0, 114, 178), (213, 94, 0), (204, 121, 167)),
+)
+"""Black, and seven colours that colour-blind people tell apart, sRGB."""
+
 
 def temperature_colours(temperature: ArrayLike) -> Picture:
     """Return temperatures as colours from near black (0, cold) to pale yellow (1, hot), sRGB in a last axis of 3.
@@ -59,11 +65,15 @@ def use_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
 
 
 def label_colours(count: int) -> Picture:
-    """Return colours for labels 0 to count - 1, (count, 3) uint8: black for 0, the others far apart."""
-    number = np.arange(1, count)
+    """Return colours for labels 0 to count - 1, (count, 3) uint8: black for 0, the others far apart.
+
+    Labels 1 to 7 have the colours of Okabe and Ito (2008), which colour-blind people tell apart too.
+    """
+    number = np.arange(len(OKABE_ITO), max(count, len(OKABE_ITO)))
     hue = number * np.pi * (3 - np.sqrt(5))  # the golden angle: neighbours in number are far apart
     lightness = 0.62 + 0.16 * (number % 3 - 1)
-    return np.concatenate([np.zeros((1, 3), np.uint8), _srgb(lightness, 0.13 * np.cos(hue), 0.13 * np.sin(hue))])
+    more = _srgb(lightness, 0.13 * np.cos(hue), 0.13 * np.sin(hue))
+    return np.concatenate([np.array(OKABE_ITO, np.uint8), more])[:count]
 
 
 def _srgb(lightness: NDArray[Any], a: NDArray[Any], b: NDArray[Any]) -> Picture:

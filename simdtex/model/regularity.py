@@ -61,6 +61,9 @@ WAVES = 4
 ROUND, FINE = 2.0**20, 2.0**16
 """Cosines are rounded to 1 / ROUND, vectors to 1 / FINE of a pixel: libraries differ in their last bits by less."""
 
+TOGETHER = 32
+"""Rows whose cosines are computed at a time: their numbers stay in the processor's cache."""
+
 SMALLEST = 4
 """Pixels of a cell that is given, at least."""
 
@@ -172,7 +175,11 @@ class Waves(NamedTuple):
         whole = grid.within
         row = (whole.top + np.arange(grid.rows)) % whole.rows * whole.step
         col = (whole.left + np.arange(grid.cols)) % whole.cols * whole.step
-        return self._levels(self.output, row[:, None], col[None, :])
+        found = np.empty((WAVES, grid.rows, grid.cols), np.uint16)
+        for first in range(0, grid.rows, TOGETHER):
+            some = slice(first, first + TOGETHER)
+            found[:, some] = self._levels(self.output, row[some, None], col[None, :])
+        return found
 
     def half(self, step: int) -> float:
         """Return the squared difference, in levels, of pixels half a step apart: the mean along rows and columns."""

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.atomic import atomic_path
-from simdtex.io.image import check_writable, read, write
+from simdtex.io.image import as_array, check_writable, read, write
 from simdtex.io.limits import TooLarge, max_pixels_or_default, read_npz
 from simdtex.model.use import SourceMap, checked
 from simdtex.options import unmasked
@@ -83,14 +83,13 @@ def _maps(
     positions: SourceMap, other_map: Any, sample_shape: Any
 ) -> tuple[list[NDArray[Any]], list[tuple[int, ...] | None]]:
     """Return the map of each sample and the sample's size, None if unknown."""
-    if positions.shape[2] == 3 and isinstance(other_map, (list, tuple)):
-        for one in other_map:
-            unmasked("another map", one)
-        maps = [np.asarray(one) for one in other_map]
+    shapes: list[tuple[int, ...] | None] = [sample_shape]
+    several = positions.shape[2] == 3 and isinstance(other_map, (list, tuple))
+    maps = [as_array("the other map", one) for one in (other_map if several else [other_map])]
+    for one in maps:
+        unmasked("the other map", one)
+    if several:
         shapes = [None] * len(maps) if sample_shape is None else list(sample_shape)
-    else:
-        unmasked("the other map", other_map)
-        maps, shapes = [np.asarray(other_map)], [sample_shape]
     wanted = 1 + (int(positions[..., 2].max(initial=0)) if positions.shape[2] == 3 else 0)
     if len(maps) < wanted:
         raise ValueError(

@@ -16,7 +16,7 @@ from simdtex.report.sheet import contact_sheet
 from simdtex.report.tables import Table
 from simdtex.run import Output
 
-UNTOLD = np.full((1, 3), 128, np.uint8)
+UNTOLD = np.full(3, 128, np.uint8)
 """The colour of pixels whose true label is not known."""
 
 
@@ -36,26 +36,32 @@ def write_classification(
         See `simdtex.report.page.check_folder`.
     image : (rows, cols[, bands]) array
     labels : (rows, cols) uint8 array
-        0 unknown, 1 the first class.
+        0 unknown.
     output : simdtex.run.Output
         Of `simdtex.classify`.
     truth : (rows, cols) array of integers, optional
-        The labels that are right; any number beyond the classes where that is not known.
+        The labels that are right, 0 to 255; one of no class where that is not known.
     command : str
         The command line, if there is one.
     """
     statistics, fit = output.statistics, output.fit
     assert fit is not None
     classes = statistics["classes"]
-    names, colours, count = [one["name"] for one in classes], label_colours(len(classes)), len(classes)
+    names, count, colours = [one["name"] for one in classes], len(classes), label_colours(256)
+    number = np.full(256, count)  # of the class of each label
+    number[[one["label"] for one in classes]] = np.arange(count)
     picture = to_display(image)
     shown = picture[..., :3] if picture.shape[-1] > 2 else np.repeat(picture[..., :1], 3, 2)
     sheet = [("the picture", shown), ("the labels", colours[labels])]
     if truth is not None:
-        sheet.append(("the truth", np.concatenate([colours, UNTOLD])[np.minimum(truth, count)]))
+        known = number[truth][..., None] < count
+        sheet.append(("the truth", np.where(known, colours[truth], UNTOLD)))
     legend = [
-        {"Label": str(c), "Class": name, "Colour": _hex(colour), "Share": f"{one['share']:.1%}"}
-        for c, (name, colour, one) in enumerate(zip(names, colours, classes, strict=True))
+        {
+            **{"Label": str(one["label"]), "Class": one["name"]},
+            **{"Colour": _hex(colours[one["label"]]), "Share": f"{one['share']:.1%}"},
+        }
+        for one in classes
     ]
     pictures = contact_sheet(sheet, columns=len(sheet))
     caption = "The picture and its labels. Black is unknown; grey is where the truth is not known."
@@ -75,7 +81,7 @@ def write_classification(
     ]
     results: dict[str, Any] = {"shape": labels.shape, "statistics": statistics}
     if truth is not None:
-        confusion = confusion_matrix(labels, truth, count)
+        confusion = confusion_matrix(number[labels], number[truth], count)
         rows = [
             {"True class": name, **{other: str(n) for other, n in zip(names, line, strict=True)}}
             for name, line in zip(names, confusion, strict=True)
@@ -97,9 +103,9 @@ def _hex(colour: NDArray[np.uint8]) -> str:
 
 
 def confusion_matrix(labels: NDArray[Any], truth: NDArray[Any], count: int) -> NDArray[np.int64]:
-    """Return how many pixels of each true label (rows) have each label (columns), (count, count).
+    """Return how many pixels of each true class (rows) are labelled as each (columns), (count, count).
 
-    Pixels whose true label is ``count`` or more are left out.
+    Classes are numbered from 0; pixels whose true class is ``count`` or more are left out.
     """
     known = truth < count
     pairs = truth[known].astype(np.int64) * count + labels[known]

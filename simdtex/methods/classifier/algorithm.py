@@ -17,7 +17,7 @@ from simdtex import schedules
 from simdtex.checkpoint import like
 from simdtex.machine import Machine, memory
 from simdtex.machine.interface import Array
-from simdtex.methods.classifier.model import UNITS, Model, Region, learn, prepared, windowed
+from simdtex.methods.classifier.model import UNITS, Model, Null, Region, learn, prepared, windowed
 from simdtex.methods.classifier.options import Options
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.pictures import Mask
@@ -30,6 +30,9 @@ from simdtex.run import Callback, Labelling, Output
 
 WORK = 2**32
 """Multiply-adds of a step, about."""
+
+AT_ONCE = 2**19
+"""Sites whose fits are computed at a time."""
 
 STEPS = 64
 """Steps to a sweep, at most: each takes a pass over the picture."""
@@ -46,27 +49,30 @@ class Plan:
         Pixels without a value, which are labelled 0.
     classes : sequence of sequences of Region, or Model
         What there is of each class; or the model that was learned from it.
-    names : tuple of str
+    names : dict of int to str
+        The label of each class, 1 to 254, and its name.
     options : Options
     """
 
     pixels: NDArray[Any]
     unknown: Mask
     classes: Sequence[Sequence[Region]] | Model
-    names: tuple[str, ...]
+    names: dict[int, str]
     options: Options
 
     def on(self, machine: Machine, seed: int) -> Run:
         """Learn the classes on a machine; raise if the memory does not suffice."""
-        shape, count = self.pixels.shape[:2], len(self.names)
+        shape, count, bands = self.pixels.shape[:2], len(self.names), self.pixels.shape[-1]
         within_32_bits(shape, count)
-        levels = self.options.levels
-        bands = self.pixels.shape[-1]
-        device = prod(shape) * (12 * count + 2 * levels * bands + 8 + 4 * count * levels)
-        memory.require(machine, device, prod(shape) * (count * (4 * levels + 24) + 16 * bands))
+        sites, experts = prod(shape), 2 * self.options.levels
+        part = min(sites, AT_ONCE)
+        device = sites * (16 * count + experts * bands) + part * 14 * experts
+        memory.require(
+            machine, device, sites * (count * (2 * experts + 20) + 24 * bands + 64) + part * (10 * experts + 24)
+        )
         model = self.classes
         if not isinstance(model, Model):
-            model = learn(machine, model, self.names, self.options, seed)
+            model = learn(machine, model, list(self.names.values()), self.options, seed)
         return Run(machine, self, model, seed)
 
 
@@ -98,10 +104,13 @@ class Run:
 
     def __init__(self, machine: Machine, plan: Plan, model: Model, seed: int) -> None:
         self.machine, self.plan, self.model, self.options = machine, plan, model, plan.options
+        self.labels = np.array([0, *plan.names], np.uint8)
         self.grid = Grid.of(plan.pixels.shape[:2], torus=False)
         self.schedule = schedules.get(plan.options.schedule)
         self._setting = schedules.Setting(machine, self.grid, neighbourhood_offsets(1), 1, seed, 0)
         self._check_schedule()
+        self._taps = gaussian(plan.options.window)
+        self._size = 2 * max(expert.reach for expert in model.experts) + 1  # of the largest neighbourhood
         self._levels = prepared(machine, model.scale, plan.pixels, model.experts[-1].level + 1)
 
     def _check_schedule(self) -> None:
@@ -141,11 +150,11 @@ class Run:
 
     def _evidence(self, logs: NDArray[np.uint16]) -> NDArray[np.int32]:
         """Return the evidence of each class, (classes, ...) int32 in 2**-18: equation (6) by the nearest neighbour."""
-        total = np.zeros(logs.shape[1:], np.int64)
+        total = np.empty(logs.shape[1:], np.int32)
+        total[:] = self.model.offsets.reshape(-1, *[1] * (total.ndim - 1))
         for expert, one in zip(self.model.experts, logs, strict=True):
-            total -= expert.factor * one.astype(np.int64)
-        shape = (-1,) + (1,) * (total.ndim - 1)
-        return (total + self.model.offsets.reshape(shape)).astype(np.int32)
+            total -= np.int32(expert.factor) * one.astype(np.int32)
+        return total
 
     @cached_property
     def _classes(self) -> Array:
@@ -176,29 +185,33 @@ class Run:
         return state.done == self.grid.rows and settled
 
     def result(self, state: State, observer: Record) -> tuple[NDArray[Any], Output]:
-        """Return labels (rows, cols, 1) uint8, 0 unknown and 1 the first class; fits and probabilities."""
+        """Return labels (rows, cols, 1) uint8, 0 unknown; fits and probabilities."""
         fit, rejected = self._fits(state)
-        labels = np.where(rejected | self.plan.unknown, 0, state.labels + 1).astype(np.uint8)
-        energy = self._evidence(state.logs) / UNITS
-        votes = self.machine.get(self._votes(self.machine.put(state.labels)))
-        energy += self.options.weight * votes / UNITS
-        chance = np.exp(energy - energy.max(0))
-        names, shares = self.plan.names, np.bincount(labels.ravel(), minlength=len(self.plan.names) + 1) / labels.size
+        found = np.where(rejected | self.plan.unknown, 0, state.labels + 1)
+        energy = self._evidence(state.logs)
+        votes = self.machine.get(self._votes(self.machine.put(state.labels))).view(np.int32)
+        energy += np.int32(round(WEIGHTS * self.options.weight)) * votes // WEIGHTS
+        energy -= energy.max(0)
+        chance = np.exp(energy.astype(np.float32) / np.float32(UNITS))
+        chance /= chance.sum(0)
+        names = {0: "unknown"} | self.plan.names
+        shares = np.bincount(found.ravel(), minlength=len(names)) / found.size
         statistics: dict[str, Any] = {
             "options": vars(self.options)
             | {"levels": self.model.experts[-1].level + 1, "schedule": self.schedule.name},
             "classes": [
-                {"label": c, "name": name, "share": float(shares[c])} for c, name in enumerate(("unknown", *names))
+                {"label": label, "name": name, "share": float(share)}
+                for (label, name), share in zip(names.items(), shares, strict=True)
             ],
             "changed": list(state.changed),
         }
         for c, one in enumerate(statistics["classes"][1:]):
             one |= {"exemplars": self.model.counts[c], "own": float(self.model.own[c].mean())}
-        return labels[..., None], Output(
+        return self.labels[found][..., None], Output(
             None,
             statistics=statistics,
             fit=np.moveaxis(fit, 0, -1),
-            probability=np.moveaxis(chance / chance.sum(0), 0, -1).astype(np.float32),
+            probability=np.moveaxis(chance, 0, -1),
         )
 
     def _fits(self, state: State) -> tuple[NDArray[np.float32], Mask]:
@@ -206,32 +219,40 @@ class Run:
 
         The fit is the probability that a texture of the class differs as much from its exemplars, on average over the
         window within the site's segment: by Hotelling's test, whose covariance has few degrees of freedom. What was
-        copied from the samples is left out, since it has no distance to them; it fits where there is nothing else.
+        copied from the samples is left out, since it has no distance to them, and fits.
         """
         from scipy.special import fdtrc, fdtri
 
-        experts, classes = state.logs.shape[:2]
-        fit = np.zeros((classes, *state.labels.shape), np.float32)
-        rejected = np.zeros(state.labels.shape, bool)
-        taps, freedom = gaussian(self.options.window), self.model.freedom
+        experts, classes, rows, cols = state.logs.shape
+        fit = np.zeros((classes, rows, cols), np.float32)
+        rejected = np.zeros((rows, cols), bool)
+        freedom, size = self.model.freedom, self._size
         limit = fdtri(experts, freedom, 1 - self.options.unknown) if self.options.unknown else np.inf
-        size = 2 * max(expert.reach for expert in self.model.experts) + 1
-        for label in np.unique(state.labels):
-            box = _around(state.labels == label, len(taps) // 2)
-            own = state.labels[box] == label
-            inner = ndimage.minimum_filter(own, size, mode="nearest")  # no neighbour beyond the segment
-            for c, null in enumerate(self.model.nulls):
-                logs = np.ascontiguousarray(state.logs[:, c][(slice(None), *box)])
-                copied = ndimage.maximum_filter((logs == 0).all(0), size, mode="nearest")  # a sample of the picture
-                means, found = windowed(self.machine, logs, inner & ~copied, taps)
-                if not found[own].all():  # a narrow segment, or the sample itself
-                    wider, there = windowed(self.machine, logs, own & ~copied, taps)
-                    means, found = np.where(found, means, wider), found | there
-                distance = np.where(found[own], null.distance(means[:, own]), 0)
-                fit[c][box][own] = fdtrc(experts, freedom, distance)
-                if c == label:
-                    rejected[box][own] = distance > limit
+        band, margin = max(1, AT_ONCE // cols), len(self._taps) // 2 + size // 2
+        for first in range(0, rows, band):
+            slab, here = slice(max(0, first - margin), first + band + margin), slice(first, first + band)
+            labels = state.labels[slab]
+            inside = np.zeros(labels.shape, bool)
+            inside[first - slab.start :][:band] = True
+            for label in np.unique(state.labels[here]):
+                own = labels == label
+                inner = ndimage.minimum_filter(own, size, mode="nearest")  # no neighbour beyond the segment
+                at, there = own & inside, state.labels[here] == label
+                for c, null in enumerate(self.model.nulls):
+                    logs = np.ascontiguousarray(state.logs[:, c, slab])
+                    distance = self._distance(null, logs, own, inner, at)
+                    fit[c, here][there] = fdtrc(experts, freedom, distance)
+                    if c == label:
+                        rejected[here][there] = distance > limit
         return fit, rejected
+
+    def _distance(self, null: Null, logs: NDArray[np.uint16], own: Mask, inner: Mask, at: Mask) -> NDArray[np.float64]:
+        """Return Hotelling's statistic of the sites ``at`` of a segment, by its ``inner`` sites if there are any."""
+        copied = ndimage.maximum_filter((logs == 0).all(0), self._size, mode="nearest")  # a sample cut from the picture
+        means, found = windowed(self.machine, logs, inner & ~copied, self._taps, at)
+        if not (found | copied[at]).all():  # a narrow segment
+            means = np.where(found, means, windowed(self.machine, logs, own & ~copied, self._taps, at)[0])
+        return np.where(copied[at], 0, null.distance(means))
 
     def save(self, state: State) -> dict[str, Any]:
         """Return a copy of the state that needs no machine."""
@@ -244,23 +265,14 @@ class Run:
 
     def observer(self, callback: Callback | None) -> Record:
         """Return what watches this run."""
-        return Record(callback)
-
-
-def _around(mask: Mask, margin: int) -> tuple[slice, slice]:
-    """Return rows and columns of the box around a mask, with a margin."""
-    row, col = (np.flatnonzero(mask.any(axis)) for axis in (1, 0))
-    return (
-        slice(max(0, int(row[0]) - margin), int(row[-1]) + margin + 1),
-        slice(max(0, int(col[0]) - margin), int(col[-1]) + margin + 1),
-    )
+        return Record(self, callback)
 
 
 class Record:
     """The progress of a classification: ``callback`` is called with a `simdtex.run.Labelling` after every step."""
 
-    def __init__(self, callback: Callback | None) -> None:
-        self._callback = callback
+    def __init__(self, run: Run, callback: Callback | None) -> None:
+        self._run, self._callback = run, callback
 
     def part(self, *seen: Any) -> None:
         """See nothing: steps are short."""
@@ -268,7 +280,8 @@ class Record:
     def step(self, state: State, info: Info) -> None:
         """Report a step."""
         if self._callback:
-            labels = info.labels + np.uint8(1)
+            labels = self._run.labels[info.labels + np.uint8(1)]
+            labels[state.done :] = 0  # not compared yet
             now: dict[str, Any] = {
                 "level": 0,
                 "levels": 1,

@@ -288,7 +288,7 @@ class _Class:
                     logs[e].reshape(-1)[shown] = machine.get(exemplars(machine, values, stacked(machine, [rest])))[0]
                 judged.reshape(-1)[shown] = True
                 parts.append(logs.reshape(len(experts), -1)[:, shown].sum(1, dtype=np.int64) / (len(shown) * LOGS))
-            windows.append(windowed(machine, logs, judged, taps)[0][:, judged])
+            windows.append(windowed(machine, logs, judged, taps, judged)[0])
         means = np.concatenate(windows, 1)
         return Self(np.array(parts).mean(0), means, np.array(parts))
 
@@ -324,16 +324,16 @@ def _boxed(sites: Mask) -> Mask:
 
 
 def windowed(
-    machine: Machine, logs: NDArray[np.uint16], sites: Mask, taps: NDArray[np.uint32]
+    machine: Machine, logs: NDArray[np.uint16], sites: Mask, taps: NDArray[np.uint32], at: Mask
 ) -> tuple[NDArray[np.int64], Mask]:
-    """Return the mean of planes (P, rows, cols) over the sites in the window of each site, and where there are any.
+    """Return the mean of planes (P, rows, cols) over the sites in a window, and whether there are any.
 
-    Means are in 1 / `MEANS` of the planes' units, (P, rows, cols).
+    The windows are around the n sites ``at``; the means are in 1 / `MEANS` of the planes' units, (P, n).
     """
     labels, weights = machine.put(sites.astype(np.uint8)), machine.put(taps)
     ones = machine.put(np.ones(len(logs), np.int32))
-    counts = machine.get(window(machine, labels, machine.put(np.ones(1, np.int32)), weights))[0].astype(np.int64)
-    sums = machine.get(window(machine, labels, ones, weights, machine.put(logs))).astype(np.int64)
+    counts = machine.get(window(machine, labels, machine.put(np.ones(1, np.int32)), weights))[0, at].astype(np.int64)
+    sums = machine.get(window(machine, labels, ones, weights, machine.put(logs)))[:, at].astype(np.int64)
     return (MEANS * sums + counts // 2) // np.maximum(counts, 1), counts > 0
 
 

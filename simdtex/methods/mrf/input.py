@@ -13,6 +13,7 @@ from simdtex.methods.mrf.options import Options
 from simdtex.model.given import Given, Planes
 from simdtex.model.sample import Sample
 from simdtex.model.soft import Soft
+from simdtex.options import SMALLER
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class Input:
     ``sample`` is Y with its structure channel and guides, ``shape`` (rows, cols) or (layers, rows, cols) of X, the
     output, ``offsets`` (N, 2) the neighbourhood, ``options`` as they are executed, and ``levels`` M of Algorithm 1.
     ``given`` are conditioning data, sites of X that keep their values, and ``planes`` the same in working levels;
-    ``soft`` are soft data.
+    ``soft`` are soft data, and ``remedy`` what to do if the memory does not suffice.
     """
 
     sample: Sample
@@ -34,3 +35,4 @@ class Input:
     given: Given | None = None
     planes: Planes | None = None
     soft: Soft | None = None
+    remedy: str = SMALLER

@@ -26,10 +26,7 @@ from simdtex.model.regularity import Phases, parse_lattice, phases
 from simdtex.model.sample import NothingUsable, Sample
 from simdtex.model.soft import Soft
 from simdtex.ops.finish import around
-from simdtex.options import SMALLER, within_32_bits
-
-TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.distributed"
-"""The remedy if an output is too large for this machine."""
+from simdtex.options import within_32_bits
 
 LABELS = 64
 """The most labels of a guide: each is a channel."""
@@ -51,12 +48,12 @@ class Plan(Input):
         """
         copies = 2 if self.schedule.tile else 1
         pixels, channels = prod(self.shape), len(self.sample.working)
-        within_32_bits(self.shape, channels * copies, TILED)
+        within_32_bits(self.shape, channels * copies, self.remedy)
         field, held = copies * (6 + 2 * channels), self.sample.rows * self.sample.cols
         each = 68 + 16 * copies + channels * (10 + 3 * self.sample.pixels.dtype.itemsize // 2)
         kinds = self.soft.rows if self.soft else 0
         device = pixels * (12 + field + 4 * kinds) + held * (14 * channels + 159)
-        memory.require(machine, device, pixels * (each + 32 * kinds) + 64 * held, TILED)
+        memory.require(machine, device, pixels * (each + 32 * kinds) + 64 * held, self.remedy)
         return Run(self, machine, seed)
 
 

@@ -6,6 +6,7 @@ Input and output are NumPy arrays over the sites of a lattice, so any process ca
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -49,9 +50,15 @@ class Tally(NamedTuple):
     ``counts`` (n,) how often each candidate is used; ``active`` sites; ``temperature_sum`` in 1/1024.
     """
 
-    counts: NDArray[np.int32]
+    counts: NDArray[Any]
     active: int
     temperature_sum: int
+
+
+def together(tallies: Sequence[Tally]) -> Tally:
+    """Return the sum of counts of several tiles."""
+    counts = np.stack([one.counts for one in tallies]).sum(0)
+    return Tally(counts, sum(one.active for one in tallies), sum(one.temperature_sum for one in tallies))
 
 
 def framed(lattice: Grid, tile: Tile, halo: int) -> Framed:

@@ -1,0 +1,224 @@
+"""A store that is damaged gives the bytes of one that is not, or a sentence: never another picture."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cases import REFERENCE, assert_same_bits, texture
+
+import simdtex
+from simdtex import distributed
+from simdtex.distributed import layout
+from simdtex.distributed.store import Store
+from simdtex.distributed.tasks import forget
+from simdtex.io import atomic
+from simdtex.methods.mrf.tiles import Tally
+
+zarr = pytest.importorskip("zarr")
+
+SAMPLE = texture((22, 25), seed=2)
+SHAPE = 26, 31
+KNOWN = np.ma.masked_array(texture(SHAPE, seed=4), np.indices(SHAPE).sum(0) % 9 > 0)
+OPTIONS = {"order": 1, "levels": 2, "xi": -8.0, "rng": 11, "device": REFERENCE}
+
+
+class Stop(Exception):
+    pass
+
+
+def flipped(path):
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 4
+    path.write_bytes(data)
+
+
+DAMAGES = {
+    "removed": Path.unlink,
+    "flipped": flipped,
+    "emptied": lambda path: path.write_bytes(b""),
+    "cut": lambda path: path.write_bytes(path.read_bytes()[:-3]),
+}
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return simdtex.synthesize(SAMPLE, SHAPE, known=KNOWN, **OPTIONS)
+
+
+@pytest.fixture(scope="module")
+def stopped(tmp_path_factory):
+    """Return a store that was stopped after so many tiles of a phase of the finest level."""
+    made = {}
+
+    def store(phase, tile, sweep=1):
+        def stop(progress):
+            if (progress.level, progress.phase, progress.tile, progress.sweep) == (0, phase, tile, sweep):
+                raise Stop
+
+        if (phase, tile, sweep) not in made:
+            made[phase, tile, sweep] = path = tmp_path_factory.mktemp("store") / "o.zarr"
+            with pytest.raises(Stop):
+                distributed.synthesize(
+                    SAMPLE, SHAPE, path, tiles=12, known=KNOWN, source_map=True, callback=stop, **OPTIONS
+                )
+        return made[phase, tile, sweep]
+
+    return store
+
+
+def gone_on(path, sentences):
+    """Resume until the output is there, and return it; None if it has to begin anew."""
+    for _ in range(5):
+        forget()
+        try:
+            return distributed.resume(path, device=REFERENCE)
+        except ValueError as error:
+            sentences.append(str(error))
+            if "begin anew" in sentences[-1]:
+                return None
+    raise AssertionError("no end")
+
+
+PARTS = [
+    ("sweep", "work/level0/1/values/c/0/1/1", "level 0 begins again with: simdtex resume"),
+    ("sweep", "work/level0/1/source/c/1/1", "level 0 begins again with: simdtex resume"),
+    ("sweep", "work/level0/1/temperature/zarr.json", "level 0 begins again with: simdtex resume"),
+    ("sweep", "work/level0/0/values/c/0/0/0", None),  # what the present turn writes
+    ("sweep", "work/level0/0/source/zarr.json", None),
+    ("sweep", "work/turn", "level 0 begins again with: simdtex resume"),
+    ("sweep", "work/tally*/c/1/0", None),
+    ("sweep", "work/tally*/zarr.json", None),
+    ("sweep", "zarr.json", None),
+    ("sweep", "work/zarr.json", None),
+    ("begin", "work/level1/*/values/c/0/0/0", "level 1 begins again with: simdtex resume"),
+    ("begin", "work/given/held0/known/c/1/1", "and nothing makes it again; remove the store and begin anew"),
+    ("show", "work/given/values/c/2/1/0", "and nothing makes it again; remove the store and begin anew"),
+    ("begin", "work/run", "and nothing makes it again; remove the store and begin anew"),
+    ("show", "image/c/0/1", None),
+    ("show", "image/zarr.json", None),
+    ("show", "source/c/0/1/0", None),
+]
+
+
+@pytest.mark.parametrize(
+    "damage", ["removed", *(pytest.param(n, marks=pytest.mark.slow) for n in DAMAGES if n != "removed")]
+)
+@pytest.mark.parametrize(("phase", "part", "words"), PARTS, ids=lambda one: one and one.replace("/", "."))
+def test_damage_is_mended_or_said(tmp_path, stopped, whole, phase, part, words, damage):
+    path, sentences = tmp_path / "o.zarr", []
+    shutil.copytree(stopped(phase, 3, 2 if phase == "sweep" else 1), path)
+    (where,) = path.glob(part)
+    DAMAGES[damage](where)
+    image = gone_on(path, sentences)
+    if words is None:
+        assert sentences == []
+    else:
+        assert words in sentences[0]
+        assert str(where.relative_to(path)) in sentences[0] or "zarr.json" in where.name
+    if words is None or "begin anew" not in words:
+        assert_same_bits(image.compute(), whole)
+        assert sorted(one.name for one in path.iterdir()) == ["image", "source", "zarr.json"]
+
+
+def test_a_flipped_bit_is_damage(tmp_path, stopped, whole):
+    path, sentences = tmp_path / "o.zarr", []
+    shutil.copytree(stopped("sweep", 3, 2), path)
+    flipped(path / "work/level0/1/source/c/0/0")
+    image = gone_on(path, sentences)
+    assert [sentence.split(" of ")[0] for sentence in sentences] == ["work/level0/1/source/c/0/0"]
+    assert_same_bits(image.compute(), whole)
+
+
+def test_the_picture_has_checksums(tmp_path, stopped):
+    path = tmp_path / "o.zarr"
+    shutil.copytree(stopped("show", 3), path)
+    image = distributed.resume(path, device=REFERENCE)
+    flipped(path / "image/c/0/1")
+    with pytest.raises(ValueError, match="checksum"):
+        image.compute()
+
+
+def test_a_store_that_goes_during_the_run_is_not_made_again(tmp_path):
+    path = tmp_path / "o.zarr"
+
+    def remove(progress):
+        if progress.phase == "sweep":
+            shutil.rmtree(path)
+
+    with pytest.raises(
+        ValueError, match=r"o\.zarr was removed or moved while the run went on; put it back, or begin anew"
+    ):
+        distributed.synthesize(SAMPLE, SHAPE, path, tiles=12, callback=remove, **OPTIONS)
+    assert not path.exists()
+
+
+def test_nothing_is_written_where_a_store_was(tmp_path, stopped):
+    path = tmp_path / "o.zarr"
+    shutil.copytree(stopped("sweep", 3, 2), path)
+    store = Store(str(path))
+    turn, work = store.turn, store.work()
+    assert store.done(turn, work, 0)  # which opens the arrays
+    shutil.rmtree(path)
+    with pytest.raises(atomic.Damaged, match=r"zarr\.json"):
+        store.note(turn, 0, Tally(np.zeros(460, np.int64), 0, 0))
+    assert not path.exists()
+
+
+def test_the_working_state_of_a_leader_that_was_killed_while_it_cleaned_is_removed(tmp_path, stopped, whole):
+    path = tmp_path / "o.zarr"
+    shutil.copytree(stopped("show", 3), path)
+    distributed.resume(path, device=REFERENCE)
+    shutil.copytree(stopped("show", 3) / "work" / "given", path / "work" / "given")
+    assert distributed.finished(path)
+    assert_same_bits(distributed.resume(path, device=REFERENCE).compute(), whole)
+    assert not (path / "work").exists()
+
+
+def test_a_chunk_and_its_folders_are_on_the_disk_before_its_tile_is_done(tmp_path, monkeypatch):
+    """Flushed in the order: the file, its new folders, and only then the row of the task."""
+    flushed, real = [], atomic._sync
+
+    def sync(path, *flags):
+        flushed.append(str(path.relative_to(tmp_path)) if path.is_dir() else "file")
+        real(path, *flags)
+
+    monkeypatch.setattr(atomic, "_sync", sync)
+    distributed.synthesize(SAMPLE, SHAPE, tmp_path / "o.zarr", tiles=12, **OPTIONS)
+    chunk, row = "o.zarr/work/level0/1/values/c/0/2", "o.zarr/work/tally{}/c/2"
+    turns = [n for n in range(1, 99) if row.format(n) in flushed]
+    at = flushed.index(chunk)
+    assert flushed[at - 1] == "file"
+    assert set(flushed[:at]) > {"o.zarr/work/level0/1/values/c/0", "o.zarr/work/level0/1/values/c"}
+    assert any(flushed.index(row.format(n)) > at for n in turns)
+    assert "." in flushed  # the name of the store itself
+
+
+@pytest.mark.parametrize("tasks", [1, 2, 4])
+def test_several_tiles_are_one_task(tmp_path, whole, monkeypatch, tasks):
+    monkeypatch.setattr(layout, "TASKS", tasks)
+    seen = []
+    given = {"known": KNOWN, "callback": lambda progress: seen.append((progress.level, progress.tile))}
+    image = distributed.synthesize(SAMPLE, SHAPE, tmp_path / "o.zarr", tiles=12, **given, **OPTIONS)
+    assert_same_bits(image.compute(), whole)
+    each = -(-9 // tasks)
+    assert {tile for level, tile in seen if level == 0} == {min(9, each * n) for n in range(1, -(-9 // each) + 1)}
+
+
+def test_a_full_disk_is_said_and_the_run_goes_on_later(tmp_path, stopped, whole, monkeypatch):
+    path = tmp_path / "o.zarr"
+    shutil.copytree(stopped("sweep", 3, 2), path)
+    forget()
+    with monkeypatch.context() as patch:
+        patch.setattr(atomic, "_sync", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
+        words = (
+            r"could not be written \(No space left on device\): free some space, and go on with: simdtex resume .*zarr"
+        )
+        with pytest.raises(ValueError, match=words):
+            distributed.resume(path, device=REFERENCE)
+    assert_same_bits(distributed.resume(path, device=REFERENCE).compute(), whole)
+    (path / "image" / "zarr.json").unlink()
+    with pytest.raises(
+        ValueError, match=r"image/zarr.json of .* is missing or damaged; remove the store and begin anew"
+    ):
+        distributed.resume(path, device=REFERENCE)
