@@ -35,7 +35,7 @@ def folder(tmp_path, monkeypatch):
     image.write("far.png", TRUTH * 9)
     alpha = np.where(np.arange(40) < 20, 255, 0).astype(np.uint8)[None].repeat(24, 0)
     image.write("cut.png", np.dstack([PICTURE, alpha]))
-    image.write_labels("strokes.png", np.where(TRUTH == 1, 1, 0).astype(np.uint8), label_colours(3))
+    image.write_labels("strokes.png", np.where(TRUTH == 1, 1, 0).astype(np.uint8))
     return tmp_path
 
 

@@ -92,7 +92,6 @@ def classify(
     """
     from simdtex import classify
     from simdtex.io import image
-    from simdtex.model.colours import label_colours
 
     whole = read_material([picture])
     true = None if truth is None else _read_truth(truth, whole)
@@ -117,7 +116,7 @@ def classify(
             f"{truth} has the label {strange[0]}; give those of the classes, 0 for unknown, and {UNLABELLED} "
             "where it is not known"
         )
-    writers: list[Any] = [lambda made, run: image.write_labels(output, made, label_colours(256))]
+    writers: list[Any] = [lambda made, run: image.write_labels(output, made)]
     if confidence:
         writers.append(lambda made, run: image.write(confidence, run.fit))
     if report:

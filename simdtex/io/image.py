@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from simdtex.io.atomic import Unbuffered, atomic_path, check_target
 from simdtex.io.decode import NOTHING, Metadata, decode, native
 from simdtex.io.limits import TooLarge, check_file, max_pixels_or_default
+from simdtex.model.colours import label_colours
 from simdtex.options import unmasked
 
 __all__ = [
@@ -475,14 +476,14 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
         path.write_bytes(pillow_bytes(PIL.Image.fromarray(pixels), kind, **_OPTIONS.get(suffix, {}), **beside))
 
 
-def write_labels(path: PathLike, labels: NDArray[np.uint8], colours: NDArray[np.uint8]) -> None:
-    """Write labels (rows, cols) as the values of a picture; a PNG has them as indices of colours (labels, 3) uint8."""
+def write_labels(path: PathLike, labels: NDArray[np.uint8]) -> None:
+    """Write labels (rows, cols) as the values of a picture; a PNG has them as indices of `label_colours`."""
     if Path(path).suffix.lower() != ".png":
         write(path, labels)
         return
     check_writable(path)
     picture = PIL.Image.fromarray(labels)
-    picture.putpalette(colours.tobytes())
+    picture.putpalette(label_colours(256).tobytes())
     content = pillow_bytes(picture, "PNG")
     with atomic_path(path) as temporary:
         temporary.write_bytes(content)

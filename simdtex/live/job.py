@@ -82,8 +82,7 @@ class Job:
 
     Of the job, ``options`` are those that differ from their defaults, ``files`` the pictures that the command line
     reads, by file name, and ``output`` and ``carried`` the files that it writes: the picture, and the further maps by
-    name. ``palettes`` are the colours of those files that hold labels, and ``classes`` the painted labels, in the order
-    in which ``classify`` numbers them from 1.
+    name. ``labelled`` are those files that hold labels, and ``classes`` the painted labels.
     """
 
     def __init__(self, message: Message, picture: Picture, maps: Maps, result: Callable[[Any], Any]) -> None:
@@ -99,7 +98,7 @@ class Job:
         whole("seed", seed, 0, 2**32 - 1)
         maps = {} if self.method in ("pyramid", "classifier") else maps
         self.classes: list[int] = []
-        self.palettes: dict[str, NDArray[np.uint8]] = {}
+        self.labelled: tuple[str, ...] = ()
         self._keywords: dict[str, Any] = {}
         self._flags: list[str] = []
         whole_picture = self.kind in ("fill", "classify")
@@ -203,7 +202,7 @@ class Job:
             raise Hint(f"label {few} is painted on {counts[few]} pixels; paint {LEAST} or more")
         self.output = "labels.png"
         self.files["strokes.png"] = strokes
-        self.palettes = dict.fromkeys((self.output, "strokes.png"), LABELS)
+        self.labelled = (self.output, "strokes.png")
         self._add("textures", strokes, "--strokes", "strokes.png")
 
     def _fill(self, strokes: Any) -> None:

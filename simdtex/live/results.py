@@ -77,7 +77,7 @@ class Result:
     @property
     def files(self) -> list[str]:
         """The names of its files; the last is an archive of the others, the files the job reads, and its command."""
-        own = dict.fromkeys([*self._pictures, *self.job.palettes])
+        own = dict.fromkeys([*self._pictures, *self.job.labelled])
         return [*own, *[ARRANGEMENT] * (self.source is not None), self.archive]
 
     def file(self, name: str) -> bytes:
@@ -89,8 +89,8 @@ class Result:
             wanted = self._pictures | self.job.files
             coloured = (self.job.output, next(iter(self.job.files)))  # the picture and its sample
             for each in wanted if name == self.archive else wanted.keys() & {name}:
-                if each in self.job.palettes:
-                    write_labels(folder / each, wanted[each], self.job.palettes[each])
+                if each in self.job.labelled:
+                    write_labels(folder / each, wanted[each])
                 else:
                     write(folder / each, wanted[each], self.job.metadata if each in coloured else None)
             if self.source is not None and name in (ARRANGEMENT, self.archive):
