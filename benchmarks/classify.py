@@ -161,12 +161,10 @@ def measure_unknown(bench):
         alone[name] = judged(np.concatenate(others), own_fit(classifier._run(grey(own.test))[1]))
     for number, pair in enumerate(bench.pairs()):
         mosaic = pair[number % 2]
-        out = number % len(mosaic.textures)
-        samples = training(mosaic.textures)
-        missing = list(samples)[out]
-        samples.pop(missing)
-        fit, strange = own_fit(labelled(bench, mosaic.picture, samples)[1]), mosaic.truth == out + 1
-        left[f"{missing} (draw {number + 1})"] = judged(fit[strange], fit[~strange])
+        for label, missing in enumerate(mosaic.textures, 1):
+            samples = {name: one for name, one in training(mosaic.textures).items() if name != missing}
+            fit, strange = own_fit(labelled(bench, mosaic.picture, samples)[1]), mosaic.truth == label
+            left[f"{missing} (draw {number + 1})"] = judged(fit[strange], fit[~strange])
     rows = []
     for case, values in cases.items():
         worst = sorted(values, key=values.get)[:3]
