@@ -153,12 +153,12 @@ def measure_unknown(bench):
         classifier = simdtex.TextureClassifier(rng=1, device=bench.machine)
         classifier.fit(grey(own.training), np.ones(own.training.shape[:2], int))
         others = [
-            own_fit(classifier._run(grey(picture))[1])[::4, ::4].ravel()
+            classifier.predict_fit(grey(picture))[::4, ::4].ravel()
             for other, texture in bench.known.items()
             for picture in (texture.training, texture.test)
             if other != name
         ]
-        alone[name] = judged(np.concatenate(others), own_fit(classifier._run(grey(own.test))[1]))
+        alone[name] = judged(np.concatenate(others), classifier.predict_fit(grey(own.test))[..., 0])
     for number, pair in enumerate(bench.pairs()):
         mosaic = pair[number % 2]
         for label, missing in enumerate(mosaic.textures, 1):

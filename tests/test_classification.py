@@ -157,6 +157,8 @@ def test_the_estimator_is_trained_once():
     assert found.classes_.tolist() == [3, 7] and found.n_features_in_ == 1
     labels = found.predict(PICTURE)
     assert (labels == classify(textures=STROKES, unknown=0.0)).all()
+    _, output = classify(textures=STROKES, unknown=0.0, full_output=True)
+    assert_same_bits(found.predict_fit(PICTURE), output.fit)
     chance = found.predict_proba(PICTURE[:, ::-1])
     assert chance.shape == (24, 40, 2) and abs(chance.sum(-1) - 1).max() < 1e-6
     both = simdtex.TextureClassifier(**QUICK).fit([PICTURE, PICTURE], [STROKES, np.where(STROKES == 3, 3, 0)])

@@ -319,6 +319,12 @@ class TextureClassifier:
         assert output.probability is not None
         return output.probability
 
+    def predict_fit(self, image: ArrayLike) -> NDArray[np.float32]:
+        """Return how well each class fits each pixel, (rows, cols, classes), as `Output.fit`."""
+        _, output = self._run(image)
+        assert output.fit is not None
+        return output.fit
+
     def _run(self, image: ArrayLike) -> tuple[NDArray[np.uint8], Output]:
         if not hasattr(self, "_model"):
             raise ValueError("the classifier is not trained; call fit first")
