@@ -119,6 +119,15 @@ def large(name, device):
     return digest([*(a for a in arrays if a is not None), counts(output.statistics.get("levels", []))])
 
 
+def classified():
+    """The digest of the labels and the unknown of a classification on the reference."""
+    picture, textures = np.hstack([sample("brick-64")[0], sample("grass-64")[0][:, ::-1]]), {}
+    for name in ("brick", "grass"):
+        textures[name] = sample(name)[0][80:, 80:]
+    options = {"exemplars": 100, "rng": 7, "device": "reference", "channel_axis": None}
+    return digest([simdtex.classify(picture, textures, unknown=unknown, **options) for unknown in (0.0, 0.3)])
+
+
 @functools.cache
 def pinned():
     return json.loads(PINNED.read_text())
@@ -126,7 +135,7 @@ def pinned():
 
 def test_every_run_is_pinned():
     names = {f"small {name}" for name in RUNS} | {f"given {name}" for name in GIVEN}
-    assert set(pinned()) == names | {f"large {name}" for name in LARGE}
+    assert set(pinned()) == names | {f"large {name}" for name in LARGE} | {"classify"}
 
 
 @pytest.mark.parametrize("name", RUNS)
@@ -137,6 +146,10 @@ def test_the_references_bytes_are_those_pinned(name):
 @pytest.mark.parametrize("name", GIVEN)
 def test_the_bytes_of_a_run_with_what_is_given_are_those_pinned(name):
     assert with_given(name) == pinned()[f"given {name}"]
+
+
+def test_the_labels_of_a_classification_are_those_pinned():
+    assert classified() == pinned()["classify"]
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in QUICK)) for name in LARGE])
@@ -150,5 +163,6 @@ if __name__ == "__main__":
     found = {f"small {name}": small(name) for name in RUNS}
     found |= {f"given {name}": with_given(name) for name in GIVEN}
     found |= {f"large {name}": large(name, None) for name in LARGE}
+    found["classify"] = classified()
     json.dump(found, sys.stdout, indent=0, sort_keys=True)
     print()
