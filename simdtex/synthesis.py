@@ -341,7 +341,7 @@ def explain(
         whole("sweep", sweep, 1)
     try:
         row, col = map(index, site)
-    except TypeError:
+    except (TypeError, ValueError):
         raise ValueError(f"site must be two integers (row, column), not {site!r}") from None
     plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
     run = plan.on(open_machine(device), as_seed(rng))

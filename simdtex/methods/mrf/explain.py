@@ -91,7 +91,7 @@ def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanat
             costs={name: cost[weighed][first] for name, cost in costs.items()},
             total=total[first],
             probability=mass[first] / mass.sum(),
-            pixels=twin.sample.own(np.concatenate([position[:, None], around], 1)),
+            pixels=twin.sample.around(position, np.append(np.int32(0), candidates.reach)),
         ),
         taken=int(np.flatnonzero(is_taken[rank])[0]),
         values=relaxed.values[:, 0],

@@ -10,7 +10,7 @@ from simdtex.ops.neighbourhood import Field
 
 
 def moment_of(run: Run, level: int, sweep: int | None, site: tuple[int, ...]) -> Moment:
-    """Run to a sweep of a level, and in it to the step in which a site relaxes; None: the last sweep in which it does.
+    """Return the moment of a sweep of a level at which a site relaxes; None: of the last sweep in which it does.
 
     Raises ValueError if the run has no such level or site, or the site does not relax there.
     """
@@ -38,16 +38,17 @@ def _relaxes(run: Run, info: Info, pixel: int) -> bool:
 
 
 def _before(run: Run, state: State, pixel: int) -> Moment:
-    """Run a sweep up to the step in which a site relaxes, step by step; the state's arrays are used up."""
-    level, machine = run.level(state.level), run.machine
+    """Return the last moment of a sweep at which a site relaxes; it does, and the state's arrays are used up."""
+    level, machine, found, last = run.level(state.level), run.machine, None, False
     field, memory, relaxation = exchanged(level, state.field), state.schedule, rule(level, state.penalty)
-    while True:
-        memory, now = level.schedule.step(
-            level.setting, memory, Active(level, field.temperature, free=not state.active)
-        )
+    number, free = state.cooling + state.free + 1, not state.active
+    while not last:
+        memory, now = level.schedule.step(level.setting, memory, Active(level, field.temperature, free))
         for step in now.apart(machine):
             if (step.sites == pixel).any():
-                planes = Field(*map(machine.get, field))
-                return Moment(level.number, state.cooling + state.free + 1, planes, state.penalty, now.turn)
+                found = Moment(level.number, number, Field(*map(machine.get, field)), state.penalty, now.turn)
             for part in relaxed(level, field, step, relaxation):
                 field = part.field
+        last = now.last
+    assert found
+    return found
