@@ -80,7 +80,7 @@ def test_what_is_taken_is_what_the_run_takes(name):
                 np.testing.assert_array_equal(why.values, np.ravel(picture[site]))
             consistent(why)
             if level == 0 and sweep is None:
-                assert why.sweep == last
+                assert why.sweep == last or name == "random"  # which leaves some sites out of a sweep
                 np.testing.assert_array_equal(why.candidates.place[why.taken], output.source[site])
                 assert why.cooled == output.temperature[site]
 
