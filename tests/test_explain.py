@@ -37,7 +37,7 @@ RUNS = {
 
 
 def arguments(name):
-    options = {"order": 4, "levels": 2, "free_sweeps": 2, "rng": 3} | RUNS[name]
+    options = {"order": 5, "levels": 2, "free_sweeps": 2, "rng": 3} | RUNS[name]
     return (options.pop("sample", BRICK), SHAPE), options
 
 
@@ -153,10 +153,11 @@ def test_a_density_is_the_lcpdf():
         if progress.end_of_sweep:
             seen.append((progress.image(), progress.temperature(), progress.explain(4, 5)))
 
-    simdtex.synthesize(BRICK, (10, 11), preset="paper", levels=1, order=4, rng=1, callback=watch, device="reference")
+    sample = texture((14, 15))  # with levels near 0 and 255
+    simdtex.synthesize(sample, (10, 11), preset="paper", levels=1, order=4, rng=1, callback=watch, device="reference")
     assert len(seen) > 2
     for image, t, why in seen:
-        expected = simdtex.lcpdf(image, BRICK, [(4, 5)], order=4, temperature=t, device="reference")
+        expected = simdtex.lcpdf(image, sample, [(4, 5)], order=4, temperature=t, device="reference")
         np.testing.assert_allclose(why.density, expected, atol=1e-6)
 
 
