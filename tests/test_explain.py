@@ -161,6 +161,11 @@ def test_a_density_is_the_lcpdf():
         np.testing.assert_allclose(why.density, expected, atol=1e-6)
 
 
+def test_a_list_continues_the_nearest_neighbours_alone():
+    """Here candidates are in the list that continue the source of a neighbour farther away."""
+    consistent(simdtex.explain(data.brick()[:32, :32], (32, 32), (5, 7), order=8, rng=1, device="reference"))
+
+
 def test_novelty_is_a_term():
     why = simdtex.explain(BRICK, SHAPE, (3, 3), level=1, levels=2, order=4, rng=1, novelty=2, device="reference")
     assert why.drawn and "novelty" in why.candidates.costs
