@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from simdtex.machine.devices import DeviceError, devices
     from simdtex.methods.pyramid.mixtures import mix
     from simdtex.run import Output, Progress
-    from simdtex.synthesis import lcpdf, synthesize, synthesize_solid
+    from simdtex.synthesis import explain, lcpdf, synthesize, synthesize_solid
 
     __version__: str
 
@@ -34,6 +34,7 @@ __all__ = [
     "classify",
     "devices",
     "estimate",
+    "explain",
     "extend",
     "fill",
     "lcpdf",
@@ -59,6 +60,7 @@ _HOMES = {
     "classify": "simdtex.jobs.classification",
     "devices": "simdtex.machine.devices",
     "estimate": "simdtex.jobs.estimation",
+    "explain": "simdtex.synthesis",
     "extend": "simdtex.jobs.filling",
     "fill": "simdtex.jobs.filling",
     "lcpdf": "simdtex.synthesis",

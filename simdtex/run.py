@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.model.explanation import Explanation
+
 
 @dataclass(frozen=True, kw_only=True)
 class Progress:
@@ -74,6 +76,10 @@ class Relaxing(Progress):
     source : callable
         ``source()`` reads back where in the sample each site of the level is from, (rows, cols, 2) or, of several
         samples, (rows, cols, 3) int32, as `Output.source`.
+    explain : callable
+        ``explain(row, col)``, of a volume ``explain(layer, row, col)``, returns a
+        `simdtex.model.explanation.Explanation`: how that site of the level would relax now, with the random numbers of
+        the present step. Later than the callback it tells of what the run has become. It changes nothing.
     """
 
     sweep: int
@@ -83,6 +89,7 @@ class Relaxing(Progress):
     end_of_sweep: bool
     temperature: Callable[[], NDArray[Any]]
     source: Callable[[], NDArray[np.int32]]
+    explain: Callable[..., Explanation]
 
     @property
     def doing(self) -> str:  # noqa: D102

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The functions that most users need: `synthesize`, `synthesize_solid` and `lcpdf`."""
+"""The functions that most users need: `synthesize`, `synthesize_solid`, `explain` and `lcpdf`."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from math import isqrt
+from operator import index
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
@@ -19,16 +20,25 @@ from simdtex.driver import Call, Plan, check_shape, drive, execute, with_channel
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine, open_machine
+from simdtex.machine.reference import Reference
 from simdtex.methods import mrf
+from simdtex.methods.mrf.explain import explained
+from simdtex.methods.mrf.level import Lattices
+from simdtex.methods.mrf.moments import moment_of
+from simdtex.model.explanation import Explanation
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
 from simdtex.options import SMALLER, one_of, real, resolve, unmasked, whole
+from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
 if TYPE_CHECKING:
     from typing import Unpack
 
     from simdtex.methods.typed_options import AnyOptions, SolidOptions
+
+GIVEN = ("channel_axis", "mask", "known", "known_source", "guide")
+"""The arrays of a synthesis, and their axis, beside sample and shape."""
 
 TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.distributed"
 """The remedy if an output of the method ``mrf`` is too large for this machine."""
@@ -265,6 +275,78 @@ def synthesize_solid(
     run, axis = partial(drive, solid.Plan(pixels, size, chosen)), None if channel_axis is None else -1
     call = Call(rng, device, callback, full_output, checkpoint)
     return execute("synthesize_solid", run, lambda: {"shape": size, "options": chosen, "sample": pixels}, axis, call)
+
+
+def explain(
+    sample: ArrayLike,
+    shape: tuple[int, int],
+    site: tuple[int, int],
+    *,
+    level: int = 0,
+    sweep: int | None = None,
+    rng: int | np.random.Generator | None = None,
+    device: str | Machine | None = None,
+    **arguments: Any,
+) -> Explanation:
+    """Return why a site of a synthesis by the method ``mrf`` takes what it takes.
+
+    The run is that of `synthesize` with the same arguments. It goes as far as the sweep, and in it to the step in which
+    the site relaxes; the explanation is of that relaxation, with the field as it is just before.
+
+    Parameters
+    ----------
+    sample, shape
+        As in `synthesize`.
+    site : (int, int)
+        (row, column) on the level's lattice: pixel (2**level row, 2**level column) of the output.
+    level : int
+        0 is the finest.
+    sweep : int, optional
+        A sweep of the level, from 1, in which the site relaxes. None: the last one, which made the pixel.
+    rng, device
+        As in `synthesize`; give the seed of the run that is to be explained.
+    **arguments
+        ``channel_axis``, ``mask``, ``known``, ``known_source`` and ``guide`` as in `synthesize`, and the options of
+        `simdtex.methods.mrf.Options`.
+
+    Returns
+    -------
+    simdtex.model.explanation.Explanation
+
+    Raises
+    ------
+    ValueError, TypeError
+        What is wrong and what would be right, in one sentence; also where the site does not relax there, as one whose
+        value is known, or that keeps that of the level above.
+
+    Notes
+    -----
+    Cost: the run up to the end of the level, of whose sweeps a copy goes to the host; up to the sweep if one is given.
+
+    Examples
+    --------
+    >>> from skimage import data
+    >>> import simdtex
+    >>> why = simdtex.explain(data.brick()[:32, :32], (32, 32), (5, 7), order=2, rng=1)
+    >>> why.drawn, why.candidates.rank[why.taken]
+    (False, 0)
+    """
+    size = check_shape(shape)
+    given = {name: arguments.pop(name) for name in GIVEN if name in arguments}
+    axis = given.get("channel_axis")
+    inputs = check_inputs(sample, size, **given)
+    chosen: Any = resolve(mrf.Options, "synth", with_channels_last(arguments, axis))
+    whole("level", level, 0)
+    if sweep is not None:
+        whole("sweep", sweep, 1)
+    try:
+        row, col = map(index, site)
+    except (TypeError, ValueError):
+        raise ValueError(f"site must be two integers (row, column), not {site!r}") from None
+    plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
+    run = plan.on(open_machine(device), as_seed(rng))
+    twin = Lattices(plan, Reference(), run.seed)
+    return explained(twin, moment_of(run, level, sweep, (row, col)), (row, col))
 
 
 def lcpdf(

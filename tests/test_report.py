@@ -109,6 +109,7 @@ def moment(level, sweep, full, end_of_sweep=True):
         end_of_sweep=end_of_sweep,
         temperature=lambda: np.full(picture.shape[:2], 0.5),
         source=lambda: np.zeros((*picture.shape[:2], 2), np.int32),
+        explain=lambda row, col: None,
     )
 
 

@@ -48,6 +48,7 @@ def test_what_progress_says_of_itself():
     assert (plain.doing, plain.stage, plain.maps()) == ("level 2", None, {})
 
     left = {"temperature_left": 0.125, "temperature": lambda: np.ones((3, 3)), "source": lambda: np.zeros((3, 3, 2))}
+    left["explain"] = lambda row, col: None
     relaxing = [Relaxing(sweep=7, step=9, phase="relax", end_of_sweep=end, **left, **where) for end in (False, True)]
     assert relaxing[0].doing == "level 2, sweep 7, temperature 0.125"
     assert [one.stage for one in relaxing] == [None, "level2-sweep07"]

@@ -23,6 +23,7 @@ HEAVY |= {"xarray", "zarr", "h5netcdf", "pandas"}
 PUBLIC = {
     *("DeviceError", "Live", "Output", "Progress", "devices", "lcpdf", "mix", "open_machine", "quality"),
     *("place_hard_data", "read_hard_data", "synthesize", "synthesize_solid", "__version__", "Checkpoint", "extend"),
+    "explain",
     *("TextureClassifier", "classify", "estimate", "fill", "simulate", "read_grid", "write_grid"),
 }
 COMMAND_LINE = """

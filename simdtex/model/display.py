@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from base64 import b64encode
+from collections.abc import Sequence
 from html import escape
 from typing import Any
 
@@ -16,6 +17,9 @@ from simdtex.model.colours import source_colours
 
 SIDE = 512
 """The longest side of a picture that is shown, pixels; of larger ones every n-th row and column is."""
+
+CELL = 12
+"""Pixels to a side of a neighbour in the picture of a neighbourhood."""
 
 
 def as_html(made: NDArray[Any] | None, source: NDArray[np.int32] | None, statistics: dict[str, Any]) -> str:
@@ -36,6 +40,45 @@ def as_html(made: NDArray[Any] | None, source: NDArray[np.int32] | None, statist
     facts += [f"seed {statistics['seed']}"] if "seed" in statistics else []
     row = f'<div style="display:flex;flex-wrap:wrap;gap:1em">{"".join(figures)}</div>'
     return f"<div>{row}<p>{escape(', '.join(facts))}</p></div>"
+
+
+def choice_html(
+    offsets: NDArray[np.int32],
+    near: NDArray[Any],
+    certain: NDArray[np.float32],
+    candidates: NDArray[Any],
+    probability: NDArray[np.float64],
+    captions: Sequence[str],
+    text: str,
+) -> str:
+    """Return HTML with a neighbourhood, candidates with bars as long as they are probable, and a text below them.
+
+    ``offsets`` (N, 2 or 3) of the neighbours, of which those in the site's layer are shown; ``near`` (N, channels)
+    pixels, white where they are not ``certain`` (N,), 0 to 1; ``candidates`` (n, 1 + N, channels) pixels of each and of
+    its neighbours; ``probability`` and ``captions`` (n,).
+    """
+    layer = np.flatnonzero((offsets[:, :-2] == 0).all(1) & offsets.any(1))
+    radius = int(np.abs(offsets[:, -1]).max())
+    row, col = (offsets[layer, -2:] + radius).T
+    limits = (min(near.min(), candidates.min()), max(near.max(), candidates.max()))
+    shown, own = to_display(near[layer], limits), to_display(candidates, limits)
+
+    def square(pixels: NDArray[np.uint8], centre: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        cells = np.full((2 * radius + 1, 2 * radius + 1, pixels.shape[-1]), 255, np.uint8)
+        cells[row, col], cells[radius, radius] = pixels, centre
+        return cells.repeat(CELL, 0).repeat(CELL, 1)
+
+    known = np.clip(certain[layer, None], 0, 1)
+    faded = np.rint(shown * known + 255 * (1 - known)).astype(np.uint8)
+    figures = [
+        _figure(square(faded, np.full(faded.shape[-1], 255, np.uint8)), "the neighbourhood; white is not certain")
+    ]
+    for one, share, caption in zip(own, probability, captions, strict=True):
+        bar = f'<div style="height:6px;background:#36c;width:{100 * share:.3g}%"></div>'
+        figure = _figure(square(one[1 + layer], one[0]), escape(caption))
+        figures.append(f'<div style="max-width:14em">{figure}{bar}</div>')
+    row_of = f'<div style="display:flex;flex-wrap:wrap;gap:1em">{"".join(figures)}</div>'
+    return f"<div>{row_of}<pre>{escape(text)}</pre></div>"
 
 
 def _thinned(array: NDArray[Any]) -> NDArray[Any]:

@@ -448,6 +448,20 @@ class Sample:
         own: NDArray[Any] = self.pixels[self._coordinates(np.maximum(source, self.first))]
         return own
 
+    def around(self, position: NDArray[np.int32], reach: NDArray[np.int32]) -> NDArray[Any]:
+        """Return the pixels (n, N, C) at pixel offsets (N,) from pixels (n,); those of the margin are reflections."""
+        lines = np.stack(self._coordinates(position[:, None] + reach))
+        number = np.zeros(position.size, np.intp) if self.layer else self.picture_of(position)
+        sides = np.array([one.shape[1:] for one in self.levels])[number].T[..., None]
+        top = np.array([top for top, *_ in self.boxes])[number, None]
+        lines[-2] -= top
+        period = np.maximum(2 * sides - 2, 1)
+        lines = abs(lines) % period
+        lines = np.minimum(lines, period - lines)
+        lines[-2] += top
+        found: NDArray[Any] = self.pixels[tuple(lines)]
+        return found
+
     def moved(self, source: NDArray[Any], by: NDArray[np.int16]) -> NDArray[Any]:
         """Return the pixels (rows, cols, C) of some sources, plus the differences from `simdtex.ops.finish`.
 

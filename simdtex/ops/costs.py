@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import prod
 from typing import Any, NamedTuple
 
@@ -117,6 +118,18 @@ class Costs(NamedTuple):
             *kinds,
         )
 
+    def terms(
+        self, numbers: NDArray[np.integer], sites: NDArray[np.int32], candidates: Candidates
+    ) -> Iterator[tuple[str, NDArray[np.float32]]]:
+        """Yield each cost of the candidates of these numbers, (slots, S or 1), by its name, in NumPy."""
+        yield "use", self.penalty[np.maximum(numbers, 0)]
+        if self.phased:
+            yield "lattice", self.phased.cost(numbers, sites)
+        if self.scattered:
+            yield "data", self.scattered.cost(numbers, sites, candidates)
+        if self.kinds:
+            yield "soft", self.kinds.cost(numbers, sites)
+
     def added(
         self,
         d: NDArray[np.float32],
@@ -125,9 +138,6 @@ class Costs(NamedTuple):
         candidates: Candidates,
     ) -> NDArray[np.float32]:
         """Return distances (slots, S) with all costs of the candidates of these numbers, (slots, S or 1), in NumPy."""
-        d = d + self.penalty[np.maximum(numbers, 0)]
-        if self.phased:
-            d = d + self.phased.cost(numbers, sites)
-        if self.scattered:
-            d = d + self.scattered.cost(numbers, sites, candidates)
-        return d + self.kinds.cost(numbers, sites) if self.kinds else d
+        for _, cost in self.terms(numbers, sites, candidates):
+            d = d + cost
+        return d

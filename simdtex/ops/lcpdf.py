@@ -138,6 +138,18 @@ def weights(distance: NDArray[np.float32], scale: np.float32) -> NDArray[np.uint
     return np.where(a < NO_WEIGHT, exp32(-near) * np.float32(2**40), 0).astype(np.uint64)
 
 
+def masses(w: NDArray[np.uint64], pixels: NDArray[Any], choice: Choice) -> NDArray[np.uint64]:
+    """Return what a draw is in proportion to: weights, of a density times the legal share of each pixel's kernel.
+
+    ``w`` (slots, S) weights; ``pixels`` (C, slots, S or 1) grey levels of the candidates.
+    """
+    for plane in pixels if choice.density else ():
+        _, mass = legal(plane, choice.window)
+        mass = np.broadcast_to(mass, w.shape)
+        w = np.where(w > 0, np.maximum(random.below(np.zeros_like(mass), mass, w), 1), 0)
+    return w
+
+
 def drawn(
     w: NDArray[np.uint64],
     pixels: NDArray[Any],
@@ -145,16 +157,11 @@ def drawn(
     choice: Choice,
     key: Key,
 ) -> NDArray[np.intp]:
-    """Return the slot (S,) that each site draws, with a probability in proportion to its mass.
+    """Return the slot (S,) that each site draws, with a probability in proportion to its mass (`masses`).
 
-    ``w`` (slots, S) weights, of a density times the share of the kernel around each pixel that is legal; ``pixels``
-    (C, slots, S or 1) grey levels of the candidates; ``places`` (S,) of the sites in the whole picture.
+    ``places`` (S,) of the sites in the whole picture.
     """
-    for plane in pixels if choice.density else ():
-        _, mass = legal(plane, choice.window)
-        mass = np.broadcast_to(mass, w.shape)
-        w = np.where(w > 0, np.maximum(random.below(np.zeros_like(mass), mass, w), 1), 0)
-    cumulative = np.cumsum(w, 0, dtype=np.uint64)
+    cumulative = np.cumsum(masses(w, pixels, choice), 0, dtype=np.uint64)
     lo, hi, *_ = random.draw4(*key, places, random.DRAW, 0)
     taken: NDArray[np.intp] = (cumulative > random.below(lo, hi, cumulative[-1])).argmax(0)
     return taken

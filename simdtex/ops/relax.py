@@ -64,13 +64,19 @@ class Everything(NamedTuple):
         found = coherence.reference(found, self.candidates, *where, relaxation.discount)
         found = charge.reference(found, self.candidates, sites, relaxation.costs)
         if relaxation.novelty > 0:
-            source = sources(relaxation.grid.neighbours(sites, relaxation.offsets), field)
-            same = np.where(source >= 0, self.candidates.index_of[source], -1)
-            for pair in zip(continuing(self.candidates, source), same, strict=True):  # in canonical order
-                for numbers, cost in zip(pair, (relaxation.novelty, AGAIN * relaxation.novelty), strict=True):
-                    here = np.flatnonzero(numbers >= 0)
-                    found.distance[numbers[here], here] += cost
+            self.add_novelty(found.distance, sites, field, relaxation)
         return np.arange(self.slots)[:, None], found
+
+    def add_novelty(
+        self, d: NDArray[np.float32], sites: NDArray[np.int32], field: Field, relaxation: Relaxation
+    ) -> None:
+        """Add to distances (slots, S), in place, what candidates cost that continue or repeat a neighbour's source."""
+        source = sources(relaxation.grid.neighbours(sites, relaxation.offsets), field)
+        same = np.where(source >= 0, self.candidates.index_of[source], -1)
+        for pair in zip(continuing(self.candidates, source), same, strict=True):  # in canonical order
+            for numbers, cost in zip(pair, (relaxation.novelty, AGAIN * relaxation.novelty), strict=True):
+                here = np.flatnonzero(numbers >= 0)
+                d[numbers[here], here] += cost
 
 
 class Listed(NamedTuple):

@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 
 from simdtex import schedules
 from simdtex.checkpoint import like
-from simdtex.methods.mrf.level import Active, Info, Lattices, Level, Part, State, parts
+from simdtex.methods.mrf.level import Active, Info, Lattices, Level, Part, State, parts, rule
 from simdtex.methods.mrf.record import Record, output
 from simdtex.model.lattice import Grid
-from simdtex.model.sample import BLOCK
 from simdtex.ops import active
 from simdtex.ops.commit import commit
-from simdtex.ops.costs import Costs
 from simdtex.ops.finish import finish
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import Relaxation, relax, relax_apart
@@ -146,25 +144,6 @@ def counted(level: Level, field: Field, grid: Grid) -> NDArray[np.int32]:
     return found
 
 
-def rule(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
-    """Return how a site of the level relaxes: what happens to all sites of a step in parallel."""
-    return Relaxation(
-        grid=level.grid,
-        offsets=level.offsets,
-        proposal=level.proposal,  # 6.2.2.1 the LCPDF, equations (6) and (12), of these candidates
-        discount=level.discount,
-        novelty=level.novelty,
-        confidences=level.confidences,
-        costs=Costs(
-            level.machine.put(np.pad(penalty, (0, -penalty.size % BLOCK))), level.phased, level.scattered, level.kinds
-        ),
-        choice=level.choice,  # 6.2.2.2 a draw from it, or its mode
-        xi=level.xi,  # 6.2.2.3 the temperature, equation (13)
-        seed=level.setting.seed,
-        level=level.number,
-    )
-
-
 def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Relaxation) -> Iterator[Part]:
     """Relax the sites of one step after another, in parts that do not take long: 6.2.2."""
     machine = level.machine
@@ -175,20 +154,21 @@ def relaxed(level: Level, field: Field, chosen: schedules.Info, relaxation: Rela
             field = relax(machine, sites, ranges, field, level.weighed, relaxation, chosen.turn)
             done = int((ranges[:, 1] - ranges[:, 0]).sum())
             machine.sync(level.work * done)
-            yield Part(begun - before, done, last and chosen.last, field)
+            yield Part(begun - before, done, last and chosen.last, chosen.turn, field)
             before = begun
         return
     for step in chosen.apart(machine):
         outcomes: list[Any] = []
         for first in range(0, step.sites.size, level.at_once):  # no site sees another of its step
             if outcomes:
-                yield Part(len(outcomes) == 1, outcomes[-1][0].size, False, field)
+                yield Part(len(outcomes) == 1, outcomes[-1][0].size, False, chosen.turn, field)
             here = machine.put(step.sites[first : first + level.at_once])
             outcomes.append((here, *relax_apart(machine, here, field, level.weighed, relaxation, chosen.turn)))
             machine.sync(level.work * here.size)
         for here, taken, cooled in outcomes:
             field = commit(machine, field, here, taken, cooled)
-        yield Part(len(outcomes) < 2, outcomes[-1][0].size if outcomes else 0, step.last, field)
+        done = outcomes[-1][0].size if outcomes else 0
+        yield Part(len(outcomes) < 2, done, step.last, chosen.turn, field)
 
 
 def exchanged(level: Level, field: Field) -> Field:

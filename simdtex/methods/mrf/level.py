@@ -19,13 +19,13 @@ from simdtex.methods.mrf.options import Options
 from simdtex.model.given import around
 from simdtex.model.lattice import Grid
 from simdtex.model.regularity import WAVES
-from simdtex.model.sample import Candidates, Places
+from simdtex.model.sample import BLOCK, Candidates, Places
 from simdtex.ops import active, lcpdf
-from simdtex.ops.costs import Kinds, Phased, Scattered
+from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
 from simdtex.ops.lcpdf import Choice
 from simdtex.ops.nearest import TAIL, strip_of
 from simdtex.ops.neighbourhood import Confidences, Field
-from simdtex.ops.relax import EXHAUSTIVE, KEPT, Everything, Listed
+from simdtex.ops.relax import EXHAUSTIVE, KEPT, Everything, Listed, Relaxation
 from simdtex.ops.square import square_of
 from simdtex.ops.use import FairUse
 from simdtex.schedules import Setting
@@ -105,12 +105,13 @@ class Part(NamedTuple):
     """A part of a sweep.
 
     ``steps`` of the schedule that have begun with it; ``sites`` that it has relaxed; ``last`` whether the sweep ends
-    with it; ``field`` the arrays over sites.
+    with it; ``turn`` the key of its random numbers; ``field`` the arrays over sites.
     """
 
     steps: int
     sites: int
     last: bool
+    turn: int
     field: Field
 
 
@@ -386,6 +387,25 @@ class Level:
         stores = isinstance(self.proposal, Everything) and (self.choice.draws or self.confidences.own)
         most = self.machine.chunk(self.proposal.slots, neighbours, channels, stores)
         return max(most, TOGETHER) if isinstance(self.proposal, Listed) and self.in_place else most
+
+
+def rule(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
+    """Return how a site of the level relaxes: what happens to all sites of a step in parallel."""
+    return Relaxation(
+        grid=level.grid,
+        offsets=level.offsets,
+        proposal=level.proposal,  # 6.2.2.1 the LCPDF, equations (6) and (12), of these candidates
+        discount=level.discount,
+        novelty=level.novelty,
+        confidences=level.confidences,
+        costs=Costs(
+            level.machine.put(np.pad(penalty, (0, -penalty.size % BLOCK))), level.phased, level.scattered, level.kinds
+        ),
+        choice=level.choice,  # 6.2.2.2 a draw from it, or its mode
+        xi=level.xi,  # 6.2.2.3 the temperature, equation (13)
+        seed=level.setting.seed,
+        level=level.number,
+    )
 
 
 class Active:

@@ -11,9 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from simdtex.machine.reference import Reference
 from simdtex.maspar.accounting import Account
 from simdtex.maspar.array import parse_array
+from simdtex.methods.mrf.explain import Moment, explained
 from simdtex.methods.mrf.level import Info, Lattices, Level, Part, State
+from simdtex.model.explanation import Explanation
 from simdtex.model.lattice import Grid
 from simdtex.model.use import effective_use
 from simdtex.ops import active
@@ -47,6 +50,7 @@ class Record:
         self._done = 0  # sites of the present sweep that are relaxed
         self._ended = True  # the next part begins a sweep
         self._skipped = self._weighed = 0
+        self._twin: Lattices | None = None  # the plan on the reference, for what asks for an explanation
 
     def part(self, level: Level, state: State, part: Part) -> None:
         """Count a part of a sweep, and report it to the callback."""
@@ -77,8 +81,16 @@ class Record:
                     end_of_sweep=part.last,
                     temperature=partial(temperatures, *read),
                     source=partial(sources, *read),
+                    explain=partial(self._explain, level, state, part),
                 )
             )
+
+    def _explain(self, level: Level, state: State, part: Part, *site: int) -> Explanation:
+        """Return how a site of the level would relax now."""
+        if self._twin is None:
+            self._twin = Lattices(self._run.plan, Reference(), self._run.seed)
+        field, sweep = Field(*map(self._run.machine.get, part.field)), state.cooling + state.free + 1
+        return explained(self._twin, Moment(level.number, sweep, field, state.penalty, part.turn), site)
 
     def _advance(self, level: int, state: State, left: float, share: float) -> None:
         """Estimate the share of the run that is done, once ``share`` of a sweep is, begun at this mean temperature.

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Why a site takes what it takes: one relaxation by the engine's own operations, with each of its terms kept.
+
+`explained` relaxes a site by the twins of the operations, from a copy of the field on the host, and changes nothing. So
+it serves a run that goes on (`simdtex.run.Relaxing.explain`) and one that is made for it (`simdtex.explain`) alike. A
+device has the twins' bits: what they take is what it takes.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.methods.mrf.level import Lattices, rule
+from simdtex.model.explanation import Explanation, Neighbours, Ranked
+from simdtex.model.guide import UNKNOWN
+from simdtex.model.lattice import parts_of
+from simdtex.ops import lcpdf
+from simdtex.ops.coherence import continuing, sources
+from simdtex.ops.costs import Costs
+from simdtex.ops.neighbourhood import Field, gathered
+from simdtex.ops.relax import SUGGESTING, Everything, Relaxation, relax_apart
+
+MOST = 100
+"""Candidates that are told in full."""
+
+
+class Moment(NamedTuple):
+    """A moment of a run, on the host.
+
+    ``level``, and ``sweep`` from 1; ``field`` before the relaxation; ``penalty`` of each candidate during the sweep;
+    ``turn`` the key of the random numbers.
+    """
+
+    level: int
+    sweep: int
+    field: Field
+    penalty: NDArray[np.float32]
+    turn: int
+
+
+def explained(twin: Lattices, moment: Moment, site: tuple[int, ...]) -> Explanation:
+    """Return the relaxation of a site, (row, column) or (layer, row, column), at a moment.
+
+    ``twin`` is the run's plan on the reference. Cost: a relaxation by the twins, some three times.
+    """
+    level = twin.level(moment.level)
+    pixel = np.array([pixel_of(twin, moment.level, site)], np.int32)
+    field, relaxation = moment.field, rule(level, moment.penalty)
+    choice, candidates = relaxation.choice, relaxation.proposal.candidates
+
+    listed, found = relaxation.proposal.weighed(pixel, field, relaxation, moment.turn)
+    weighed = np.flatnonzero(np.isfinite(found.distance[:, 0]))  # others are no candidates
+    total, numbers = found.distance[weighed, 0], listed[weighed, 0]
+    relaxed, cooled = relax_apart.reference(
+        pixel, field, np.zeros(field.source.shape, np.int32), relaxation, moment.turn
+    )
+    pixels = candidates.pixels[:, candidates.positions[numbers], None]
+    weights = lcpdf.weights(total[:, None], choice.window.scale)
+    mass = lcpdf.masses(weights, pixels, choice)[:, 0].astype(np.float64)
+
+    ranked = np.lexsort((numbers, total))
+    rank = np.flatnonzero(np.arange(ranked.size) < MOST)
+    is_taken = candidates.positions[numbers[ranked]] == relaxed.choice
+    rank = np.union1d(rank, np.flatnonzero(is_taken))
+    first = ranked[rank]
+    distance, costs = _terms(relaxation, pixel, field, moment.turn)
+    neighbours, continued = _neighbours(twin, relaxation, pixel, field)
+    position = candidates.positions[numbers[first]]
+    around = position[:, None] + candidates.reach
+    return Explanation(
+        site=site,
+        level=moment.level,
+        sweep=moment.sweep,
+        drawn=choice.draws,
+        exact=isinstance(relaxation.proposal, Everything),
+        weighed=total.size,
+        bandwidth=float(np.sqrt(0.5 / np.float64(choice.window.scale))),
+        temperature=float(field.temperature.ravel()[pixel[0]]) / 1024,
+        cooled=float(cooled[0]) / 1024,
+        neighbours=neighbours,
+        candidates=Ranked(
+            rank=rank,
+            place=twin.sample.place(position),
+            values=candidates.pixels[:, position].T.astype(np.uint16),
+            around=np.moveaxis(candidates.pixels[:, around], 0, -1).astype(np.uint16),
+            continues=(continued == numbers[first][:, None]).sum(1),
+            distance=distance[weighed][first],
+            costs={name: cost[weighed][first] for name, cost in costs.items()},
+            total=total[first],
+            probability=mass[first] / mass.sum(),
+            pixels=twin.sample.around(position, np.append(np.int32(0), candidates.reach)),
+        ),
+        taken=int(np.flatnonzero(is_taken[rank])[0]),
+        values=relaxed.values[:, 0],
+        density=_density(weights, pixels[: candidates.made], choice) if choice.density else None,
+    )
+
+
+def pixel_of(run: Lattices, number: int, site: tuple[int, ...]) -> int:
+    """Return the pixel index of a site of a level; raise ValueError if it is not of the level's lattice."""
+    shape = run.grid(number).shape
+    if len(site) != len(shape) or not all(0 <= n < side for n, side in zip(site, shape, strict=True)):
+        sides = " x ".join(map(str, shape))
+        raise ValueError(f"site {site} is not of the {sides} sites of level {number}; give one of these, from 0")
+    return int(run.grid(number).pixel_of([np.array(n) for n in site]))
+
+
+def _terms(
+    relaxation: Relaxation, pixel: NDArray[np.int32], field: Field, turn: int
+) -> tuple[NDArray[np.float32], dict[str, NDArray[np.float32]]]:
+    """Return equation (12) without guides, and each cost by its name, of all candidates that are proposed, (slots,)."""
+    proposal, costs = relaxation.proposal, relaxation.costs
+    bare = relaxation._replace(novelty=np.float32(0), costs=Costs(np.zeros_like(costs.penalty)))
+
+    def weighed(field: Field, discount: np.float32) -> NDArray[np.float32]:
+        found: NDArray[np.float32] = proposal.weighed(pixel, field, bare._replace(discount=discount), turn)[1].distance
+        return found
+
+    whole = distance = weighed(field, np.float32(1))
+    numbers, _ = proposal.weighed(pixel, field, bare, turn)
+    terms = {}
+    with np.errstate(invalid="ignore"):  # a slot without a candidate is infinitely far
+        if guides := relaxation.confidences.guides:
+            values = field.values.copy()
+            values[-guides:] = UNKNOWN  # which nothing is compared with
+            distance = weighed(field._replace(values=values), np.float32(1))
+            terms["guide"] = whole - distance
+        if relaxation.discount != 1:
+            terms["coherence"] = weighed(field, relaxation.discount) - whole
+    terms |= costs.terms(numbers, pixel, proposal.candidates)
+    if relaxation.novelty and isinstance(proposal, Everything):
+        terms["novelty"] = np.zeros_like(whole)
+        proposal.add_novelty(terms["novelty"], pixel, field, relaxation)
+    return distance[:, 0], {name: np.broadcast_to(cost, whole.shape)[:, 0] for name, cost in terms.items()}
+
+
+def _neighbours(
+    twin: Lattices, relaxation: Relaxation, pixel: NDArray[np.int32], field: Field
+) -> tuple[Neighbours, NDArray[np.int32]]:
+    """Return the neighbourhood of a site, and the candidate that continues each neighbour's source, if it counts."""
+    grid, sample, given = relaxation.grid, twin.sample, twin.plan.given
+    r = grid.neighbours(pixel, relaxation.offsets)
+    values, certain = gathered(pixel, r, field, relaxation.confidences)
+    source, proposal = sources(r, field), relaxation.proposal
+    looked_at = len(r) if isinstance(proposal, Everything) else SUGGESTING
+    continued = continuing(proposal.candidates, source)[:looked_at, 0]
+    offsets = np.stack(parts_of(relaxation.offsets), 1)[:, -len(grid.shape) :]
+    if relaxation.confidences.guides:
+        r, source, offsets = (np.pad(array, ((0, 1), (0, 0))) for array in (r, source, offsets))
+        r[-1], source[-1] = pixel, -1
+    there, made = r >= 0, len(values[0]) - relaxation.confidences.guides
+    pixels = sample.picture(values[:, :made].transpose(1, 0, 2), field.source.ravel()[r])[:, 0]
+    if given:
+        own = r[:, 0] % grid.plane
+        known, told = (one.reshape(grid.plane, -1)[own] for one in (given.known, given.values))
+        pixels = np.where(known, told, pixels)
+    near = Neighbours(
+        offsets=offsets.astype(np.int32),
+        values=np.where(there, values[..., 0], 0).astype(np.uint16),
+        confidence=np.ascontiguousarray(np.broadcast_to(certain, values.shape)[..., 0]),
+        source=sample.place(source[:, 0]),
+        pixels=np.where(there, pixels, np.zeros((), pixels.dtype)),
+    )
+    return near, continued
+
+
+def _density(weights: NDArray[np.uint64], pixels: NDArray[Any], choice: lcpdf.Choice) -> NDArray[np.float64]:
+    """Return the LCPDF of each channel, (C, greys), of weights (slots, 1) and grey levels (C, slots, 1)."""
+    rows = []
+    for c, grey in enumerate(pixels):
+        mass = np.zeros(choice.window.top + 1, np.uint64)
+        others = lcpdf.masses(weights, np.delete(pixels, c, 0), choice)  # what is drawn of them is legal, too
+        np.add.at(mass, grey[:, 0].astype(np.int64), others[:, 0])
+        rows.append(lcpdf.smoothed(mass, choice.window).astype(np.float64))
+    return np.stack([row / row.sum() for row in rows])
