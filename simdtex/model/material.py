@@ -77,7 +77,9 @@ def find_maps(folder: str | os.PathLike[str]) -> Maps:
     try:
         found = sorted(path for path in Path(folder).iterdir() if path.name[0] != "." and path.is_file())
     except OSError as error:
-        raise ValueError(f"{os.fspath(folder)} cannot be read ({error.strerror}): check the path of the folder") from None
+        raise ValueError(
+            f"{os.fspath(folder)} cannot be read ({error.strerror}): check the path of the folder"
+        ) from None
     maps = Maps({}, [])
     for path in found:
         role, suffix = map_role(path), path.suffix.lower()
