@@ -70,7 +70,8 @@ class Material(NamedTuple):
 class Writes(Protocol):
     """What writes a picture with what its file says of it, and other maps in its arrangement."""
 
-    def write(self, made: NDArray[Any], run: Any, metadata: Metadata | None) -> None: ...
+    def write(self, made: NDArray[Any], run: Any, metadata: Metadata | None) -> None:
+        """Write all files, or none."""
 
 
 class Also(NamedTuple):

@@ -109,7 +109,8 @@ def unit_normals(pixels: NDArray[Any], where: NDArray[np.bool_]) -> NDArray[Any]
     Returns
     -------
     ndarray
-        The shape and type of `pixels`; unsigned integers are rounded.
+        The shape and type of `pixels`; unsigned integers are rounded. A vector shorter than 0.01 has no direction, and
+        is unchanged.
     """
     if pixels.ndim < 3 or pixels.shape[2] < 3 or pixels.dtype.kind not in "uf":
         return pixels
@@ -119,7 +120,7 @@ def unit_normals(pixels: NDArray[Any], where: NDArray[np.bool_]) -> NDArray[Any]
         scale, offset = 1.0, 0.0
     vectors = pixels[where][:, :3] / scale - offset
     length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    vectors = np.divide(vectors, length, out=vectors, where=length > 0)
+    vectors = np.divide(vectors, length, out=vectors, where=length > 0.01)
     values = (vectors + offset) * scale
     made = pixels.copy()
     made[where, :3] = (np.round(values) if whole else values).astype(pixels.dtype)
