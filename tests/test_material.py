@@ -1,9 +1,12 @@
 """The maps of a material: what a name says, what is in a folder, and normals of length 1."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from simdtex.model.material import find_maps, map_role, unit_normals
+from simdtex.model.material import ROLES, find_maps, map_role, unit_normals
 
 NAMES = {
     "albedo.png": "albedo",
@@ -34,6 +37,18 @@ NAMES = {
 @pytest.mark.parametrize("name", NAMES)
 def test_the_end_of_a_name_says_what_a_map_is(name):
     assert map_role(f"Color/{name}") == NAMES[name]
+
+
+def test_the_words_of_the_page_are_known():
+    page = (Path(__file__).parent.parent / "docs" / "readers" / "materials.rst").read_text(encoding="utf-8")
+    rows = re.findall(r"^   \* - ([a-z; -]+)\n     - (.+)$", page, re.MULTILINE)
+    told = {}
+    for roles, words in rows:
+        told |= dict(zip(roles.split("; "), words.split("; "), strict=True))
+    assert set(told) == set(ROLES)
+    for role, words in told.items():
+        for word in words.split(", "):
+            assert map_role(f"brick {word}.png") == role
 
 
 def test_maps_of_a_folder(tmp_path):

@@ -64,9 +64,9 @@ def extend(
 ) -> Task:
     """Continue PICTURE beyond its edges, or make it seamless.
 
-    PICTURE may be a folder with the maps of a material, which are named by what they are, as brick_albedo.png and
-    brick_normal.png; OUT is a folder, too, then. The albedo decides the arrangement, or the map in the folder that
-    PICTURE names.
+    PICTURE may be a folder with the maps of a material, whose names end in what they are, as brick_albedo.png and
+    brick_normal.png; the output is a folder, too, then. The albedo decides the arrangement. If another map should,
+    give its path in place of the folder's.
     """
     from simdtex import extend
     from simdtex.io import image
