@@ -109,6 +109,11 @@ def test_what_has_no_role_is_left_out_and_named(folder):
     assert names(folder / "tiled") == NAMES
 
 
+def test_a_folder_may_have_a_point_in_its_name(folder):
+    assert run("extend", "brick", "-o", "brick.v2", *SEAMLESS).exit_code == 0
+    assert names(folder / "brick.v2") == NAMES
+
+
 def test_a_picture_beside_other_maps_is_still_one_picture(folder):
     done = run("extend", "brick/brick_albedo.png", "-o", "out.png", *SEAMLESS)
     assert done.exit_code == 0 and (folder / "out.png").is_file(), done.output
@@ -150,6 +155,8 @@ BAD = {
     "no albedo": (["extend", "none", *TO], "has no albedo: end the name of one in _albedo", "none/b_normal.png"),
     "no maps at all": (["extend", "none", *TO], "no albedo (b.png does not say what it is): end", "none/b.png"),
     "a file as output": (["extend", "brick", "-o", "out.png", *SEAMLESS], "give a folder for the output", None),
+    "a store as output": (["synth", "brick", "-o", "out.zarr"], "give a folder for the output", None),
+    "a suffix": (["extend", "brick/brick_ao.jpg", "-o", "out.pgn", *SEAMLESS], "ends in .pgn: end its name", None),
     "into itself": (["extend", "brick", "-o", "brick/tiled", *SEAMLESS], "is an input", None),
     "over itself": (["extend", "brick/brick_ao.jpg", "-o", "brick", *SEAMLESS], "is an input", None),
     "no folder for it": (["extend", "brick", "-o", "none/tiled", *SEAMLESS], "none does not exist: create it", None),

@@ -69,7 +69,7 @@ class Folder:
 
 def folder_of(picture: Path, output: Path) -> Folder | None:
     """Return the maps of a folder, if `picture` is one, or is a map in one and `output` a folder; else None."""
-    from simdtex.model.material import find_maps, map_role
+    from simdtex.model.material import READABLE, find_maps, map_role
 
     role = map_role(picture)
     whole = picture.is_dir()
@@ -85,7 +85,7 @@ def folder_of(picture: Path, output: Path) -> Folder | None:
             f"{picture} has no albedo{what}: end the name of one in _albedo, or give the map that decides the "
             f"arrangement, as {there}"
         )
-    if output.suffix and not output.is_dir():
+    if output.suffix.lower() in (*READABLE, ".zarr") and not output.is_dir():
         raise ValueError(f"{picture} is a folder of maps and {output} a file: give a folder for the output")
     for path in found.files.values():
         check_input(output, path)
