@@ -109,6 +109,21 @@ def test_what_has_no_role_is_left_out_and_named(folder):
     assert names(folder / "tiled") == NAMES
 
 
+def test_all_maps_are_written_or_none(folder, monkeypatch):
+    assert run("extend", "brick", "-o", "tiled", *SEAMLESS).exit_code == 0
+    before, real = everything(folder), image.write
+
+    def fails(path, *given):
+        if "height" in str(path):
+            raise NotWritten("the disk is full")
+        real(path, *given)
+
+    monkeypatch.setattr(image, "write", fails)
+    done = run("extend", "brick", "-o", "tiled", "--right", 4)
+    assert done.exit_code == 2 and "the disk is full" in done.output
+    assert everything(folder) == before
+
+
 def test_a_folder_may_have_a_point_in_its_name(folder):
     assert run("extend", "brick", "-o", "brick.v2", *SEAMLESS).exit_code == 0
     assert names(folder / "brick.v2") == NAMES
