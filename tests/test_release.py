@@ -37,6 +37,26 @@ def test_the_citation_is_that_of_the_project():
     assert CITATION.get("repository-code") == PROJECT.get("urls", {}).get("Repository")
 
 
+def test_every_supported_python_is_tried():
+    named = [line.rpartition(" ")[2] for line in PROJECT["classifiers"] if ":: Python :: 3." in line]
+    assert read("ci")["jobs"]["all"]["strategy"]["matrix"]["python"] == named
+    assert PROJECT["requires-python"] == f">={named[0]}"
+
+
+@pytest.mark.parametrize("name", ["bug", "wish"])
+def test_an_issue_begins_with_the_version(name):
+    form = yaml.safe_load((ROOT / ".github" / "ISSUE_TEMPLATE" / f"{name}.yml").read_text(encoding="utf-8"))
+    assert {"name", "description", "body"} <= set(form)
+    fields = {one["id"]: one for one in form["body"]}
+    assert "`simdtex --version`" in fields["version"]["attributes"]["label"]
+    assert fields["version"]["validations"]["required"] is True
+
+
+def test_a_release_takes_three_steps():
+    page = (ROOT / "docs" / "releasing.rst").read_text(encoding="utf-8")
+    assert re.findall(r"^(\d)\. ", page, re.MULTILINE) == ["1", "2", "3"]
+
+
 def test_the_changelog_knows_the_version():
     headings = re.findall(r"^## \[(.+?)\]", CHANGELOG, re.MULTILINE)
     assert headings[0] == "Unreleased"

@@ -50,6 +50,7 @@ WHAT = "More of a texture from a sample of it, by parallel relaxation on any Ope
 EXAMPLES = (
     ("synth gravel.png -o more.png", "More of a texture; it tiles."),
     ("extend photo.png -o tile.png --seamless", "A photo that tiles."),
+    ("extend brick -o tiled --seamless", "All maps of a material, from a folder to another."),
     ("fill photo.png -o whole.png --mask hole.png", "A hole that is filled."),
 )
 

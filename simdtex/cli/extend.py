@@ -11,8 +11,9 @@ import click
 
 from simdtex.cli.inputs import channels, check_source_map, note_lossy, read_also, read_material, write_arranged
 from simdtex.cli.job import Task, command_line, job
+from simdtex.cli.maps import folder_of
 from simdtex.cli.options import ALSO, SOURCE_MAP, given, option, report_option
-from simdtex.cli.places import READ, WRITE
+from simdtex.cli.places import EITHER, ENTER
 
 SIDES = ("top", "bottom", "left", "right")
 
@@ -20,11 +21,11 @@ SIDES = ("top", "bottom", "left", "right")
 @job(
     ("extend photo.png -o tile.png --seamless", "Make a photo tile."),
     ("extend photo.png -o wide.png --left 200 --right 200", "Continue it at both sides."),
-    ("extend photo.png -o tile.png --seamless --also normal.png=tile-normal.png", "And its normal map with it."),
+    ("extend brick -o tiled --seamless", "All maps in the folder brick: albedo, normal, roughness..."),
     stages="every level and sweep",
 )
-@click.argument("picture", type=READ)
-@click.option("-o", "--output", required=True, type=WRITE, help="Write this picture.")
+@click.argument("picture", type=ENTER)
+@click.option("-o", "--output", required=True, type=EITHER, help="Write this picture, or a folder of maps.")
 @click.option("--left", type=int, default=0, help="Add this many pixels at the left.")
 @click.option("--right", type=int, default=0, help="Add this many pixels at the right.")
 @click.option("--top", type=int, default=0, help="Add this many pixels at the top.")
@@ -63,12 +64,15 @@ def extend(
 ) -> Task:
     """Continue PICTURE beyond its edges, or make it seamless.
 
-    `simdtex extend photo.png -o tile.png --seamless` makes of a photo a texture that tiles.
+    PICTURE may be a folder with the maps of a material, whose names end in what they are, as brick_albedo.png and
+    brick_normal.png; the output is a folder, too, then. The albedo decides the arrangement. If another map should,
+    give its path in place of the folder's.
     """
     from simdtex import extend
     from simdtex.io import image
 
-    whole = read_material([picture])
+    folder = folder_of(picture, output)
+    whole = read_material([folder.lead if folder else picture])
     pixels, (rows, cols) = whole.pixels[0], whole.sizes[0]
     sides = {name: options.pop(name) for name in SIDES}
     if size is not None:
@@ -81,10 +85,13 @@ def extend(
     if options["band"] is not None and not tiling:
         raise ValueError("--band is what --seamless makes anew; leave it out, or give --seamless")
     others = read_also(also, whole)
-    image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, whole)
-    note_lossy(output, pixels)
-    writers = write_arranged(output, others, source_map, whole.metadata)
+    if folder:
+        folder.read(whole)
+    else:
+        image.check_writable(output, pixels.dtype, channels(pixels))
+        note_lossy(output, pixels)
+    writers = write_arranged(folder or output, others, source_map, whole.metadata)
     if report:
         from simdtex.report.page import check_folder
         from simdtex.report.synthesis import write_synthesis
@@ -94,7 +101,7 @@ def extend(
     return Task(
         partial(extend, pixels, seamless=tiling, channel_axis=whole.channel_axis, **sides, **given(options)),
         lambda made: f"{made.shape[1]}x{made.shape[0]} from {cols}x{rows}",
-        str(output),
+        str(folder or output),
         writers,
         whole.limits,
     )

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +65,13 @@ class Material(NamedTuple):
     def known(self) -> bool:
         """Whether nothing is NaN."""
         return all(array.dtype.kind != "f" or not np.isnan(array).any() for array in self.pixels)
+
+
+class Writes(Protocol):
+    """What writes a picture with what its file says of it, and other maps in its arrangement."""
+
+    def write(self, made: NDArray[Any], run: Any, metadata: Metadata | None) -> None:
+        """Write all files, or none."""
 
 
 class Also(NamedTuple):
@@ -225,16 +232,22 @@ def read_also(texts: Sequence[str], samples: Material, *, files: bool = True) ->
 
 
 def write_arranged(
-    output: Path, others: Sequence[Also], source_map: Path | None, metadata: Metadata | None
+    output: Path | Writes, others: Sequence[Also], source_map: Path | None, metadata: Metadata | None
 ) -> list[Callable[[Any, Any], object]]:
     """Return functions that write a picture, the other maps in its arrangement, and the source map if it has a file.
 
-    ``metadata`` is written with the picture.
+    ``metadata`` is written with the picture; `output` is its file, or an object that writes it and others.
     """
     from simdtex.io import image
     from simdtex.model.source_map import save_source_map
 
-    writers: list[Callable[[Any, Any], object]] = [lambda made, run: image.write(output, made, metadata)]
+    def write(made: NDArray[Any], run: Any) -> None:
+        if isinstance(output, Path):
+            image.write(output, made, metadata)
+        else:
+            output.write(made, run, metadata)
+
+    writers: list[Callable[[Any, Any], object]] = [write]
     for one in others:
         writers.append(partial(_write_map, one))
     if source_map:

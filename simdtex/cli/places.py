@@ -83,6 +83,11 @@ def check_places(context: click.Context) -> None:
                     )
 
 
+def check_input(folder: Path, path: Path) -> None:
+    """Raise if a file that is read would be overwritten or removed where a folder is written."""
+    _check_input(_Named(folder, "folder"), _Named(path, "read"))
+
+
 def _check_input(out: _Named, one: _Named) -> None:
     """Raise if an output would overwrite or remove an input, or change a folder that is one."""
     if _same(out.path, one.path):

@@ -21,6 +21,7 @@ from simdtex.cli.inputs import (
     write_arranged,
 )
 from simdtex.cli.job import Task, command_line, job
+from simdtex.cli.maps import folder_of
 from simdtex.cli.options import (
     ALSO,
     GUIDE,
@@ -33,7 +34,7 @@ from simdtex.cli.options import (
     report_option,
     size_option,
 )
-from simdtex.cli.places import EITHER, READ
+from simdtex.cli.places import EITHER, ENTER
 from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 
 
@@ -47,8 +48,14 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
     stages="every level, sweep or iteration",
     profile=True,
 )
-@click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=READ)
-@click.option("-o", "--output", required=True, type=EITHER, help="Write this picture; with --tiles a .zarr store.")
+@click.argument("samples", metavar="SAMPLE...", nargs=-1, required=True, type=ENTER)
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    type=EITHER,
+    help="Write this picture, or a folder of maps; with --tiles a .zarr store.",
+)
 @size_option("that of --known or of the output guide, else twice the first sample")
 @option(
     "--method",
@@ -76,16 +83,19 @@ def synth(
 ) -> Task | None:
     """Make more of the texture SAMPLE.
 
-    The method mrf takes several samples of one type, and their pixels may be NaN where they are unknown.
+    The method mrf takes several samples of one type, and their pixels may be NaN where they are unknown. SAMPLE may
+    be a folder with the maps of a material, as PICTURE of `simdtex extend`.
     """
     from simdtex.io import image
     from simdtex.synthesis import synthesize
 
     context = click.get_current_context()
     check_tiles(context)
-    if method == "pyramid" and (source_map or also):
-        raise ValueError("the method pyramid takes no pixel from the sample; leave --source-map and --also out")
-    material = read_material(samples)
+    folder = folder_of(samples[0], output) if len(samples) == 1 and options["tiles"] is None else None
+    if method == "pyramid" and (source_map or also or folder):
+        what = "give one picture" if folder else "leave --source-map and --also out"
+        raise ValueError(f"the method pyramid takes no pixel from the sample; {what}")
+    material = read_material([folder.lead] if folder else samples)
     pixels = material.pixels[0]
     data = read_data(material, options)
     known, guide = data["known"], data["guide"]
@@ -95,15 +105,19 @@ def synth(
         others = read_also(also, material, files=False)
         synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, inputs)
         return None
-    image.check_writable(output, pixels.dtype, channels(pixels))
+    if folder:
+        folder.read(material)
+    else:
+        image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, material, everywhere=known is None)
     others = read_also(also, material)
-    if others and known is not None:
-        raise ValueError("known pixels are from no sample, and nothing says what a map has there; leave --also out")
+    if (others or folder) and known is not None:
+        what = "give one picture" if folder else "leave --also out"
+        raise ValueError(f"known pixels are from no sample, and nothing says what a map has there; {what}")
     if known is not None:
         note_lossy(output, pixels)
     like = material.metadata and material.metadata._replace(exif=None)  # a new picture was taken by no camera
-    writers = write_arranged(output, others, source_map, like)
+    writers = write_arranged(folder or output, others, source_map, like)
     if report:
         from simdtex.report.page import check_folder
         from simdtex.report.synthesis import write_synthesis
@@ -134,7 +148,7 @@ def synth(
     return Task(
         partial(synthesize, material.array, shape, method=method, **inputs),
         lambda made: f"{shape[1]}x{shape[0]} from {by}",
-        str(output),
+        str(folder or output),
         writers,
         material.limits,
         more,

@@ -401,6 +401,12 @@ def check_writable(
         check_holds(target, _FORMATS, dtype, channels, suitable_suffix(dtype, channels))
 
 
+def holds_all(path: PathLike, dtype: DTypeLike, channels: int) -> bool:
+    """Return whether the format of a path's suffix is one that is written, and changes no such pixel."""
+    suffix = Path(path).suffix.lower()
+    return suffix in _FORMATS and suffix not in LOSSY and _FORMATS[suffix].holds(dtype, channels)
+
+
 def check_holds(
     target: Path, formats: dict[str, Format], dtype: DTypeLike | None, channels: int | None, other: str
 ) -> None:

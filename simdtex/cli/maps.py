@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A whole material: a folder of maps that is read, and a folder of maps that is written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex.cli.ending import note
+from simdtex.cli.inputs import Also, Material, channels, read_material, size
+from simdtex.cli.places import check_input
+
+if TYPE_CHECKING:
+    from simdtex.io.image import Metadata
+    from simdtex.model.material import Maps
+
+
+class Folder:
+    """The maps of a folder: ``lead``, whose pixels decide the arrangement, and the others, for a folder ``output``."""
+
+    def __init__(self, maps: Maps, role: str, output: Path) -> None:
+        self.output, self.lead, self.role = output, maps.files[role], role
+        self.paths = [path for path in maps.files.values() if path != self.lead]
+        self.unknown = maps.unknown
+        self.sample: NDArray[Any] = np.empty(0)
+        self.others: list[Also] = []
+        self.name = ""
+
+    def read(self, lead: Material) -> None:
+        """Read the other maps, and check that all can be written; `lead` is the first, which is read already."""
+        from simdtex.report.folder import earlier_files
+
+        self.sample = lead.pixels[0]
+        self.name = _written(self.lead, self.sample)
+        for path in self.paths:
+            maps = read_material([path])
+            if maps.sizes != lead.sizes:
+                raise ValueError(
+                    f"{path} is {size(maps.pixels[0])} and {self.lead.name} {size(self.sample)}: scale it to that "
+                    "size, or move it out of the folder"
+                )
+            self.others.append(Also(maps, self.output / _written(path, maps.pixels[0])))
+        names = [self.name, *(one.out.name for one in self.others)]
+        earlier_files(self.output, "the maps", names.__contains__)
+        if self.unknown:
+            note(f"the name does not say what map it is, so it is left out: {', '.join(self.unknown)}")
+
+    def write(self, made: NDArray[Any], run: Any, metadata: Metadata | None) -> None:
+        """Write all maps into the folder, or none; normals that are means of several get the length 1 again."""
+        from simdtex.io import image
+        from simdtex.io.atomic import atomic_folder
+        from simdtex.model.material import NORMALS, unit_normals
+        from simdtex.model.source_map import apply_source_map
+
+        if self.role in NORMALS and made.ndim == 3:
+            mixed = (made != apply_source_map(run.source, self.sample)).any(axis=2)
+            made = unit_normals(made, mixed)
+        with atomic_folder(self.output) as temporary:
+            image.write(temporary / self.name, made, metadata)
+            for one in self.others:
+                image.write(temporary / one.out.name, one.carried(run.source), one.maps.metadata)
+
+    def __str__(self) -> str:
+        return f"{self.output} ({1 + len(self.others)} maps arranged by {self.lead.name})"
+
+
+def folder_of(picture: Path, output: Path) -> Folder | None:
+    """Return the maps of a folder, if `picture` is one, or is a map in one and `output` a folder; else None."""
+    from simdtex.model.material import READABLE, find_maps, map_role
+
+    role = map_role(picture)
+    whole = picture.is_dir()
+    if not whole and (role is None or not picture.is_file() or (output.suffix and not output.is_dir())):
+        return None
+    found = find_maps(picture if whole else picture.parent)
+    if whole:
+        role = "albedo"
+    if role is None or role not in found.files:
+        there = next(iter(found.files.values()), picture / "brick_normal.png")
+        what = f" ({found.unknown[0]} does not say what it is)" if found.unknown else ""
+        raise ValueError(
+            f"{picture} has no albedo{what}: end the name of one in _albedo, or give the map that decides the "
+            f"arrangement, as {there}"
+        )
+    if output.suffix.lower() in (*READABLE, ".zarr") and not output.is_dir():
+        raise ValueError(f"{picture} is a folder of maps and {output} a file: give a folder for the output")
+    for path in found.files.values():
+        check_input(output, path)
+    return Folder(found, role, output)
+
+
+def _written(path: Path, pixels: NDArray[Any]) -> str:
+    """Return the name of a map's file in the output: its own, if its format is written and keeps all pixels."""
+    from simdtex.io.image import holds_all, suitable_suffix
+
+    if holds_all(path, pixels.dtype, channels(pixels)):
+        return path.name
+    return path.stem + suitable_suffix(pixels.dtype, channels(pixels))
