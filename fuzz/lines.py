@@ -11,7 +11,7 @@ import click
 
 from fuzz import corpus
 from simdtex.cli import load
-from simdtex.methods import mrf, multires, pyramid
+from simdtex.methods import classifier, mrf, multires, pyramid
 from simdtex.options import table
 
 COMMANDS = {
@@ -20,6 +20,7 @@ COMMANDS = {
     "extend": 6,
     "simulate": 8,
     "estimate": 3,
+    "classify": 4,
     "solid": 8,
     "mix": 8,
     "ising": 6,
@@ -49,12 +50,17 @@ MODEST = {
     **dict.fromkeys(("seeds", "sweeps"), (2, 3)),
     **dict.fromkeys(("burn_in", "number", "jobs", "first"), (0, 1, 2)),
     "seed": (0, 1, 2**63),
+    "exemplars": (16, 40),
+    "coupling": (0.5, 2),
     "xi": (-1, -0.5, -5),
     "tiles": (8, 12, 16),
 }
 """Values that make sense on pictures of ten pixels a side; other numbers are small ones."""
 
-METHODS = {"mrf": mrf.Options, "multires": multires.Options, "pyramid": pyramid.Options}
+METHODS = {
+    **{"mrf": mrf.Options, "multires": multires.Options, "pyramid": pyramid.Options},
+    "classifier": classifier.Options,
+}
 
 CHOICES = {
     "array": ("4x4", "maspar-mp1-1k", "2x3:hierarchical"),
@@ -205,6 +211,8 @@ class _Maker:
             words += ["--json", "no/such/file.json"]
         if name in ("simulate", "synth", "fill", "extend") and method in (None, "mrf"):
             words += ["--order", rng.choice("1124")]
+        if name == "classify" and rng.random() < 0.9:
+            words += ["--texture", f"a={samples[0] if rng.random() < 0.5 else self.file('picture')}"]
         words += ["--number", rng.choice("1112")] if name == "simulate" else []
         if name in ("solid", "mix") or method == "pyramid":
             words += ["--iterations", "1"]
@@ -212,7 +220,7 @@ class _Maker:
         usual = [option for option in options if not taken & set(option.opts) and option.name not in OTHERS]
         if method and fitting:
             usual = [option for option in usual if _of_method(option, method)]
-        self.method = {"solid": "pyramid", "mix": "pyramid"}.get(name, method or "mrf")
+        self.method = {"solid": "pyramid", "mix": "pyramid", "classify": "classifier"}.get(name, method or "mrf")
         if fitting:
             useless = ("profile", *(("source_map", "also") if self.method == "pyramid" else ()))
             usual = [option for option in usual if option.name not in useless]
@@ -250,6 +258,8 @@ class _Maker:
         rng, metavar = self.rng, option.metavar or ""
         if not modest and rng.random() < 0.7:
             return rng.choice(TEXT)
+        if metavar == "NAME=FILE":
+            return f"{rng.choice('abc')}={rng.choice((samples[0], self.file('picture')))}"
         if "=" in metavar:
             guide = self.file("picture" if name == "also" else "mask")
             out = self.file("mask") if name == "guide" else rng.choice(("map.png", "map.npy", "map.tif"))
@@ -285,9 +295,9 @@ class _Maker:
         rng = self.rng
         if name in ("stages", "report", "checkpoint"):
             return rng.choice(("pages", "a/b", "out.png") if rng.random() < 0.3 else ("pages",))
-        if name in ("source_map", "picture", "json", "plot"):
+        if name in ("source_map", "picture", "json", "plot", "confidence"):
             return rng.choice(("map.npz", "map.npy", "map.png", "out.png", "view.png"))
-        role = {"sample_mask": "mask", "known": "table"}.get(name, "picture")
+        role = {"sample_mask": "mask", "strokes": "mask", "truth": "mask", "known": "table"}.get(name, "picture")
         if name == "start" and command == "solid":
             role = "volume"
         if name == "known" and rng.random() < 0.4:
