@@ -8,6 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
 import PIL.Image
 from skimage import data
 
@@ -41,7 +42,6 @@ def main():
 
         def made(count):
             until(lambda: script("return page.results.size") == count, 120)
-            until(lambda: script("return page.figures.children.length") >= 16, 60)
 
         drop(driver, sample)
         made(1)
@@ -61,6 +61,23 @@ def main():
         shown(driver, width=390, height=844, dark=True)
         script("page.job.value = 'synth'; page.showJob(); page.view.fit(); scrollTo(0, 560)")
         keep(driver, "phone")
+        shown(driver, width=1400, height=900)
+        ground = Path(folder) / "ground.png"
+        textures = [data.brick(), data.grass(), data.gravel()]
+        PIL.Image.fromarray(np.hstack([one[:360, :180] for one in textures])).save(ground)
+        script("page.job.value = 'classify'; page.showJob(); page.startClasses(); scrollTo(0, 0)")
+        drop(driver, ground)
+        until(lambda: script("return page.view.cols") == 540)
+        for label in (1, 2, 3):
+            script(
+                "page.tool.value = arguments[0]; page.brushWidth.value = 24; const x = 180 * arguments[0] - 90;"
+                "const { brush } = page; brush.begin([x, 60]); brush.add([x - 30, 180]); brush.add([x + 30, 300])",
+                str(label),
+            )
+        before = script("return page.results.size")
+        script("page.brush.end()")
+        made(before + 1)
+        keep(driver, "classes")
 
 
 if __name__ == "__main__":

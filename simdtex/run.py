@@ -219,7 +219,7 @@ class Tiling(Progress):
 class Labelling(Progress):
     """The progress of `simdtex.classify`, after every step.
 
-    All is at level 0; the picture has the labels so far, 1 the first class.
+    All is at level 0; the picture has the labels so far, 1 the first class; 0 where nothing was compared yet.
 
     Attributes
     ----------

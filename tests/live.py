@@ -22,6 +22,18 @@ def texture(rows=40, cols=48, channels=3, dtype=np.uint8, seed=0):
     return found[..., 0] if channels == 1 else found
 
 
+def striped(channels=3, dtype=np.uint8):
+    """Two textures side by side, of 40 columns each, and noise in 16 more."""
+    found, top = texture(48, 96, channels, dtype), np.iinfo(dtype).max
+    rng = np.random.default_rng(1)
+    i, j = np.indices((48, 40))
+    found[:, 40:80] = (np.where((i // 3 + j // 5) % 2, top // 4, top // 2) + rng.integers(0, 9, (48, 40))).reshape(
+        48, 40, *[1] * (found.ndim - 2)
+    )
+    found[:, 80:] = rng.integers(0, top, found[:, 80:].shape, dtype)
+    return found
+
+
 def png(pixels):
     """The bytes of a PNG."""
     file = BytesIO()
@@ -31,7 +43,8 @@ def png(pixels):
 
 def asked(**settings):
     """A request with few levels, which is quick."""
-    options = {"order": 4} if settings.get("method", "mrf") == "mrf" else {}
+    order = settings.get("method", "mrf") == "mrf" and settings.get("job") != "classify"
+    options = {"order": 4} if order else {}
     message = {"kind": "make", "job": "synth", "method": "mrf", "width": 36, "height": 28, "seed": 7}
     return message | settings | {"options": options | settings.get("options", {})}
 
@@ -82,7 +95,8 @@ class Fake:
 
     def package(self, number):
         """The files of a result, by name."""
-        _, (data,) = self.ask("file", kind="download", result=number, name="texture.zip")
+        archive = self.session.results[number].files[-1]
+        _, (data,) = self.ask("file", kind="download", result=number, name=archive)
         with zipfile.ZipFile(BytesIO(data)) as archive:
             return {name: archive.read(name) for name in archive.namelist()}
 

@@ -11,7 +11,9 @@ import numpy as np
 import PIL.Image
 import pytest
 from browsing import AXE, browser, drop, live, missing, shown, until
-from live import png, texture
+from live import png, striped, texture
+
+from simdtex.live.job import LABELS
 
 REQUIRE = "SIMDTEX_REQUIRE_BROWSER"
 TOKEN = "a-token-for-the-browser"
@@ -118,7 +120,8 @@ class Page:
     def assert_command_repeats(self, folder):
         """The command line, where the sample is, writes the result's bytes."""
         subprocess.run([sys.executable, "-m", *self.command, "--quiet"], cwd=folder, check=True, timeout=120)
-        assert (folder / "texture.png").read_bytes() == self.download("texture.png")
+        output = self.command[self.command.index("-o") + 1]
+        assert (folder / output).read_bytes() == self.download(output)
 
     def canvas(self):
         """What the view shows, (rows, cols, 4)."""
@@ -127,6 +130,25 @@ class Page:
             "c.height).data; return [[c.height, c.width], Array.from(d)]"
         )
         return np.array(data, np.uint8).reshape(*size, 4)
+
+    def paint(self, label, left, top, right, bottom):
+        """Draw a stroke with the mouse, from one pixel of the layer to another."""
+        self.choose("Paint", label)
+        canvas = self.one("canvas.view")
+        x, y, unit = self.script("return [page.view.left, page.view.top, page.view.unit]")
+        start = [int((left - x) * unit - canvas.size["width"] / 2), int((top - y) * unit - canvas.size["height"] / 2)]
+        move = ActionChains(self.driver).move_to_element_with_offset(canvas, *start).click_and_hold()
+        move.move_by_offset(int((right - left) * unit), int((bottom - top) * unit)).release().perform()
+
+    def sees(self, picture):
+        """Whether the view shows these pixels, (rows, cols, 3), as they are."""
+        seen, zoom = self.canvas(), self.script("return page.view.scale")
+        rows, cols = (zoom * side for side in picture.shape[:2])
+        top, left = (seen.shape[0] - rows) // 2, (seen.shape[1] - cols) // 2
+        shown_there = seen[top - zoom : top + rows + zoom, left - zoom : left + cols + zoom, :3]
+        wanted = picture.repeat(zoom, 0).repeat(zoom, 1)
+        windows = np.lib.stride_tricks.sliding_window_view(shown_there, wanted.shape)
+        return bool((windows == wanted).all((-3, -2, -1)).any())
 
     def faults(self):
         """What axe-core finds, in words."""
@@ -161,15 +183,7 @@ def test_a_dropped_picture_gives_the_bytes_of_the_command_line(page, wall):
     page.assert_command_repeats(wall.parent)
     assert "144 \u00d7 128 in " in page.one(".doing").text
     assert page.script("return page.frames") >= 1
-    seen = page.canvas()
-    made = np.array(PIL.Image.open(wall.parent / "texture.png"))
-    zoom = page.script("return page.view.scale")
-    rows, cols = 128 * zoom, 144 * zoom
-    top, left = (seen.shape[0] - rows) // 2, (seen.shape[1] - cols) // 2
-    shown_there = seen[top - zoom : top + rows + zoom, left - zoom : left + cols + zoom, :3]
-    wanted = made.repeat(zoom, 0).repeat(zoom, 1)
-    windows = np.lib.stride_tricks.sliding_window_view(shown_there, wanted.shape)
-    assert (windows == wanted).all((-3, -2, -1)).any(), "the pixels are seen as they are"
+    assert page.sees(np.array(PIL.Image.open(wall.parent / "texture.png"))), "the pixels are seen as they are"
 
 
 @pytest.mark.slow
@@ -253,6 +267,35 @@ def test_painted_labels_are_a_guide(page, wall):
         ActionChains(page.driver).move_to_element(canvas).click_and_hold().move_by_offset(40, 0).release().perform()
     page.result(2)
     assert "--guide guide-sample.png=guide-texture.png" in " ".join(page.command)
+
+
+def test_painted_classes_are_labelled_over_the_picture(page, tmp_path):
+    page.choose("Make", "A classification by texture")
+    (tmp_path / "ground.png").write_bytes(png(striped()))
+    drop(page.driver, tmp_path / "ground.png")
+    until(lambda: page.one(".hint").text.startswith("No label is painted yet; paint over two or more textures"))
+    until(lambda: page.script("return page.view.cols") == 96)
+    page.paint("Label 1", 20, 10, 20, 38)
+    until(lambda: page.one(".hint").text.startswith("Only label 1 is painted;"))
+    assert page.one(".classes").text == "Label 1" and page.results == 0
+    page.paint("Label 3", 60, 10, 60, 38)
+    page.result(1)
+    assert not page.one(".hint").text and not page.all("[role=alert]:not([hidden])")
+    page.script("page.make(); page.pause()")
+    until(lambda: page.script("return page.running && page.shown === null"))
+    page.paint("Label 3", 50, 10, 70, 10)  # during the run, which begins again
+    page.result(2)
+    assert page.script("return page.guide.sample.length") == 3
+    page.choose("Paint", "Nothing")  # which hides the strokes
+    (tmp_path / "strokes.png").write_bytes(page.download("strokes.png"))
+    page.assert_command_repeats(tmp_path)
+    labels = np.array(PIL.Image.open(tmp_path / "labels.png"))
+    painted = np.array(PIL.Image.open(tmp_path / "strokes.png"))
+    assert set(np.unique(painted)) == {0, 1, 3} and painted[10, 50] == painted[38, 60] == 3
+    colours = LABELS[np.array([0, 1, 3])[labels]]
+    until(lambda: page.sees((striped().astype(int) + colours) // 2))
+    wanted = zip(("Unknown", "Label 1", "Label 3"), np.bincount(labels.ravel(), minlength=3), strict=True)
+    assert page.one(".classes").text.split("\n") == [f"{name}: {100 * n / labels.size:.1f} %" for name, n in wanted]
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
-"""Strokes become labels, and windows of layers become frames."""
+"""Strokes become labels, and windows of layers become frames; labels lie over a picture."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,6 +23,22 @@ def test_a_stroke_is_round_and_the_last_one_counts():
     assert (label[10, 4], label[10, 10], label[0, 10], label[0, 0]) == (1, 2, 2, 0)
     assert paint([stroke(1, 8, (5, 5)), stroke(0, 30, (5, 5))], (12, 12)).sum() == 0
     assert paint([stroke(1, 4, (-50, 5), (500, 5))], (12, 12))[5].all(), "it goes on beyond the edges"
+
+
+@pytest.mark.parametrize("channels", [(), (1,), (2,), (4,)], ids=str)
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_labels_lie_over_a_picture(channels, dtype):
+    pixels = np.random.default_rng(0).integers(0, 256, (4, 6, *channels)).astype(dtype)
+    pixels[:2, 0] = np.array([0, 255]).reshape(2, *[1] * len(channels))  # black and white
+    labels = np.arange(24, dtype=np.uint8).reshape(4, 6) % 3
+    colours = np.array([[0, 0, 0], [200, 100, 0], [255, 255, 255]], np.uint8)
+    own = pixels.reshape(4, 6, -1)
+    own = (own[..., :3] if own.shape[2] > 2 else own[..., :1]).astype(int) * np.ones(3, int)
+    for plain in (False, True):
+        found = render(frames.overlay(pixels, labels, colours, plain=plain), Window(width=6, height=4))
+        shown = np.frombuffer(found.pixels, np.uint8).reshape(4, 6, 4)[..., :3]
+        mixed = (own + colours[labels]) // 2
+        np.testing.assert_array_equal(shown, np.where((labels == 0)[..., None] & plain, own, mixed))
 
 
 @given(

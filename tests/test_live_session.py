@@ -10,18 +10,19 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from live import Fake, asked, png, texture
+from live import Fake, asked, png, striped, texture
 from PIL import ImageCms
 
 import simdtex
 from simdtex import cli
-from simdtex.io.image import read_bytes
+from simdtex.io.image import read_bytes, read_labels
 from simdtex.live import results
 from simdtex.live import session as sessions
-from simdtex.live.job import Picture
+from simdtex.live.job import LABELS, Picture
 from simdtex.live.levels import Levels
 from simdtex.live.results import Results
 from simdtex.methods import mrf
+from simdtex.methods.classifier import algorithm
 from simdtex.model.source_map import apply_source_map
 
 
@@ -73,7 +74,7 @@ def assert_command_repeats(page, number, folder, monkeypatch):
     """The command line of a package writes the bytes of its outputs from its other files."""
     files, result = page.package(number), page.session.results[number]
     assert files["again.txt"].decode() == result.job.command
-    outputs = [name for name in files if name.startswith("texture")]
+    outputs = [result.job.output, *(name for name in files if name.startswith("texture-"))]
     assert len(outputs) == 1 + len(result.maps)
     for name in set(files) - set(outputs):
         (folder / name).write_bytes(files[name])
@@ -103,6 +104,81 @@ def test_the_command_of_a_filled_hole_repeats_its_bytes(opened, of_result, tmp_p
     result = opened.result(job="fill", of=before, hole=[stroke((30, 20), (40, 24)), stroke((35, 22), label=0, width=2)])
     assert set(result["files"]) == {"texture.png", "texture-h.png", "arrangement.npz", "texture.zip"}
     assert_command_repeats(opened, result["result"], tmp_path, monkeypatch)
+
+
+def strokes(*labels):
+    """The classes of `striped`, a stroke over each."""
+    return {
+        "sample": [stroke((20 + 40 * k, 10), (20 + 40 * k, 38), label=one, width=12) for k, one in enumerate(labels)]
+    }
+
+
+CLASSIFIED = {
+    "colour": (striped(), {}),
+    "grey-16-bits": (striped(1, np.uint16), {"options": {"coupling": 3.5, "unknown": 0}}),
+    "alpha": (np.dstack([striped(), np.where(striped(1) > 90, 255, 100).astype(np.uint8)]), {"part": [0, 0, 20, 20]}),
+}
+
+
+@pytest.mark.parametrize("case", CLASSIFIED)
+def test_the_command_of_a_classification_repeats_its_bytes(page, case, tmp_path, monkeypatch):
+    pixels, settings = CLASSIFIED[case]
+    page.ask("picture", png(pixels), kind="open", name="Labels.png")
+    page.ask("maps", png(pixels), kind="map", name="h.png")
+    result = page.result(job="classify", guide=strokes(1, 3), **settings)
+    assert (result["width"], result["height"], result["layers"]) == (96, 48, ["sample", "labels"])
+    assert result["files"] == ["labels.png", "strokes.png", "labels.zip"]
+    command = shlex.split(result["command"])
+    assert command[:7] == ["simdtex", "classify", "sample.png", "-o", "labels.png", "--strokes", "strokes.png"]
+    labels, painted = page.latest.image, page.latest.job.files["strokes.png"]
+    assert np.unique(painted).tolist() == [0, 1, 3]
+    assert (labels[:, :36] == 1).mean() > 0.3 and not (labels[:, :36] == 2).any()
+    assert (labels[:, 44:76] == 2).mean() > 0.3 and not (labels[:, 44:76] == 1).any()
+    assert [label for label, _ in result["shares"]] == [0, 1, 3], "the labels as they are painted"
+    counted = [(labels == label).mean() for label in range(3)]
+    np.testing.assert_allclose([share for _, share in result["shares"]], counted)
+    assert_command_repeats(page, 1, tmp_path, monkeypatch)
+    for name, found in (("labels.png", labels), ("strokes.png", painted)):
+        np.testing.assert_array_equal(read_labels(tmp_path / name), found)
+
+
+def test_labels_are_shown_over_the_picture_and_rows_that_are_not_compared_yet_have_none(page, monkeypatch):
+    monkeypatch.setattr(sessions, "INTERVAL", 0)
+    monkeypatch.setattr(sessions, "MAX_RATE", 1e9)
+    monkeypatch.setattr(algorithm, "WORK", 2**25)
+    page.ask("picture", png(striped()), kind="open", name="a.png")
+    page.ask("frame", layer="labels", **WINDOW | {"width": 96, "height": 48})
+    after = len(page.got)
+    page.result(job="classify", guide=strokes(1, 3))
+    page.wait("frame", after=after, of=1)
+    assert page.wait("begun")[0]["layers"] == ["labels", "sample"]
+    sent = [(one, pixels) for one, pixels in page.got[after:] if one["kind"] == "frame" and one["of"] != "sample"]
+    assert {one["layer"] for one, _ in sent} == {"labels"} and len(sent) > 4
+    frames = [np.frombuffer(pixels, np.uint8).reshape(48, 96, 4)[..., :3] for _, (pixels,) in sent]
+    picture, first = striped(), frames[0]
+    plain = (first == picture).all((1, 2))
+    assert not plain[0] and plain[-1] and (np.diff(plain.astype(int)) >= 0).all(), "from the top to the bottom"
+    colours = LABELS[np.array([0, 1, 3])[page.latest.image]]
+    np.testing.assert_array_equal(frames[-1], (picture.astype(int) + colours) // 2)
+    assert (page.latest.image == 0).any(), "where it is darker"
+
+
+HINTS = [
+    ("no label is painted yet; paint over two or more textures of the picture, each with a label of its own", {}),
+    ("only label 3 is painted; paint over two or more textures", strokes(3)),
+    (
+        "label 2 is painted on 5 pixels; paint 16 or more",
+        {"sample": [*strokes(1)["sample"], stroke((60, 20), label=2, width=2)]},
+    ),
+]
+
+
+def test_too_little_paint_is_a_hint_and_no_error(page):
+    page.ask("picture", png(striped()), kind="open", name="a.png")
+    for sentence, guide in HINTS:
+        hint, _ = page.ask(("hint", "error", "begun"), **asked(job="classify", guide=guide))
+        assert hint["kind"] == "hint" and hint["text"].startswith(sentence), hint
+    page.result(job="classify", guide=strokes(1, 2))
 
 
 @pytest.mark.parametrize("name", ["hole.png", "guide-sample.png", "texture.png"])
@@ -365,7 +441,7 @@ WRONG = [
     ("result 5 is no longer kept; make it again with its command line", {"kind": "select", "result": 5}),
     ("width is 0; give 1 or more", asked(width=0)),
     ("width must be an integer, not 'big'", asked(width="big")),
-    ("unknown job 'rm'; choose one of: synth, extend, fill", asked(job="rm")),
+    ("unknown job 'rm'; choose one of: synth, extend, fill, classify", asked(job="rm")),
     ("unknown method 'os'; choose one of: mrf, multires, pyramid", asked(method="os")),
     ("there is no control for 'array'; choose one of: ", asked(options={"array": "4x4"})),
     ("balance is -1; give a number of at least 0", asked(options={"balance": -1})),
@@ -373,6 +449,11 @@ WRONG = [
     ("the part reaches beyond the picture of 48x40; choose one within it", asked(part=[40, 0, 20, 20])),
     ("a part of the picture is four numbers: left, top, width and height", asked(part=[1, 2])),
     ("a guide is painted on the sample and on the output; paint both", asked(guide=[1])),
+    ("a guide is painted on the sample and on the output; paint both", asked(job="classify", guide=[1])),
+    (
+        "there is no control for 'order'; choose one of: exemplars, ",
+        asked(job="classify", guide=GUIDE, options={"order": 4}),
+    ),
     ("label 1 is on the output and not on the sample;", asked(guide={"output": [stroke((1, 1))]})),
     ("there is no hole to fill; paint over what is to be replaced", hole()),
     ("the hole covers the whole picture; leave some of it", hole(stroke((20, 20), width=200))),

@@ -88,6 +88,21 @@ def picture(pixels: Array, sample: Array, shape: tuple[int, int] | None = None) 
     return Layer(shape or (pixels.shape[0], pixels.shape[1]), pixels, partial(to_display, limits=limits))
 
 
+def overlay(pixels: Array, labels: NDArray[np.uint8], colours: NDArray[np.uint8], *, plain: bool) -> Layer:
+    """Return a picture with its labels (rows, cols) over it, each as half of its colour of (labels, 3), as a layer.
+
+    If `plain`, pixels with the label 0 are as they are.
+    """
+    shown = picture(pixels, pixels).colours(pixels).reshape(*labels.shape, -1)
+    shown = shown[..., :3] if shown.shape[2] > 2 else shown[..., :1]
+
+    def mixed(part: Array) -> NDArray[np.uint8]:
+        own, label = part[..., :-1].astype(np.uint16), part[..., -1]
+        return np.where((label[..., None] == 0) & plain, own, (own + colours[label]) // 2).astype(np.uint8)
+
+    return Layer((labels.shape[0], labels.shape[1]), np.concatenate([shown, labels[..., None]], -1), mixed)
+
+
 def layers(
     sample: Array,
     shape: tuple[int, int],

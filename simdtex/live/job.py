@@ -17,9 +17,13 @@ from numpy.typing import NDArray
 from simdtex.checkpoint import Checkpointing
 from simdtex.io.decode import NOTHING
 from simdtex.io.image import Metadata, suitable_suffix
+from simdtex.jobs.classification import classify
 from simdtex.jobs.filling import extend, fill
+from simdtex.live import frames
 from simdtex.live.words import controls
 from simdtex.machine import Machine
+from simdtex.methods.classifier.model import LEAST
+from simdtex.model.colours import label_colours
 from simdtex.options import one_of, real, shown, whole
 from simdtex.run import Output
 from simdtex.synthesis import METHODS, synthesize
@@ -28,8 +32,8 @@ Array = NDArray[Any]
 Maps = dict[str, Array]
 Message = dict[str, Any]
 
-FUNCTIONS: dict[str, Callable[..., Any]] = {"synth": synthesize, "extend": extend, "fill": fill}
-"""The functions behind the page's jobs, by command: more of a texture, a seamless picture, and a filled hole."""
+FUNCTIONS: dict[str, Callable[..., Any]] = {"synth": synthesize, "extend": extend, "fill": fill, "classify": classify}
+"""The functions behind the page's jobs, by command: more of a texture, a seamless picture, a filled hole, labels."""
 
 MAX_SIDE = 2**14
 """Rows or columns of an output, at most."""
@@ -43,11 +47,18 @@ MAX_POINTS = 2**16
 MAX_LABEL = 8
 """The largest label of a stroke; 0 erases."""
 
+LABELS = label_colours(MAX_LABEL + 1)
+"""The colours of labels, on the brush and over a picture."""
+
 WHOLE = (slice(None), slice(None))
 """All rows and columns."""
 
-RESERVED = ("", "texture", "hole", "guide-sample", "guide-texture")
+RESERVED = ("", "texture", "hole", "guide-sample", "guide-texture", "labels", "strokes")
 """Names that a picture's files cannot have, since other files of a package have them."""
+
+
+class Hint(ValueError):
+    """What is painted does not suffice yet; the sentence says what is missing."""
 
 
 class Picture(NamedTuple):
@@ -62,15 +73,17 @@ class Picture(NamedTuple):
 class Job:
     """A run that the page asks for, checked; raises ValueError or TypeError if the message is wrong.
 
-    The ``message`` has ``job`` (``synth``, ``extend`` or ``fill``) and ``seed``; ``width``, ``height`` and ``method``
-    of ``synth``; ``options``; ``part``, the region ``[left, top, width, height]`` of the picture that is the sample;
-    ``guide``, with strokes on the ``sample`` and the ``output``; ``hole``, strokes; ``of``, the number of the result to
-    fill. ``maps`` are further maps of the picture, by name, which ``pyramid`` cannot carry; ``result(number)`` returns
-    a result.
+    The ``message`` has ``job`` (``synth``, ``extend``, ``fill`` or ``classify``) and ``seed``; ``width``, ``height``
+    and ``method`` of ``synth``; ``options``; ``part``, the region ``[left, top, width, height]`` of the picture that is
+    the sample of ``synth`` and ``extend``; ``guide``, with strokes on the ``sample`` and the ``output``, of which those
+    on the sample are the classes of ``classify``; ``hole``, strokes; ``of``, the number of the result to fill. ``maps``
+    are further maps of the picture, by name, which ``pyramid`` and ``classify`` do not carry; ``result(number)``
+    returns a result.
 
     Of the job, ``options`` are those that differ from their defaults, ``files`` the pictures that the command line
     reads, by file name, and ``output`` and ``carried`` the files that it writes: the picture, and the further maps by
-    name.
+    name. ``palettes`` are the colours of those files that hold labels, and ``classes`` the painted labels, in the order
+    in which ``classify`` numbers them from 1.
     """
 
     def __init__(self, message: Message, picture: Picture, maps: Maps, result: Callable[[Any], Any]) -> None:
@@ -78,14 +91,19 @@ class Job:
         one_of("job", message.get("job"), FUNCTIONS)
         self.kind: str = message["job"]
         self.metadata = picture.metadata._replace(exif=None)
-        self.method: str = message.get("method", "mrf") if self.kind == "synth" else "mrf"
-        one_of("method", self.method, METHODS)
+        self.method: str = "classifier" if self.kind == "classify" else "mrf"
+        if self.kind == "synth":
+            self.method = message.get("method", "mrf")
+            one_of("method", self.method, METHODS)
         seed: Any = message.get("seed")
         whole("seed", seed, 0, 2**32 - 1)
-        maps = {} if self.method == "pyramid" else maps
+        maps = {} if self.method in ("pyramid", "classifier") else maps
+        self.classes: list[int] = []
+        self.palettes: dict[str, NDArray[np.uint8]] = {}
         self._keywords: dict[str, Any] = {}
         self._flags: list[str] = []
-        part = _part(message.get("part") if self.kind != "fill" else None, picture.pixels.shape)
+        whole_picture = self.kind in ("fill", "classify")
+        part = _part(None if whole_picture else message.get("part"), picture.pixels.shape)
         number = message.get("of") if self.kind == "fill" else None
         if number is None:
             name = file_stem(picture.name, "sample") + ("" if part == WHOLE else "-part")
@@ -98,8 +116,10 @@ class Job:
             self._synthesize(message, picture, part)
         elif self.kind == "extend":
             self._add("seamless", True, "--seamless")
-        else:
+        elif self.kind == "fill":
             self._fill(message.get("hole", []))
+        else:
+            self._classify(message)
         self._add("rng", seed, "--seed", str(seed))
         self._add("channel_axis", picture.channel_axis)
         self.options = _options(message.get("options", {}), self.method if self.kind == "synth" else self.kind)
@@ -113,6 +133,27 @@ class Job:
         keywords = {**self._keywords, "device": machine, "callback": callback, "full_output": True}
         made: tuple[Array, Output] = FUNCTIONS[self.kind](self.sample, checkpoint=checkpointing, **keywords)
         return made
+
+    def layers(
+        self,
+        image: Callable[[], Array],
+        source: Callable[[], Array] | None = None,
+        temperature: Callable[[], Array] | None = None,
+        *,
+        ended: bool = True,
+    ) -> dict[str, Callable[[], frames.Layer]]:
+        """Return functions that make the layers of the run or, once it has ended, of its result: `frames.layers`."""
+        if self.kind != "classify":
+            return frames.layers(self.sample, self.shape, image, source, temperature)
+        colours = LABELS[[0, *self.classes]]
+        return {"labels": lambda: frames.overlay(self.sample, image(), colours, plain=not ended)}
+
+    def shares(self, labels: Array) -> list[tuple[int, float]]:
+        """Return the painted label of each class, 0 of the unknown, and its share of the labels of a result."""
+        if not self.classes:
+            return []
+        counts = np.bincount(labels.ravel(), minlength=len(self.classes) + 1)
+        return list(zip([0, *self.classes], (counts / labels.size).tolist(), strict=True))
 
     @property
     def command(self) -> str:
@@ -141,9 +182,7 @@ class Job:
         rows, cols = self.shape = (message["height"], message["width"])
         self._add("shape", self.shape, "--size", f"{cols}x{rows}")
         self._add("method", self.method, "--method", self.method)
-        guide = message.get("guide") or {}
-        if not isinstance(guide, dict):
-            raise TypeError("a guide is painted on the sample and on the output; paint both")
+        guide = _guide(message)
         own = paint(guide.get("sample", []), picture.pixels.shape)[part]
         wanted = paint(guide.get("output", []), self.shape)
         if not wanted.any():
@@ -152,9 +191,24 @@ class Job:
             raise ValueError(f"label {missing[0]} is on the output and not on the sample; paint it on the sample too")
         transparent = np.stack([wanted, np.where(wanted > 0, 255, 0)], -1).astype(np.uint8)
         self.files |= {"guide-sample.png": own, "guide-texture.png": transparent}
-        guide = own, np.where(wanted == 0, np.nan, wanted)
-        self._add("guide", guide, "--guide", "guide-sample.png=guide-texture.png")
+        given = own, np.where(wanted == 0, np.nan, wanted)
+        self._add("guide", given, "--guide", "guide-sample.png=guide-texture.png")
         self._add("labels", True)
+
+    def _classify(self, message: Message) -> None:
+        strokes = paint(_guide(message).get("sample", []), self.shape)
+        counts = np.bincount(strokes.ravel())
+        self.classes = [label for label in np.flatnonzero(counts).tolist() if label]
+        if len(self.classes) < 2:
+            done = f"only label {self.classes[0]} is painted" if self.classes else "no label is painted yet"
+            raise Hint(f"{done}; paint over two or more textures of the picture, each with a label of its own")
+        few = min(self.classes, key=lambda label: int(counts[label]))
+        if counts[few] < LEAST:
+            raise Hint(f"label {few} is painted on {counts[few]} pixels; paint {LEAST} or more")
+        self.output = "labels.png"
+        self.files["strokes.png"] = strokes
+        self.palettes = {self.output: label_colours(len(self.classes) + 1), "strokes.png": LABELS}
+        self._add("textures", strokes, "--strokes", "strokes.png")
 
     def _fill(self, strokes: Any) -> None:
         hole = paint(strokes, self.shape) > 0
@@ -164,6 +218,13 @@ class Job:
             raise ValueError("the hole covers the whole picture; leave some of it")
         self.files["hole.png"] = hole * np.uint8(255)
         self._add("mask", hole, "--mask", "hole.png")
+
+
+def _guide(message: Message) -> dict[str, Any]:
+    guide = message.get("guide") or {}
+    if not isinstance(guide, dict):
+        raise TypeError("a guide is painted on the sample and on the output; paint both")
+    return guide
 
 
 def paint(strokes: Any, shape: tuple[int, ...]) -> NDArray[np.uint8]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.image import write
+from simdtex.io.image import write, write_labels
 from simdtex.live import frames
 from simdtex.live.job import Job
 from simdtex.model.regularity import lattice_sentence
@@ -29,7 +29,7 @@ MAX_BYTES = 2**29
 THUMBNAIL = 96
 """The longest side of a thumbnail, pixels."""
 
-ARRANGEMENT, ARCHIVE = "arrangement.npz", "texture.zip"
+ARRANGEMENT = "arrangement.npz"
 
 
 class Result:
@@ -43,7 +43,8 @@ class Result:
         source: Any = self.source if complete else None
         self.maps = {name: apply_source_map(source, one) for name, one in job.maps.items() if complete}
         arrays = [None if one is None else partial(np.asarray, one) for one in (source, self.temperature)]
-        self.layers = frames.layers(job.sample, job.shape, lambda: image, *arrays)
+        self.layers = job.layers(lambda: image, *arrays)
+        self.archive = f"{Path(job.output).stem}.zip"
         for name, one in self.maps.items():
             self.layers[f"map {name}"] = partial(frames.picture, one, one)
 
@@ -56,14 +57,14 @@ class Result:
     @cached_property
     def thumbnail(self) -> frames.Frame:
         """The picture, small."""
-        return frames.thumbnail(self.layers["picture"](), THUMBNAIL)
+        return frames.thumbnail(next(iter(self.layers.values()))(), THUMBNAIL)
 
     def describe(self) -> dict[str, Any]:
         """Return the message to the page."""
         return {
             **{"result": self.number, "width": self.job.shape[1], "height": self.job.shape[0]},
             **{"seconds": self.seconds, "device": self.device, "settings": self.job.message},
-            "note": self.note,
+            **{"note": self.note, "shares": self.job.shares(self.image)},
             **{"layers": ["sample", *self.layers], "files": self.files},
             **{"command": self.job.command, "thumbnail": [self.thumbnail.width, self.thumbnail.height]},
         }
@@ -76,7 +77,8 @@ class Result:
     @property
     def files(self) -> list[str]:
         """The names of its files; the last is an archive of the others, the files the job reads, and its command."""
-        return [*self._pictures, *[ARRANGEMENT] * (self.source is not None), ARCHIVE]
+        own = dict.fromkeys([*self._pictures, *self.job.palettes])
+        return [*own, *[ARRANGEMENT] * (self.source is not None), self.archive]
 
     def file(self, name: str) -> bytes:
         """Return the bytes of a file; raises ValueError if there is none of that name."""
@@ -86,11 +88,14 @@ class Result:
             folder.mkdir()
             wanted = self._pictures | self.job.files
             coloured = (self.job.output, next(iter(self.job.files)))  # the picture and its sample
-            for each in wanted if name == ARCHIVE else wanted.keys() & {name}:
-                write(folder / each, wanted[each], self.job.metadata if each in coloured else None)
-            if self.source is not None and name in (ARRANGEMENT, ARCHIVE):
+            for each in wanted if name == self.archive else wanted.keys() & {name}:
+                if each in self.job.palettes:
+                    write_labels(folder / each, wanted[each], self.job.palettes[each])
+                else:
+                    write(folder / each, wanted[each], self.job.metadata if each in coloured else None)
+            if self.source is not None and name in (ARRANGEMENT, self.archive):
                 save_source_map(folder / ARRANGEMENT, self.source)
-            if name != ARCHIVE:
+            if name != self.archive:
                 return (folder / name).read_bytes()
             (folder / "again.txt").write_text(self.job.command, encoding="utf-8")
             return Path(make_archive(str(folder), "zip", folder)).read_bytes()

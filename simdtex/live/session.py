@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from simdtex.io.examples import EXAMPLES, example
 from simdtex.io.image import read_bytes
 from simdtex.live import frames
-from simdtex.live.job import Job, Message, Picture, file_stem
+from simdtex.live.job import LABELS, Hint, Job, Message, Picture, file_stem
 from simdtex.live.levels import Levels
 from simdtex.live.results import Result, Results
 from simdtex.live.words import METHODS, TABLES, controls
@@ -135,10 +135,13 @@ class Session:
 
     @contextmanager
     def _reported(self) -> Iterator[None]:
-        """Tell the page in a sentence what goes wrong in this block."""
+        """Tell the page in a sentence what goes wrong in this block, or what is still to be painted."""
+        kind = "error"
         try:
             yield
             return
+        except Hint as hint:
+            kind, sentence = "hint", str(hint)
         except (ValueError, TypeError) as error:
             sentence = str(error)
         except MemoryError:
@@ -146,13 +149,13 @@ class Session:
         except Exception:
             log.exception("a request of the live page failed")
             sentence = "this is an error in simdtex itself; the terminal says more"
-        self.send({"kind": "error", "text": sentence}, [])
+        self.send({"kind": kind, "text": sentence}, [])
 
     def _on_hello(self, message: Message, buffers: Sequence[Any]) -> None:
         """Send everything that the page shows: it may have been loaded again during a run."""
         tables = {name: controls(name) for name in TABLES}
         hello = {"version": version("simdtex"), "device": self._machine.name, "controls": tables, "bytes": MAX_BYTES}
-        hello |= {"methods": METHODS, "examples": list(EXAMPLES)}
+        hello |= {"methods": METHODS, "examples": list(EXAMPLES), "colours": LABELS.tolist()}
         self.send({"kind": "hello", **hello, "session": self.key, "fresh": self._picture is None}, [])
         self._unseen = 0
         if self._picture is None:
@@ -251,7 +254,7 @@ class Session:
         if name == "sample" or not layers:
             name, layer = "sample", frames.picture(pixels, pixels)
         else:
-            name = name if name in layers else "picture"
+            name = name if name in layers else next(iter(layers))
             layer = layers[name]()
         frame = frames.render(layer, self._window, smooth=smooth)._asdict()
         pixels = frame.pop("pixels")
@@ -294,7 +297,8 @@ class Session:
         restarts = job.method == "mrf" and job.kind != "fill"
         options = resolve(mrf.Options, job.kind, job.options if restarts else {})
         levels = Levels(key if restarts else None, options, self._levels)
-        layers = ["picture", "sample", *(["arrangement", "use", "temperature"] if job.method == "mrf" else [])]
+        first = "labels" if job.kind == "classify" else "picture"
+        layers = [first, "sample", *(["arrangement", "use", "temperature"] if job.method == "mrf" else [])]
         size = {"width": job.shape[1], "height": job.shape[0]}
         self._begun = {"kind": "begun", **size, "from": levels.level, "layers": layers}
         self._levels, self._selected, self._stale = levels, None, True
@@ -323,7 +327,7 @@ class Session:
         began = time.perf_counter()
         if self._selected is None:
             source, temperature = getattr(progress, "source", None), getattr(progress, "temperature", None)
-            layers = frames.layers(job.sample, job.shape, progress.picture, source, temperature)
+            layers = job.layers(progress.picture, source, temperature, ended=False)
             self._send_frame(layers, "run", smooth=False)
         elif self._stale:
             self._show_selected()

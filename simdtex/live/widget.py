@@ -51,7 +51,7 @@ class Live(AnyWidget):
     Attributes
     ----------
     image : array or None
-        The latest result, in the sample's type; channels are last.
+        The latest result, in the sample's type, channels last; of a classification its labels.
     source : (rows, cols, 2) int32 array or None
         Its source map.
     maps : dict

@@ -6,7 +6,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import Any
 
-from simdtex.methods import mrf, multires, pyramid
+from simdtex.methods import classifier, mrf, multires, pyramid
 from simdtex.options import Choice, Number, Option, Other, Whole, is_flag, table
 
 METHODS = {
@@ -22,8 +22,9 @@ TABLES: dict[str, tuple[Any, str]] = {
     "pyramid": (pyramid.Options, "synth"),
     "fill": (mrf.Options, "fill"),
     "extend": (mrf.Options, "extend"),
+    "classify": (classifier.Options, "classify"),
 }
-"""The options and the command of each set of controls: of the methods, and of the jobs that only ``mrf`` does."""
+"""The options and the command of each set of controls: of the methods, and of the jobs that one method does."""
 
 
 def controls(name: str) -> list[dict[str, Any]]:

@@ -2,9 +2,9 @@
 // The live page of simdtex: in a browser beside `simdtex live`, and in a notebook as the widget simdtex.Live.
 // simdtex does all arithmetic on textures; the page shows frames and sends messages (docs/live.rst lists them).
 
-const LABELS = ["#e69f00", "#56b4e9", "#009e73", "#f0e442", "#cc79a7"]; // of Okabe and Ito, told apart by most eyes
 const HOLE = "#ff1e9b";
 const LAYERS = {
+  labels: "Labels over the picture",
   picture: "Picture",
   sample: "Sample",
   arrangement: "Arrangement (source map)",
@@ -15,7 +15,9 @@ const JOBS = {
   synth: ["More of the texture", "Make the texture"],
   extend: ["A seamless picture", "Make it seamless"],
   fill: ["A filled hole", "Fill the hole"],
+  classify: ["A classification by texture", "Classify the picture"],
 }; // what the page calls them, and their button
+const PICTURE_LAYERS = ["sample", "labels"]; // which show the picture itself
 const SIDES = ["left", "top", "width", "height"];
 const MAX_PIXELS = 2 ** 22; // of a frame
 const STARTING_SIDE = 512;
@@ -121,6 +123,8 @@ const checkbox = (attributes) => make("input", { type: "checkbox", ...attributes
 const bar = (...children) => make("div", { class: "bar" }, ...children);
 const choices = (pairs) => pairs.map(([value, text]) => make("option", { value }, text));
 const choice = (pairs, onchange) => make("select", { onchange }, ...choices(pairs));
+const made = (layers) => layers.find((name) => name !== "sample");
+const sentence = (text) => `${text[0].toUpperCase()}${text.slice(1)}.`;
 const clamp = (value, least, most) => Math.max(least, Math.min(most, value));
 
 /** RGBA bytes as something that a canvas draws. */
@@ -535,7 +539,7 @@ class Page {
     this.again = null;
     this.showJob();
     if (this.job.value !== "fill") this.make();
-    else this.showLayer("sample");
+    if (["fill", "classify"].includes(this.job.value)) this.showLayer("sample");
   }
 
   /** The part, also where it is the whole picture. */
@@ -603,6 +607,8 @@ class Page {
       button("Fit", () => this.view.fit()),
     ];
     const shown = bar(labelled("Layer", this.layerChoice), labelled("Tiled 3 × 3", this.tiling), bar(...zoom));
+    this.classes = make("ul", { class: "classes", "aria-label": "Classes", hidden: true });
+    this.hint = make("p", { role: "status", class: "hint" });
     this.progress = make("progress", { max: 1, value: 0, "aria-label": "Progress" });
     this.doing = make("p", { class: "doing" });
     this.pausing = button("Pause", () => this.pause(), { disabled: true });
@@ -611,13 +617,14 @@ class Page {
     this.currentItem = make("li", { class: "current", hidden: true }, this.current);
     this.strip = make("ol", { class: "strip", "aria-label": "Results" }, this.currentItem);
     this.files = bar();
+    this.archive = make("p");
     this.command = make("pre", { tabindex: 0, "aria-label": "Command line" });
     this.downloads = make(
       "section",
       { "aria-label": "Download", hidden: true },
       make("h3", {}, "Download"),
       this.files,
-      make("p", {}, "This line makes the same bytes from the files in texture.zip:"),
+      this.archive,
       this.command,
       button("Copy the command line", () => this.copy(this.command.textContent)),
     );
@@ -627,6 +634,8 @@ class Page {
       make("h2", {}, "Result"),
       shown,
       this.view.canvas,
+      this.hint,
+      this.classes,
       bar(this.pausing, this.cancelling, this.progress),
       this.doing,
       this.paintSet(),
@@ -662,7 +671,7 @@ class Page {
   offer(layers) {
     const text = (name) => LAYERS[name] ?? name.replace(/^map /, "Map: ");
     this.layerChoice.replaceChildren(...choices(layers.map((name) => [name, text(name)])));
-    if (!layers.includes(this.layer)) this.showLayer("picture");
+    if (!layers.includes(this.layer)) this.showLayer(made(layers));
     this.layerChoice.value = this.layer;
   }
 
@@ -671,10 +680,16 @@ class Page {
     this.frames = 0;
     this.progress.value = 0;
     this.alert.hidden = true;
+    this.hint.textContent = "";
     this.setRunning(true);
     this.select(null);
     this.say(message.from === null ? "Running." : `Continuing after level ${message.from}.`);
-    if (this.layer === "sample") this.showLayer("picture");
+    if (this.layer === "sample") this.showLayer(made(message.layers));
+  }
+
+  on_hint({ text }) {
+    this.alert.hidden = true;
+    this.hint.textContent = sentence(text);
   }
 
   on_ended() {
@@ -716,6 +731,7 @@ class Page {
     this.command.textContent = found.command;
     const download = (name) => button(name, () => this.send({ kind: "download", result, name }), { "data-file": name });
     this.files.replaceChildren(...found.files.map(download));
+    this.archive.textContent = `This line makes the same bytes from the files in ${found.files.at(-1)}:`;
   }
 
   /** Mark a result, or the present run, as the one that is shown. */
@@ -726,6 +742,22 @@ class Page {
     const found = this.results.get(result);
     this.downloads.hidden = !found;
     if (found || this.running) this.offer(found?.layers ?? this.runLayers);
+    this.showClasses();
+  }
+
+  /** Show the classes of a result and their shares; before there is one, the classes that are painted. */
+  showClasses() {
+    const painted = [...new Set(this.guide.sample.map(({ label }) => label))].filter(Boolean).sort();
+    const found = this.results.get(this.shown)?.shares ?? [];
+    const classes = found.length || this.job.value !== "classify" ? found : painted.map((label) => [label, null]);
+    const item = ([label, share]) => {
+      const swatch = make("span", { class: "swatch", "aria-hidden": "true" });
+      swatch.style.background = this.colours[label];
+      const name = label ? `Label ${label}` : "Unknown";
+      return make("li", {}, swatch, share === null ? name : `${name}: ${(100 * share).toFixed(1)} %`);
+    };
+    this.classes.replaceChildren(...classes.map(item));
+    this.classes.hidden = !classes.length;
   }
 
   mark(result, current) {
@@ -766,15 +798,14 @@ class Page {
   // -- painting
 
   paintSet() {
-    const labels = LABELS.map((_, index) => [`${index + 1}`, `Label ${index + 1}`]);
-    this.tool = choice([["", "Nothing"], ["hole", "Hole"], ...labels, ["0", "Eraser"]], () => this.chooseTool());
+    this.tool = choice([], () => this.chooseTool());
     this.brushWidth = number({ min: 1, max: 1024, value: 16 });
     const hint =
-      "Labels are a guide: what has a label on the sample goes where the result has the same. With the keyboard, arrow keys move the brush, and the space bar starts and ends a stroke.";
+      "Labels are a guide: what has a label on the sample goes where the result has the same. For a classification, paint each texture of the picture with a label of its own. With the keyboard, arrow keys move the brush, and the space bar starts and ends a stroke.";
     return make(
       "details",
       { class: "paint" },
-      make("summary", {}, "Paint a hole or a guide"),
+      make("summary", {}, "Paint a hole, a guide or classes"),
       bar(
         labelled("Paint", this.tool),
         labelled("Brush width, pixels", this.brushWidth),
@@ -793,7 +824,11 @@ class Page {
   /** The strokes that the tool adds to. */
   get surface() {
     if (this.tool.value === "hole" || (this.tool.value === "0" && this.job.value === "fill")) return this.hole;
-    return this.seen === "sample" ? this.guide.sample : this.guide.output;
+    return this.labelStrokes;
+  }
+
+  get labelStrokes() {
+    return this.seen === "sample" || this.job.value === "classify" ? this.guide.sample : this.guide.output;
   }
 
   /** Whether the run is shown, which cannot be painted on. */
@@ -802,6 +837,7 @@ class Page {
   }
 
   get paintable() {
+    if (this.job.value === "classify") return PICTURE_LAYERS.includes(this.seen); // which stays as it is during the run
     return !this.watching && ["sample", "picture"].includes(this.seen);
   }
 
@@ -814,28 +850,36 @@ class Page {
       width,
       begin: (point) => surface.push({ label, width, points: [point] }),
       add: (point) => surface.at(-1)?.points.push(point),
-      end: () => {
-        if (surface !== this.hole && this.guide.sample.length && this.guide.output.length) this.changed();
-      },
+      end: () => surface !== this.hole && this.painted(),
     };
+  }
+
+  /** Run again with labels that have changed. */
+  painted() {
+    this.showClasses();
+    if (this.job.value === "classify" || (this.guide.sample.length && this.guide.output.length)) this.changed();
   }
 
   visibleStrokes() {
     if (!this.paintable) return [];
     if (this.job.value === "fill") return [{ strokes: this.hole, colour: () => HOLE }];
-    const colour = (label) => LABELS[label - 1] ?? "#000";
-    if (this.seen === "sample") return [{ strokes: this.guide.sample, colour }];
-    return this.tool.value ? [{ strokes: this.guide.output, colour }] : [];
+    const colour = (label) => this.colours[label];
+    return this.seen === "sample" || this.tool.value ? [{ strokes: this.labelStrokes, colour }] : [];
   }
 
   undo() {
     this.surface.pop();
-    this.view.draw();
+    this.repainted();
   }
 
   clear() {
     this.hole.length = this.guide.sample.length = this.guide.output.length = 0;
+    this.repainted();
+  }
+
+  repainted() {
     this.view.draw();
+    if (this.job.value === "classify") this.painted();
   }
 
   // -- options
@@ -846,6 +890,7 @@ class Page {
     this.job = choice(jobs, () => {
       this.showJob();
       if (this.job.value === "fill") this.startHole();
+      else if (this.job.value === "classify") this.startClasses();
       else this.changed();
     });
     this.method = choice([], () => {
@@ -889,14 +934,23 @@ class Page {
     this.methodField.hidden = this.size.hidden = this.job.value !== "synth";
     this.makeButton.textContent = JOBS[this.job.value][1];
     if (this.options) this.controls.replaceChildren(this.jobOptions.element);
+    if (this.job.value !== "classify") this.hint.textContent = "";
+    this.showClasses();
     this.view.draw();
   }
 
   startHole() {
     this.tool.value = "hole";
     this.root.querySelector(".paint").open = true;
-    if (this.shown === null && !this.running) this.showLayer("sample");
+    if (this.layer === "labels" || (this.shown === null && !this.running)) this.showLayer("sample");
     this.view.draw();
+  }
+
+  startClasses() {
+    if (!(this.tool.value > 0)) this.tool.value = "1";
+    this.root.querySelector(".paint").open = true;
+    if (this.picture && this.layer !== "labels") this.showLayer("sample");
+    this.painted();
   }
 
   reset() {
@@ -922,9 +976,9 @@ class Page {
     const job = this.job.value;
     const [width, height, seed] = [this.width, this.height, this.seed].map((input) => Number(input.value));
     const message = { kind: "make", job, method: this.method.value, width, height, seed, options: this.jobOptions.values };
-    if (job === "fill") Object.assign(message, { hole: this.hole, of: this.seen === "sample" ? null : this.shown });
-    else message.part = this.part;
-    if (job === "synth" && this.guide.output.length) message.guide = this.guide;
+    if (job === "fill") Object.assign(message, { hole: this.hole, of: PICTURE_LAYERS.includes(this.seen) ? null : this.shown });
+    else if (job !== "classify") message.part = this.part;
+    if (job === "classify" || (job === "synth" && this.guide.output.length)) message.guide = this.guide;
     this.last = message;
     this.send(message);
   }
@@ -938,7 +992,7 @@ class Page {
     }
     this.seed.value = settings.seed;
     this.jobOptions.values = settings.options;
-    if (settings.job !== "fill") this.setPart(settings.part ?? null, false);
+    if ("part" in settings) this.setPart(settings.part, false);
     if (settings.guide) this.guide = structuredClone(settings.guide);
     this.showJob();
   }
@@ -948,9 +1002,12 @@ class Page {
   on_hello(message) {
     this.bytes = message.bytes;
     this.device.textContent = message.device;
+    this.colours = message.colours.map((colour) => `rgb(${colour})`);
     if (!this.options) {
       const options = ([name, controls]) => [name, new Options(controls, () => this.changed())];
       this.options = Object.fromEntries(Object.entries(message.controls).map(options));
+      const labels = this.colours.slice(1).map((_, index) => [`${index + 1}`, `Label ${index + 1}`]);
+      this.tool.replaceChildren(...choices([["", "Nothing"], ["hole", "Hole"], ...labels, ["0", "Eraser"]]));
       this.method.replaceChildren(...choices(Object.entries(message.methods)));
       this.examples.replaceChildren("or try ", ...message.examples.map((name) => button(name, () => this.example(name))));
       this.showJob();

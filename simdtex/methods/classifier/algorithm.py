@@ -278,6 +278,7 @@ class Record:
         """Report a step."""
         if self._callback:
             labels = info.labels + np.uint8(1)
+            labels[state.done :] = 0  # not compared yet
             now: dict[str, Any] = {
                 "level": 0,
                 "levels": 1,
