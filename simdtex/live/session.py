@@ -14,11 +14,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from functools import partial
+from functools import cache, partial
 from importlib.metadata import version
 from math import inf
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.io.examples import EXAMPLES, example
@@ -26,10 +27,11 @@ from simdtex.io.image import read_bytes
 from simdtex.live import frames
 from simdtex.live.job import LABELS, Hint, Job, Message, Picture, file_stem
 from simdtex.live.levels import Levels
-from simdtex.live.results import Result, Results
+from simdtex.live.results import THUMBNAIL, Result, Results
 from simdtex.live.words import METHODS, TABLES, controls
 from simdtex.machine import Machine
 from simdtex.methods import mrf
+from simdtex.model.colours import temperature_colours
 from simdtex.options import one_of, resolve
 
 __all__ = ["MAX_BYTES", "MAX_PIXELS", "Message", "Send", "Session"]
@@ -201,8 +203,11 @@ class Session:
         """Send everything that the page shows: it may have been loaded again during a run."""
         tables = {name: controls(name) for name in TABLES}
         hello = {"version": version("simdtex"), "device": self._machine.name, "controls": tables, "bytes": MAX_BYTES}
-        hello |= {"methods": METHODS, "examples": list(EXAMPLES), "colours": LABELS.tolist()}
-        self.send({"kind": "hello", **hello, "session": self.key, "fresh": self._picture is None}, [])
+        shown = {name: frames.thumbnail(frames.picture(one, one), THUMBNAIL) for name, one in _examples().items()}
+        hello |= {"methods": METHODS, "examples": {name: [one.width, one.height] for name, one in shown.items()}}
+        hello |= {"colours": LABELS.tolist(), "scale": temperature_colours(np.linspace(0, 1, 9)).tolist()}
+        hello |= {"session": self.key, "fresh": self._picture is None}
+        self.send({"kind": "hello", **hello}, [one.pixels for one in shown.values()])
         self._unseen = 0
         if self._picture is None:
             return
@@ -220,7 +225,7 @@ class Session:
 
     def _on_example(self, message: Message, buffers: Sequence[Any]) -> None:
         one_of("example", message.get("name"), EXAMPLES)
-        self._open(Picture(f"{message['name']}.png", example(message["name"])[:192, :192], None))
+        self._open(Picture(f"{message['name']}.png", _examples()[message["name"]], None))
 
     def _open(self, picture: Picture) -> None:
         self._picture, self._maps, self._levels = picture, {}, None
@@ -260,7 +265,15 @@ class Session:
         if self._picture is not None and self._asked is None:
             part, (width, height) = _beginning(self._picture)
             size = {"width": width, "height": height}
-            first = {"kind": "make", "job": "synth", "method": "mrf", "seed": 1, "options": {}, "part": part, **size}
+            first: Message = {
+                "kind": "make",
+                "job": "synth",
+                "method": "mrf",
+                "seed": 1,
+                "options": {},
+                "part": part,
+                **size,
+            }
             self._on_make(first, [])
             self._send_picture(new=False)
 
@@ -314,9 +327,8 @@ class Session:
             picture, maps = job.given
             if picture is not self._picture:
                 self._levels = None
-            if [id(one) for one in (picture, *maps.values())] != [
-                id(one) for one in (self._picture, *self._maps.values())
-            ]:
+            before, after = ((one, *more.values()) for one, more in ((self._picture, self._maps), job.given))
+            if [id(one) for one in before] != [id(one) for one in after]:
                 self._picture, self._maps = picture, dict(maps)
                 self._send_picture(new=False)
         self.send({"kind": "selected", "result": number, "settings": settings}, [])
@@ -408,8 +420,14 @@ class Session:
         self._next_frame = began + max(1 / MAX_RATE, INTERVAL * (time.perf_counter() - began))
 
 
+@cache
+def _examples() -> dict[str, NDArray[np.uint8]]:
+    """Return the pictures that the page offers, by name."""
+    return {name: example(name)[:192, :192] for name in EXAMPLES}
+
+
 def _beginning(picture: Picture) -> tuple[list[int] | None, list[int]]:
-    """Return the part of a picture that is the sample at first, None for all of it, and the output's columns and rows."""
+    """Return the part of a picture that is the sample at first, None if it is all, and the output's width and height."""
     rows, cols = picture.pixels.shape[:2]
     width, height = min(cols, LARGE), min(rows, LARGE)
     part = [(cols - width) // 2, (rows - height) // 2, width, height] if max(rows, cols) > LARGE else None
