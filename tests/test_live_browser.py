@@ -270,7 +270,7 @@ def test_painted_labels_are_a_guide(page, wall):
 
 
 def test_painted_classes_are_labelled_over_the_picture(page, tmp_path):
-    page.choose("Make", "A classification by texture")
+    page.script("page.job.value = 'classify'; page.showJob(); page.startClasses()")
     (tmp_path / "ground.png").write_bytes(png(striped()))
     drop(page.driver, tmp_path / "ground.png")
     until(lambda: page.one(".hint").text.startswith("No label is painted yet; paint over two or more textures"))
@@ -380,7 +380,7 @@ def test_what_is_wrong_is_said(page, tmp_path):
     (tmp_path / "text.png").write_text("this is no picture")
     drop(page.driver, tmp_path / "text.png")
     until(lambda: "text.png is not an image" in page.alert)
-    page.button("Make the texture").click()
+    page.script("page.make()")
     until(lambda: "There is no picture yet" in page.alert)
 
 

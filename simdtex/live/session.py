@@ -264,17 +264,8 @@ class Session:
         """Make a first result of the picture, as the page does, if nothing was asked for yet."""
         if self._picture is not None and self._asked is None:
             part, (width, height) = _beginning(self._picture)
-            size = {"width": width, "height": height}
-            first: Message = {
-                "kind": "make",
-                "job": "synth",
-                "method": "mrf",
-                "seed": 1,
-                "options": {},
-                "part": part,
-                **size,
-            }
-            self._on_make(first, [])
+            first: Message = {"kind": "make", "job": "synth", "method": "mrf", "seed": 1, "options": {}, "part": part}
+            self._on_make(first | {"width": width, "height": height}, [])
             self._send_picture(new=False)
 
     def _on_pause(self, message: Message, buffers: Sequence[Any]) -> None:
@@ -427,7 +418,7 @@ def _examples() -> dict[str, NDArray[np.uint8]]:
 
 
 def _beginning(picture: Picture) -> tuple[list[int] | None, list[int]]:
-    """Return the part of a picture that is the sample at first, None if it is all, and the output's width and height."""
+    """Return the part of a picture that is the sample at first, None if all is, and the output's width and height."""
     rows, cols = picture.pixels.shape[:2]
     width, height = min(cols, LARGE), min(rows, LARGE)
     part = [(cols - width) // 2, (rows - height) // 2, width, height] if max(rows, cols) > LARGE else None

@@ -1144,7 +1144,7 @@ class Page {
 
   /** Say what is wrong; with a `job`, that could not be done. */
   on_error({ text, job }) {
-    this.warn(sentence(text));
+    this.warn(text);
     if (!job) return;
     this.refused = true;
     this.say("Nothing was made.");
