@@ -136,7 +136,7 @@ class Session:
         end = inf if timeout is None else time.monotonic() + timeout
         begun = self.receive({"kind": "begin"})
         while not begun.is_set() or self._wanted:
-            if not self._thread.is_alive():
+            if self._closed:
                 raise ValueError("the page is closed; open another one")
             if time.monotonic() > end:
                 raise TimeoutError(f"there is no result within {timeout} s")
