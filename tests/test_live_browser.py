@@ -472,11 +472,14 @@ def test_a_finger_scrolls_the_page_and_chooses_a_part_if_it_is_to(page, wall):
 
     def swipe(selector):
         page.script("arguments[0].scrollIntoView({block: 'center'})", page.one(selector))
-        box = page.one(selector).rect
+        box = page.script("return arguments[0].getBoundingClientRect().toJSON()", page.one(selector))
         before = page.script("return scrollY")
-        where = {"x": int(box["x"] + 30), "y": int(box["y"] - before + box["height"] / 2), "yDistance": -90}
-        gesture = where | {"gestureSourceType": "touch", "xDistance": 40, "speed": 400}
-        page.driver.execute_cdp_cmd("Input.synthesizeScrollGesture", gesture)
+        x, y = box["x"] + 20, box["y"] + box["height"] / 2
+        touches = [("Start", [(x, y)]), *(("Move", [(x + i, y - 3 * i)]) for i in range(1, 30)), ("End", [])]
+        for kind, points in touches:
+            at = [{"x": left, "y": top} for left, top in points]
+            page.driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": at})
+        page.script("return new Promise((done) => setTimeout(done, 200))")
         return page.script("return scrollY") - before
 
     try:
