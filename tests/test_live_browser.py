@@ -490,12 +490,12 @@ def test_a_finger_scrolls_the_page_and_chooses_a_part_if_it_is_to(page, wall):
             assert swipe(selector) > 30, selector
         assert page.script("return [page.part, page.view.fitted]") == [None, True]
         page.script("page.chooseByFinger(true)")
-        assert swipe("canvas.preview") == 0
+        assert abs(swipe("canvas.preview")) < 30  # what stands above it may have changed its height
         assert page.script("return page.part") is not None
         page.result(2)
         page.script("page.view.zoom(1)")
         page.script("return new Promise((done) => setTimeout(done, 100))")
-        assert swipe("canvas.view") == 0, "what is larger than the view is moved in it"
+        assert abs(swipe("canvas.view")) < 30, "what is larger than the view is moved in it"
     finally:
         page.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
 
