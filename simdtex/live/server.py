@@ -198,6 +198,7 @@ def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
         compression=None,
         max_size=MAX_MESSAGE,
         max_queue=2,
+        ping_timeout=FILE_WAIT,  # no answer is read while a message waits for the file of another page
         open_timeout=ENDING,
         close_timeout=ENDING,
     )
