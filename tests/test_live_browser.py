@@ -419,6 +419,19 @@ def test_a_page_that_is_loaded_again_during_a_run_has_its_settings(page, wall):
     page.button("Cancel").click()
 
 
+def test_a_page_that_loses_its_connection_keeps_what_is_not_asked_for_yet(page, wall):
+    page.script("page.auto.checked = false")
+    drop(page.driver, wall)
+    page.result(1)
+    page.script("page.setPart([8, 4, 50, 60]); page.guide.sample = [{label: 1, width: 9, points: [[9, 9]]}]")
+    page.put("Coherence", 1.5)
+    page.script("page.connection.socket.close()")
+    until(lambda: page.status == "Not connected.")
+    until(lambda: page.status == "Result 1 is ready: " + page.one(".doing").text)
+    assert page.script("return [page.part, page.guide.sample.length]") == [[8, 4, 50, 60], 1]
+    assert page.labelled("Coherence").get_attribute("value") == "1.5"
+
+
 @pytest.mark.slow
 def test_an_earlier_result_comes_back_as_a_whole(page, wall, tmp_path):
     stroke = "{label: 1, width: 20, points: [[30, 30]]}"

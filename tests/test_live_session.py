@@ -558,8 +558,8 @@ def test_a_result_is_a_whole_state(opened):
     first = opened.result(**settings)["result"]
     opened.ask("maps", kind="unmap", name="h")
     opened.result()
-    opened.ask("picture", png(texture(20, 24)), kind="open", name="other.png")
-    opened.result()
+    opened.ask("picture", png(texture(44, 52)), kind="open", name="other.png")
+    opened.result(**settings)
     after = len(opened.got)
     chosen, _ = opened.ask("selected", kind="select", result=first)
     assert chosen["settings"] == asked(**settings)
@@ -570,7 +570,7 @@ def test_a_result_is_a_whole_state(opened):
     np.testing.assert_array_equal(opened.session.results[4].image, opened.session.results[first].image)
     assert opened.session.results[4].maps.keys() == {"h"}
     shown, _ = opened.ask("picture", kind="select", result=3)
-    assert (shown["width"], shown["maps"]) == (24, [])
+    assert (shown["width"], shown["maps"]) == (52, [])
 
 
 def test_the_present_run_comes_back_with_its_picture(opened):

@@ -559,6 +559,8 @@ class Page {
   }
 
   on_picture(message, [bytes]) {
+    const before = this.picture;
+    const same = before && ["name", "width", "height"].every((key) => before[key] === message[key]);
     this.picture = message;
     this.small = bitmap(bytes, ...message.preview);
     [this.preview.width, this.preview.height] = message.preview;
@@ -568,9 +570,9 @@ class Page {
     this.start.hidden = true;
     this.columns.hidden = false;
     this.listMaps(message.maps);
-    this.setPart(message.part, false);
+    this.setPart(same && !message.new ? this.part : message.part, false);
     if (!message.new) {
-      if (message.settings) this.restore(message.settings);
+      if (message.settings && !before) this.restore(message.settings); // else the page has its own, perhaps later ones
       return;
     }
     if (this.pending) this.given = { ...this.pending, label: message.name };
@@ -775,7 +777,7 @@ class Page {
   }
 
   on_result(message, [bytes]) {
-    const { result, width, height, settings } = message;
+    const { result, width, height, settings, picture } = message;
     this.setRunning(false);
     this.progress.value = 1;
     this.results.set(result, message);
@@ -786,7 +788,7 @@ class Page {
     }
     const small = bitmap(bytes, ...message.thumbnail);
     small.setAttribute("aria-hidden", "true");
-    message.button = button(small, () => this.send({ kind: "select", result }));
+    message.button = button(small, () => this.send({ kind: "select", result }), { title: `From ${picture}` });
     message.button.append(make("span", {}, `Result ${result}, ${width} × ${height}, seed ${settings.seed}`));
     message.item = make("li", {}, message.button);
     this.currentItem.before(message.item);
