@@ -59,7 +59,7 @@ def main():
         script("page.brush.begin([90, 100]); page.hole[0].points.push([150, 120], [260, 110]); page.view.draw()")
         keep(driver, "hole")
         shown(driver, width=390, height=844, dark=True)
-        script("page.job.value = 'synth'; page.showJob(); page.view.fit(); scrollTo(0, 560)")
+        script("page.job.value = 'synth'; page.showJob(); page.view.fit(); scrollTo(0, 0)")
         keep(driver, "phone")
         shown(driver, width=1400, height=900)
         ground = Path(folder) / "ground.png"

@@ -107,7 +107,7 @@ class Page:
         """Download a file of the result: its bytes."""
         self.script("arguments[0].click()", self.one(f".result [data-file='{name}']"))
         path = self.folder / name
-        until(path.exists)
+        until(lambda: path.exists() and path.stat().st_size)
         data = path.read_bytes()
         path.unlink()
         return data
@@ -270,7 +270,7 @@ def test_painted_labels_are_a_guide(page, wall):
 
 
 def test_painted_classes_are_labelled_over_the_picture(page, tmp_path):
-    page.choose("Make", "A classification by texture")
+    page.script("page.job.value = 'classify'; page.showJob(); page.startClasses()")
     (tmp_path / "ground.png").write_bytes(png(striped()))
     drop(page.driver, tmp_path / "ground.png")
     until(lambda: page.one(".hint").text.startswith("No label is painted yet; paint over two or more textures"))
@@ -376,11 +376,207 @@ def test_a_killed_server_is_told_and_a_new_one_found(chromium, wall):
 
 
 @pytest.mark.slow
+def test_a_lost_picture_is_said_and_a_map_is_given_again(chromium, wall, tmp_path):
+    (tmp_path / "normal.png").write_bytes(png(texture(64, 72, seed=5)))
+    with live("--device", "reference", SIMDTEX_LIVE_TOKEN=TOKEN) as (process, address):
+        page = Page(chromium, address)
+        port = address.split(":")[2].split("/")[0]
+        drop(page.driver, wall)
+        until(lambda: page.script("return Boolean(page.picture)"))
+        page.script("page.method.value = 'pyramid'; page.showJob(); page.make()")
+        drop(page.driver, tmp_path / "normal.png", ".maps")
+        until(lambda: len(page.all(".maps li")) == 1)
+        process.kill()
+        until(lambda: page.alert)
+    with live("--device", "reference", "--port", port, SIMDTEX_LIVE_TOKEN=TOKEN) as (process, _):
+        until(lambda: page.results)
+        assert page.one(".maps li").get_attribute("textContent").startswith("normal")
+        page.driver.refresh()
+        until(lambda: page.script("return Boolean(window.page && page.picture)"))
+        process.kill()
+        until(lambda: page.alert)
+    with live("--device", "reference", "--port", port, SIMDTEX_LIVE_TOKEN=TOKEN):
+        until(lambda: "give the picture again" in page.alert)  # the page that was loaded again has no file
+        assert page.one(".start").is_displayed() and not page.one(".columns").is_displayed()
+    chromium.close()
+    chromium.switch_to.window(chromium.window_handles[0])
+
+
+@pytest.mark.slow
+def test_a_page_that_is_loaded_again_during_a_run_has_its_settings(page, wall):
+    drop(page.driver, wall)
+    page.result(1)
+    page.script("page.auto.checked = false; page.setPart([8, 4, 50, 60])")
+    page.put("Result width", 1500)
+    page.put("Coherence", 1.5)
+    page.script("page.make()")
+    until(lambda: page.script("return page.running"))
+    page.button("Pause").click()
+    page.driver.refresh()
+    until(lambda: page.script("return Boolean(window.page && page.running)"))
+    assert page.script("return [page.width.value, page.part]") == ["1500", [8, 4, 50, 60]]
+    assert page.labelled("Coherence").get_attribute("value") == "1.5"
+    page.button("Cancel").click()
+
+
+def test_a_page_that_loses_its_connection_keeps_what_is_not_asked_for_yet(page, wall):
+    page.script("page.auto.checked = false")
+    drop(page.driver, wall)
+    page.result(1)
+    page.script("page.setPart([8, 4, 50, 60]); page.guide.sample = [{label: 1, width: 9, points: [[9, 9]]}]")
+    page.put("Coherence", 1.5)
+    page.script("page.connection.socket.close()")
+    until(lambda: page.status == "Not connected.")
+    until(lambda: page.status == "Result 1 is ready: " + page.one(".doing").text)
+    assert page.script("return [page.part, page.guide.sample.length]") == [[8, 4, 50, 60], 1]
+    assert page.labelled("Coherence").get_attribute("value") == "1.5"
+
+
+@pytest.mark.slow
+def test_an_earlier_result_comes_back_as_a_whole(page, wall, tmp_path):
+    stroke = "{label: 1, width: 20, points: [[30, 30]]}"
+    (tmp_path / "other.png").write_bytes(png(texture(30, 40)))
+    page.script("page.auto.checked = false")
+    drop(page.driver, wall)
+    page.result(1)
+    page.script(f"page.setPart([8, 4, 50, 60]); page.guide = {{sample: [{stroke}], output: [{stroke}]}}; page.make()")
+    page.result(2)
+    drop(page.driver, tmp_path / "other.png")
+    page.result(3)
+    page.script(f"page.job.value = 'fill'; page.showJob(); page.hole = [{stroke}]; page.make()")
+    page.result(4)
+    state = "return [page.picture.name, page.part, page.guide.output.length, page.hole.length, page.job.value]"
+    wanted = [["wall.png", None, 0, 0, "synth"], ["wall.png", [8, 4, 50, 60], 1, 0, "synth"]]
+    wanted += [["other.png", None, 0, 0, "synth"], ["other.png", None, 0, 1, "fill"]]
+    for number in (2, 1, 4, 3, 2):
+        page.script("page.send({kind: 'select', result: arguments[0]})", number)
+        until(lambda number=number: page.script("return page.shown") == number)
+        assert page.script(state) == wanted[number - 1], number
+    assert page.results == 4
+
+
+def test_a_refusal_leaves_no_result_as_if_it_were_its(page, wall):
+    drop(page.driver, wall)
+    page.result(1)
+    assert page.one("[aria-label='Download']").is_displayed()
+    page.put("Finish", 99)
+    until(lambda: page.alert.startswith("finish is 99"))
+    until(lambda: page.script("return page.shown") is None)
+    assert not page.one("[aria-label='Download']").is_displayed() and not page.one(".doing").text
+    until(lambda: page.script("return page.seen") == "sample")
+    drop(page.driver, wall)
+    page.result(2)
+    assert page.labelled("Finish").get_attribute("value") == "", "the option is not kept"
+
+
+FOCUS = "button, input, select, summary, textarea, a[href], [tabindex]"
+
+
+def test_no_key_in_a_control_is_a_shortcut_of_the_notebook(page, wall):
+    drop(page.driver, wall)
+    page.result(1)
+    bad = [one.get_attribute("outerHTML")[:80] for one in page.all(f":is({FOCUS}):not([data-lm-suppress-shortcuts])")]
+    assert not bad and len(page.all(FOCUS)) > 30
+
+
+def test_a_finger_scrolls_the_page_and_chooses_a_part_if_it_is_to(page, wall):
+    shown(page.driver, width=390, height=700)
+    page.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": True})
+
+    def swipe(selector, across=1, down=-3):
+        page.script("arguments[0].scrollIntoView({block: 'center'})", page.one(selector))
+        box = page.script("return arguments[0].getBoundingClientRect().toJSON()", page.one(selector))
+        before = page.script("return scrollY")
+        x, y = box["x"] + 20, box["y"] + box["height"] / 2
+        moves = [("Move", [(x + across * i, y + down * i)]) for i in range(1, 30)]
+        touches = [("Start", [(x, y)]), *moves, ("End", [])]
+        for kind, points in touches:
+            at = [{"x": left, "y": top} for left, top in points]
+            page.driver.execute_cdp_cmd("Input.dispatchTouchEvent", {"type": f"touch{kind}", "touchPoints": at})
+        page.script("return new Promise((done) => setTimeout(done, 200))")
+        return page.script("return scrollY") - before
+
+    try:
+        drop(page.driver, wall)
+        page.result(1)
+        page.script("page.columns.style.paddingBottom = '900px'")
+        for selector in ("canvas.preview", "canvas.view"):
+            assert swipe(selector) > 30, selector
+            swipe(selector, across=2, down=-1)
+        page.script(
+            "const c = page.preview; c.setPointerCapture = () => {}; const b = c.getBoundingClientRect();"
+            "for (const [kind, by] of [['down', 5], ['move', 40], ['up', 40]]) c.dispatchEvent(new PointerEvent("
+            "`pointer${kind}`, {pointerType: 'touch', clientX: b.x + by, clientY: b.y + by}))"
+        )  # a browser that waits longer than Chromium before it takes a finger for a swipe
+        assert page.script("return [page.part, page.view.fitted]") == [None, True]
+        page.script("delete page.preview.setPointerCapture; page.chooseByFinger(true)")
+        assert abs(swipe("canvas.preview")) < 30  # what stands above it may have changed its height
+        assert page.script("return page.part") is not None
+        page.result(2)
+        page.script("page.view.zoom(1)")
+        page.script("return new Promise((done) => setTimeout(done, 100))")
+        assert abs(swipe("canvas.view")) < 30, "what is larger than the view is moved in it"
+    finally:
+        page.driver.execute_cdp_cmd("Emulation.setTouchEmulationEnabled", {"enabled": False})
+
+
+def test_the_page_begins_with_a_place_to_drop_a_picture_and_examples(page, wall):
+    assert page.one(".start").is_displayed() and not page.one(".columns").is_displayed()
+    assert [one.text for one in page.all(".examples button")] == ["brick", "grass", "gravel"]
+    pixels = (
+        "const c = arguments[0]; return new Set(c.getContext('2d').getImageData(0, 0, c.width, c.height).data).size"
+    )
+    assert all(page.script(pixels, one) > 20 for one in page.all(".examples canvas"))
+    drop(page.driver, wall, ".start")
+    page.result(1)
+    assert not page.one(".start").is_displayed()
+    for width in (720, 390):
+        shown(page.driver, width=width)
+        tops = [page.one(f".{name}").rect["y"] for name in ("result", "sample", "options")]
+        assert tops == sorted(tops) and page.one("canvas.view").rect["y"] < 350
+
+
+def test_a_widget_is_not_much_higher_than_its_view(page, wall):
+    page.script("document.getElementById('simdtex-live').style.width = '1008px'")
+    drop(page.driver, wall)
+    page.result(1)
+    assert page.script("return document.querySelector('.columns').scrollHeight") < 1300
+
+
+def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
+    page.script("page.auto.checked = false")
+    file = tmp_path / "moving.gif"
+    first, second = (PIL.Image.fromarray(texture(64, 72, seed=seed)) for seed in (1, 2))
+    first.save(file, save_all=True, append_images=[second])
+    drop(page.driver, file)
+    page.result(1)
+    assert "further frames or pages; this is the first" in page.one(".named").text
+    slider = "return document.querySelector(`[aria-label='${arguments[0]}, slider']`).value"
+    assert float(page.script(slider, "Finish")) == 1.5
+    field = page.labelled("Order")
+    for value, words in ((1000, "More than 40: a run can take many times as long"), (20, "")):
+        page.script("arguments[0].value = arguments[1]; arguments[0].dispatchEvent(new Event('input'))", field, value)
+        note = field.find_element(By.XPATH, "..//small[@class='beyond']").get_attribute("textContent")
+        assert note.startswith(words) and bool(note) == bool(words)
+    assert not page.one(".legend").is_displayed()
+    page.choose("Layer", "Temperature")
+    until(lambda: page.one(".legend").text.startswith("Black: settled."))
+    assert "gradient" in page.one(".scale").value_of_css_property("background-image")
+    page.script("page.doing.textContent = 'level 0'; page.on_begun({layers: ['picture', 'sample'], from: null})")
+    assert page.one(".doing").text == "", "a new run does not show the last one's level"
+    small = "[new Uint8Array(4)]"
+    page.script(
+        "page.on_result({...page.results.get(1), result: 25, thumbnail: [1, 1], dropped: [1]}, " + small + ")",
+    )
+    assert "Result 1 is no longer kept" in page.status
+
+
+@pytest.mark.slow
 def test_what_is_wrong_is_said(page, tmp_path):
     (tmp_path / "text.png").write_text("this is no picture")
     drop(page.driver, tmp_path / "text.png")
     until(lambda: "text.png is not an image" in page.alert)
-    page.button("Make the texture").click()
+    page.script("page.make()")
     until(lambda: "There is no picture yet" in page.alert)
 
 

@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from contextlib import ExitStack, contextmanager
 from contextlib import closing as closing_of
@@ -20,6 +21,7 @@ from websockets.sync.client import connect
 
 from simdtex import cli
 from simdtex.live import server as serving
+from simdtex.live import session as sessions
 from simdtex.live.server import TOKEN, Pages, is_own_name, listen, serve
 from simdtex.machine import open_machine
 
@@ -70,7 +72,7 @@ class Client:
         self.key = self.hello["session"]
 
     def say(self, *buffers, **message):
-        self.socket.send(json.dumps(message | {"buffers": len(buffers)}))
+        self.socket.send(json.dumps(message | {"buffers": [len(one) for one in buffers]}))
         for one in buffers:
             self.socket.send(one)
 
@@ -195,7 +197,7 @@ def test_pages_are_few_and_those_that_were_lost_give_way(monkeypatch):
         assert second.key not in pages._sessions, "it has been lost for too long"
 
 
-@pytest.mark.parametrize("text", ["", "[", "[]", "3", '{"buffers": "x"}', '{"buffers": []}', "[" * 10000, b"\xff"])
+@pytest.mark.parametrize("text", ["", "[", "[]", "3", '{"buffers": "x"}', '{"buffers": 3}', "[" * 10000, b"\xff"])
 def test_what_is_no_message_ends_the_connection(port, text):
     page = Client(port)
     page.socket.send(text)
@@ -206,7 +208,7 @@ def test_what_is_no_message_ends_the_connection(port, text):
 
 
 def test_a_message_that_is_too_large_ends_the_connection(monkeypatch):
-    monkeypatch.setattr(serving, "MAX_BYTES", 2**20)
+    monkeypatch.setattr(serving, "MAX_MESSAGE", 2**20)
     with running() as (port, _):
         page = Client(port)
         with pytest.raises(ConnectionClosed) as closed:
@@ -266,3 +268,122 @@ def test_a_missing_package_is_named(monkeypatch):
     found = CliRunner().invoke(cli.main, ["live"])
     assert found.exit_code == 2
     assert "pip install 'simdtex[live]'" in found.output
+
+
+def soon(found, timeout=20):
+    """Wait until something is so."""
+    end = time.monotonic() + timeout
+    while not found():
+        assert time.monotonic() < end, "it is not so in time"
+        time.sleep(0.01)
+
+
+def test_the_run_of_a_page_that_is_gone_ends(monkeypatch):
+    monkeypatch.setattr(serving, "RUN_KEPT", 0.0)
+    with running() as (port, pages):
+        page = Client(port)
+        session = pages._sessions[page.key]
+        page.say(png(texture()), kind="open", name="a.png")
+        page.say(**asked(width=2000, height=2000))
+        page.wait("begun")
+        page.socket.close()
+        soon(lambda: session._wanted is None and session._begun is None)
+        assert page.key in pages._sessions, "the session is kept"
+        monkeypatch.setattr(serving, "KEPT", 0.0)
+        soon(lambda: not pages._sessions, 5)
+        session._thread.join(5)
+        assert not session._thread.is_alive()
+
+
+def test_a_page_that_comes_back_in_time_keeps_its_run(monkeypatch):
+    monkeypatch.setattr(serving, "RUN_KEPT", 2.0)
+    with running() as (port, pages):
+        page = Client(port)
+        session = pages._sessions[page.key]
+        page.say(png(texture()), kind="open", name="a.png")
+        page.say(**asked(width=2000, height=2000))
+        page.wait("begun")
+        page.socket.close()
+        soon(lambda: page.key in pages._lost)
+        again = Client(port, session=page.key)
+        shown = again.wait("picture")[0]
+        assert not shown["new"] and shown["settings"]["width"] == 2000
+        time.sleep(3)
+        assert session._begun, "the run goes on"
+
+
+def test_a_file_that_stops_half_way_ends_the_connection_and_others_go_on(monkeypatch):
+    monkeypatch.setattr(serving, "PIECE_WAIT", 0.5)
+    with running() as (port, _):
+        first, second = Client(port), Client(port)
+        data = png(texture())
+        first.socket.send(json.dumps({"kind": "open", "name": "a.png", "buffers": [len(data)]}))
+        first.socket.send(data[:100])
+        time.sleep(0.2)
+        second.say(data, kind="open", name="b.png")
+        with pytest.raises(ConnectionClosed) as closed:
+            first.wait("picture")
+        assert closed.value.rcvd.reason == "the file has not come in time"
+        assert second.wait("picture")[0]["name"] == "b.png"
+
+
+def test_one_large_message_at_a_time_is_held(monkeypatch):
+    """However many files come at once, only one is in the memory."""
+    held, most, lock = [0], [0], threading.Lock()
+    read = sessions._read
+
+    def reading(message, buffers):
+        with lock:
+            held[0] += 1
+            most[0] = max(most[0], held[0])
+        time.sleep(0.05)
+        with lock:
+            held[0] -= 1
+        return read(message, buffers)
+
+    monkeypatch.setattr(sessions, "_read", reading)
+    with running() as (port, _):
+        clients = [Client(port) for _ in range(3)]
+        for client in clients:
+            for number in range(3):
+                client.say(png(texture()), kind="open", name=f"{number}.png")
+        for client in clients:
+            while client.wait("picture")[0]["name"] != "2.png":
+                pass
+        assert most == [1]
+
+
+@pytest.mark.parametrize("sizes", [[0], [-1], ["x"], [2**27 + 1], [4, 4]])
+def test_sizes_of_files_are_checked(port, sizes):
+    page = Client(port)
+    with pytest.raises(ConnectionClosed) as closed:
+        page.socket.send(json.dumps({"kind": "open", "name": "a.png", "buffers": sizes}))
+        for _ in sizes:
+            page.socket.send(bytes(4))
+        while True:
+            page.wait("error")
+    assert closed.value.rcvd.code == serving.BAD_MESSAGE
+
+
+def test_few_small_messages_wait(monkeypatch):
+    monkeypatch.setattr(sessions, "MAX_QUEUE", 4)
+    with running() as (port, pages):
+        page = Client(port)
+        session = pages._sessions[page.key]
+        page.say(png(texture()), kind="open", name="a.png")
+        page.wait("picture")
+        holding = threading.Event()
+        monkeypatch.setattr(session, "_on_pause", lambda *_: holding.wait(5))
+        most = 0
+        for kind in ["pause", *["resume"] * 40]:
+            page.say(kind=kind)
+        end = time.monotonic() + 1
+        while time.monotonic() < end:
+            most = max(most, session._messages.qsize())
+        holding.set()
+        assert 0 < most <= 4
+
+
+def test_the_address_without_its_last_slash_leads_to_the_page(port):
+    answer, _ = get(port, f"/{SECRET}")
+    assert (answer.status, answer.headers["Location"]) == (308, f"/{SECRET}/")

@@ -397,7 +397,7 @@ def test_a_page_that_is_loaded_again_gets_everything(opened):
     opened.result()
     opened.result(seed=8)
     after = len(opened.got)
-    assert opened.ask("selected", kind="hello")[0] == {"kind": "selected", "result": 2, "restore": True}
+    assert opened.ask("selected", kind="hello")[0] == {"kind": "selected", "result": 2, "settings": None}
     told = [message for message, _ in opened.got[after:] if message["kind"] != "frame"]
     assert [one["kind"] for one in told] == ["hello", "picture", "result", "result", "selected"]
     assert not told[0]["fresh"] and not told[1]["new"]
@@ -463,6 +463,7 @@ WRONG = [
     (POINT, hole(stroke((1e30, 0)))),
     ("there are more than 65536 points; paint with a wider brush", hole(stroke(*[(1, 1)] * 70000))),
     ("width is 0; give 1 or more", {"kind": "view", "width": 0}),
+    ("step is 1000000; give ", {"kind": "view", "step": 10**6}),
     ("a window has at most 4194304 pixels; make it smaller", {"kind": "view", "width": 4096, "height": 4096}),
     ("the layer must be a name", {"kind": "view", "layer": 3}),
 ]
@@ -498,7 +499,7 @@ def test_an_unforeseen_error_is_told_without_its_words(opened, monkeypatch, capl
 
 
 def test_few_results_are_kept(monkeypatch):
-    monkeypatch.setattr(results, "Result", lambda number, job, *_: SimpleNamespace(number=number, nbytes=job))
+    monkeypatch.setattr(results, "Result", lambda _, job, *__: SimpleNamespace(arrays=[np.zeros(job, np.uint8)]))
     monkeypatch.setattr(results, "MAX_RESULTS", 3)
     monkeypatch.setattr(results, "MAX_BYTES", 100)
     kept = Results()
@@ -539,3 +540,103 @@ def test_no_message_does_harm(kind, message, buffers):
     HARDY.ask("hello", kind="hello")
     assert "this is an error in simdtex itself" not in str(HARDY.got)
     HARDY.got.clear()
+
+
+def test_a_page_that_is_loaded_during_a_run_shows_what_runs(opened):
+    begin_and_pause(opened)
+    wanted = opened.session._wanted
+    message, _ = opened.ask("picture", kind="hello")
+    assert not message["new"] and message["settings"] == wanted
+    opened.ask("ended", kind="cancel")
+    message, _ = opened.ask("picture", kind="hello")
+    assert not message["new"] and message["settings"] == wanted, "also after the run was cancelled"
+
+
+def test_a_result_is_a_whole_state(opened):
+    settings = {"part": [4, 2, 32, 30], "options": {"finish": 0}, "seed": 9}
+    opened.ask("maps", png(texture(channels=1, seed=2)), kind="map", name="h.png")
+    first = opened.result(**settings)["result"]
+    opened.ask("maps", kind="unmap", name="h")
+    opened.result()
+    opened.ask("picture", png(texture(44, 52)), kind="open", name="other.png")
+    opened.result(**settings)
+    after = len(opened.got)
+    chosen, _ = opened.ask("selected", kind="select", result=first)
+    assert chosen["settings"] == asked(**settings)
+    shown, _ = opened.wait("picture", after=after)
+    assert (shown["new"], shown["width"], shown["height"], shown["maps"]) == (False, 48, 40, ["h"])
+    assert opened.ask("begun", **asked(**settings))[0]["from"] is None, "states of another picture are not used"
+    opened.wait("selected", after=len(opened.got) - 1, result=4)
+    np.testing.assert_array_equal(opened.session.results[4].image, opened.session.results[first].image)
+    assert opened.session.results[4].maps.keys() == {"h"}
+    shown, _ = opened.ask("picture", kind="select", result=3)
+    assert (shown["width"], shown["maps"]) == (52, [])
+
+
+def test_the_present_run_comes_back_with_its_picture(opened):
+    first = opened.result()["result"]
+    opened.ask("picture", png(texture(20, 24)), kind="open", name="other.png")
+    begin_and_pause(opened)
+    assert opened.ask("picture", kind="select", result=first)[0]["width"] == 48
+    after = len(opened.got)
+    shown, _ = opened.ask("picture", kind="select", result=None)
+    assert shown["width"] == 24 and shown["settings"] == opened.session._wanted
+    assert opened.wait("selected", after=after)[0]["settings"] == opened.session._wanted
+    opened.say(kind="resume")
+    assert opened.wait("result", after=after)[0]["picture"] == "other.png"
+
+
+def test_after_a_refusal_no_result_is_shown_as_its(opened):
+    opened.result()
+    after = len(opened.got)
+    assert opened.error(**asked(options={"finish": 99})).startswith("finish is 99")
+    assert opened.wait("error", after=after)[0]["job"] == "synth"
+    assert opened.wait("selected", after=after)[0]["result"] is None
+    after = len(opened.got)
+    assert "no hole" in opened.error(**hole())
+    opened.ask("hello", kind="hello")
+    assert "selected" not in opened.kinds(after)[: opened.kinds(after).index("hello")], "it is what is to be filled"
+
+
+def test_frames_that_are_not_shown_are_few(opened):
+    opened.sees = False
+    opened.result()
+    after = len(opened.got)
+    for left in range(50):
+        opened.session.receive(WINDOW | {"left": left}).wait(5)
+    opened.ask("hello", kind="hello")
+    assert opened.kinds(after).count("frame") <= sessions.MAX_UNSEEN
+
+
+def test_too_little_memory_for_a_frame_is_said(opened, monkeypatch):
+    def none(*_, **__):
+        raise MemoryError
+
+    opened.result()
+    monkeypatch.setattr(sessions.frames, "render", none)
+    assert "not enough memory" in opened.error(**WINDOW)
+    monkeypatch.undo()
+    opened.ask("frame", **WINDOW)
+
+
+def test_picture_and_maps_together_are_bounded(opened, monkeypatch):
+    monkeypatch.setattr(sessions, "MAX_HELD", 48 * 40 * 4)
+    opened.ask("maps", png(texture(channels=1)), kind="map", name="a.png")
+    error = opened.error(png(texture(channels=1)), kind="map", name="b.png")
+    assert error == "the picture and its maps have 9600 bytes and at most 7680 are held; remove a map"
+
+
+def test_results_hold_their_picture_once(opened, monkeypatch):
+    for seed in (1, 2):
+        opened.result(seed=seed)
+    kept = opened.session.results
+    own = sum(one.image.nbytes + one.source.nbytes + one.temperature.nbytes for one in kept.values())
+    assert kept.nbytes == own + texture().nbytes
+
+
+def test_a_file_with_further_frames_is_said(page):
+    file = io.BytesIO()
+    frames = [PIL.Image.fromarray(texture(seed=seed)) for seed in (1, 2)]
+    frames[0].save(file, "GIF", save_all=True, append_images=frames[1:])
+    assert page.ask("picture", file.getvalue(), kind="open", name="a.gif")[0]["more"] is True
+    assert page.ask("picture", png(texture()), kind="open", name="a.png")[0]["more"] is False

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,15 @@ MAX_PIXELS = 2**22
 MAX_OFFSET = 2**20
 """Rows or columns between a window's corner and the layer's, at most."""
 
+MAX_SIDE = 2**14
+"""Rows or columns of a frame, at most."""
+
+MAX_STEP = 2**9
+"""Rows and columns of a layer in one pixel of a frame, at most."""
+
+TILES = 3
+"""Copies of a tiled layer along each axis: it and one on either side."""
+
 CHUNK = 2**22
 """Pixels of a layer that are averaged at a time, which bounds the memory."""
 
@@ -30,7 +40,8 @@ class Window(NamedTuple):
     """The part of a layer that the page shows.
 
     ``left`` and ``top`` are the layer's first column and row, ``width`` and ``height`` the pixels of the frame, each
-    the mean of ``step`` x ``step`` pixels of the layer; ``tiled`` repeats the layer without end.
+    the mean of ``step`` x ``step`` pixels of the layer; ``tiled`` shows it `TILES` x `TILES`
+    times.
     """
 
     layer: str = "picture"
@@ -71,8 +82,8 @@ def parse_window(message: Mapping[str, Any]) -> Window:
         raise TypeError("the layer must be a name")
     for name in ("left", "top"):
         whole(name, getattr(window, name), -MAX_OFFSET, MAX_OFFSET)
-    for name in ("width", "height", "step"):
-        whole(name, getattr(window, name), 1, MAX_OFFSET)
+    for name, most in (("width", MAX_SIDE), ("height", MAX_SIDE), ("step", MAX_STEP)):
+        whole(name, getattr(window, name), 1, most)
     true_or_false("tiled", window.tiled)
     if window.width * window.height > MAX_PIXELS:
         raise ValueError(f"a window has at most {MAX_PIXELS} pixels; make it smaller")
@@ -132,15 +143,16 @@ def render(layer: Layer, window: Window, *, smooth: bool = True) -> Frame:
     top, rows, row = _axis(window.top, window.height, window, fine, layer.shape[0], layer.values.shape[0])
     left, cols, col = _axis(window.left, window.width, window, fine, layer.shape[1], layer.values.shape[1])
     pixels = np.full((rows, cols, 4), 255, np.uint8)
-    chunk = max(1, CHUNK // max(1, len(fine) * len(col)))
-    for first in range(0, rows, chunk):
-        part = pixels[first : first + chunk]
-        taken = np.ix_(row[first * len(fine) : (first + chunk) * len(fine)], col)
-        colours = layer.colours(layer.values[taken])
+    across = max(1, min(cols, CHUNK // len(fine) ** 2))
+    down = max(1, CHUNK // (len(fine) ** 2 * across))
+    for top_row, left_col in product(range(0, rows, down), range(0, cols, across)):
+        part = pixels[top_row : top_row + down, left_col : left_col + across]
+        begin, end = np.array([[top_row, left_col], [top_row + down, left_col + across]]) * len(fine)
+        colours = layer.colours(layer.values[np.ix_(row[begin[0] : end[0]], col[begin[1] : end[1]])])
         colours = colours if colours.ndim == 3 else colours[..., None]
         colours = colours[..., :3] if colours.shape[2] > 2 else colours[..., :1]
         if len(fine) > 1:
-            blocks = colours.reshape(len(part), len(fine), cols, len(fine), colours.shape[2])
+            blocks = colours.reshape(part.shape[0], len(fine), part.shape[1], len(fine), colours.shape[2])
             colours = np.round(blocks.mean(axis=(1, 3), dtype=np.float32))
         part[..., :3] = colours
     return Frame(left, top, cols, rows, pixels.tobytes())
@@ -158,8 +170,8 @@ def _axis(
 ) -> tuple[int, int, NDArray[np.intp]]:
     """Return where the frame begins on an axis of the layer, its pixels, and the indices of the values they average."""
     places = begin + window.step * np.arange(count)
-    if not window.tiled:
-        places = places[(places > -window.step) & (places < size)]
+    beside = size * (TILES // 2) if window.tiled else 0
+    places = places[(places > -beside - window.step) & (places < size + beside)]
     index = (places[:, None] + fine).reshape(-1)
     index = index % size if window.tiled else index.clip(0, size - 1)
     return int(places[0]) if len(places) else begin, len(places), index * stored // size

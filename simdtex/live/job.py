@@ -82,11 +82,12 @@ class Job:
 
     Of the job, ``options`` are those that differ from their defaults, ``files`` the pictures that the command line
     reads, by file name, and ``output`` and ``carried`` the files that it writes: the picture, and the further maps by
-    name. ``labelled`` are those files that hold labels, and ``classes`` the painted labels.
+    name. ``given`` are the picture and its maps. ``labelled`` are those files that hold labels, and ``classes`` the
+    painted labels.
     """
 
     def __init__(self, message: Message, picture: Picture, maps: Maps, result: Callable[[Any], Any]) -> None:
-        self.message = message
+        self.message, self.given = message, (picture, dict(maps))
         one_of("job", message.get("job"), FUNCTIONS)
         self.kind: str = message["job"]
         self.metadata = picture.metadata._replace(exif=None)

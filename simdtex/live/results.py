@@ -49,10 +49,11 @@ class Result:
             self.layers[f"map {name}"] = partial(frames.picture, one, one)
 
     @property
-    def nbytes(self) -> int:
-        """Bytes of all arrays."""
-        arrays = [self.image, self.source, self.temperature, *self.maps.values()]
-        return sum(one.nbytes for one in arrays if one is not None)
+    def arrays(self) -> list[NDArray[Any]]:
+        """All arrays that it holds; those of the picture are shared with other results."""
+        picture, maps = self.job.given
+        own = [self.image, self.source, self.temperature, *self.maps.values()]
+        return [one for one in [*own, picture.pixels, *maps.values()] if one is not None]
 
     @cached_property
     def thumbnail(self) -> frames.Frame:
@@ -64,6 +65,7 @@ class Result:
         return {
             **{"result": self.number, "width": self.job.shape[1], "height": self.job.shape[0]},
             **{"seconds": self.seconds, "device": self.device, "settings": self.job.message},
+            **{"picture": self.job.given[0].name},
             **{"note": self.note, "shares": self.job.shares(self.image)},
             **{"layers": ["sample", *self.layers], "files": self.files},
             **{"command": self.job.command, "thumbnail": [self.thumbnail.width, self.thumbnail.height]},
@@ -112,10 +114,15 @@ class Results(dict[int, Result]):
         """Add a result."""
         number = 1 + max(self, default=0)
         result = self[number] = Result(number, job, image, output, seconds)
-        while len(self) > MAX_RESULTS or (len(self) > 1 and sum(one.nbytes for one in self.values()) > MAX_BYTES):
+        while len(self) > MAX_RESULTS or (len(self) > 1 and self.nbytes > MAX_BYTES):
             self.dropped.append(min(self))
             del self[self.dropped[-1]]
         return result
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return sum({id(one): one.nbytes for result in self.values() for one in result.arrays}.values())
 
     def find(self, number: Any) -> Result:
         """Return the result of a number; raises ValueError or TypeError if there is none."""

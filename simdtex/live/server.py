@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The server of the live page: for this computer alone, and for those who know the page's address.
 
-A message is a text of JSON, whose ``buffers`` says how many binary messages with its buffers follow.
+A message is a text of JSON. In those of the page, ``buffers`` has the size of the file that follows in pieces, if any;
+in those to the page it is the number of binary messages that follow.
 """
 
 from __future__ import annotations
@@ -15,18 +16,21 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.sync.server import ServerConnection
 from websockets.sync.server import serve as websocket_server
+from websockets.typing import Data
 
 from simdtex.live.job import Message, Picture
 from simdtex.live.session import MAX_BYTES, Send, Session
 from simdtex.machine import Machine, open_machine
+from simdtex.options import whole
 from simdtex.synthesis import synthesize
 
 TOKEN = "SIMDTEX_LIVE_TOKEN"
@@ -58,6 +62,18 @@ MAX_PAGES = 8
 KEPT = 600.0
 """Seconds that a session is kept for a page that has lost the connection, unless others need its place."""
 
+RUN_KEPT = 30.0
+"""Seconds that its run goes on."""
+
+MAX_MESSAGE = 2**22
+"""Bytes of a message without its file, and of a piece of a file, at most."""
+
+SMALL = 2**16
+"""Bytes of a message that may wait to be handled beside others."""
+
+PIECE_WAIT, FILE_WAIT = 10.0, 120.0
+"""Seconds that a piece of a file, and all of it, may take to come."""
+
 ENDING = 2.0
 """Seconds that the end of the server waits for a session's run, or for a request that does not come."""
 
@@ -75,6 +91,8 @@ class Pages:
         self._lock = threading.Lock()
         self._sessions: dict[str, Session] = {}
         self._lost: dict[str, float] = {}  # when, the oldest first
+        self._closed = threading.Event()
+        self.large = threading.Lock()  # of the page whose large message comes and is handled: one at a time
 
     def join(self, key: str | None, send: Send) -> Session | None:
         """Return the session of a page, the one it had before or a new one; None if there are too many."""
@@ -83,10 +101,7 @@ class Pages:
                 del self._lost[key]
                 self._sessions[key].send = send
                 return self._sessions[key]
-            for one, since in list(self._lost.items()):
-                if time.monotonic() - since > KEPT or len(self._sessions) >= MAX_PAGES:
-                    del self._lost[one]
-                    self._sessions.pop(one).close()
+            self._expire()
             if len(self._sessions) >= MAX_PAGES:
                 return None
             session = Session(send, self._machine, self._picture)
@@ -99,8 +114,24 @@ class Pages:
             self._lost[session.key] = time.monotonic()
             session.send = lambda message, buffers: None
 
+    def tend(self, every: float = 1.0) -> None:
+        """End runs and sessions of pages that are lost for long, until `close`."""
+        while not self._closed.wait(every):
+            with self._lock:
+                self._expire()
+
+    def _expire(self) -> None:
+        for one, since in list(self._lost.items()):
+            alone = time.monotonic() - since
+            if alone > KEPT or len(self._sessions) >= MAX_PAGES:
+                del self._lost[one]
+                self._sessions.pop(one).close()
+            elif alone > RUN_KEPT:
+                self._sessions[one].receive({"kind": "cancel"})
+
     def close(self) -> None:
         """End all sessions."""
+        self._closed.set()
         for wait in (0.0, ENDING):
             for session in self._sessions.values():
                 session.close(wait)
@@ -143,11 +174,15 @@ def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
     def answer(connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request; None has the WebSocket opened."""
         host = request.headers.get("Host", "")
-        given, _, name = request.path.partition("?")[0].lstrip("/").partition("/")
+        given, slash, name = request.path.partition("?")[0].lstrip("/").partition("/")
         if not is_own_name(host, address):
             return _response(connection, 400, "This server has another name.")
         if not secrets.compare_digest(given.encode(errors="surrogateescape"), token.encode()):
             return _response(connection, 403, REFUSED)
+        if not slash:  # without it the names in the page would lack the token
+            response = _response(connection, 308, "")
+            response.headers["Location"] = f"/{token}/"
+            return response
         if name == "socket":
             own = request.headers.get("Origin") == f"http://{host}"
             return None if own else _response(connection, 403, REFUSED)
@@ -161,11 +196,14 @@ def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
         sock=listening,
         process_request=answer,
         compression=None,
-        max_size=MAX_BYTES,
+        max_size=MAX_MESSAGE,
+        max_queue=2,
+        ping_timeout=FILE_WAIT,  # no answer is read while a message waits for the file of another page
         open_timeout=ENDING,
         close_timeout=ENDING,
     )
-    threading.Thread(target=server.serve_forever, daemon=True).start()
+    for target in (server.serve_forever, pages.tend):
+        threading.Thread(target=target, daemon=True).start()
     try:
         yield listening.getsockname()[1]
     finally:
@@ -210,15 +248,37 @@ def talk(connection: ServerConnection, pages: Pages) -> None:
         return
     try:
         for text in connection:
-            message = json.loads(text)
-            count = message.pop("buffers", 0)
-            session.receive(message, [connection.recv() for _ in range(count)])
+            _carry(text, connection, session, pages)
     except ConnectionClosed:
         pass
+    except TimeoutError:
+        connection.close(BAD_MESSAGE, "the file has not come in time")
     except (ValueError, TypeError, AttributeError, RecursionError):
         connection.close(BAD_MESSAGE, "this is no message")
     finally:
         pages.leave(session)
+
+
+def _carry(text: Data, connection: ServerConnection, session: Session, pages: Pages) -> None:
+    """Give a session a message and its file; a large one is handled before another one comes, of whatever page."""
+    message = json.loads(text)
+    sizes = message.pop("buffers", [])
+    large = bool(sizes) or len(text) > SMALL
+    with pages.large if large else nullcontext():
+        files = [_file(size, connection) for size in sizes[:1]]
+        session.follow(session.receive(message, files), every=large)
+
+
+def _file(size: Any, connection: ServerConnection) -> bytes:
+    """Return a file of so many bytes, which comes in pieces."""
+    whole("the size of a file", size, 1, MAX_BYTES)
+    data, end = bytearray(), time.monotonic() + FILE_WAIT
+    while len(data) < size:
+        piece = connection.recv(timeout=min(PIECE_WAIT, end - time.monotonic()))
+        if not isinstance(piece, bytes) or not 0 < len(piece) <= size - len(data):
+            raise ValueError("this is no piece of a file")
+        data += piece
+    return bytes(data)
 
 
 def build_kernels(machine: Machine) -> None:

@@ -14,10 +14,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from functools import partial
+from functools import cache, partial
 from importlib.metadata import version
+from math import inf
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.io.examples import EXAMPLES, example
@@ -25,10 +27,11 @@ from simdtex.io.image import read_bytes
 from simdtex.live import frames
 from simdtex.live.job import LABELS, Hint, Job, Message, Picture, file_stem
 from simdtex.live.levels import Levels
-from simdtex.live.results import Result, Results
+from simdtex.live.results import THUMBNAIL, Result, Results
 from simdtex.live.words import METHODS, TABLES, controls
 from simdtex.machine import Machine
 from simdtex.methods import mrf
+from simdtex.model.colours import temperature_colours
 from simdtex.options import one_of, resolve
 
 __all__ = ["MAX_BYTES", "MAX_PIXELS", "Message", "Send", "Session"]
@@ -43,6 +46,15 @@ MAX_PIXELS = 2**25
 
 MAX_MAPS = 16
 """Further maps of a material, at most."""
+
+MAX_HELD = 2**29
+"""Bytes of a picture and its further maps, at most."""
+
+MAX_QUEUE = 64
+"""Messages that wait to be handled, at most."""
+
+STARTING_SIDE = 512
+"""The first output is twice as large as its sample, and no side of it is longer than this, pixels."""
 
 PREVIEW = 512
 """The longest side of the preview of the picture, pixels."""
@@ -91,19 +103,49 @@ class Session:
         self._selected: int | None = None  # the result that the page shows; None for the run or the sample
         self._window = frames.Window()
         self._wanted: Message | None = None  # the job that is asked for, until it is finished
+        self._asked: Message | None = None  # the last job that was asked for with this picture
+        self._refused = ""  # why the last job could not be done
         self._begun: Message | None = None  # the message that announced the present run
+        self._job: Job | None = None  # of the present run
         self._paused = self._closed = False
         self._stale = False  # whether the page waits for another frame
         self._unseen = 0  # frames that the page has not shown yet
         self._next_frame = 0.0  # when the run may be shown again
         self._levels: Levels | None = None
-        self._messages: queue.SimpleQueue[tuple[Any, Sequence[Any]]] = queue.SimpleQueue()
+        self._messages: queue.SimpleQueue[tuple[Any, Sequence[Any], threading.Event]] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._thread.start()
 
-    def receive(self, message: Any, buffers: Sequence[Any] = ()) -> None:
-        """Handle a message of the page later; an error is sent back as one sentence."""
-        self._messages.put((message, buffers))
+    def receive(self, message: Any, buffers: Sequence[Any] = ()) -> threading.Event:
+        """Handle a message of the page later, and return what is set then; an error is sent back as one sentence."""
+        handled = threading.Event()
+        self._messages.put((message, buffers, handled))
+        return handled
+
+    def follow(self, handled: threading.Event, *, every: bool) -> None:
+        """Wait until a message is handled if `every` has to be, else until fewer than `MAX_QUEUE` wait."""
+        while self._thread.is_alive() and not handled.is_set() and (every or self._messages.qsize() >= MAX_QUEUE):
+            handled.wait(0.01)
+
+    def wait(self, timeout: float | None = None) -> Result:
+        """Return the latest result once nothing is being made; a picture with which nothing was made yet is begun with.
+
+        Raises ValueError if there is no picture or the job was refused or cancelled, and TimeoutError after so many
+        seconds.
+        """
+        end = inf if timeout is None else time.monotonic() + timeout
+        begun = self.receive({"kind": "begin"})
+        while not begun.is_set() or self._wanted:
+            if self._closed:
+                raise ValueError("the page is closed; open another one")
+            if time.monotonic() > end:
+                raise TimeoutError(f"there is no result within {timeout} s")
+            time.sleep(0.01)
+        if self._picture is None:
+            raise ValueError("there is no picture yet; give one first")
+        if self._refused or not self.results:
+            raise ValueError(self._refused or "the run was cancelled; ask for another one")
+        return self.results[max(self.results)]
 
     def close(self, wait: float = 0.0) -> None:
         """End the run and the thread; wait for it, so many seconds at most."""
@@ -118,24 +160,26 @@ class Session:
             while self._wanted and not self._closed:
                 self._run(self._wanted)
                 self._handle_all()
-            if self._stale:
-                self._show_selected()
+            if self._stale and self._unseen < MAX_UNSEEN:
+                with self._reported():
+                    self._show_selected()
 
     def _handle_all(self) -> None:
         while not self._messages.empty():
             self._handle(*self._messages.get())
 
-    def _handle(self, message: Any, buffers: Sequence[Any]) -> None:
+    def _handle(self, message: Any, buffers: Sequence[Any], handled: threading.Event) -> None:
         kind = message.get("kind") if isinstance(message, dict) else None
         handler = getattr(self, f"_on_{kind}", None)
         with self._reported():
             if handler is None:
                 raise ValueError("the page and simdtex are of different versions; load the page again")
             handler(message, buffers)
+        handled.set()
 
     @contextmanager
-    def _reported(self) -> Iterator[None]:
-        """Tell the page in a sentence what goes wrong in this block, or what is still to be painted."""
+    def _reported(self, job: str = "") -> Iterator[None]:
+        """Tell the page in a sentence what goes wrong in this block, or what is still to be painted for a ``job``."""
         kind = "error"
         try:
             yield
@@ -149,18 +193,25 @@ class Session:
         except Exception:
             log.exception("a request of the live page failed")
             sentence = "this is an error in simdtex itself; the terminal says more"
-        self.send({"kind": kind, "text": sentence}, [])
+        self.send({"kind": kind, "text": sentence, "job": job}, [])
+        if job:
+            self._refused = sentence
+            if job not in ("fill", "classify"):  # which are about the result or the picture that is shown
+                self._select(None)
 
     def _on_hello(self, message: Message, buffers: Sequence[Any]) -> None:
         """Send everything that the page shows: it may have been loaded again during a run."""
         tables = {name: controls(name) for name in TABLES}
         hello = {"version": version("simdtex"), "device": self._machine.name, "controls": tables, "bytes": MAX_BYTES}
-        hello |= {"methods": METHODS, "examples": list(EXAMPLES), "colours": LABELS.tolist()}
-        self.send({"kind": "hello", **hello, "session": self.key, "fresh": self._picture is None}, [])
+        shown = {name: frames.thumbnail(frames.picture(one, one), THUMBNAIL) for name, one in _examples().items()}
+        hello |= {"methods": METHODS, "examples": {name: [one.width, one.height] for name, one in shown.items()}}
+        hello |= {"colours": LABELS.tolist(), "scale": temperature_colours(np.linspace(0, 1, 9)).tolist()}
+        hello |= {"session": self.key, "fresh": self._picture is None}
+        self.send({"kind": "hello", **hello}, [one.pixels for one in shown.values()])
         self._unseen = 0
         if self._picture is None:
             return
-        self._send_picture(new=not self.results and not self._begun)
+        self._send_picture(new=self._asked is None)
         for result in self.results.values():
             self._send_result(result)
         if self._begun:
@@ -174,11 +225,12 @@ class Session:
 
     def _on_example(self, message: Message, buffers: Sequence[Any]) -> None:
         one_of("example", message.get("name"), EXAMPLES)
-        self._open(Picture(f"{message['name']}.png", example(message["name"])[:192, :192], None))
+        self._open(Picture(f"{message['name']}.png", _examples()[message["name"]], None))
 
     def _open(self, picture: Picture) -> None:
         self._picture, self._maps, self._levels = picture, {}, None
         self._wanted, self._selected, self._stale, self._paused = None, None, True, False
+        self._asked = None
         self._send_picture(new=True)
 
     def _on_map(self, message: Message, buffers: Sequence[Any]) -> None:
@@ -190,6 +242,11 @@ class Session:
             raise ValueError(f"{given.name} is {size} and the picture {wanted}; give a map of the picture's size")
         if len(self._maps) >= MAX_MAPS:
             raise ValueError(f"there are {MAX_MAPS} maps already; remove one first")
+        held = sum(one.nbytes for one in (given.pixels, self._picture.pixels, *self._maps.values()))
+        if held > MAX_HELD:
+            raise ValueError(
+                f"the picture and its maps have {held} bytes and at most {MAX_HELD} are held; remove a map"
+            )
         self._maps[file_stem(given.name, "map")] = given.pixels
         self.send({"kind": "maps", "names": list(self._maps)}, [])
 
@@ -200,7 +257,16 @@ class Session:
     def _on_make(self, message: Message, buffers: Sequence[Any]) -> None:
         if self._picture is None:
             raise ValueError("there is no picture yet; give one first")
-        self._wanted, self._paused = message, False
+        self._wanted = self._asked = message
+        self._paused, self._refused = False, ""
+
+    def _on_begin(self, message: Message, buffers: Sequence[Any]) -> None:
+        """Make a first result of the picture, as the page does, if nothing was asked for yet."""
+        if self._picture is not None and self._asked is None:
+            part, (width, height) = _beginning(self._picture)
+            first: Message = {"kind": "make", "job": "synth", "method": "mrf", "seed": 1, "options": {}, "part": part}
+            self._on_make(first | {"width": width, "height": height}, [])
+            self._send_picture(new=False)
 
     def _on_pause(self, message: Message, buffers: Sequence[Any]) -> None:
         self._paused = self._stale = True
@@ -221,7 +287,7 @@ class Session:
         number = message.get("result")
         if number is not None:
             self.results.find(number)
-        self._select(number)
+        self._select(number, restore=True)
 
     def _on_download(self, message: Message, buffers: Sequence[Any]) -> None:
         result, name = self.results.find(message.get("result")), str(message.get("name"))
@@ -232,20 +298,31 @@ class Session:
         pixels = self._picture.pixels
         rows, cols = pixels.shape[:2]
         preview = frames.thumbnail(frames.picture(pixels, pixels), PREVIEW)
-        width, height = min(cols, LARGE), min(rows, LARGE)
-        part = [(cols - width) // 2, (rows - height) // 2, width, height] if max(rows, cols) > LARGE else None
+        part, size = _beginning(self._picture)
         fields = {"name": self._picture.name, "width": cols, "height": rows, "values": str(pixels.dtype), "part": part}
-        fields |= {"new": new, "preview": [preview.width, preview.height], "maps": list(self._maps)}
+        fields |= {"new": new, "preview": [preview.width, preview.height], "maps": list(self._maps), "size": size}
+        fields |= {"more": self._picture.metadata.more, "settings": self._asked}
         self.send({"kind": "picture", **fields}, [preview.pixels])
 
     def _send_result(self, result: Result) -> None:
         dropped = self.results.dropped
         self.send({"kind": "result", **result.describe(), "dropped": dropped}, [result.thumbnail.pixels])
 
-    def _select(self, number: int | None, restore: bool = True) -> None:
-        """Have the page show a result, and its settings if they are to be restored."""
+    def _select(self, number: int | None, *, restore: bool = False) -> None:
+        """Have the page show a result, or the run; with `restore` also its picture, its maps and its settings."""
         self._selected, self._stale = number, True
-        self.send({"kind": "selected", "result": number, "restore": restore}, [])
+        job = self._job if number is None else self.results[number].job
+        settings = None
+        if job and restore:
+            settings = self._asked = job.message
+            picture, maps = job.given
+            if picture is not self._picture:
+                self._levels = None
+            before, after = ((one, *more.values()) for one, more in ((self._picture, self._maps), job.given))
+            if [id(one) for one in before] != [id(one) for one in after]:
+                self._picture, self._maps = picture, dict(maps)
+                self._send_picture(new=False)
+        self.send({"kind": "selected", "result": number, "settings": settings}, [])
 
     def _send_frame(self, layers: Mapping[str, Callable[[], frames.Layer]], of: str | int, smooth: bool = True) -> None:
         """Send the window of the layer that the page looks at, of a result, the run or the sample."""
@@ -273,20 +350,20 @@ class Session:
     def _run(self, message: Message) -> None:
         """Make what a message asks for, unless something else is asked for meanwhile."""
         assert self._picture is not None
-        with self._reported(), suppress(Cancelled):
+        with self._reported(str(message.get("job"))), suppress(Cancelled):
             try:
                 job = Job(message, self._picture, self._maps, self.results.find)
                 levels = self._begin(job)
                 began = time.perf_counter()
                 image, output = job.run(self._machine, partial(self._watch, job), levels.checkpointing)
                 result = self.results.add(job, image, output, time.perf_counter() - began)
-                self._begun = None
+                self._begun = self._job = None
                 self._send_result(result)
                 if self._selected not in self.results:
-                    self._select(result.number, restore=False)
+                    self._select(result.number)
             finally:
                 if self._begun:
-                    self._begun = None
+                    self._begun = self._job = None
                     self.send({"kind": "ended"}, [])
                 if self._wanted is message:
                     self._wanted = None
@@ -301,7 +378,7 @@ class Session:
         layers = [first, "sample", *(["arrangement", "use", "temperature"] if job.method == "mrf" else [])]
         size = {"width": job.shape[1], "height": job.shape[0]}
         self._begun = {"kind": "begun", **size, "from": levels.level, "layers": layers}
-        self._levels, self._selected, self._stale = levels, None, True
+        self._levels, self._selected, self._stale, self._job = levels, None, True, job
         self.send(self._begun, [])
         return levels
 
@@ -332,6 +409,20 @@ class Session:
         elif self._stale:
             self._show_selected()
         self._next_frame = began + max(1 / MAX_RATE, INTERVAL * (time.perf_counter() - began))
+
+
+@cache
+def _examples() -> dict[str, NDArray[np.uint8]]:
+    """Return the pictures that the page offers, by name."""
+    return {name: example(name)[:192, :192] for name in EXAMPLES}
+
+
+def _beginning(picture: Picture) -> tuple[list[int] | None, list[int]]:
+    """Return the part of a picture that is the sample at first, None if all is, and the output's width and height."""
+    rows, cols = picture.pixels.shape[:2]
+    width, height = min(cols, LARGE), min(rows, LARGE)
+    part = [(cols - width) // 2, (rows - height) // 2, width, height] if max(rows, cols) > LARGE else None
+    return part, [min(2 * width, STARTING_SIDE), min(2 * height, STARTING_SIDE)]
 
 
 def _read(message: Message, buffers: Sequence[Any]) -> Picture:

@@ -78,6 +78,8 @@ class Live(AnyWidget):
     >>> live = simdtex.Live(data.gravel()[:128, :128])
     >>> live.image is None
     True
+    >>> live.wait().shape
+    (256, 256)
     """
 
     _esm = (PAGE / "live.js").read_text(encoding="utf-8")
@@ -101,6 +103,17 @@ class Live(AnyWidget):
         super().__init__()
         session = self._session = Session(self.send, open_machine(device), picture)
         self.on_msg(lambda _, message, buffers: session.receive(message, buffers))
+
+    def wait(self, timeout: float | None = None) -> NDArray[Any]:
+        """Return the latest result once nothing is being made, and begin if nothing was made yet.
+
+        Of a cell that runs with those after it (*Run All*) the page shows nothing before all have ended, so that the
+        first run begins here. ``timeout`` is in seconds. Raises ValueError if there is no sample, or if the job was
+        refused or cancelled, and TimeoutError.
+        """
+        if self._session is None:
+            raise ValueError("there is no picture yet; give one first")
+        return self._session.wait(timeout).image
 
     @property
     def _latest(self) -> Result | None:

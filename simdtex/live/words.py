@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from math import isfinite
 from typing import Any
 
@@ -32,8 +33,8 @@ def controls(name: str) -> list[dict[str, Any]]:
 
     A control has ``name``, ``group``, ``label``, ``hint``, ``kind`` (``"words"``, ``"whole"``, ``"number"`` or
     ``"switch"``) and ``default``, None if the method decides. Words have ``valid``, pairs of a value and its label.
-    Numbers have ``least``, None if there is none; ``span``, the least, the largest and the step of the slider;
-    and ``empty``, the text of an empty field.
+    Numbers have ``least``, None if there is none; ``span``, the least, the largest and the step of the slider; and
+    ``empty``, the text of an empty field, and ``usual``, what it stands for as a number, None if that depends.
     """
     options, job = TABLES[name]
     made = [_control(name, one, one.default_of(job)) for name, one in table(options).items() if job in one.shown]
@@ -52,6 +53,8 @@ def _control(name: str, one: Option, default: Any) -> dict[str, Any]:
         return control | {"kind": "switch"}
     if isinstance(kind, (Whole, Number)) and one.slider:
         control |= {"least": kind.least if isfinite(kind.least) else None, "span": one.slider}
-        control["empty"] = "automatic" if default is None else ""
+        found = re.match(r"[\d.]+(?=;|$)", one.none)
+        control["usual"] = float(found[0]) if found else default
+        control["empty"] = "" if default is not None else f"automatic: {found[0]}" if found else "automatic"
         return control | {"kind": "whole" if isinstance(kind, Whole) else "number"}
     return control

@@ -20,12 +20,22 @@ const JOBS = {
 const PICTURE_LAYERS = ["sample", "labels"]; // which show the picture itself
 const SIDES = ["left", "top", "width", "height"];
 const MAX_PIXELS = 2 ** 22; // of a frame
-const STARTING_SIDE = 512;
+const PIECE = 2 ** 20; // bytes of a file that are sent at a time
+const CONTROLS = ["button", "input", "select", "summary"];
+const LEGENDS = {
+  arrangement: "Each place of the sample has a colour of its own. An area without edges was copied whole.",
+  use: "Black: never taken. Yellow: taken most often.",
+  temperature: "Black: settled. Yellow: still to be decided. At the end of a run all is black.",
+};
 
 // -- connections --------------------------------------------------------------------------------------------------
 
 /** A WebSocket to `simdtex live`, which is opened again when it is lost. */
 class Socket {
+  get key() {
+    return sessionStorage.getItem("simdtex-session");
+  }
+
   constructor(address) {
     this.address = address;
     this.wait = 250;
@@ -33,8 +43,7 @@ class Socket {
   }
 
   open() {
-    const key = sessionStorage.getItem("simdtex-session");
-    this.socket = new WebSocket(`${this.address}${key ? `?session=${key}` : ""}`);
+    this.socket = new WebSocket(`${this.address}${this.key ? `?session=${this.key}` : ""}`);
     this.socket.binaryType = "arraybuffer";
     this.socket.onopen = () => {
       this.wait = 250;
@@ -56,8 +65,9 @@ class Socket {
 
   send(message, buffers = []) {
     if (this.socket.readyState !== WebSocket.OPEN) return;
-    this.socket.send(JSON.stringify({ ...message, buffers: buffers.length }));
-    for (const buffer of buffers) this.socket.send(buffer);
+    this.socket.send(JSON.stringify({ ...message, buffers: buffers.map((buffer) => buffer.length) }));
+    for (const buffer of buffers)
+      for (let begin = 0; begin < buffer.length; begin += PIECE) this.socket.send(buffer.subarray(begin, begin + PIECE));
   }
 
   close() {
@@ -103,6 +113,8 @@ function make(tag, attributes = {}, ...children) {
     else if (value !== undefined && value !== null) element.setAttribute(name, value);
   }
   element.append(...children.filter((child) => child !== null && child !== undefined));
+  // JupyterLab asks the element with the focus alone whether keys are its own
+  if (CONTROLS.includes(tag) || "tabindex" in attributes) element.dataset.lmSuppressShortcuts = "true";
   return element;
 }
 
@@ -123,7 +135,8 @@ const checkbox = (attributes) => make("input", { type: "checkbox", ...attributes
 const bar = (...children) => make("div", { class: "bar" }, ...children);
 const choices = (pairs) => pairs.map(([value, text]) => make("option", { value }, text));
 const choice = (pairs, onchange) => make("select", { onchange }, ...choices(pairs));
-const made = (layers) => layers.find((name) => name !== "sample");
+const made = (layers) => layers.find((name) => name !== "sample") ?? "sample";
+const stem = (name) => name.replace(/\.[^.]*$/, "").toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 40); // as simdtex names a map
 const sentence = (text) => `${text[0].toUpperCase()}${text.slice(1)}.`;
 const clamp = (value, least, most) => Math.max(least, Math.min(most, value));
 
@@ -158,8 +171,7 @@ class Options {
     const groups = new Map();
     for (const control of controls) {
       if (!groups.has(control.group)) {
-        const open = groups.size === 0;
-        groups.set(control.group, make("details", { open }, make("summary", {}, control.group)));
+        groups.set(control.group, make("details", {}, make("summary", {}, control.group)));
       }
       groups.get(control.group).append(this.field(control, onchange));
     }
@@ -178,8 +190,17 @@ class Options {
     const [least, most, step] = control.span;
     const input = number({ step: "any", min: control.least, placeholder: control.empty || null, onchange });
     const slider = make("input", { type: "range", min: least, max: most, step, "aria-label": `${label}, slider` });
-    const follow = () => (slider.value = input.value === "" ? (control.default ?? least) : input.value);
-    slider.addEventListener("input", () => (input.value = slider.value));
+    const note = make("small", { class: "beyond", role: "status" });
+    const follow = () => {
+      slider.value = input.value === "" ? (control.usual ?? least) : input.value;
+      slider.classList.toggle("automatic", input.value === "");
+      const beyond = Number(input.value) > most;
+      note.textContent = beyond ? `More than ${most}: a run can take many times as long, or need too much memory.` : "";
+    };
+    slider.addEventListener("input", () => {
+      input.value = slider.value;
+      follow();
+    });
     slider.addEventListener("change", onchange);
     input.addEventListener("input", follow);
     const get = () => (input.value === "" ? null : Number(input.value));
@@ -190,7 +211,7 @@ class Options {
     this.fields.set(name, { get, set });
     set(control.default);
     const field = labelled(label, input, hint);
-    input.after(slider);
+    input.after(slider, note);
     return field;
   }
 
@@ -307,6 +328,7 @@ class View {
   }
 
   paint() {
+    this.canvas.style.touchAction = this.page.brush || !this.fitted ? "none" : "auto"; // else a finger scrolls the page
     const context = this.canvas.getContext("2d");
     context.clearRect(0, 0, this.canvas.width, this.canvas.height);
     const { frame, unit } = this;
@@ -364,6 +386,7 @@ class View {
   press(event) {
     if (event.button !== 0) return;
     const { brush } = this.page;
+    if (event.pointerType === "touch" && !brush && this.fitted) return;
     let [x, y] = this.place(event);
     const point = () => [this.left + x / this.unit, this.top + y / this.unit].map((one) => Math.round(10 * (one - 0.5)) / 10);
     const move = (now) => {
@@ -432,7 +455,8 @@ class Page {
     this.results = new Map();
     this.shown = null; // the number of the selected result
     this.picture = null;
-    this.given = null; // the file, to give it again to a server that was started anew
+    this.given = this.pending = null; // the file and its maps, to give them again to a server that was started anew
+    this.session = connection.key;
     this.guide = { sample: [], output: [] };
     this.hole = [];
     this.part = null; // the region of the picture that is the sample
@@ -454,9 +478,10 @@ class Page {
     this.status = make("p", { role: "status", class: "status" }, "Connecting …");
     this.alert = make("p", { role: "alert", class: "alert", hidden: true });
     this.device = make("p", { class: "device" });
-    const main = make("div", { class: "columns" }, this.sampleSection(), this.resultSection(), this.optionsSection());
+    const side = make("div", { class: "side" }, this.sampleSection(), this.optionsSection());
+    this.columns = make("div", { class: "columns", hidden: true }, this.resultSection(), side);
     const header = make("header", {}, make("h1", {}, "simdtex live"), this.device, this.status);
-    this.root = make("main", { class: "simdtex", "data-lm-suppress-shortcuts": "true" }, header, this.alert, main);
+    this.root = make("main", { class: "simdtex" }, header, this.alert, this.startSection(), this.columns);
     root.replaceChildren(this.root);
     this.root.addEventListener("dragover", (event) => event.preventDefault());
     this.root.addEventListener("drop", (event) => {
@@ -469,30 +494,45 @@ class Page {
 
   // -- sample
 
+  /** What the page begins with. */
+  startSection() {
+    this.examples = make("div", { class: "examples" });
+    this.start = make(
+      "section",
+      { "aria-label": "Start", class: "start" },
+      make("h2", {}, "Drop a picture of a texture here"),
+      make("p", {}, "or paste one, or choose a file:"),
+      this.fileInput("A picture", "open"),
+      make("p", {}, "or try an example:"),
+      this.examples,
+    );
+    return this.start;
+  }
+
   sampleSection() {
-    this.examples = make("p", { class: "bar" });
     this.preview = make("canvas", { class: "preview", role: "img", "aria-label": "There is no picture yet." });
     this.preview.addEventListener("pointerdown", (event) => this.drawPart(event));
     this.partFields = SIDES.map(() => number({ min: 0, onchange: () => this.typePart() }));
     this.partSet = make(
       "fieldset",
-      { class: "part", hidden: true },
-      make("legend", {}, "The part that is the sample, pixels"),
+      { class: "part" },
+      make("legend", {}, "Pixels"),
       ...this.partFields.map((input, index) => labelled(SIDES[index][0].toUpperCase() + SIDES[index].slice(1), input)),
       button("Whole picture", () => this.setPart(null)),
     );
+    this.finger = button("Choose a part with a finger", () => this.chooseByFinger(!this.choosing), { class: "finger" });
+    const typed = make("details", {}, make("summary", {}, "The part that is the sample"), this.finger, this.partSet);
     this.mapList = make("ul");
     this.maps = make(
       "details",
-      { class: "maps", hidden: true },
+      { class: "maps" },
       make("summary", {}, "Further maps of the material"),
       make("p", {}, "Normal, height, roughness: each is arranged as the picture is."),
       this.fileInput("A further map", "map"),
       this.mapList,
     );
-    this.named = make("p", { class: "named" }, "Drop a picture anywhere, paste one, or choose a file.");
-    const heading = make("h2", {}, "Sample");
-    const parts = [heading, this.named, this.fileInput("A picture", "open"), this.examples, this.preview, this.partSet];
+    this.named = make("p", { class: "named" });
+    const parts = [make("h2", {}, "Sample"), this.named, this.fileInput("Another picture", "open"), this.preview, typed];
     return make("section", { "aria-label": "Sample", class: "sample" }, ...parts, this.maps);
   }
 
@@ -512,29 +552,42 @@ class Page {
       return;
     }
     const bytes = new Uint8Array(await file.arrayBuffer());
-    if (kind === "open") this.given = { name: file.name, bytes };
-    this.send({ kind, name: file.name || "pasted.png" }, [bytes]);
+    const name = file.name || "pasted.png";
+    if (kind === "open") this.pending = { name, bytes, maps: new Map() };
+    else this.given?.maps.set(stem(name), { name, bytes });
+    this.send({ kind, name }, [bytes]);
   }
 
   on_picture(message, [bytes]) {
+    const before = this.picture;
+    const same = before && ["name", "width", "height"].every((key) => before[key] === message[key]);
     this.picture = message;
     this.small = bitmap(bytes, ...message.preview);
     [this.preview.width, this.preview.height] = message.preview;
     this.preview.setAttribute("aria-label", `${message.name}, ${message.width} by ${message.height} pixels. Drag over it to choose the part that is the sample.`);
-    this.named.textContent = `${message.name}, ${message.width} × ${message.height}, ${message.values}`;
-    this.partSet.hidden = this.maps.hidden = false;
-    this.on_maps({ names: message.maps });
-    this.setPart(message.part, false);
-    if (!message.new) return;
+    const more = message.more ? ". The file has further frames or pages; this is the first." : "";
+    this.named.textContent = `${message.name}, ${message.width} × ${message.height}, ${message.values}${more}`;
+    this.start.hidden = true;
+    this.columns.hidden = false;
+    this.listMaps(message.maps);
+    this.setPart(same && !message.new ? this.part : message.part, false);
+    if (!message.new) {
+      if (message.settings && !before) this.restore(message.settings); // else the page has its own, perhaps later ones
+      return;
+    }
+    if (this.pending) this.given = { ...this.pending, label: message.name };
+    this.pending = null;
+    if (this.refused) for (const options of Object.values(this.options)) options.values = {};
+    this.refused = false;
+    this.downloads.hidden = true;
+    this.doing.textContent = "";
     this.guide = { sample: [], output: [] };
     this.hole = [];
     this.mark(this.shown, false);
     this.shown = null;
     if (this.again) this.restore(this.again);
     else {
-      const [, , width, height] = this.wholePart;
-      this.width.value = Math.min(2 * width, STARTING_SIDE);
-      this.height.value = Math.min(2 * height, STARTING_SIDE);
+      [this.width.value, this.height.value] = message.size;
     }
     this.again = null;
     this.showJob();
@@ -571,7 +624,7 @@ class Page {
   }
 
   drawPart(event) {
-    if (!this.picture || event.button !== 0) return;
+    if (!this.picture || event.button !== 0 || (event.pointerType === "touch" && !this.choosing)) return;
     const box = this.preview.getBoundingClientRect();
     const place = (now) => [
       Math.round(clamp((now.clientX - box.left) / box.width, 0, 1) * this.picture.width),
@@ -584,13 +637,31 @@ class Page {
       const part = [Math.min(x, toX), Math.min(y, toY), Math.abs(toX - x), Math.abs(toY - y)];
       if (part[2] >= 8 && part[3] >= 8) this.setPart(part, false);
     };
-    drag(this.preview, event, move, () => this.part !== before && this.changed());
+    drag(this.preview, event, move, () => {
+      this.chooseByFinger(false);
+      if (this.part !== before) this.changed();
+    });
+  }
+
+  /** Let a finger on the preview choose the part, or scroll the page. */
+  chooseByFinger(choosing) {
+    this.choosing = choosing;
+    this.preview.style.touchAction = choosing ? "none" : "auto";
+    this.finger.setAttribute("aria-pressed", `${choosing}`);
   }
 
   on_maps({ names }) {
-    const remove = (name) => button("×", () => this.send({ kind: "unmap", name }), { "aria-label": `Remove ${name}` });
+    this.listMaps(names);
+    if (names.length && (this.shown !== null || this.running)) this.make();
+  }
+
+  listMaps(names) {
+    const unmap = (name) => {
+      this.given?.maps.delete(name);
+      this.send({ kind: "unmap", name });
+    };
+    const remove = (name) => button("×", () => unmap(name), { "aria-label": `Remove ${name}` });
     this.mapList.replaceChildren(...names.map((name) => make("li", {}, `${name} `, remove(name))));
-    if (names.length && this.shown !== null) this.make();
   }
 
   // -- result
@@ -607,13 +678,16 @@ class Page {
       button("Fit", () => this.view.fit()),
     ];
     const shown = bar(labelled("Layer", this.layerChoice), labelled("Tiled 3 × 3", this.tiling), bar(...zoom));
+    this.scale = make("span", { class: "scale", "aria-hidden": "true" });
+    this.meaning = make("span");
+    this.legend = make("p", { class: "legend", hidden: true }, this.scale, this.meaning);
     this.classes = make("ul", { class: "classes", "aria-label": "Classes", hidden: true });
     this.hint = make("p", { role: "status", class: "hint" });
     this.progress = make("progress", { max: 1, value: 0, "aria-label": "Progress" });
     this.doing = make("p", { class: "doing" });
     this.pausing = button("Pause", () => this.pause(), { disabled: true });
     this.cancelling = button("Cancel", () => this.send({ kind: "cancel" }), { disabled: true });
-    this.current = button("Present run", () => this.send({ kind: "select", result: null }));
+    this.current = button("Current run", () => this.send({ kind: "select", result: null }));
     this.currentItem = make("li", { class: "current", hidden: true }, this.current);
     this.strip = make("ol", { class: "strip", "aria-label": "Results" }, this.currentItem);
     this.files = bar();
@@ -634,6 +708,7 @@ class Page {
       make("h2", {}, "Result"),
       shown,
       this.view.canvas,
+      this.legend,
       this.hint,
       this.classes,
       bar(this.pausing, this.cancelling, this.progress),
@@ -658,6 +733,9 @@ class Page {
   on_frame(message, [bytes]) {
     this.send({ kind: "shown" });
     this.seen = message.layer;
+    this.meaning.textContent = LEGENDS[message.layer] ?? "";
+    this.legend.hidden = !LEGENDS[message.layer];
+    this.scale.hidden = message.layer === "arrangement";
     this.view.show(message, bytes);
     if (message.of === "run") this.frames += 1;
   }
@@ -680,7 +758,8 @@ class Page {
     this.frames = 0;
     this.progress.value = 0;
     this.alert.hidden = true;
-    this.hint.textContent = "";
+    this.refused = false;
+    this.hint.textContent = this.doing.textContent = "";
     this.setRunning(true);
     this.select(null);
     this.say(message.from === null ? "Running." : `Continuing after level ${message.from}.`);
@@ -698,34 +777,41 @@ class Page {
   }
 
   on_result(message, [bytes]) {
-    const { result, width, height, settings } = message;
+    const { result, width, height, settings, picture } = message;
     this.setRunning(false);
     this.progress.value = 1;
     this.results.set(result, message);
-    for (const number of message.dropped) {
-      this.results.get(number)?.item.remove();
+    const dropped = message.dropped.filter((number) => this.results.has(number));
+    for (const number of dropped) {
+      this.results.get(number).item.remove();
       this.results.delete(number);
     }
     const small = bitmap(bytes, ...message.thumbnail);
     small.setAttribute("aria-hidden", "true");
-    message.button = button(small, () => this.send({ kind: "select", result }));
+    message.button = button(small, () => this.send({ kind: "select", result }), { title: `From ${picture}` });
     message.button.append(make("span", {}, `Result ${result}, ${width} × ${height}, seed ${settings.seed}`));
     message.item = make("li", {}, message.button);
     this.currentItem.before(message.item);
     this.strip.scrollLeft = this.strip.scrollWidth;
-    this.say(`Result ${result} is ready: ${this.summary(message)}`);
+    const gone = dropped.length ? ` Result ${dropped.join(", ")} is no longer kept, to save memory.` : "";
+    this.say(`Result ${result} is ready: ${this.summary(message)}${gone}`);
+    if (this.results.size === 1 && this.columns.clientWidth > 1000) this.controls.querySelector("details").open = true;
   }
 
   summary({ width, height, seconds, device, settings, note }) {
     return `${width} × ${height} in ${seconds.toFixed(2)} s on ${device}, seed ${settings.seed}${note && `. ${note}`}`.replace(/\.?$/, ".");
   }
 
-  on_selected({ result, restore }) {
+  on_selected({ result, settings }) {
     this.select(result);
+    if (settings) this.restore(settings);
     const found = this.results.get(result);
-    if (!found) return;
-    if (restore) this.restore(found.settings);
-    else if (found.settings.job === "fill") this.hole = [];
+    if (!found) {
+      this.doing.textContent = "";
+      this.view.canvas.setAttribute("aria-label", "The run, or the sample.");
+      return;
+    }
+    if (!settings && found.settings.job === "fill") this.hole = [];
     this.doing.textContent = this.summary(found);
     this.view.canvas.setAttribute("aria-label", `Result ${result}: ${this.summary(found)} Arrow keys move, plus and minus zoom, 0 fits.`);
     this.command.textContent = found.command;
@@ -741,7 +827,7 @@ class Page {
     this.mark(result, true);
     const found = this.results.get(result);
     this.downloads.hidden = !found;
-    if (found || this.running) this.offer(found?.layers ?? this.runLayers);
+    this.offer(found?.layers ?? (this.running ? this.runLayers : ["sample"]));
     this.showClasses();
   }
 
@@ -862,7 +948,7 @@ class Page {
 
   visibleStrokes() {
     if (!this.paintable) return [];
-    if (this.job.value === "fill") return [{ strokes: this.hole, colour: () => HOLE }];
+    if (this.job.value === "fill") return this.tool.value ? [{ strokes: this.hole, colour: () => HOLE }] : [];
     const colour = (label) => this.colours[label];
     return this.seen === "sample" || this.tool.value ? [{ strokes: this.labelStrokes, colour }] : [];
   }
@@ -979,7 +1065,7 @@ class Page {
     if (job === "fill") Object.assign(message, { hole: this.hole, of: PICTURE_LAYERS.includes(this.seen) ? null : this.shown });
     else if (job !== "classify") message.part = this.part;
     if (job === "classify" || (job === "synth" && this.guide.output.length)) message.guide = this.guide;
-    this.last = message;
+    this.last = structuredClone(message);
     this.send(message);
   }
 
@@ -992,14 +1078,18 @@ class Page {
     }
     this.seed.value = settings.seed;
     this.jobOptions.values = settings.options;
-    if ("part" in settings) this.setPart(settings.part, false);
-    if (settings.guide) this.guide = structuredClone(settings.guide);
+    this.setPart(settings.part ?? null, false);
+    this.guide = structuredClone(settings.guide ?? { sample: [], output: [] });
+    this.hole = structuredClone(settings.hole ?? []);
+    if (settings.job === "fill") this.tool.value = ""; // the strokes would hide what they were filled with
+    else if (this.tool.value === "hole") this.tool.value = "";
     this.showJob();
+    if (this.hole.length) this.hint.textContent = "The hole is kept: choose Hole under Paint to see it.";
   }
 
   // -- the connection
 
-  on_hello(message) {
+  on_hello(message, buffers) {
     this.bytes = message.bytes;
     this.device.textContent = message.device;
     this.colours = message.colours.map((colour) => `rgb(${colour})`);
@@ -1009,7 +1099,18 @@ class Page {
       const labels = this.colours.slice(1).map((_, index) => [`${index + 1}`, `Label ${index + 1}`]);
       this.tool.replaceChildren(...choices([["", "Nothing"], ["hole", "Hole"], ...labels, ["0", "Eraser"]]));
       this.method.replaceChildren(...choices(Object.entries(message.methods)));
-      this.examples.replaceChildren("or try ", ...message.examples.map((name) => button(name, () => this.example(name))));
+      this.scale.style.background = `linear-gradient(to right, ${message.scale.map((colour) => `rgb(${colour})`)})`;
+      const picture = (size, bytes) => {
+        const small = bitmap(bytes, ...size);
+        small.setAttribute("aria-hidden", "true");
+        return small;
+      };
+      const shown = ([name, size], index) => {
+        const found = button(name, () => this.example(name));
+        found.prepend(picture(size, buffers[index]));
+        return found;
+      };
+      this.examples.replaceChildren(...Object.entries(message.examples).map(shown));
       this.showJob();
     }
     this.say("Ready.");
@@ -1018,19 +1119,37 @@ class Page {
     this.shown = null;
     this.setRunning(false);
     this.view.ask();
-    if (!message.fresh || !this.given) return;
-    this.again = this.last?.job === "fill" ? null : this.last; // the server was started anew, and is given all again
+    const other = this.session && this.session !== message.session; // simdtex was started anew, or has forgotten the page
+    this.session = message.session;
+    if (!other || !message.fresh) return;
+    if (this.given && this.given.label === this.picture?.name) this.giveAgain();
+    else {
+      this.picture = null;
+      this.start.hidden = false;
+      this.columns.hidden = true;
+      this.warn("The picture and the results of this page are no longer kept; give the picture again.");
+    }
+  }
+
+  giveAgain() {
+    this.again = this.last?.job === "fill" ? null : this.last;
+    this.pending = this.given;
     if (this.given.bytes) this.send({ kind: "open", name: this.given.name }, [this.given.bytes]);
-    else this.example(this.given.name);
+    else this.send({ kind: "example", name: this.given.name });
+    for (const { name, bytes } of this.given.maps.values()) this.send({ kind: "map", name }, [bytes]);
   }
 
   example(name) {
-    this.given = { name };
+    this.pending = { name, maps: new Map() };
     this.send({ kind: "example", name });
   }
 
-  on_error({ text }) {
+  /** Say what is wrong; with a `job`, that could not be done. */
+  on_error({ text, job }) {
     this.warn(text);
+    if (!job) return;
+    this.refused = true;
+    this.say("Nothing was made.");
   }
 
   connected(state, reason) {
