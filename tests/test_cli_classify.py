@@ -13,6 +13,7 @@ import simdtex
 from simdtex.cli import main
 from simdtex.io import image
 from simdtex.model.colours import label_colours
+from simdtex.model.labels import read_labels, write_labels
 from simdtex.report.classification import confusion_matrix
 
 LEFT, RIGHT = texture((24, 20), 3, seed=1), texture((24, 20), 3, seed=2)[:, ::-1] // 3
@@ -35,7 +36,7 @@ def folder(tmp_path, monkeypatch):
     image.write("far.png", TRUTH * 9)
     alpha = np.where(np.arange(40) < 20, 255, 0).astype(np.uint8)[None].repeat(24, 0)
     image.write("cut.png", np.dstack([PICTURE, alpha]))
-    image.write_labels("strokes.png", np.where(TRUTH == 1, 1, 0).astype(np.uint8))
+    write_labels("strokes.png", np.where(TRUTH == 1, 1, 0).astype(np.uint8))
     return tmp_path
 
 
@@ -56,7 +57,7 @@ def test_the_command_gives_the_bytes_of_the_function(folder):
         unknown=0.02,
         **OPTIONS,
     )
-    assert (image.read_labels("labels.png") == wanted).all()
+    assert (read_labels("labels.png") == wanted).all()
     assert (image.read("fit.tif").pixels == output.fit).all()
     shares = [f"{one['name']} {one['share']:.1%}" for one in output.statistics["classes"]]
     assert f"labels.png: {', '.join(shares)} in " in result.output and "seed 5" in result.output
@@ -64,7 +65,7 @@ def test_the_command_gives_the_bytes_of_the_function(folder):
 
 def test_viewers_see_the_colours_of_labels_and_programs_their_numbers(folder):
     assert run("picture.png", *SAMPLES, "-o", "labels.png", "--unknown", 0).exit_code == 0
-    labels = image.read_labels("labels.png")
+    labels = read_labels("labels.png")
     with PIL.Image.open("labels.png") as shown:
         assert (np.asarray(shown.convert("RGB")) == label_colours(256)[labels]).all()
     assert run("picture.png", *SAMPLES, "-o", "labels.tif", "--unknown", 0).exit_code == 0
@@ -87,13 +88,13 @@ def test_several_samples_of_a_class_and_transparent_parts(folder):
         PICTURE, textures, validation={"right": RIGHT[6:]}, channel_axis=-1, rng=5, device="reference", unknown=0.0,
         **OPTIONS,
     )  # fmt: skip
-    assert (image.read_labels("labels.png") == wanted).all()
+    assert (read_labels("labels.png") == wanted).all()
 
 
 def test_the_report_shows_labels_fits_and_the_confusion(folder):
     result = run("picture.png", *SAMPLES, "-o", "labels.png", "--truth", "truth.png", "--report", "page")
     assert result.exit_code == 0, result.output
-    labels, truth = image.read_labels("labels.png"), image.read_labels("truth.png")
+    labels, truth = read_labels("labels.png"), read_labels("truth.png")
     numbers = json.loads((folder / "page/results.json").read_text())
     confusion = [[int(((truth == t) & (labels == c)).sum()) for c in range(3)] for t in range(3)]
     assert numbers["confusion"] == confusion

@@ -15,7 +15,7 @@ from PIL import ImageCms
 
 import simdtex
 from simdtex import cli
-from simdtex.io.image import read_bytes, read_labels
+from simdtex.io.image import read_bytes
 from simdtex.live import results
 from simdtex.live import session as sessions
 from simdtex.live.job import LABELS, Picture
@@ -23,6 +23,7 @@ from simdtex.live.levels import Levels
 from simdtex.live.results import Results
 from simdtex.methods import mrf
 from simdtex.methods.classifier import algorithm
+from simdtex.model.labels import read_labels
 from simdtex.model.source_map import apply_source_map
 
 

@@ -92,6 +92,7 @@ def classify(
     """
     from simdtex import classify
     from simdtex.io import image
+    from simdtex.model.labels import read_labels, write_labels
 
     whole = read_material([picture])
     true = None if truth is None else _read_truth(truth, whole)
@@ -102,7 +103,7 @@ def classify(
     more: dict[str, Any] = {"channel_axis": whole.channel_axis}
     known: Any
     if strokes:
-        known = image.read_labels(strokes)
+        known = read_labels(strokes)
         names = {int(label): str(label) for label in np.unique(known[known > 0])}
     else:
         known = _read_samples("--texture", textures, whole)
@@ -116,7 +117,7 @@ def classify(
             f"{truth} has the label {strange[0]}; give those of the classes, 0 for unknown, and {UNLABELLED} "
             "where it is not known"
         )
-    writers: list[Any] = [lambda made, run: image.write_labels(output, made)]
+    writers: list[Any] = [lambda made, run: write_labels(output, made)]
     if confidence:
         writers.append(lambda made, run: image.write(confidence, run.fit))
     if report:
@@ -155,7 +156,7 @@ def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[st
 
 def _read_truth(path: Path, picture: Material) -> NDArray[Any]:
     """Read the labels that are to be found; raise if they have another size."""
-    from simdtex.io.image import read_labels
+    from simdtex.model.labels import read_labels
 
     true, pixels = read_labels(path), picture.array
     if true.shape != pixels.shape[:2]:

@@ -12,7 +12,6 @@ import io
 import os
 import re
 from collections.abc import Collection, Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,7 +23,6 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from simdtex.io.atomic import Unbuffered, atomic_path, check_target
 from simdtex.io.decode import NOTHING, Metadata, decode, native
 from simdtex.io.limits import TooLarge, check_file, max_pixels_or_default
-from simdtex.model.colours import label_colours
 from simdtex.options import unmasked
 
 __all__ = [
@@ -480,33 +478,6 @@ def encode(path: Path, suffix: str, pixels: Array, metadata: Metadata = NOTHING)
     else:
         kind = PIL.Image.registered_extensions()[suffix]
         path.write_bytes(pillow_bytes(PIL.Image.fromarray(pixels), kind, **_OPTIONS.get(suffix, {}), **beside))
-
-
-def write_labels(path: PathLike, labels: NDArray[np.uint8]) -> None:
-    """Write labels (rows, cols) as the values of a picture; a PNG has them as indices of `label_colours`."""
-    if Path(path).suffix.lower() != ".png":
-        write(path, labels)
-        return
-    check_writable(path)
-    picture = PIL.Image.fromarray(labels)
-    picture.putpalette(label_colours(256).tobytes())
-    content = pillow_bytes(picture, "PNG")
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(content)
-
-
-def read_labels(path: PathLike) -> NDArray[Any]:
-    """Read a picture of labels, (rows, cols) of an integer type: its values or, with a palette, the indices.
-
-    Raises ValueError if it is no such picture.
-    """
-    pixels = read(path).pixels  # first: it refuses what is too large or damaged
-    with suppress(OSError, ValueError), PIL.Image.open(path) as picture:
-        if picture.mode == "P":
-            return np.asarray(picture)
-    if pixels.dtype.kind not in "iu" or (pixels.ndim == 3 and pixels.shape[2] > 1):
-        raise ValueError(f"{os.fspath(path)} is no picture of labels; save it grey or with a palette, 0, 1, 2...")
-    return pixels.reshape(pixels.shape[:2])
 
 
 def pillow_bytes(picture: PIL.Image.Image, kind: str, **options: Any) -> bytes:

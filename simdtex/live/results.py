@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.io.image import write, write_labels
+from simdtex.io.image import write
 from simdtex.live import frames
 from simdtex.live.job import Job
+from simdtex.model.labels import write_labels
 from simdtex.model.regularity import lattice_sentence
 from simdtex.model.source_map import apply_source_map, save_source_map
 from simdtex.options import one_of, whole
