@@ -108,6 +108,13 @@ def test_the_report_shows_labels_fits_and_the_confusion(folder):
     assert {"labels.png", "fit.png"} <= {path.name for path in (folder / "page").iterdir()}
 
 
+def test_the_report_shows_a_grey_picture(folder):
+    result = run("grey.png", "--texture", "left=grey.png", "-o", "labels.png", "--report", "page", "--unknown", 0)
+    assert result.exit_code == 0, result.output
+    shown = image.read(folder / "page/labels.png").pixels.reshape(-1, 3)
+    assert set(map(tuple, np.repeat(LEFT[..., 0].reshape(-1, 1), 3, 1))) <= set(map(tuple, shown))
+
+
 def test_confusion_leaves_out_what_is_not_known():
     truth = np.array([[0, 1, 1], [2, 2, 255]])
     assert confusion_matrix(np.array([[0, 1, 2], [2, 2, 1]]), truth, 3).tolist() == [[1, 0, 0], [0, 1, 1], [0, 0, 2]]
