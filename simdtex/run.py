@@ -79,7 +79,8 @@ class Relaxing(Progress):
     explain : callable
         ``explain(row, col)``, of a volume ``explain(layer, row, col)``, returns a
         `simdtex.model.explanation.Explanation`: how that site of the level would relax now, with the random numbers of
-        the present step. Later than the callback it tells of what the run has become. It changes nothing.
+        the present step. Called after the callback has returned, it uses the state that the run has then. It changes
+        nothing.
     """
 
     sweep: int

@@ -1,4 +1,4 @@
-"""Why a site takes what it takes: what is told is what the run does, and the numbers are those of the equations."""
+"""Why a site takes what it takes: an explanation is what the run does, by the equations."""
 
 import re
 
@@ -86,7 +86,7 @@ def test_what_is_taken_is_what_the_run_takes(name):
 
 
 def consistent(why):
-    """The terms are those of the equations, by the neighbourhoods that are told."""
+    """The terms are those of the equations, by the neighbourhoods of the explanation."""
     near, found = why.neighbours, why.candidates
     guides = "guide" in found.costs
     x, y, u = (a.astype(np.float64) for a in (near.values, found.around, near.confidence))

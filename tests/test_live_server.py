@@ -278,15 +278,21 @@ def soon(found, timeout=20):
         time.sleep(0.01)
 
 
+def closed_in_a_run(port, pages):
+    """A page that was closed while it made a large result, and its session."""
+    page = Client(port)
+    session = pages._sessions[page.key]
+    page.say(png(texture()), kind="open", name="a.png")
+    page.say(**asked(width=2000, height=2000))
+    page.wait("begun")
+    page.socket.close()
+    return page, session
+
+
 def test_the_run_of_a_page_that_is_gone_ends(monkeypatch):
     monkeypatch.setattr(serving, "RUN_KEPT", 0.0)
     with running() as (port, pages):
-        page = Client(port)
-        session = pages._sessions[page.key]
-        page.say(png(texture()), kind="open", name="a.png")
-        page.say(**asked(width=2000, height=2000))
-        page.wait("begun")
-        page.socket.close()
+        page, session = closed_in_a_run(port, pages)
         soon(lambda: session._wanted is None and session._begun is None)
         assert page.key in pages._sessions, "the session is kept"
         monkeypatch.setattr(serving, "KEPT", 0.0)
@@ -298,12 +304,7 @@ def test_the_run_of_a_page_that_is_gone_ends(monkeypatch):
 def test_a_page_that_comes_back_in_time_keeps_its_run(monkeypatch):
     monkeypatch.setattr(serving, "RUN_KEPT", 2.0)
     with running() as (port, pages):
-        page = Client(port)
-        session = pages._sessions[page.key]
-        page.say(png(texture()), kind="open", name="a.png")
-        page.say(**asked(width=2000, height=2000))
-        page.wait("begun")
-        page.socket.close()
+        page, session = closed_in_a_run(port, pages)
         soon(lambda: page.key in pages._lost)
         again = Client(port, session=page.key)
         shown = again.wait("picture")[0]

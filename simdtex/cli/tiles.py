@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from simdtex.cli.command import RUNS
-from simdtex.cli.ending import RESUME
+from simdtex.cli.ending import RESUME, note
 from simdtex.cli.inputs import Also
 from simdtex.cli.job import progress_bar
 from simdtex.cli.options import option
@@ -101,7 +101,7 @@ def synthesize_in_tiles(
     options["maps"] = {one.out.name: one.maps.array for one in others}
     with _progress(output, given["quiet"]) as callback:
         distributed.synthesize(
-            sample, shape, output, tiles=given["tiles"], workers=workers, callback=callback, note=_note, **options
+            sample, shape, output, tiles=given["tiles"], workers=workers, callback=callback, note=note, **options
         )
     _done(output, given["quiet"], began)
 
@@ -112,15 +112,11 @@ def resume_tiles(store: Path, workers: str | None, device: str | None, quiet: bo
 
     began, finished = time.perf_counter(), distributed.finished(store)
     with _progress(store, quiet) as callback:
-        distributed.resume(store, workers=workers_of(workers), device=device, callback=callback, note=_note)
+        distributed.resume(store, workers=workers_of(workers), device=device, callback=callback, note=note)
     if finished:
         click.echo(f"{store} is finished; there is nothing to go on with")
     else:
         _done(store, quiet, began)
-
-
-def _note(sentence: str) -> None:
-    click.echo(f"simdtex: {sentence}", err=True)
 
 
 @contextmanager

@@ -99,6 +99,17 @@ class Info(NamedTuple):
     labels: NDArray[np.uint8]
 
 
+class _Segment(NamedTuple):
+    """The sites of a label in a strip of the picture.
+
+    ``own`` all of them; ``inner`` those whose neighbours are of it, too; ``at`` those whose fit is wanted.
+    """
+
+    own: Mask
+    inner: Mask
+    at: Mask
+
+
 class Run:
     """A classification on a machine: rows are compared with the classes, then labels are relaxed, sweep by sweep."""
 
@@ -109,7 +120,8 @@ class Run:
         self.schedule = schedules.get(plan.options.schedule)
         self._setting = schedules.Setting(machine, self.grid, neighbourhood_offsets(1), 1, seed, 0)
         self._check_schedule()
-        self._taps = gaussian(plan.options.window)
+        self._taps, self._coupling = gaussian(plan.options.window), machine.put(gaussian(plan.options.coupling))
+        self._weight = round(WEIGHTS * plan.options.weight)
         self._size = 2 * max(expert.reach for expert in model.experts) + 1  # of the largest neighbourhood
         self._levels = prepared(machine, model.scale, plan.pixels, model.experts[-1].level + 1)
 
@@ -162,10 +174,10 @@ class Run:
 
     def _votes(self, labels: Array) -> Array:
         """Return the votes of the labels around each site for every class."""
-        return window(self.machine, labels, self._classes, self.machine.put(gaussian(self.options.coupling)))
+        return window(self.machine, labels, self._classes, self._coupling)
 
     def _swept(self, state: State) -> State:
-        machine, weight = self.machine, round(WEIGHTS * self.options.weight)
+        machine = self.machine
         evidence, labels = machine.put(self._evidence(state.logs)), machine.put(state.labels)
         kept, everywhere, last = state.schedule, schedules.Masked(self.grid), False
         while not last:
@@ -173,7 +185,7 @@ class Run:
             for one in chosen.apart(machine):
                 if one.sites.size:
                     sites = machine.put(one.sites.astype(np.int32))
-                    labels = potts(machine, sites, evidence, self._votes(labels), weight, labels)
+                    labels = potts(machine, sites, evidence, self._votes(labels), self._weight, labels)
             last = chosen.last
         found = machine.get(labels)
         changed = int(np.count_nonzero(found != state.labels))
@@ -190,7 +202,7 @@ class Run:
         found = np.where(rejected | self.plan.unknown, 0, state.labels + 1)
         energy = self._evidence(state.logs)
         votes = self.machine.get(self._votes(self.machine.put(state.labels))).view(np.int32)
-        energy += np.int32(round(WEIGHTS * self.options.weight)) * votes // WEIGHTS
+        energy += np.int32(self._weight) * votes // WEIGHTS
         energy -= energy.max(0)
         chance = np.exp(energy.astype(np.float32) / np.float32(UNITS))
         chance /= chance.sum(0)
@@ -234,21 +246,24 @@ class Run:
             labels = state.labels[slab]
             inside = np.zeros(labels.shape, bool)
             inside[first - slab.start :][:band] = True
+            segments = []
             for label in np.unique(state.labels[here]):
                 own = labels == label
                 inner = ndimage.minimum_filter(own, size, mode="nearest")  # no neighbour beyond the segment
-                at, there = own & inside, state.labels[here] == label
-                for c, null in enumerate(self.model.nulls):
-                    logs = np.ascontiguousarray(state.logs[:, c, slab])
-                    distance = self._distance(null, logs, own, inner, at)
+                segments.append((label, _Segment(own, inner, own & inside)))
+            for c, null in enumerate(self.model.nulls):
+                logs = np.ascontiguousarray(state.logs[:, c, slab])
+                copied = ndimage.maximum_filter((logs == 0).all(0), size, mode="nearest")  # a sample of the picture
+                for label, segment in segments:
+                    distance, there = self._distance(null, logs, copied, segment), state.labels[here] == label
                     fit[c, here][there] = fdtrc(experts, freedom, distance)
                     if c == label:
                         rejected[here][there] = distance > limit
         return fit, rejected
 
-    def _distance(self, null: Null, logs: NDArray[np.uint16], own: Mask, inner: Mask, at: Mask) -> NDArray[np.float64]:
-        """Return Hotelling's statistic of the sites ``at`` of a segment, by its ``inner`` sites if there are any."""
-        copied = ndimage.maximum_filter((logs == 0).all(0), self._size, mode="nearest")  # a sample cut from the picture
+    def _distance(self, null: Null, logs: NDArray[np.uint16], copied: Mask, segment: _Segment) -> NDArray[np.float64]:
+        """Return Hotelling's statistic of the sites of a segment that are judged, 0 where the sample is copied."""
+        own, inner, at = segment
         means, found = windowed(self.machine, logs, inner & ~copied, self._taps, at)
         if not (found | copied[at]).all():  # a narrow segment
             means = np.where(found, means, windowed(self.machine, logs, own & ~copied, self._taps, at)[0])

@@ -24,7 +24,7 @@ from simdtex.ops.neighbourhood import Field, gathered
 from simdtex.ops.relax import SUGGESTING, Everything, Relaxation, relax_apart
 
 MOST = 100
-"""Candidates that are told in full."""
+"""Candidates whose terms are returned, the first by rank."""
 
 
 class Moment(NamedTuple):
