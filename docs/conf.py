@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import simdtex
+from simdtex.live import script, style
 
 HERE = Path(__file__).parent
 
@@ -23,7 +24,7 @@ nitpicky = True
 html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = f"simdtex {release}"
-html_static_path = ["_static"]
+html_static_path = ["_static", "generated/live"]
 html_css_files = ["simdtex.css"]
 
 # The gallery is examples/*.py, all of which run at every build; one that fails is an error of the build.
@@ -58,6 +59,14 @@ STUDIES = {
     "study-pyramid": ("pyramid.csv", "pyramid-"),
 }
 (HERE / "generated").mkdir(exist_ok=True)
+
+# concepts/why.rst plays a recorded session of the live page; a page that is opened as a file cannot load a module.
+(HERE / "generated" / "live").mkdir(exist_ok=True)
+(HERE / "generated" / "live" / "live.js").write_text(
+    script().replace("export default", "window.simdtexLive ="), encoding="utf-8"
+)
+(HERE / "generated" / "live" / "live.css").write_text(style(), encoding="utf-8")
+
 for result, (figures, prefix) in STUDIES.items():
     others = tuple(other for _, other in STUDIES.values() if len(other) > len(prefix))
     results = [f".. csv-table::\n   :file: ../study/{figures}\n   :header-rows: 1\n"]

@@ -2,10 +2,12 @@
 
 import os
 import shlex
+import shutil
 import subprocess
 import sys
 import zipfile
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 import PIL.Image
@@ -15,9 +17,11 @@ from live import png, striped, texture
 
 import simdtex
 from simdtex.io.examples import example
+from simdtex.live import script, style
 from simdtex.live.job import LABELS
 
 REQUIRE = "SIMDTEX_REQUIRE_BROWSER"
+ROOT = Path(__file__).resolve().parent.parent
 TOKEN = "a-token-for-the-browser"
 LACKS = missing() or ("" if AXE.exists() else "axe-core is not installed (make browser, which needs npm)")
 if LACKS and os.environ.get(REQUIRE):
@@ -145,9 +149,10 @@ class Page:
     def sees(self, picture):
         """Whether the view shows these pixels, (rows, cols, 3), as they are."""
         zoom = self.script(
-            "const v = page.view, zoom = Math.max(1, Math.floor(v.unit)); const least = (all, side) => Math.round((all - "
-            "side / zoom) / 2); Object.assign(v, {unit: zoom, fitted: false, left: least(v.cols, v.canvas.width), "
-            "top: least(v.rows, v.canvas.height)}); v.panes[0].frame = null; v.moved(); return zoom"
+            "const v = page.view, zoom = Math.max(1, Math.floor(v.unit));"
+            "const least = (all, side) => Math.round((all - side / zoom) / 2);"
+            "const [left, top] = [least(v.cols, v.canvas.width), least(v.rows, v.canvas.height)];"
+            "Object.assign(v, {unit: zoom, fitted: false, left, top}); v.panes[0].frame = null; v.moved(); return zoom"
         )
         until(lambda: self.script("return page.view.panes[0].frame && !page.view.drawing"))
         seen = self.canvas()
@@ -660,9 +665,7 @@ def test_a_click_explains_a_pixel(inside):
     why = explained(inside)
     assert max(abs(one - other) for one, other in zip(why["pixel"], pixel, strict=True)) <= 1
     pixel = tuple(why["pixel"])
-    expected = simdtex.explain(
-        example("grass")[:192, :192], (48, 48), pixel, order=4, schedule="checkerboard", rng=1
-    )
+    expected = simdtex.explain(example("grass")[:192, :192], (48, 48), pixel, order=4, schedule="checkerboard", rng=1)
     assert why["reason"] == expected.reason
     rows = [row.text for row in inside.all(".reason tbody tr")]
     assert len(rows) == len(expected.shown())
@@ -780,8 +783,32 @@ def test_the_lattice_is_drawn_and_the_fitting_size_taken(page):
     before = page.canvas()
     page.labelled("Lattice").click()
     until(lambda: (page.canvas() != before).any())
-    page.button(f"Use {cols} × {rows}, which fits").click()
+    page.one(".fitting").click()
     page.result(2)
     assert page.script("return [page.results.get(2).height, page.results.get(2).width]") == [rows, cols]
     page.choose("Layer", "Faults of the lattice")
     until(lambda: page.script("return page.seen") == "faults")
+
+
+def test_the_recording_of_the_docs_plays_without_a_server(page, tmp_path):
+    sys.path.insert(0, str(ROOT / "docs"))
+    import recorded
+
+    moments = recorded.unpack(recorded.FILE.read_text("ascii"))[0]["moments"]
+    (tmp_path / "live.js").write_text(script().replace("export default", "window.simdtexLive ="), encoding="utf-8")
+    (tmp_path / "live.css").write_text(style(), encoding="utf-8")
+    shutil.copy(recorded.FILE, tmp_path)
+    (tmp_path / "page.html").write_text(
+        '<!doctype html><html lang="en"><title>t</title><link rel="stylesheet" href="live.css">'
+        '<div id="simdtex-recorded"></div><script src="recording.js"></script><script src="live.js"></script></html>'
+    )
+    page.driver.get((tmp_path / "page.html").as_uri())
+    until(lambda: page.all(".reason p") and page.one(".moment").text == "The result.")
+    before = page.canvas()
+    page.one("[aria-label='A sweep back']").click()
+    level, sweep, sets = moments[-1][1]
+    until(lambda: page.one(".moment").text.startswith(f"Level {level}, sweep {sweep} of {sweep}, set {sets} of {sets}"))
+    until(lambda: (page.canvas() != before).any())
+    ActionChains(page.driver).move_to_element(page.one("canvas.view")).click().perform()
+    until(lambda: page.all(".reason tr.taken"))
+    assert page.faults() == []

@@ -184,4 +184,6 @@ def _axis(
     places = places[(places > -beside - window.step) & (places < size + beside)]
     index = (places[:, None] + fine).reshape(-1)
     index = index % size if window.tiled else index.clip(0, size - 1)
-    return int(places[0]) if len(places) else begin, len(places), index * stored // size
+    side = next((2**level for level in range(16) if -(-size // 2**level) == stored), None)  # of a site of its lattice
+    index = index // side if side else index * stored // size
+    return int(places[0]) if len(places) else begin, len(places), index

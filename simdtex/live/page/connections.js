@@ -103,3 +103,55 @@ class Kernel {
     this.model.off("msg:custom", this.received);
   }
 }
+
+/** A recorded session, which the documentation plays without a server; docs/recorded.py makes one. */
+class Recording {
+  constructor(text) {
+    this.text = text;
+    [this.layer, this.at] = ["picture", "null"];
+    this.onmessage = this.onstate = () => {};
+  }
+
+  get key() {
+    return null;
+  }
+
+  async open() {
+    const packed = Uint8Array.from(atob(this.text), (one) => one.charCodeAt(0));
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+    const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+    const end = bytes.indexOf(0);
+    this.recorded = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
+    this.bytes = bytes.subarray(end + 1);
+    this.onstate("open", "");
+  }
+
+  emit([message, places]) {
+    const buffers = places.map(([begin, size]) => this.bytes.subarray(begin, begin + size));
+    setTimeout(() => this.onmessage(message, buffers));
+  }
+
+  send(message) {
+    const { start, inside, moments, frames, explained, pixels } = this.recorded;
+    const frame = () => this.emit(frames[`${this.layer} ${this.at}`] ?? frames[`picture ${this.at}`]);
+    if (message.kind === "hello") start.forEach((one) => this.emit(one));
+    else if (message.kind === "inside" && message.open) this.emit([inside, []]);
+    else if (message.kind === "view") {
+      this.layer = message.layer;
+      frame();
+    } else if (message.kind === "seek") {
+      const { level, sweep, sets } = message;
+      const own = moments.filter(([, found]) => found && found[0] === level && found[1] === sweep);
+      const near = own.sort((one, other) => Math.abs(one[1][2] - sets) - Math.abs(other[1][2] - sets))[0];
+      this.at = near ? near[0] : "null";
+      this.emit([{ kind: "moments", moments: [near ? JSON.parse(near[0]) : null] }, []]);
+      frame();
+    } else if (message.kind === "explain") {
+      const far = ([row, col]) => Math.hypot(row - message.row, col - message.col);
+      const [near] = [...pixels].sort((one, other) => far(one) - far(other));
+      this.emit([explained[`${near} ${this.at}`], []]);
+    }
+  }
+
+  close() {}
+}

@@ -2,7 +2,7 @@
 
 // -- a look inside a run ------------------------------------------------------------------------------------------
 
-const CELL = 6; // pixels to a side of a neighbour in the picture of a neighbourhood
+const TILE = 66; // pixels to a side of the picture of a neighbourhood, about
 const FRAMES = 12; // of a sweep while the time line plays, at most
 const PACE = 70; // milliseconds between two of them, at least
 const HOW = "Click a pixel of the result, or press Enter in the view and move with the arrow keys.";
@@ -46,7 +46,7 @@ class Inside {
         step("›", "A set of sites on", 1),
         sweepStep("»", "A sweep on", 1),
         labelled("Beside it", this.choice),
-        button("Save this view", () => this.page.saveView()),
+        button("Save this view", () => this.page.saveView(), { class: "save" }),
       ),
       make("div", { class: "lines" }, make("span", {}, "Sweep"), this.sweepRange, make("span", {}, "Set"), this.setRange),
       this.moment,
@@ -249,15 +249,16 @@ class Inside {
     const around = make(
       "figure",
       {},
-      this.tile(why.offsets, white, null, 2 * CELL),
+      this.tile(why.offsets, white, null, 2 * TILE),
       make("figcaption", {}, "Its neighbourhood; white: confidence 1 − t is 0."),
     );
     place.replaceChildren(heading, make("p", {}, cooled), bar(around, this.marks(why)), this.table(why), ...this.density(why));
   }
 
   /** A neighbourhood as a picture: pixels at offsets, and one in the middle. */
-  tile(offsets, pixels, middle, size = CELL) {
+  tile(offsets, pixels, middle, about = TILE) {
     const radius = Math.max(...offsets.flat().map(Math.abs));
+    const size = Math.max(3, Math.round(about / (2 * radius + 1)));
     const side = (2 * radius + 1) * size;
     const canvas = make("canvas", { width: side, height: side, class: "tile", "aria-hidden": "true" });
     const context = canvas.getContext("2d");
@@ -301,7 +302,7 @@ class Inside {
 
   table({ candidates, offsets, pane }) {
     const terms = Object.keys(candidates[0].costs);
-    const heads = ["around", "rank", "row, column", "continues", ...terms.map((name) => NAMES[name] ?? name), "probability"];
+    const heads = ["around", "probability", "rank", "row, column", "continues", ...terms.map((name) => NAMES[name] ?? name)];
     const cells = (one) => {
       const share = make("span", { class: "share" });
       share.style.width = `${100 * one.probability}%`;
@@ -310,7 +311,7 @@ class Inside {
       const [middle, ...around] = one.pixels;
       const tile = make("td", {}, this.tile(offsets, around, middle));
       const bar_ = make("td", { class: "bars" }, make("span", {}, one.probability.toPrecision(3)), share);
-      return make("tr", { class: one.taken ? "taken" : null }, tile, ...texts.map((text) => make("td", {}, `${text}`)), bar_);
+      return make("tr", { class: one.taken ? "taken" : null }, tile, bar_, ...texts.map((text) => make("td", {}, `${text}`)));
     };
     return make(
       "div",

@@ -249,7 +249,7 @@ class Page {
       button("Fit", () => this.view.fit()),
     ];
     this.latticeShown = checkbox({ onchange: () => this.view.draw() });
-    this.fitting = button("", () => this.useFitting(), { hidden: true });
+    this.fitting = button("", () => this.useFitting(), { hidden: true, class: "fitting" });
     this.latticeField = labelled("Lattice", this.latticeShown);
     const tiled = labelled("Tiled 3 × 3", this.tiling);
     const shown = bar(labelled("Layer", this.layerChoice), tiled, this.latticeField, this.fitting, bar(...zoom));
@@ -870,4 +870,11 @@ if (place) {
   const address = new URL("socket", document.baseURI);
   address.protocol = address.protocol.replace("http", "ws");
   window.page = new Page(place, new Socket(address.href));
+}
+
+const recorded = document.getElementById("simdtex-recorded");
+if (recorded) {
+  const page = new Page(recorded, new Recording(window.simdtexRecording));
+  page.root.classList.add("recorded");
+  page.next("selected").then(() => (page.inside.element.open = true));
 }

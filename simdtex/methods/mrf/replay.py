@@ -227,4 +227,3 @@ class Replay:
         sweep = self._sweeps[number]
         penalty = self._states[number]["penalty"] if number in self._states else self._before(number).penalty
         return Moment(sweep.level, sweep.sweep, field, penalty, turn)
-
