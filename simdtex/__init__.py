@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from simdtex.machine.devices import DeviceError, devices
     from simdtex.methods.pyramid.mixtures import mix
     from simdtex.run import Output, Progress
-    from simdtex.synthesis import explain, lcpdf, synthesize, synthesize_solid
+    from simdtex.synthesis import explain, lcpdf, replay, synthesize, synthesize_solid
 
     __version__: str
 
@@ -44,6 +44,7 @@ __all__ = [
     "quality",
     "read_grid",
     "read_hard_data",
+    "replay",
     "simulate",
     "synthesize",
     "synthesize_solid",
@@ -69,6 +70,7 @@ _HOMES = {
     "place_hard_data": "simdtex.io.hard_data",
     "read_grid": "simdtex.io.grids",
     "read_hard_data": "simdtex.io.hard_data",
+    "replay": "simdtex.synthesis",
     "simulate": "simdtex.jobs.simulation",
     "synthesize": "simdtex.synthesis",
     "synthesize_solid": "simdtex.synthesis",

@@ -304,7 +304,7 @@ class Output:
     Notes
     -----
     A level of ``mrf`` has ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation (12)), ``skipped`` (those of
-    them that a bound made needless; docs/concepts/skipping.rst), and ``equilibrium``: the
+    them that a bound made needless; docs/concepts/search.rst), and ``equilibrium``: the
     ``sweeps``, ``steps`` and ``relaxations`` until no temperature was left, free sweeps not counted. Its statistics
     also have ``accounting`` if the option ``array`` is given, what the run costs on that processor array:
     ``array``, ``mapping``; ``layers``, virtual layers; ``shifts``, X-Net shifts of a word that bring

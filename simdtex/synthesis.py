@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The functions that most users need: `synthesize`, `synthesize_solid`, `explain` and `lcpdf`."""
+"""The functions that most users need: `synthesize`, `synthesize_solid`, `explain`, `replay` and `lcpdf`."""
 
 from __future__ import annotations
 
@@ -20,11 +20,8 @@ from simdtex.driver import Call, Plan, check_shape, drive, execute, with_channel
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine, open_machine
-from simdtex.machine.reference import Reference
 from simdtex.methods import mrf
-from simdtex.methods.mrf.explain import explained
-from simdtex.methods.mrf.level import Lattices
-from simdtex.methods.mrf.moments import moment_of
+from simdtex.methods.mrf.replay import Replay
 from simdtex.model.explanation import Explanation
 from simdtex.model.lattice import Grid, neighbourhood_offsets
 from simdtex.model.sample import Sample
@@ -331,11 +328,6 @@ def explain(
     >>> why.drawn, why.candidates.rank[why.taken]
     (False, 0)
     """
-    size = check_shape(shape)
-    given = {name: arguments.pop(name) for name in GIVEN if name in arguments}
-    axis = given.get("channel_axis")
-    inputs = check_inputs(sample, size, **given)
-    chosen: Any = resolve(mrf.Options, "synth", with_channels_last(arguments, axis))
     whole("level", level, 0)
     if sweep is not None:
         whole("sweep", sweep, 1)
@@ -343,10 +335,57 @@ def explain(
         row, col = map(index, site)
     except (TypeError, ValueError):
         raise ValueError(f"site must be two integers (row, column), not {site!r}") from None
+    return replay(sample, shape, rng=rng, device=device, **arguments).explain((row, col), level, sweep)
+
+
+def replay(
+    sample: ArrayLike,
+    shape: tuple[int, int],
+    *,
+    rng: int | np.random.Generator | None = None,
+    device: str | Machine | None = None,
+    **arguments: Any,
+) -> Replay:
+    """Return a synthesis by the method ``mrf`` that can be looked at after any set of sites that relax together.
+
+    Parameters
+    ----------
+    sample, shape, rng, device, **arguments
+        As in `explain`.
+
+    Returns
+    -------
+    simdtex.methods.mrf.replay.Replay
+        ``sweeps`` lists the sweeps of all levels, ``at(sweep, sets)`` returns the field after so many sets of sites of
+        a sweep, and ``explain(site, level, sweep)`` and ``explain_pixel(row, col, sweep, sets)`` explain a relaxation.
+
+    Raises
+    ------
+    ValueError, TypeError
+        What is wrong and what would be right, in one sentence.
+
+    Notes
+    -----
+    Cost: the run, and 6 bytes of the host for each site and sweep and 2 for each of its channels, 256 MiB at most.
+
+    Examples
+    --------
+    >>> from skimage import data
+    >>> import simdtex
+    >>> replay = simdtex.replay(data.brick()[:32, :32], (32, 32), order=2, schedule="checkerboard", rng=1)
+    >>> last = replay.sweeps[-1]
+    >>> last.level, last.sets
+    (0, 2)
+    >>> replay.at(-1, sets=1).image.shape
+    (32, 32, 1)
+    """
+    size = check_shape(shape)
+    given = {name: arguments.pop(name) for name in GIVEN if name in arguments}
+    axis = given.get("channel_axis")
+    inputs = check_inputs(sample, size, **given)
+    chosen: Any = resolve(mrf.Options, "synth", with_channels_last(arguments, axis))
     plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
-    run = plan.on(open_machine(device), as_seed(rng))
-    twin = Lattices(plan, Reference(), run.seed)
-    return explained(twin, moment_of(run, level, sweep, (row, col)), (row, col))
+    return Replay(plan, open_machine(device), as_seed(rng))
 
 
 def lcpdf(

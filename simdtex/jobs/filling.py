@@ -271,6 +271,26 @@ def extend(
     >>> simdtex.extend(grass, right=16, bottom=8, rng=1).shape
     (72, 80)
     """
+    plan, inputs = extension(
+        image, channel_axis, top=top, bottom=bottom, left=left, right=right, seamless=seamless, band=band, **options
+    )
+    call = Call(rng, device, callback, full_output, checkpoint)
+    return execute("extend", partial(drive, plan), lambda: inputs, channel_axis, call)
+
+
+def extension(
+    image: ArrayLike,
+    channel_axis: int | None,
+    *,
+    top: int = 0,
+    bottom: int = 0,
+    left: int = 0,
+    right: int = 0,
+    seamless: bool | str = False,
+    band: int | None = None,
+    **options: Any,
+) -> tuple[mrf.Plan, dict[str, Any]]:
+    """Return the plan of a run of `extend`, and its input by the names that users give it."""
     pixels = check_sample(image, channel_axis)
     rows, cols = pixels.shape[:2]
     for name, value in {"top": top, "bottom": bottom, "left": left, "right": right}.items():
@@ -307,11 +327,7 @@ def extend(
     if not seamless and _has_tones(chosen, pictures):
         corner = (np.nan if top or bottom else 0, np.nan if left or right else 0)  # rows for rows, columns for columns
         guide = Surroundings(pixels, np.ones((rows, cols), bool), canvas, ~hole, corner)
-    plan = mrf.plan(pictures, canvas.shape[:2], chosen, given, guide)
-    call = Call(rng, device, callback, full_output, checkpoint)
-    return execute(
-        "extend", partial(drive, plan), lambda: {"options": chosen, "image": pixels, **sides}, channel_axis, call
-    )
+    return mrf.plan(pictures, canvas.shape[:2], chosen, given, guide), {"options": chosen, "image": pixels, **sides}
 
 
 class Made(NamedTuple):

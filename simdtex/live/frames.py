@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
@@ -99,19 +99,29 @@ def picture(pixels: Array, sample: Array, shape: tuple[int, int] | None = None) 
     return Layer(shape or (pixels.shape[0], pixels.shape[1]), pixels, partial(to_display, limits=limits))
 
 
-def overlay(pixels: Array, labels: NDArray[np.uint8], colours: NDArray[np.uint8], *, plain: bool) -> Layer:
-    """Return a picture with its labels (rows, cols) over it, each as half of its colour of (labels, 3), as a layer.
+def overlay(
+    pixels: Array,
+    labels: NDArray[np.uint8],
+    colours: NDArray[np.uint8],
+    shares: Sequence[float],
+    shape: tuple[int, int] | None = None,
+) -> Layer:
+    """Return a picture with its labels (rows, cols) over it, as a layer.
 
-    If `plain`, pixels with the label 0 are as they are.
+    Each label has its colour of ``colours`` (labels, 3), and that colour its share of ``shares`` (labels,) in the
+    pixels. ``shape`` is the picture's size on the page, if of a coarse level.
     """
     shown = picture(pixels, pixels).colours(pixels).reshape(*labels.shape, -1)
     shown = shown[..., :3] if shown.shape[2] > 2 else shown[..., :1]
+    weights = np.asarray(shares, np.float32)[:, None]
+    added = weights * colours
 
     def mixed(part: Array) -> NDArray[np.uint8]:
-        own, label = part[..., :-1].astype(np.uint16), part[..., -1]
-        return np.where((label[..., None] == 0) & plain, own, (own + colours[label]) // 2).astype(np.uint8)
+        own, label = part[..., :-1], part[..., -1]
+        return (own * (1 - weights[label]) + added[label]).astype(np.uint8)
 
-    return Layer((labels.shape[0], labels.shape[1]), np.concatenate([shown, labels[..., None]], -1), mixed)
+    size = shape or (labels.shape[0], labels.shape[1])
+    return Layer(size, np.concatenate([shown, labels[..., None]], -1), mixed)
 
 
 def layers(

@@ -18,15 +18,16 @@ from simdtex.checkpoint import Checkpointing
 from simdtex.io.decode import NOTHING
 from simdtex.io.image import Metadata, suitable_suffix
 from simdtex.jobs.classification import classify
-from simdtex.jobs.filling import extend, fill
+from simdtex.jobs.filling import extend, extension, fill
 from simdtex.live import frames
 from simdtex.live.words import controls
 from simdtex.machine import Machine
 from simdtex.methods.classifier.model import LEAST
+from simdtex.methods.mrf.replay import Replay
 from simdtex.model.colours import label_colours
 from simdtex.options import one_of, real, shown, whole
 from simdtex.run import Output
-from simdtex.synthesis import METHODS, synthesize
+from simdtex.synthesis import METHODS, replay, synthesize
 
 Array = NDArray[Any]
 Maps = dict[str, Array]
@@ -134,6 +135,16 @@ class Job:
         made: tuple[Array, Output] = FUNCTIONS[self.kind](self.sample, checkpoint=checkpointing, **keywords)
         return made
 
+    def replay(self, machine: Machine) -> Replay:
+        """Return the run, to look at any moment of it; raise ValueError if it is not one run of ``mrf``."""
+        if self.method != "mrf" or self.kind == "fill":
+            raise ValueError("only textures and seamless pictures by the method mrf can be looked into")
+        keywords = {name: value for name, value in self._keywords.items() if name != "method"}
+        if self.kind == "synth":
+            return replay(self.sample, device=machine, **keywords)
+        seed = keywords.pop("rng")
+        return Replay(extension(self.sample, **keywords)[0], machine, seed)
+
     def layers(
         self,
         image: Callable[[], Array],
@@ -145,7 +156,8 @@ class Job:
         """Return functions that make the layers of the run or, once it has ended, of its result: `frames.layers`."""
         if self.kind != "classify":
             return frames.layers(self.sample, self.shape, image, source, temperature)
-        return {"labels": lambda: frames.overlay(self.sample, image(), LABELS, plain=not ended)}
+        shares = [0.5 if ended else 0.0, *[0.5] * MAX_LABEL]
+        return {"labels": lambda: frames.overlay(self.sample, image(), LABELS, shares)}
 
     def shares(self, labels: Array) -> list[tuple[int, float]]:
         """Return each label of a result, 0 of the unknown, and its share."""

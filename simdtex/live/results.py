@@ -30,6 +30,9 @@ MAX_BYTES = 2**29
 THUMBNAIL = 96
 """The longest side of a thumbnail, pixels."""
 
+FAULT_COLOURS = np.array([[0, 0, 0], [255, 30, 155]], np.uint8)
+"""Colours over pixels that keep the lattice, and over faults."""
+
 ARRANGEMENT = "arrangement.npz"
 
 
@@ -39,15 +42,28 @@ class Result:
     def __init__(self, number: int, job: Job, image: NDArray[Any], output: Output, seconds: float) -> None:
         self.number, self.job, self.image, self.seconds = number, job, image, seconds
         self.source, self.temperature = output.source, output.temperature
-        self.device, self.note = output.statistics["device"], lattice_sentence(output.statistics.get("lattice"))
+        self.device, self.lattice = output.statistics["device"], output.statistics.get("lattice")
         complete = self.source is not None and bool((self.source[..., 0] >= 0).all())  # every pixel has a source
         source: Any = self.source if complete else None
         self.maps = {name: apply_source_map(source, one) for name, one in job.maps.items() if complete}
         arrays = [None if one is None else partial(np.asarray, one) for one in (source, self.temperature)]
         self.layers = job.layers(lambda: image, *arrays)
+        if self.lattice:
+            self.layers["faults"] = self._faults
         self.archive = f"{Path(job.output).stem}.zip"
         for name, one in self.maps.items():
             self.layers[f"map {name}"] = partial(frames.picture, one, one)
+
+    def _faults(self) -> frames.Layer:
+        """Return the picture with marks where its pattern leaves its lattice."""
+        return frames.overlay(self.image, self._fault_map, FAULT_COLOURS, (0.0, 0.5))
+
+    @cached_property
+    def _fault_map(self) -> NDArray[np.uint8]:
+        from simdtex.experiments.quality.regular import lattice_fault_map
+
+        found = lattice_fault_map(self.job.sample, self.image)
+        return np.zeros(self.job.shape, np.uint8) if found is None else found.astype(np.uint8)
 
     @property
     def arrays(self) -> list[NDArray[Any]]:
@@ -67,7 +83,7 @@ class Result:
             **{"result": self.number, "width": self.job.shape[1], "height": self.job.shape[0]},
             **{"seconds": self.seconds, "device": self.device, "settings": self.job.message},
             **{"picture": self.job.given[0].name},
-            **{"note": self.note, "shares": self.job.shares(self.image)},
+            **{"note": lattice_sentence(self.lattice), "lattice": self.lattice, "shares": self.job.shares(self.image)},
             **{"layers": ["sample", *self.layers], "files": self.files},
             **{"command": self.job.command, "thumbnail": [self.thumbnail.width, self.thumbnail.height]},
         }

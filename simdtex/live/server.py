@@ -17,7 +17,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -27,6 +26,7 @@ from websockets.sync.server import ServerConnection
 from websockets.sync.server import serve as websocket_server
 from websockets.typing import Data
 
+from simdtex.live import PAGE, script, style
 from simdtex.live.job import Message, Picture
 from simdtex.live.session import MAX_BYTES, Send, Session
 from simdtex.machine import Machine, open_machine
@@ -36,12 +36,12 @@ from simdtex.synthesis import synthesize
 TOKEN = "SIMDTEX_LIVE_TOKEN"
 """The environment variable with the token of the page's address, so that the address stays the same."""
 
-FILES = {
-    "": ("index.html", "text/html"),
-    "live.js": ("live.js", "text/javascript"),
-    "live.css": ("live.css", "text/css"),
+FILES: dict[str, tuple[Callable[[], str], str]] = {
+    "": (lambda: (PAGE / "index.html").read_text(encoding="utf-8"), "text/html"),
+    "live.js": (script, "text/javascript"),
+    "live.css": (style, "text/css"),
 }
-"""The files of the page, by the part of the address after the token."""
+"""The files of the page, by the part of the address after the token: what returns the text, and its type."""
 
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
@@ -188,8 +188,8 @@ def listen(pages: Pages, token: str, address: str, port: int) -> Iterator[int]:
             return None if own else _response(connection, 403, REFUSED)
         if name not in FILES:
             return _response(connection, 404, "There is no such page.")
-        file, kind = FILES[name]
-        return _response(connection, 200, (files("simdtex.live") / "page" / file).read_text(encoding="utf-8"), kind)
+        text, kind = FILES[name]
+        return _response(connection, 200, text(), kind)
 
     server = websocket_server(
         lambda connection: talk(connection, pages),

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from simdtex.io.examples import EXAMPLES, example
 from simdtex.io.image import read_bytes
 from simdtex.live import frames
+from simdtex.live.inside import Inside
 from simdtex.live.job import LABELS, Hint, Job, Message, Picture, file_stem
 from simdtex.live.levels import Levels
 from simdtex.live.results import THUMBNAIL, Result, Results
@@ -62,8 +63,8 @@ PREVIEW = 512
 LARGE = 1024
 """The middle of a picture with a longer side is the sample at first."""
 
-INTERVAL = 20
-"""Time between two frames of a run in units of what the last one took: frames take about 1 / 20 of a run."""
+INTERVAL = 4
+"""Time between two frames of a run in units of what the last one took: frames take at most a quarter of a run."""
 
 MAX_RATE = 30
 """Frames a second, at most."""
@@ -101,6 +102,7 @@ class Session:
         self._maps: dict[str, NDArray[Any]] = {}
         self.results = Results()
         self._selected: int | None = None  # the result that the page shows; None for the run or the sample
+        self._inside: dict[int, Inside] = {}  # the results that the page looks into: the shown one, and one beside it
         self._window = frames.Window()
         self._wanted: Message | None = None  # the job that is asked for, until it is finished
         self._asked: Message | None = None  # the last job that was asked for with this picture
@@ -289,6 +291,41 @@ class Session:
             self.results.find(number)
         self._select(number, restore=True)
 
+    def _on_inside(self, message: Message, buffers: Sequence[Any]) -> None:
+        """Look into the selected result and, side by side, into another; or close them."""
+        if not message.get("open"):
+            self._inside, self._stale = {}, True
+            return
+        if self._job:
+            raise ValueError("a run is going on; look inside when it has ended")
+        shown = self._selected
+        if shown is None:
+            raise ValueError("there is no result to look into yet; make one first")
+        kept, self._inside = self._inside, {}
+        found = [self.results.find(number) for number in dict.fromkeys([shown, message.get("beside") or shown])]
+        self._inside = {one.number: kept.get(one.number) or Inside(one.job, self._machine) for one in found}
+        looked = [{"result": number, **one.describe()} for number, one in self._inside.items()]
+        self._stale = True
+        self.send({"kind": "inside", "panes": looked}, [])
+
+    def _on_seek(self, message: Message, buffers: Sequence[Any]) -> None:
+        """Show a moment of the results that are looked into, or, without a level, the results."""
+        for one in self._inside.values():
+            if message.get("level") is None:
+                one.finish()
+            else:
+                one.seek(message["level"], message.get("sweep"), message.get("sets"))
+        self._stale = True
+        self.send({"kind": "moments", "moments": [one.moment for one in self._inside.values()]}, [])
+
+    def _on_explain(self, message: Message, buffers: Sequence[Any]) -> None:
+        for pane, one in enumerate(self._inside.values()):
+            try:
+                found = one.explain(message.get("row"), message.get("col"))
+            except ValueError as error:
+                found = {"pixel": [message.get("row"), message.get("col")], "reason": str(error)}
+            self.send({"kind": "explained", "pane": pane, **found}, [])
+
     def _on_download(self, message: Message, buffers: Sequence[Any]) -> None:
         result, name = self.results.find(message.get("result")), str(message.get("name"))
         self.send({"kind": "file", "name": name, "result": result.number}, [result.file(name)])
@@ -310,6 +347,8 @@ class Session:
 
     def _select(self, number: int | None, *, restore: bool = False) -> None:
         """Have the page show a result, or the run; with `restore` also its picture, its maps and its settings."""
+        if number not in self._inside:
+            self._inside = {}
         self._selected, self._stale = number, True
         job = self._job if number is None else self.results[number].job
         settings = None
@@ -324,7 +363,9 @@ class Session:
                 self._send_picture(new=False)
         self.send({"kind": "selected", "result": number, "settings": settings}, [])
 
-    def _send_frame(self, layers: Mapping[str, Callable[[], frames.Layer]], of: str | int, smooth: bool = True) -> None:
+    def _send_frame(
+        self, layers: Mapping[str, Callable[[], frames.Layer]], of: str | int, smooth: bool = True, pane: int = 0
+    ) -> None:
         """Send the window of the layer that the page looks at, of a result, the run or the sample."""
         assert self._picture is not None
         name, pixels = self._window.layer, self._picture.pixels
@@ -336,12 +377,17 @@ class Session:
         frame = frames.render(layer, self._window, smooth=smooth)._asdict()
         pixels = frame.pop("pixels")
         fields = {"layer": name, "rows": layer.shape[0], "cols": layer.shape[1], "step": self._window.step, "of": of}
+        fields["pane"] = pane
         self._stale = False
         self._unseen += 1
         self.send({"kind": "frame", **fields, **frame}, [pixels])
 
     def _show_selected(self) -> None:
-        """Send a frame of the selected result, or of the sample."""
+        """Send a frame of the selected result and of the one beside it, or of the sample."""
+        for pane, (number, inside) in enumerate(self._inside.items()):
+            self._send_frame(inside.layers(self.results[number].layers), number, pane=pane)
+        if self._inside:
+            return
         if result := self.results.get(self._selected or 0):
             self._send_frame(result.layers, result.number)
         elif self._picture:
@@ -378,7 +424,7 @@ class Session:
         layers = [first, "sample", *(["arrangement", "use", "temperature"] if job.method == "mrf" else [])]
         size = {"width": job.shape[1], "height": job.shape[0]}
         self._begun = {"kind": "begun", **size, "from": levels.level, "layers": layers}
-        self._levels, self._selected, self._stale, self._job = levels, None, True, job
+        self._levels, self._selected, self._stale, self._job, self._inside = levels, None, True, job, {}
         self.send(self._begun, [])
         return levels
 

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.image import check_sample
+from simdtex.live import script, style
 from simdtex.live.job import Picture
 from simdtex.live.results import Result
 from simdtex.live.session import Session
@@ -26,9 +26,6 @@ except ModuleNotFoundError:
             raise ValueError(
                 "simdtex.Live needs a package of its own; install it with: pip install 'simdtex[notebook]'"
             )
-
-
-PAGE = files("simdtex.live") / "page"
 
 
 class Live(AnyWidget):
@@ -69,7 +66,7 @@ class Live(AnyWidget):
     Notes
     -----
     Cost: a frame takes 4 bytes for each pixel of the view; at most 30 a second are sent, as fast as the page sees them,
-    and making them takes less than 5 % of a run.
+    and making them takes at most a quarter of a run.
 
     Examples
     --------
@@ -82,8 +79,8 @@ class Live(AnyWidget):
     (256, 256)
     """
 
-    _esm = (PAGE / "live.js").read_text(encoding="utf-8")
-    _css = (PAGE / "live.css").read_text(encoding="utf-8")
+    _esm = script()
+    _css = style()
 
     _session: Session | None = None  # None if the sample is refused
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 SHOWN = 8
-"""Candidates that a table or a notebook shows: the first by rank, and the one that is taken."""
+"""Candidates that a table or a notebook shows, beside the one that is taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +153,7 @@ class Explanation:
         found = self.candidates
         names = ["", "rank", "place", "continues", "distance", *found.costs, "total", "probability"]
         lines = [names]
-        for n in self._shown():
+        for n in self.shown():
             costs = [found.distance[n], *(cost[n] for cost in found.costs.values()), found.total[n]]
             place = ",".join(map(str, found.place[n].tolist()))
             numbers = [str(found.rank[n]), place, str(found.continues[n]), *(f"{cost:.1f}" for cost in costs)]
@@ -170,7 +170,7 @@ class Explanation:
         """Return what a notebook shows: the neighbourhood and the first candidates as pictures, and the table."""
         from simdtex.model.display import choice_html
 
-        found, shown = self.candidates, self._shown()
+        found, shown = self.candidates, self.shown()
         captions = [
             f"{'taken: ' if n == self.taken else ''}rank {found.rank[n]}, at {tuple(found.place[n].tolist())}, "
             f"total {found.total[n]:.1f}, probability {found.probability[n]:.4g}"
@@ -186,5 +186,6 @@ class Explanation:
             self.table(),
         )
 
-    def _shown(self) -> list[int]:
+    def shown(self) -> list[int]:
+        """Return which candidates a table or a picture shows: the first by rank, and the one that is taken."""
         return sorted({*range(min(SHOWN, len(self.candidates.rank))), self.taken})

@@ -2,7 +2,7 @@
 """ICM over sample positions: each site's nearest candidate, found without keeping a distance.
 
 The twin weighs everything and takes the least. A device first weighs the few candidates that continue a neighbour's
-source, and then skips candidates that are proved to lie beyond the best so far: ``docs/concepts/skipping.rst``.
+source, and then skips candidates that are proved to lie beyond the best so far: ``docs/concepts/search.rst``.
 """
 
 from __future__ import annotations

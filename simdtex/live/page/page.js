@@ -1,451 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// The live page of simdtex: in a browser beside `simdtex live`, and in a notebook as the widget simdtex.Live.
-// simdtex does all arithmetic on textures; the page shows frames and sends messages (docs/live.rst lists them).
-
-const HOLE = "#ff1e9b";
-const LAYERS = {
-  labels: "Labels over the picture",
-  picture: "Picture",
-  sample: "Sample",
-  arrangement: "Arrangement (source map)",
-  use: "Use of the sample",
-  temperature: "Temperature",
-};
-const JOBS = {
-  synth: ["More of the texture", "Make the texture"],
-  extend: ["A seamless picture", "Make it seamless"],
-  fill: ["A filled hole", "Fill the hole"],
-  classify: ["A classification by texture", "Classify the picture"],
-}; // what the page calls them, and their button
-const PICTURE_LAYERS = ["sample", "labels"]; // which show the picture itself
-const SIDES = ["left", "top", "width", "height"];
-const MAX_PIXELS = 2 ** 22; // of a frame
-const PIECE = 2 ** 20; // bytes of a file that are sent at a time
-const CONTROLS = ["button", "input", "select", "summary"];
-const LEGENDS = {
-  arrangement: "Each place of the sample has a colour of its own. An area without edges was copied whole.",
-  use: "Black: never taken. Yellow: taken most often.",
-  temperature: "Black: settled. Yellow: still to be decided. At the end of a run all is black.",
-};
-
-// -- connections --------------------------------------------------------------------------------------------------
-
-/** A WebSocket to `simdtex live`, which is opened again when it is lost. */
-class Socket {
-  get key() {
-    return sessionStorage.getItem("simdtex-session");
-  }
-
-  constructor(address) {
-    this.address = address;
-    this.wait = 250;
-    this.onmessage = this.onstate = () => {};
-  }
-
-  open() {
-    this.socket = new WebSocket(`${this.address}${this.key ? `?session=${this.key}` : ""}`);
-    this.socket.binaryType = "arraybuffer";
-    this.socket.onopen = () => {
-      this.wait = 250;
-      this.onstate("open", "");
-    };
-    this.socket.onclose = (event) => {
-      this.onstate("lost", event.reason);
-      this.timer = setTimeout(() => this.open(), this.wait);
-      this.wait = Math.min(2 * this.wait, 4000);
-    };
-    this.socket.onmessage = ({ data }) => {
-      if (typeof data === "string") [this.message, this.buffers] = [JSON.parse(data), []];
-      else this.buffers.push(new Uint8Array(data));
-      if (this.buffers.length < this.message.buffers) return;
-      if (this.message.kind === "hello") sessionStorage.setItem("simdtex-session", this.message.session);
-      this.onmessage(this.message, this.buffers);
-    };
-  }
-
-  send(message, buffers = []) {
-    if (this.socket.readyState !== WebSocket.OPEN) return;
-    this.socket.send(JSON.stringify({ ...message, buffers: buffers.map((buffer) => buffer.length) }));
-    for (const buffer of buffers)
-      for (let begin = 0; begin < buffer.length; begin += PIECE) this.socket.send(buffer.subarray(begin, begin + PIECE));
-  }
-
-  close() {
-    clearTimeout(this.timer);
-    this.socket.onclose = null;
-    this.socket.close();
-  }
-}
-
-/** The connection of a notebook to its kernel. */
-class Kernel {
-  constructor(model) {
-    this.model = model;
-    this.onmessage = this.onstate = () => {};
-    this.received = (message, buffers) =>
-      this.onmessage(message, (buffers ?? []).map((one) => new Uint8Array(one.buffer, one.byteOffset, one.byteLength)));
-  }
-
-  open() {
-    this.model.on("msg:custom", this.received);
-    this.onstate("open", "");
-  }
-
-  send(message, buffers = []) {
-    this.model.send(message, undefined, buffers);
-  }
-
-  close() {
-    this.model.off("msg:custom", this.received);
-  }
-}
-
-// -- elements -----------------------------------------------------------------------------------------------------
-
-let count = 0;
-
-/** An element with attributes, listeners (`onclick`) and children. */
-function make(tag, attributes = {}, ...children) {
-  const element = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
-    else if (typeof value === "boolean") element.toggleAttribute(name, value);
-    else if (value !== undefined && value !== null) element.setAttribute(name, value);
-  }
-  element.append(...children.filter((child) => child !== null && child !== undefined));
-  // JupyterLab asks the element with the focus alone whether keys are its own
-  if (CONTROLS.includes(tag) || "tabindex" in attributes) element.dataset.lmSuppressShortcuts = "true";
-  return element;
-}
-
-/** A control and its label. */
-function labelled(text, control, hint = "") {
-  control.id ||= `simdtex-${++count}`;
-  const field = make("div", { class: "field" }, make("label", { for: control.id }, text), control);
-  if (hint) {
-    field.append(make("small", { id: `${control.id}-hint` }, hint));
-    control.setAttribute("aria-describedby", `${control.id}-hint`);
-  }
-  return field;
-}
-
-const button = (text, onclick, attributes = {}) => make("button", { type: "button", onclick, ...attributes }, text);
-const number = (attributes) => make("input", { type: "number", step: 1, ...attributes });
-const checkbox = (attributes) => make("input", { type: "checkbox", ...attributes });
-const bar = (...children) => make("div", { class: "bar" }, ...children);
-const choices = (pairs) => pairs.map(([value, text]) => make("option", { value }, text));
-const choice = (pairs, onchange) => make("select", { onchange }, ...choices(pairs));
-const made = (layers) => layers.find((name) => name !== "sample") ?? "sample";
-const stem = (name) => name.replace(/\.[^.]*$/, "").toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 40); // as simdtex names a map
-const sentence = (text) => `${text[0].toUpperCase()}${text.slice(1)}.`;
-const clamp = (value, least, most) => Math.max(least, Math.min(most, value));
-
-/** RGBA bytes as something that a canvas draws. */
-function bitmap(bytes, width, height) {
-  const canvas = make("canvas", { width, height });
-  const data = new ImageData(new Uint8ClampedArray(bytes.buffer, bytes.byteOffset, 4 * width * height), width, height);
-  canvas.getContext("2d").putImageData(data, 0, 0);
-  return canvas;
-}
-
-/** Follow a pointer that is pressed until it is released. */
-function drag(element, event, move, end) {
-  element.setPointerCapture(event.pointerId);
-  const following = new AbortController();
-  const stop = () => {
-    following.abort();
-    end();
-  };
-  const { signal } = following;
-  element.addEventListener("pointermove", move, { signal });
-  for (const kind of ["pointerup", "pointercancel"]) element.addEventListener(kind, stop, { signal });
-}
-
-// -- options ------------------------------------------------------------------------------------------------------
-
-/** The controls of a method, made from the options' declarations. */
-class Options {
-  constructor(controls, onchange) {
-    this.controls = controls;
-    this.fields = new Map();
-    const groups = new Map();
-    for (const control of controls) {
-      if (!groups.has(control.group)) {
-        groups.set(control.group, make("details", {}, make("summary", {}, control.group)));
-      }
-      groups.get(control.group).append(this.field(control, onchange));
-    }
-    this.element = make("div", {}, ...groups.values());
-  }
-
-  field(control, onchange) {
-    const { name, label, hint } = control;
-    if (control.kind === "words" || control.kind === "switch") {
-      const input = control.kind === "words" ? choice(control.valid, onchange) : checkbox({ onchange });
-      const property = control.kind === "words" ? "value" : "checked";
-      this.fields.set(name, { get: () => input[property], set: (value) => (input[property] = value ?? false) });
-      this.fields.get(name).set(control.default);
-      return labelled(label, input, hint);
-    }
-    const [least, most, step] = control.span;
-    const input = number({ step: "any", min: control.least, placeholder: control.empty || null, onchange });
-    const slider = make("input", { type: "range", min: least, max: most, step, "aria-label": `${label}, slider` });
-    const note = make("small", { class: "beyond", role: "status" });
-    const follow = () => {
-      slider.value = input.value === "" ? (control.usual ?? least) : input.value;
-      slider.classList.toggle("automatic", input.value === "");
-      const beyond = Number(input.value) > most;
-      note.textContent = beyond ? `More than ${most}: a run can take many times as long, or need too much memory.` : "";
-    };
-    slider.addEventListener("input", () => {
-      input.value = slider.value;
-      follow();
-    });
-    slider.addEventListener("change", onchange);
-    input.addEventListener("input", follow);
-    const get = () => (input.value === "" ? null : Number(input.value));
-    const set = (value) => {
-      input.value = value ?? "";
-      follow();
-    };
-    this.fields.set(name, { get, set });
-    set(control.default);
-    const field = labelled(label, input, hint);
-    input.after(slider, note);
-    return field;
-  }
-
-  /** The options that differ from their defaults. */
-  get values() {
-    const values = this.controls.map(({ name, default: usual }) => [name, this.fields.get(name).get() ?? usual, usual]);
-    return Object.fromEntries(values.filter(([, value, usual]) => value !== usual));
-  }
-
-  set values(given) {
-    for (const control of this.controls) this.fields.get(control.name).set(given[control.name] ?? control.default);
-  }
-}
-
-// -- the view -----------------------------------------------------------------------------------------------------
-
-/** A window of a layer, at whole pixels: simdtex sends what the window shows and no more, so memory is bounded. */
-class View {
-  constructor(page) {
-    this.page = page;
-    this.left = this.top = 0;
-    this.scale = 1; // above 0 pixels of the screen for each of the layer, below 0 the other way round
-    this.fitted = true;
-    this.rows = this.cols = 0;
-    this.frame = null;
-    this.cursor = null;
-    this.canvas = make("canvas", { class: "view", tabindex: 0, role: "img", "aria-label": "There is no result yet." });
-    this.observer = new ResizeObserver(() => this.resized());
-    this.observer.observe(this.canvas);
-    this.canvas.addEventListener("pointerdown", (event) => this.press(event));
-    this.canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
-    this.canvas.addEventListener("keydown", (event) => this.key(event));
-  }
-
-  get unit() {
-    return this.scale > 0 ? this.scale : -1 / this.scale;
-  }
-
-  get step() {
-    return this.scale > 0 ? 1 : -this.scale;
-  }
-
-  resized() {
-    const ratio = window.devicePixelRatio || 1;
-    const [width, height] = [this.canvas.clientWidth, this.canvas.clientHeight].map((side) => Math.round(side * ratio));
-    if (!width || (width === this.canvas.width && height === this.canvas.height)) return;
-    [this.canvas.width, this.canvas.height] = [width, height];
-    if (this.fitted) this.fit();
-    else this.moved();
-  }
-
-  fit() {
-    this.fitted = true;
-    const times = this.page.tiled ? 3 : 1;
-    const room = Math.min(this.canvas.width / (times * this.cols), this.canvas.height / (times * this.rows));
-    if (!this.cols || !Number.isFinite(room)) return;
-    this.scale = room >= 1 ? Math.floor(room) : -Math.ceil(1 / room);
-    this.left = Math.floor((this.cols - this.canvas.width / this.unit) / 2);
-    this.top = Math.floor((this.rows - this.canvas.height / this.unit) / 2);
-    this.moved();
-  }
-
-  zoom(by, x = this.canvas.width / 2, y = this.canvas.height / 2) {
-    const [col, row] = [this.left + x / this.unit, this.top + y / this.unit];
-    let scale = this.scale + by;
-    if (scale > -2 && scale < 1) scale = by > 0 ? 1 : -2;
-    this.scale = clamp(scale, -64, 64);
-    this.left = Math.round(col - x / this.unit);
-    this.top = Math.round(row - y / this.unit);
-    this.fitted = false;
-    this.moved();
-  }
-
-  pan(cols, rows) {
-    this.left += cols;
-    this.top += rows;
-    this.fitted = false;
-    this.moved();
-  }
-
-  /** Ask for the window, soon. */
-  moved() {
-    this.draw();
-    clearTimeout(this.asking);
-    this.asking = setTimeout(() => this.ask(), 15);
-  }
-
-  ask() {
-    const { step } = this;
-    const across = this.canvas.width / this.unit / step;
-    const down = this.canvas.height / this.unit / step;
-    const width = clamp(Math.ceil(across) + 1, 1, 4096);
-    const height = clamp(Math.ceil(down) + 1, 1, Math.floor(MAX_PIXELS / width));
-    const { layer, tiled } = this.page;
-    this.page.send({ kind: "view", layer, left: this.left, top: this.top, width, height, step, tiled });
-    this.page.zoomOutput.textContent = this.scale > 0 ? `${100 * this.scale} %` : `1 : ${-this.scale}`;
-  }
-
-  show(message, bytes) {
-    this.frame = { ...message, picture: message.width && message.height ? bitmap(bytes, message.width, message.height) : null };
-    if (message.rows !== this.rows || message.cols !== this.cols) {
-      [this.rows, this.cols] = [message.rows, message.cols];
-      if (this.fitted) this.fit();
-    }
-    this.draw();
-  }
-
-  draw() {
-    if (this.drawing) return;
-    this.drawing = requestAnimationFrame(() => {
-      this.drawing = null;
-      this.paint();
-    });
-  }
-
-  paint() {
-    this.canvas.style.touchAction = this.page.brush || !this.fitted ? "none" : "auto"; // else a finger scrolls the page
-    const context = this.canvas.getContext("2d");
-    context.clearRect(0, 0, this.canvas.width, this.canvas.height);
-    const { frame, unit } = this;
-    if (!frame) return;
-    context.imageSmoothingEnabled = false;
-    if (frame.picture) {
-      const size = frame.step * unit;
-      const [x, y] = [(frame.left - this.left) * unit, (frame.top - this.top) * unit];
-      context.drawImage(frame.picture, x, y, frame.width * size, frame.height * size);
-    }
-    for (const { strokes, colour } of this.page.visibleStrokes()) this.strokes(context, strokes, colour);
-    const { cursor } = this;
-    if (cursor && this.page.brush) {
-      context.globalAlpha = 1;
-      context.lineWidth = 2;
-      for (const [colour, more] of [["#000", 1], ["#fff", -1]]) {
-        context.strokeStyle = colour;
-        context.beginPath();
-        const radius = Math.max(3, (this.page.brush.width * unit) / 2 + more);
-        context.arc((cursor[0] - this.left) * unit, (cursor[1] - this.top) * unit, radius, 0, 7);
-        context.stroke();
-      }
-    }
-  }
-
-  strokes(context, strokes, colour) {
-    const layer = document.createElement("canvas"); // of its own, so that strokes over one another are not darker
-    [layer.width, layer.height] = [this.canvas.width, this.canvas.height];
-    const on = layer.getContext("2d");
-    on.lineCap = on.lineJoin = "round";
-    for (const stroke of strokes) {
-      on.globalCompositeOperation = stroke.label === 0 ? "destination-out" : "source-over";
-      on.strokeStyle = colour(stroke.label);
-      on.lineWidth = Math.max(1, stroke.width * this.unit);
-      on.beginPath();
-      const points = stroke.points.length > 1 ? stroke.points : [stroke.points[0], stroke.points[0]];
-      points.forEach(([x, y], index) => {
-        const at = [(x + 0.5 - this.left) * this.unit, (y + 0.5 - this.top) * this.unit];
-        if (index) on.lineTo(...at);
-        else on.moveTo(...at);
-      });
-      on.stroke();
-    }
-    context.globalAlpha = 0.6;
-    context.drawImage(layer, 0, 0);
-    context.globalAlpha = 1;
-  }
-
-  place(event) {
-    const box = this.canvas.getBoundingClientRect();
-    const ratio = this.canvas.width / box.width;
-    return [(event.clientX - box.left) * ratio, (event.clientY - box.top) * ratio];
-  }
-
-  press(event) {
-    if (event.button !== 0) return;
-    const { brush } = this.page;
-    if (event.pointerType === "touch" && !brush && this.fitted) return;
-    let [x, y] = this.place(event);
-    const point = () => [this.left + x / this.unit, this.top + y / this.unit].map((one) => Math.round(10 * (one - 0.5)) / 10);
-    const move = (now) => {
-      const [toX, toY] = this.place(now);
-      if (brush) {
-        [x, y] = [toX, toY];
-        brush.add(point());
-        this.draw();
-        return;
-      }
-      const [cols, rows] = [(x - toX) / this.unit, (y - toY) / this.unit].map(Math.round);
-      if (!cols && !rows) return;
-      [x, y] = [x - cols * this.unit, y - rows * this.unit];
-      this.pan(cols, rows);
-    };
-    brush?.begin(point());
-    drag(this.canvas, event, move, () => brush?.end());
-    this.draw();
-  }
-
-  wheel(event) {
-    event.preventDefault();
-    this.zoom(event.deltaY < 0 ? 1 : -1, ...this.place(event));
-  }
-
-  key(event) {
-    const directions = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
-    const { brush } = this.page;
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (event.key in directions) {
-      const [x, y] = directions[event.key];
-      if (brush) {
-        const by = Math.max(1, Math.round(brush.width / 4)) * (event.shiftKey ? 4 : 1);
-        const [col, row] = this.cursor ?? [this.cols / 2, this.rows / 2];
-        this.cursor = [clamp(col + x * by, 0, this.cols - 1), clamp(row + y * by, 0, this.rows - 1)];
-        if (this.down) brush.add([...this.cursor]);
-        this.draw();
-      } else {
-        const by = Math.max(1, Math.round(32 / this.unit));
-        this.pan(x * by, y * by);
-      }
-    } else if (event.key === " " && brush) {
-      this.cursor ??= [this.cols / 2, this.rows / 2];
-      this.down = !this.down;
-      if (this.down) brush.begin([...this.cursor]);
-      else brush.end();
-      this.draw();
-    } else if (event.key === "+" || event.key === "=") this.zoom(1);
-    else if (event.key === "-") this.zoom(-1);
-    else if (event.key === "0") this.fit();
-    else return;
-    event.preventDefault();
-    event.stopPropagation(); // a notebook has its own meaning for keys
-  }
-
-  close() {
-    this.observer.disconnect();
-  }
-}
 
 // -- the page -----------------------------------------------------------------------------------------------------
 
@@ -464,13 +17,24 @@ class Page {
     this.tiled = false;
     this.running = this.paused = false;
     this.build(root);
-    connection.onmessage = (message, buffers) => this[`on_${message.kind}`]?.(message, buffers);
+    this.awaited = new Map();
+    connection.onmessage = (message, buffers) => {
+      const handler = `on_${message.kind}`;
+      (this[handler] ? this : this.inside)[handler]?.(message, buffers);
+      this.awaited.get(message.kind)?.(message);
+      this.awaited.delete(message.kind);
+    };
     connection.onstate = (state, reason) => this.connected(state, reason);
     connection.open();
   }
 
   send(message, buffers) {
     this.connection.send(message, buffers);
+  }
+
+  /** Wait for the next message of a kind. */
+  next(kind) {
+    return new Promise((done) => this.awaited.set(kind, done));
   }
 
   build(root) {
@@ -480,8 +44,10 @@ class Page {
     this.device = make("p", { class: "device" });
     const side = make("div", { class: "side" }, this.sampleSection(), this.optionsSection());
     this.columns = make("div", { class: "columns", hidden: true }, this.resultSection(), side);
-    const header = make("header", {}, make("h1", {}, "simdtex live"), this.device, this.status);
-    this.root = make("main", { class: "simdtex" }, header, this.alert, this.startSection(), this.columns);
+    this.tour = new Tour(this);
+    const tour = button("Tour in five steps", () => this.tour.start());
+    const header = make("header", {}, make("h1", {}, "simdtex live"), this.device, tour, this.status);
+    this.root = make("main", { class: "simdtex" }, header, this.alert, this.startSection(), this.columns, this.tour.element);
     root.replaceChildren(this.root);
     this.root.addEventListener("dragover", (event) => event.preventDefault());
     this.root.addEventListener("drop", (event) => {
@@ -537,7 +103,7 @@ class Page {
   }
 
   fileInput(label, kind) {
-    const input = make("input", { type: "file", accept: "image/*,.tif,.tiff,.npy", "aria-label": label });
+    const input = make("input", { type: "file", accept: "image/*,.tif,.tiff,.npy,.json", "aria-label": label });
     input.addEventListener("change", () => {
       this.open(input.files[0], kind);
       input.value = "";
@@ -553,6 +119,10 @@ class Page {
     }
     const bytes = new Uint8Array(await file.arrayBuffer());
     const name = file.name || "pasted.png";
+    if (kind === "open" && name.endsWith(".json")) {
+      await this.restoreView(bytes);
+      return;
+    }
     if (kind === "open") this.pending = { name, bytes, maps: new Map() };
     else this.given?.maps.set(stem(name), { name, bytes });
     this.send({ kind, name }, [bytes]);
@@ -668,6 +238,7 @@ class Page {
 
   resultSection() {
     this.view = new View(this);
+    this.inside = new Inside(this);
     this.layerChoice = choice(Object.entries(LAYERS), () => this.showLayer(this.layerChoice.value));
     this.tiling = checkbox({ onchange: () => this.tile() });
     this.zoomOutput = make("output", { "aria-label": "Zoom" }, "100 %");
@@ -677,7 +248,11 @@ class Page {
       button("+", () => this.view.zoom(1), { "aria-label": "Zoom in" }),
       button("Fit", () => this.view.fit()),
     ];
-    const shown = bar(labelled("Layer", this.layerChoice), labelled("Tiled 3 × 3", this.tiling), bar(...zoom));
+    this.latticeShown = checkbox({ onchange: () => this.view.draw() });
+    this.fitting = button("", () => this.useFitting(), { hidden: true });
+    this.latticeField = labelled("Lattice", this.latticeShown);
+    const tiled = labelled("Tiled 3 × 3", this.tiling);
+    const shown = bar(labelled("Layer", this.layerChoice), tiled, this.latticeField, this.fitting, bar(...zoom));
     this.scale = make("span", { class: "scale", "aria-hidden": "true" });
     this.meaning = make("span");
     this.legend = make("p", { class: "legend", hidden: true }, this.scale, this.meaning);
@@ -707,14 +282,15 @@ class Page {
       { "aria-label": "Result", class: "result" },
       make("h2", {}, "Result"),
       shown,
-      this.view.canvas,
+      this.view.element,
       this.legend,
       this.hint,
       this.classes,
+      this.inside.element,
       bar(this.pausing, this.cancelling, this.progress),
       this.doing,
-      this.paintSet(),
       this.strip,
+      this.paintSet(),
       this.downloads,
     );
   }
@@ -730,12 +306,35 @@ class Page {
     this.view.fit();
   }
 
+  /** Show what the run began from while a key is held, then the layer again. */
+  before(held) {
+    if (held === Boolean(this.held)) return;
+    const layer = held ? "sample" : this.held;
+    this.held = held ? this.layer : null;
+    this.showLayer(layer);
+  }
+
+  /** The lattice that is drawn over the result; null if none is. */
+  get lattice() {
+    return this.latticeShown.checked ? (this.results.get(this.shown)?.lattice ?? null) : null;
+  }
+
+  useFitting() {
+    const [rows, cols] = this.results.get(this.shown).lattice.fitting;
+    [this.width.value, this.height.value] = [cols, rows];
+    this.make();
+  }
+
   on_frame(message, [bytes]) {
     this.send({ kind: "shown" });
+    if (message.pane) {
+      this.view.show(message, bytes);
+      return;
+    }
     this.seen = message.layer;
     this.meaning.textContent = LEGENDS[message.layer] ?? "";
     this.legend.hidden = !LEGENDS[message.layer];
-    this.scale.hidden = message.layer === "arrangement";
+    this.scale.hidden = !["use", "temperature"].includes(message.layer);
     this.view.show(message, bytes);
     if (message.of === "run") this.frames += 1;
   }
@@ -743,6 +342,17 @@ class Page {
   on_progress({ fraction, doing }) {
     this.progress.value = fraction;
     if (this.watching) this.doing.textContent = doing;
+  }
+
+  /** Offer the layers of what is shown. */
+  offerLayers() {
+    const found = this.results.get(this.shown);
+    const layers = found?.layers ?? (this.running ? this.runLayers : ["sample"]);
+    this.offer(this.inside.at ? [...layers, "sets"] : layers);
+    this.latticeField.hidden = !found?.lattice;
+    const [rows, cols] = found?.lattice?.fitting ?? [found?.height, found?.width];
+    this.fitting.hidden = !found || found.settings.job !== "synth" || (rows === found.height && cols === found.width);
+    this.fitting.textContent = `Use ${cols} × ${rows}, which fits`;
   }
 
   /** Offer these layers. */
@@ -827,7 +437,9 @@ class Page {
     this.mark(result, true);
     const found = this.results.get(result);
     this.downloads.hidden = !found;
-    this.offer(found?.layers ?? (this.running ? this.runLayers : ["sample"]));
+    this.inside.close(true);
+    this.offerLayers();
+    this.inside.open_();
     this.showClasses();
   }
 
@@ -857,6 +469,72 @@ class Page {
     make("a", { href: address, download: name }).click();
     setTimeout(() => URL.revokeObjectURL(address), 60000);
     this.say(`${name} is downloaded.`);
+  }
+
+  /** Give everything that is shown as a file, which brings it back when it is dropped on the page. */
+  saveView() {
+    const numbers = [this.shown, this.inside.beside].filter((number) => number !== null);
+    const runs = numbers.map((number) => this.results.get(number).settings);
+    if (!this.given || runs.some(({ of }) => of)) {
+      this.warn("Only a picture that was given to this page can be saved with its view; give it again first.");
+      return;
+    }
+    const text = (bytes) => bytes && btoa(Array.from(bytes, (one) => String.fromCharCode(one)).join(""));
+    const { name, bytes, maps } = this.given;
+    const { left, top, unit } = this.view;
+    const given = { name, bytes: text(bytes), maps: [...maps.values()].map((one) => ({ name: one.name, bytes: text(one.bytes) })) };
+    const { at, sweeps, pixel } = this.inside;
+    const moment = at && [...sweeps[at[0]].slice(0, 2), at[1]];
+    const saved = { simdtex: "view", given, runs, moment, pixel, layer: this.layer, tiled: this.tiled, left, top, unit };
+    this.on_file({ name: `${stem(name)}-view.json` }, [new TextEncoder().encode(JSON.stringify(saved))]);
+  }
+
+  /** Bring back what `saveView` has saved. */
+  async restoreView(bytes) {
+    let saved = {};
+    try {
+      saved = JSON.parse(new TextDecoder().decode(bytes));
+    } catch {
+      // the sentence below says it
+    }
+    if (saved.simdtex !== "view") {
+      this.warn("This file is no view that the live page has saved.");
+      return;
+    }
+    const read = (text) => Uint8Array.from(atob(text), (one) => one.charCodeAt(0));
+    const { given, runs, moment } = saved;
+    this.pending = { name: given.name, bytes: given.bytes && read(given.bytes), maps: new Map() };
+    [this.again] = runs;
+    if (given.bytes) this.send({ kind: "open", name: given.name }, [this.pending.bytes]);
+    else this.send({ kind: "example", name: given.name });
+    await this.next("picture");
+    for (const { name, bytes: map } of given.maps) {
+      this.given.maps.set(stem(name), { name, bytes: read(map) });
+      this.send({ kind: "map", name }, [read(map)]);
+      await this.next("maps");
+    }
+    const numbers = [];
+    for (const settings of [...runs].reverse()) {
+      this.restore(settings);
+      this.last = structuredClone(settings);
+      this.send({ ...settings, kind: "make" });
+      numbers.unshift((await this.next("result")).result);
+    }
+    this.inside.element.open = true;
+    await this.next("inside");
+    if (numbers.length > 1) {
+      this.inside.open_(numbers[1]);
+      await this.next("inside");
+    }
+    if (moment) {
+      this.inside.seek(this.inside.sweeps.findIndex((one) => one[0] === moment[0] && one[1] === moment[1]), moment[2]);
+      await this.next("moments");
+    }
+    this.tiling.checked = this.tiled = saved.tiled;
+    Object.assign(this.view, { left: saved.left, top: saved.top, unit: saved.unit, fitted: false });
+    this.showLayer(saved.layer);
+    if (saved.pixel) this.inside.pick(...saved.pixel);
+    this.say("The view is restored.");
   }
 
   async copy(text) {

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The live page of simdtex: in a browser beside `simdtex live`, and in a notebook as the widget simdtex.Live.
+// simdtex does all arithmetic on textures; the page shows frames and sends messages (docs/live.rst lists them).
+
+const HOLE = "#ff1e9b";
+const LAYERS = {
+  labels: "Labels over the picture",
+  picture: "Picture",
+  sample: "Sample",
+  arrangement: "Arrangement (source map)",
+  use: "Use of the sample",
+  temperature: "Temperature",
+  sets: "Sites that relax together",
+  faults: "Faults of the lattice",
+};
+const JOBS = {
+  synth: ["More of the texture", "Make the texture"],
+  extend: ["A seamless picture", "Make it seamless"],
+  fill: ["A filled hole", "Fill the hole"],
+  classify: ["A classification by texture", "Classify the picture"],
+}; // what the page calls them, and their button
+const PICTURE_LAYERS = ["sample", "labels"]; // which show the picture itself
+const SIDES = ["left", "top", "width", "height"];
+const MAX_PIXELS = 2 ** 22; // of a frame
+const PIECE = 2 ** 20; // bytes of a file that are sent at a time
+const CONTROLS = ["button", "input", "select", "summary"];
+const LEGENDS = {
+  arrangement: "Each place of the sample has a colour of its own. An area without edges was copied whole.",
+  use: "Black: never taken. Yellow: taken most often.",
+  sets: "Magenta: the sites that relaxed last, all together. Grey-blue: those that relaxed earlier in the sweep.",
+  faults: "Magenta: the pattern is out of place there.",
+  temperature: "Black: settled. Yellow: still to be decided. At the end of a run all is black.",
+};
+
+// -- connections --------------------------------------------------------------------------------------------------
+
+/** A WebSocket to `simdtex live`, which is opened again when it is lost. */
+class Socket {
+  get key() {
+    return sessionStorage.getItem("simdtex-session");
+  }
+
+  constructor(address) {
+    this.address = address;
+    this.wait = 250;
+    this.onmessage = this.onstate = () => {};
+  }
+
+  open() {
+    this.socket = new WebSocket(`${this.address}${this.key ? `?session=${this.key}` : ""}`);
+    this.socket.binaryType = "arraybuffer";
+    this.socket.onopen = () => {
+      this.wait = 250;
+      this.onstate("open", "");
+    };
+    this.socket.onclose = (event) => {
+      this.onstate("lost", event.reason);
+      this.timer = setTimeout(() => this.open(), this.wait);
+      this.wait = Math.min(2 * this.wait, 4000);
+    };
+    this.socket.onmessage = ({ data }) => {
+      if (typeof data === "string") [this.message, this.buffers] = [JSON.parse(data), []];
+      else this.buffers.push(new Uint8Array(data));
+      if (this.buffers.length < this.message.buffers) return;
+      if (this.message.kind === "hello") sessionStorage.setItem("simdtex-session", this.message.session);
+      this.onmessage(this.message, this.buffers);
+    };
+  }
+
+  send(message, buffers = []) {
+    if (this.socket.readyState !== WebSocket.OPEN) return;
+    this.socket.send(JSON.stringify({ ...message, buffers: buffers.map((buffer) => buffer.length) }));
+    for (const buffer of buffers)
+      for (let begin = 0; begin < buffer.length; begin += PIECE) this.socket.send(buffer.subarray(begin, begin + PIECE));
+  }
+
+  close() {
+    clearTimeout(this.timer);
+    this.socket.onclose = null;
+    this.socket.close();
+  }
+}
+
+/** The connection of a notebook to its kernel. */
+class Kernel {
+  constructor(model) {
+    this.model = model;
+    this.onmessage = this.onstate = () => {};
+    this.received = (message, buffers) =>
+      this.onmessage(message, (buffers ?? []).map((one) => new Uint8Array(one.buffer, one.byteOffset, one.byteLength)));
+  }
+
+  open() {
+    this.model.on("msg:custom", this.received);
+    this.onstate("open", "");
+  }
+
+  send(message, buffers = []) {
+    this.model.send(message, undefined, buffers);
+  }
+
+  close() {
+    this.model.off("msg:custom", this.received);
+  }
+}

@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A run of Algorithm 1 that can be looked at after any set of sites that relax together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from simdtex import schedules
+from simdtex.machine import Machine
+from simdtex.machine.reference import Reference
+from simdtex.methods.mrf.algorithm import exchanged, relaxed
+from simdtex.methods.mrf.explain import Moment, explained, pixel_of
+from simdtex.methods.mrf.level import Active, Lattices, State, rule
+from simdtex.methods.mrf.plan import Plan
+from simdtex.methods.mrf.record import picture, sources, temperatures
+from simdtex.model.explanation import Explanation
+from simdtex.ops.neighbourhood import Field
+
+KEPT = 2**28
+"""Bytes of the states that a replay keeps, at most; what is not kept is computed again."""
+
+
+class Sweep(NamedTuple):
+    """A sweep of a run.
+
+    Attributes
+    ----------
+    level : int
+        0 is the finest.
+    sweep : int
+        Its number on the level, from 1.
+    sets : int
+        How many sets of sites relax one after another.
+    sites : int
+        How many sites relax.
+    temperature : float
+        Mean temperature of the level before the sweep, 0 to 1.
+    """
+
+    level: int
+    sweep: int
+    sets: int
+    sites: int
+    temperature: float
+
+
+@dataclass(frozen=True, eq=False)
+class Instant:
+    """The field of a run between two sets of sites.
+
+    Attributes
+    ----------
+    level : int
+        0 is the finest.
+    image : (rows, cols[, channels]) array
+        The level's picture, in the sample's type.
+    source : (rows, cols, 2 or 3) int32 array
+        Source map, as in `simdtex.Output.source`.
+    temperature : (rows, cols) float64 array
+        0 to 1.
+    relaxed : (rows, cols) uint8 array
+        2 for the sites of the last set, 1 for those that have relaxed earlier in the sweep, 0 for all others.
+    """
+
+    level: int
+    image: NDArray[Any]
+    source: NDArray[np.int32]
+    temperature: NDArray[np.float64]
+    relaxed: NDArray[np.uint8]
+
+
+class Played(NamedTuple):
+    """A part of a sweep: its sites after it, and what the schedule has decided, the sites on the host."""
+
+    field: Field
+    decided: list[schedules.Info]
+
+
+class Replay:
+    """A run of the method ``mrf`` that can be looked at after any set of sites that relax together.
+
+    `simdtex.replay` makes one. Sweeps are numbered from 0 over all levels, the coarsest level first.
+
+    Notes
+    -----
+    The run is made once, as far as it is asked for, and a copy of the state before each sweep goes to the host: 6 bytes
+    per site and 2 for each channel, `KEPT` bytes at most. `at` and `explain` start from the nearest state before.
+    """
+
+    def __init__(self, plan: Plan, machine: Machine, seed: int, kept: int = KEPT) -> None:
+        self._run, self._twin = plan.on(machine, seed), Lattices(plan, Reference(), seed)
+        self._sweeps: list[Sweep] = []
+        self._states: dict[int, dict[str, Any]] = {}  # before a sweep
+        self._room = kept
+        self._state = self._sweeping(self._run.begin())
+
+    @property
+    def sweeps(self) -> list[Sweep]:
+        """All sweeps of the run, in order."""
+        while self._record():
+            pass
+        return self._sweeps
+
+    def at(self, sweep: int, sets: int | None = None) -> Instant:
+        """Return the field after so many sets of a sweep; None: after all of it. Negative sweeps count from the end."""
+        sweep = range(len(self.sweeps))[sweep]
+        played = self._play(sweep, sets)
+        level = self._sweeps[sweep].level
+        run, grid = self._twin, self._twin.grid(level)
+        field = Field(*map(self._run.machine.get, played.field))
+        done = np.zeros(grid.pixels, np.uint8)
+        chosen = [info.sites[begin:end] for info in played.decided for begin, end in info.ranges]
+        for each in chosen:
+            done.flat[each] = 1
+        if chosen:
+            done.flat[chosen[-1]] = 2
+        seen = picture(run, grid, field), sources(run, grid, field), temperatures(run, grid, field)
+        return Instant(level, *seen, grid.view(done))
+
+    def explain(self, site: tuple[int, ...], level: int = 0, sweep: int | None = None) -> Explanation:
+        """Return why a site of a level took its value in a sweep of the level, from 1.
+
+        None: in the last sweep in which it relaxes. Raises ValueError if there is no such site or level, or if the site
+        does not relax there.
+        """
+        if not 0 <= level < self._run.levels:
+            raise ValueError(
+                f"level is {level} and the levels of this run are 0 to {self._run.levels - 1}; give one of these"
+            )
+        pixel = pixel_of(self._run, level, site)
+        asked = (level, sweep)
+        while self._state.level >= level and all(one[:2] != asked for one in self._sweeps) and self._record():
+            pass
+        for n, one in reversed(list(enumerate(self._sweeps))):
+            if one.level == level and sweep in (None, one.sweep) and (moment := self._moment(n, pixel)):
+                return explained(self._twin, moment, site)
+        where = f"level {level}" + (f", sweep {sweep}" if sweep else "")
+        raise ValueError(
+            f"site {site} does not relax at {where}: it keeps its value; give another site, sweep or level"
+        )
+
+    def explain_pixel(self, row: int, col: int, sweep: int = -1, sets: int | None = None) -> Explanation:
+        """Return why a pixel of the output had its value after so many sets of a sweep.
+
+        It is the last relaxation until then: on the sweep's level or, if the pixel has kept its value since, on a level
+        above. Raises ValueError if there was none: the pixel's value is known, or it was drawn at random at the start.
+        """
+        sweep = range(len(self.sweeps))[sweep]
+        limits: dict[int, int | None] = {sweep: sets}
+        row, col = (n >> self._sweeps[sweep].level for n in (row, col))
+        for level in range(self._sweeps[sweep].level, self._run.levels):
+            pixel = pixel_of(self._run, level, (row, col))
+            for n in range(sweep, -1, -1):
+                if self._sweeps[n].level == level and (moment := self._moment(n, pixel, limits.get(n))):
+                    return explained(self._twin, moment, (row, col))
+            if row % 2 or col % 2:  # which is no site of the level above
+                break
+            row, col = row // 2, col // 2
+        raise ValueError("this pixel has not relaxed yet: its value is given, or drawn at random from the sample")
+
+    def _record(self) -> bool:
+        """Run the next sweep, and keep the state before it; return False if the run has ended."""
+        run, state = self._run, self._state
+        if run.ended(state):
+            return False
+        number, grid = len(self._sweeps), run.grid(state.level)
+        saved = run.save(state)
+        size = sum(one.nbytes for one in saved.values() if isinstance(one, np.ndarray))
+        if not number or size <= self._room:
+            self._states[number] = saved
+            self._room -= size
+        after, info = run.step(state)
+        ranges = np.concatenate([chosen.ranges for chosen in info.chosen])
+        sites, left = int((ranges[:, 1] - ranges[:, 0]).sum()), state.temperature_sum / (1024 * grid.size)
+        self._sweeps.append(Sweep(state.level, info.sweep, len(ranges), sites, left))
+        self._state = self._sweeping(after)
+        return True
+
+    def _sweeping(self, state: State) -> State:
+        """Return the state before the next sweep, which may be of a finer level; the last state if there is none."""
+        while self._run.at_equilibrium(state) and not self._run.ended(state):
+            state, _ = self._run.step(state)
+        return state
+
+    def _before(self, number: int) -> State:
+        """Return the state before a sweep, on the machine."""
+        first = max(n for n in self._states if n <= number)
+        state = self._run.load(self._states[first])
+        for _ in range(first, number):
+            state = self._sweeping(self._run.step(state)[0])
+        return state
+
+    def _play(self, number: int, sets: int | None) -> Played:
+        """Run so many sets of a sweep; None: all."""
+        state, machine = self._before(number), self._run.machine
+        level, left = self._run.level(state.level), self._sweeps[number].sets if sets is None else sets
+        field, memory = exchanged(level, state.field), state.schedule
+        relaxation, free = rule(level, state.penalty), not state.active
+        decided: list[schedules.Info] = []
+        while left > 0 and not (decided and decided[-1].last):
+            memory, now = level.schedule.step(level.setting, memory, Active(level, field.temperature, free))
+            sites = now.sites if isinstance(now.sites, np.ndarray) else machine.get(now.sites)
+            ranges = now.ranges[:left]
+            now = now._replace(sites=sites, steps=ranges)
+            left -= len(ranges)
+            decided.append(now)
+            for part in relaxed(level, field, now, relaxation):
+                field = part.field
+        return Played(field, decided)
+
+    def _moment(self, number: int, pixel: int, sets: int | None = None) -> Moment | None:
+        """Return the last moment at which a site relaxes within so many sets of a sweep; None if it does not."""
+        found, done = None, 0
+        for info in self._play(number, sets).decided:
+            for place in np.flatnonzero(info.sites == pixel):
+                for number_of_set in np.flatnonzero((info.ranges[:, 0] <= place) & (place < info.ranges[:, 1])):
+                    found = done + int(number_of_set), info.turn
+            done += len(info.ranges)
+        if found is None:
+            return None
+        before, turn = found
+        field = Field(*map(self._run.machine.get, self._play(number, before).field))
+        sweep = self._sweeps[number]
+        penalty = self._states[number]["penalty"] if number in self._states else self._before(number).penalty
+        return Moment(sweep.level, sweep.sweep, field, penalty, turn)
+
