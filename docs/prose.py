@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 from proselint.checks import __register__ as general
-from proselint.registry.checks import Check, types
+from proselint.registry.checks import Check, engine, types
 from pygments.lexers import MarkdownLexer, PythonLexer, RstLexer
 from pygments.token import Generic, Name, String, Text
 
@@ -43,8 +43,9 @@ def prose(path):
     lexer = (MarkdownLexer if path.suffix == ".md" else RstLexer)(handlecodeblocks=False, **plain)
     if path.suffix == ".py":
         text = only(text, PythonLexer(**plain), [String.Doc, Text]).replace('"""', "   ")
-    names, empty = r"\S*[./]\w\S*", r"^(?=\n)"
-    return re.sub(rf"{names}|\d|{empty}", "·", only(text, lexer, [Text, Generic, Name.Tag]), flags=re.MULTILINE)
+    path_or_name, directive, empty = r"\S*[./]\w\S*", r"^·· ·+ \S+$", r"^(?=\n)"
+    text = only(text, lexer, [Text, Generic, Name.Tag])
+    return re.sub(rf"{path_or_name}|{directive}|\d|{empty}", "·", text, flags=re.MULTILINE)
 
 
 def checks():
@@ -52,7 +53,7 @@ def checks():
     lines = [line.split(": ", 1) for line in (HERE / "prose.txt").read_text("utf-8").splitlines() if line[:1] != "#"]
     words = types.PreferredForms({word.replace(" ", r"\s+"): instead for word, instead in lines})
     return [rule for rule in general if not rule.path.startswith(OFF)] + [
-        Check(words, path="project", message="'{1}': write {0}.")
+        Check(words, engine.Fancy(), path="project", message="'{1}': write {0}.")
     ]
 
 
