@@ -10,7 +10,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "docs"))
 import prose
 
 PAGES = {
-    "page.rst": ".. autofunction:: begun\n\nTitle\n=====\n\nIt is ``begun`` here\nand :doc:`begun`.\n\n::\n\n   begun the the\n\n"
+    "page.rst": ".. autofunction:: begun\n\nTitle\n=====\n\nIt is ``begun`` here\nand :doc:`begun`.\n\n"
+    "::\n\n   begun the the\n\n"
     ".. figure:: begun.png\n   :alt: what has\n      begun\n\n   64 x 64 x 64, and the\n   the end.\n",
     "page.md": "# Title\n\n![what has\nbegun](begun.png) the\n\n```console\nbegun the the\n```\n\n\nand the\nthe end\n",
     "page.py": '"""\nTitle\n=====\n\n``begun``\n"""\n\nbegun = "begun"\n\n\n'
