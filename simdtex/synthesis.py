@@ -254,7 +254,7 @@ def synthesize_solid(
     Notes
     -----
     Cost: some 5000 multiply-adds and 25 sorted values for every voxel, channel and iteration. Memory: see
-    ``docs/concepts/solid.rst``.
+    ``docs/concepts/pyramid.rst``.
 
     Examples
     --------

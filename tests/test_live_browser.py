@@ -13,6 +13,8 @@ import pytest
 from browsing import AXE, browser, drop, live, missing, shown, until
 from live import png, striped, texture
 
+import simdtex
+from simdtex.io.examples import example
 from simdtex.live.job import LABELS
 
 REQUIRE = "SIMDTEX_REQUIRE_BROWSER"
@@ -142,7 +144,13 @@ class Page:
 
     def sees(self, picture):
         """Whether the view shows these pixels, (rows, cols, 3), as they are."""
-        seen, zoom = self.canvas(), self.script("return page.view.scale")
+        zoom = self.script(
+            "const v = page.view, zoom = Math.max(1, Math.floor(v.unit)); const least = (all, side) => Math.round((all - "
+            "side / zoom) / 2); Object.assign(v, {unit: zoom, fitted: false, left: least(v.cols, v.canvas.width), "
+            "top: least(v.rows, v.canvas.height)}); v.panes[0].frame = null; v.moved(); return zoom"
+        )
+        until(lambda: self.script("return page.view.panes[0].frame && !page.view.drawing"))
+        seen = self.canvas()
         rows, cols = (zoom * side for side in picture.shape[:2])
         top, left = (seen.shape[0] - rows) // 2, (seen.shape[1] - cols) // 2
         shown_there = seen[top - zoom : top + rows + zoom, left - zoom : left + cols + zoom, :3]
@@ -331,15 +339,15 @@ def test_everything_is_done_by_the_keyboard_alone(page):
     keys(Keys.ENTER)
     page.result(1)
     tab_to(lambda one: one.get_attribute("aria-label") == "Zoom in")
-    scale = page.script("return page.view.scale")
+    scale = page.script("return page.view.unit")
     keys(Keys.ENTER)
-    assert page.script("return page.view.scale") == scale + 1
+    assert page.script("return page.view.unit") == int(scale) + 1, "the next whole factor"
     tab_to(lambda one: one.tag_name == "canvas")
     left = page.script("return page.view.left")
     keys(Keys.ARROW_RIGHT)
     assert page.script("return page.view.left") > left
     keys("0")
-    assert page.script("return page.view.scale") == scale
+    assert page.script("return page.view.unit") == scale
     tab_to(lambda one: one.text.startswith("Paint a hole"))
     keys(Keys.ENTER)
     tab_to(lambda one: one.tag_name == "select")
@@ -427,7 +435,7 @@ def test_a_page_that_loses_its_connection_keeps_what_is_not_asked_for_yet(page, 
     page.put("Coherence", 1.5)
     page.script("page.connection.socket.close()")
     until(lambda: page.status == "Not connected.")
-    until(lambda: page.status == "Result 1 is ready: " + page.one(".doing").text)
+    until(lambda: page.status == "Result 1 is ready." and "seed" in page.one(".doing").text)
     assert page.script("return [page.part, page.guide.sample.length]") == [[8, 4, 50, 60], 1]
     assert page.labelled("Coherence").get_attribute("value") == "1.5"
 
@@ -612,3 +620,168 @@ def test_nothing_is_loaded_from_elsewhere_and_nothing_is_complained_of(page, wal
     loaded = page.script("return performance.getEntriesByType('resource').map((one) => one.name)")
     assert {name.rsplit("/", 1)[0] for name in loaded} == {served.rstrip("/")}
     assert page.driver.get_log("browser") == []
+
+
+# -- a look inside a run
+
+
+@pytest.fixture
+def inside(page):
+    """A page with two results that differ in their schedule, looked into."""
+    page.button("grass").click()
+    page.result(1)
+    small = "page.width.value = page.height.value = 48; page.options.mrf.values = {order: 4%s}; page.make()"
+    page.script(small % "")
+    page.result(2)
+    page.script(small % ", schedule: 'checkerboard'")
+    page.result(3)
+    page.open("details.inside")
+    until(lambda: page.script("return page.inside.open"))
+    return page
+
+
+def explained(page, pane=0):
+    until(lambda: page.script("return Boolean(page.view.panes[arguments[0]].why)", pane))
+    return page.script("return page.view.panes[arguments[0]].why", pane)
+
+
+def at(page):
+    until(lambda: page.script("return !page.inside.waiting && !page.inside.wanted"))
+    return page.script("return page.inside.at")
+
+
+def test_a_click_explains_a_pixel(inside):
+    canvas = inside.one("canvas.view")
+    inside.script("page.view.zoom(1)")
+    left, top, unit = inside.script("return [page.view.left, page.view.top, page.view.unit]")
+    middle = canvas.size["width"] / 2, canvas.size["height"] / 2
+    pixel = int(top + middle[1] / unit), int(left + middle[0] / unit)
+    ActionChains(inside.driver).move_to_element(canvas).click().perform()
+    why = explained(inside)
+    assert max(abs(one - other) for one, other in zip(why["pixel"], pixel, strict=True)) <= 1
+    pixel = tuple(why["pixel"])
+    expected = simdtex.explain(
+        example("grass")[:192, :192], (48, 48), pixel, order=4, schedule="checkerboard", rng=1
+    )
+    assert why["reason"] == expected.reason
+    rows = [row.text for row in inside.all(".reason tbody tr")]
+    assert len(rows) == len(expected.shown())
+    assert ", ".join(map(str, expected.candidates.place[expected.taken])) in inside.one(".reason tr.taken").text
+    canvas.send_keys(Keys.ARROW_RIGHT)
+    until(lambda: explained(inside)["pixel"] == [pixel[0], pixel[1] + 1])
+    assert inside.script("return page.view.left") == left, "the view stays where it is"
+    canvas.send_keys(Keys.ESCAPE)
+    until(lambda: not inside.all(".reason table"))
+    canvas.send_keys(Keys.ENTER)
+    assert explained(inside)["pixel"] == [24, 24]
+    assert inside.faults() == []
+
+
+def test_the_time_line_steps_and_plays(inside):
+    assert at(inside) is None
+    sweeps = inside.script("return page.inside.sweeps")
+    back, forth = (inside.one(f"[aria-label='A set of sites {way}']") for way in ("back", "on"))
+    inside.one("[aria-label='A sweep back']").click()
+    until(lambda: at(inside) == [len(sweeps) - 1, 2])
+    back.click()
+    until(lambda: at(inside) == [len(sweeps) - 1, 1])
+    until(lambda: inside.script("return page.seen") == "sets")
+    assert "set 1 of 2" in inside.one(".moment").text
+    shown_there = inside.canvas()
+    magenta = (shown_there[..., :3] == [255, 30, 155]).all(-1).mean() / (shown_there[..., 3] > 0).mean()
+    assert 0.2 < magenta < 0.6, "half of the sites have relaxed last"
+    forth.click()
+    forth.click()
+    until(lambda: at(inside) is None)
+    inside.script("page.inside.seek(0, 0)")
+    until(lambda: at(inside) == [0, 0])
+    inside.button("Play").click()
+    until(lambda: at(inside) is not None and at(inside)[0] > 3)
+    inside.button("Stop").click()
+    seen = at(inside)
+    assert 3 < seen[0] < len(sweeps)
+
+
+def test_two_results_side_by_side_share_window_moment_and_pixel(inside):
+    inside.choose("Beside it", "Result 2")
+    until(lambda: inside.script("return page.inside.panes.length") == 2)
+    beside = inside.one("canvas.beside")
+    until(lambda: inside.script("return Boolean(page.view.panes[1].frame)"))
+    assert beside.size == inside.one("canvas.view").size
+    inside.script("page.inside.seek(page.inside.sweeps.length - 1, 1)")
+    until(lambda: "set 1 of 2" in inside.one(".moment").text)
+    moments = inside.script("return page.view.panes.map(({frame}) => [frame.left, frame.top, frame.step, frame.of])")
+    assert moments[0][:3] == moments[1][:3]
+    assert [one[3] for one in moments] == [3, 2]
+    ActionChains(inside.driver).move_to_element(beside).click().perform()
+    why = [explained(inside, pane) for pane in (0, 1)]
+    assert why[0]["pixel"] == why[1]["pixel"]
+    assert len(inside.all(".reason table")) == 2
+    assert inside.faults() == []
+
+
+def test_a_saved_view_brings_all_of_it_back(inside, served):
+    inside.choose("Beside it", "Result 2")
+    until(lambda: inside.script("return page.inside.panes.length") == 2)
+    inside.script("page.inside.seek(page.inside.sweeps.length - 2, 1); page.showLayer('temperature')")
+    moment = at(inside)
+    inside.script("page.view.zoom(1); page.inside.pick(20, 30)")
+    explained(inside)
+    wanted = inside.script("return [page.inside.at, page.inside.pixel, page.layer, page.view.unit, page.view.left]")
+    assert wanted[0] == moment
+    inside.button("Save this view").click()
+    path = inside.folder / "grass-view.json"
+    until(lambda: path.exists() and path.stat().st_size)
+    other = Page(inside.driver, served)
+    try:
+        drop(other.driver, path, ".start")
+        until(lambda: other.status == "The view is restored.", 60)
+        now = other.script("return [page.inside.at, page.inside.pixel, page.layer, page.view.unit, page.view.left]")
+        assert now == wanted
+        settings = other.script("return page.inside.panes.map(({result}) => page.results.get(result).settings.options)")
+        assert settings == [{"order": 4, "schedule": "checkerboard"}, {"order": 4}]
+        path.write_text("{}")
+        drop(other.driver, path, ".result")
+        until(lambda: "no view" in other.alert)
+    finally:
+        other.driver.close()
+        other.driver.switch_to.window(inside.handle)
+
+
+def test_the_tour_has_five_steps_and_needs_nothing(page):
+    page.button("Tour in five steps").click()
+    until(lambda: page.one(".tour").is_displayed(), 60)
+    for number in range(1, 6):
+        assert page.one(".tour h2").text.startswith(f"{number} of 5")
+        assert page.one(".pointed").is_displayed()
+        assert page.faults() == []
+        page.one(".tour .next").click()
+    assert not page.one(".tour").is_displayed()
+    assert explained(page)["candidates"], "the tour has explained a pixel"
+
+
+def test_a_key_shows_the_sample_while_it_is_held(page):
+    page.button("gravel").click()
+    page.result(1)
+    until(lambda: page.script("return page.seen") == "picture")
+    page.one("canvas.view").click()
+    ActionChains(page.driver).key_down("b").perform()
+    until(lambda: page.script("return page.seen") == "sample")
+    ActionChains(page.driver).key_up("b").perform()
+    until(lambda: page.script("return page.seen") == "picture")
+
+
+def test_the_lattice_is_drawn_and_the_fitting_size_taken(page):
+    page.button("brick").click()
+    page.result(1)
+    until(lambda: page.script("return page.seen") == "picture")
+    rows, cols = page.script("return page.results.get(1).lattice.fitting")
+    until(lambda: page.script("return !page.view.drawing"))
+    before = page.canvas()
+    page.labelled("Lattice").click()
+    until(lambda: (page.canvas() != before).any())
+    page.button(f"Use {cols} × {rows}, which fits").click()
+    page.result(2)
+    assert page.script("return [page.results.get(2).height, page.results.get(2).width]") == [rows, cols]
+    page.choose("Layer", "Faults of the lattice")
+    until(lambda: page.script("return page.seen") == "faults")

@@ -36,11 +36,11 @@ def test_labels_lie_over_a_picture(channels, dtype):
     colours = np.array([[0, 0, 0], [200, 100, 0], [255, 255, 255]], np.uint8)
     own = pixels.reshape(4, 6, -1)
     own = (own[..., :3] if own.shape[2] > 2 else own[..., :1]).astype(int) * np.ones(3, int)
-    for plain in (False, True):
-        found = render(frames.overlay(pixels, labels, colours, plain=plain), Window(width=6, height=4))
+    for shares in ([0.5, 0.5, 0.5], [0, 0.25, 1]):
+        found = render(frames.overlay(pixels, labels, colours, shares), Window(width=6, height=4))
         shown = np.frombuffer(found.pixels, np.uint8).reshape(4, 6, 4)[..., :3]
-        mixed = (own + colours[labels]) // 2
-        np.testing.assert_array_equal(shown, np.where((labels == 0)[..., None] & plain, own, mixed))
+        share = np.array(shares)[labels][..., None]
+        np.testing.assert_array_equal(shown, np.floor(own * (1 - share) + colours[labels] * share))
 
 
 @given(

@@ -15,6 +15,7 @@ from live import asked, texture
 import simdtex
 from simdtex.io.image import read_bytes
 from simdtex.live import widget
+from simdtex.live.server import FILES
 from simdtex.model.colours import source_colours
 from simdtex.run import Output
 
@@ -72,10 +73,11 @@ def test_a_cell_waits_for_the_first_result_and_for_later_ones(monkeypatch):
 
 
 def test_the_widget_has_the_page_of_the_server():
-    page = ROOT / "simdtex" / "live" / "page"
-    assert (page / "live.js").read_text(encoding="utf-8") == widget.Live._esm
-    assert (page / "live.css").read_text(encoding="utf-8") == widget.Live._css
-    assert "export default" in widget.Live._esm
+    assert FILES["live.js"][0]() == widget.Live._esm
+    assert FILES["live.css"][0]() == widget.Live._css
+    assert widget.Live._esm.count("export default") == 1
+    for path in (ROOT / "simdtex" / "live" / "page").glob("*.js"):  # none is forgotten
+        assert path.read_text(encoding="utf-8") in widget.Live._esm
 
 
 def test_bad_samples_are_refused():

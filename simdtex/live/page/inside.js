@@ -299,9 +299,9 @@ class Inside {
     return make("figure", {}, canvas, make("figcaption", {}, "Candidates in the sample, by rank; the ring in colour is taken."));
   }
 
-  table({ candidates, offsets }) {
+  table({ candidates, offsets, pane }) {
     const terms = Object.keys(candidates[0].costs);
-    const heads = ["", "rank", "row, column", "continues", ...terms.map((name) => NAMES[name] ?? name), "probability"];
+    const heads = ["around", "rank", "row, column", "continues", ...terms.map((name) => NAMES[name] ?? name), "probability"];
     const cells = (one) => {
       const share = make("span", { class: "share" });
       share.style.width = `${100 * one.probability}%`;
@@ -314,7 +314,7 @@ class Inside {
     };
     return make(
       "div",
-      { class: "wide", tabindex: 0, role: "region", "aria-label": "Candidates" },
+      { class: "wide", tabindex: 0, role: "region", "aria-label": `Candidates of result ${this.panes[pane].result}` },
       make("table", {}, make("thead", {}, make("tr", {}, ...heads.map((text) => make("th", { scope: "col" }, text)))), make("tbody", {}, ...candidates.map(cells))),
     );
   }

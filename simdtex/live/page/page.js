@@ -404,7 +404,7 @@ class Page {
     this.currentItem.before(message.item);
     this.strip.scrollLeft = this.strip.scrollWidth;
     const gone = dropped.length ? ` Result ${dropped.join(", ")} is no longer kept, to save memory.` : "";
-    this.say(`Result ${result} is ready: ${this.summary(message)}${gone}`);
+    this.say(`Result ${result} is ready.${gone}`);
     if (this.results.size === 1 && this.columns.clientWidth > 1000) this.controls.querySelector("details").open = true;
   }
 
