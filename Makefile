@@ -6,7 +6,7 @@ VENV ?= .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --disable-pip-version-check -qq
 
-.PHONY: help demo test slow browser lint docs links mutants fuzz cpu clean
+.PHONY: help demo test slow browser lint docs prose links mutants fuzz cpu clean
 
 help:
 	@echo "make demo    textures from real samples, into ./demo"
@@ -14,7 +14,8 @@ help:
 	@echo "make slow    the tests that take long or need the package index"
 	@echo "make browser what tests in a browser need of npm; Chromium and its driver are the system's"
 	@echo "make lint    ruff and mypy"
-	@echo "make docs    the documentation, into docs/_build/html, and whether its links and pages are sound"
+	@echo "make docs    the documentation, into docs/_build/html; checks its prose, links and pages"
+	@echo "make prose   a check of the documentation's prose alone"
 	@echo "make links   whether the links of the documentation to other sites still lead there; needs the network"
 	@echo "make mutants mutation tests of the Markov random field"
 	@echo "make fuzz    random command lines and damaged files, for MINUTES=10"
@@ -78,10 +79,15 @@ lint:
 docs:
 	$(call install,docs,[docs])
 	$(device)
+	@$(PY) docs/prose.py
 	@rm -rf docs/_build/html docs/gallery
 	$(PY) -m sphinx -W --keep-going -q -b html docs docs/_build/html
 	@$(PY) docs/check.py docs/_build/html
 	@echo "The documentation is in docs/_build/html/index.html"
+
+prose:
+	$(call install,docs,[docs])
+	@$(PY) docs/prose.py
 
 links:
 	$(call install,docs,[docs])

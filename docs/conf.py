@@ -3,6 +3,7 @@
 
 import csv
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -118,6 +119,17 @@ by_sample = {
 tables = [table("What it takes: brick", by_sample["brick"], COST)]
 tables += [table(name.capitalize(), rows, RESULT) for name, rows in by_sample.items()]
 (HERE / "generated" / "schedules.txt").write_text("\n".join(tables), encoding="utf-8")
+
+# The first page shows the comparison of README.md: its table, and the notes below it.
+readme = (HERE.parent / "README.md").read_text(encoding="utf-8")
+part = re.search(r"^## Comparison.*?\n\n(.*?)^## ", readme, re.MULTILINE | re.DOTALL)[1]
+part = re.sub(r"`([^`]+)`", r"``\1``", part)
+part = re.sub(r"\[([^]]+)\]\(docs/([^)]+)\.rst\)", r":doc:`\1 </\2>`", part)
+rows = [re.split(r" *\| *", line.strip("| ")) for line in part.splitlines() if line.startswith("| ")]
+lines = [".. list-table::", "   :header-rows: 1", ""]
+lines += [f"   {'  -' if column else '* -'} {text}" for row in rows for column, text in enumerate(row)]
+notes = [line for line in part.splitlines() if not line.startswith("|")]
+(HERE / "generated" / "comparison.txt").write_text("\n".join([*lines, *notes]) + "\n", encoding="utf-8")
 
 # The page on fuzzing shows what `make fuzz RECORD=--record` has written.
 with open(HERE / "fuzzing.json", encoding="utf-8") as file:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-Schedules compared, one of your own among them
-==============================================
+Comparison of schedules
+=======================
 
-Two schedules of simdtex and one that is written here make the same grass, and the report says what each one does:
+Run the same job under two built-in schedules and one defined here, and write a report of cost, oscillation and quality:
 ``python compare_schedules.py [FOLDER] [--size 64]``.
 """
 
@@ -26,7 +26,7 @@ folder = args.folder or Path(tempfile.mkdtemp(prefix="simdtex-"))
 
 
 class Wavefront(Partition):
-    """Raster order, but all sites that do not wait for one another relax at once."""
+    """Raster order in which all sites without a pending neighbour relax together."""
 
     name = "wavefront"
 

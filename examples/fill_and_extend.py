@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-Holes filled, pictures continued and made seamless
-==================================================
+Filling holes and extending a picture
+=====================================
 
-Gravel with holes, gravel that is to be wider, and a tile of it: ``python fill_and_extend.py [FOLDER] [--size 256]``.
+Fill holes in a picture of gravel, extend it to the right, and make it seamless:
+``python fill_and_extend.py [FOLDER] [--size 256]``.
 
-What is given of a picture comes out as it is, to the bit; only what is missing is made.
+The given pixels do not change; only the missing ones are synthesised.
 """
 
 import argparse

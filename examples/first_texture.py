@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-The first texture
-=================
+First texture
+=============
 
-More brick from a piece of brick: ``python first_texture.py [FOLDER] [--size 256]``.
+Synthesise brick from a sample of brick: ``python first_texture.py [FOLDER] [--size 256]``.
 """
 
 import argparse

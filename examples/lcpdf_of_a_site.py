@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-The LCPDF of a site
-===================
+LCPDF of a site
+===============
 
-How likely a picture's pixels are, given their neighbours: ``python lcpdf_of_a_site.py [FOLDER] [--size 128]``.
+Compute the probability of each pixel of a picture given its neighbours:
+``python lcpdf_of_a_site.py [FOLDER] [--size 128]``.
 
-Half of the picture is grass, like the sample, and half is gravel. Where the model knows the texture, a pixel tends to
-be likely; surprise.png shows -log P of every pixel, which is dark where the pixel is likely.
+Half of the picture is grass, like the sample, and half is gravel. Pixels of grass tend to be more likely. surprise.png
+shows -log P of every pixel: dark pixels are likely.
 """
 
 import argparse

@@ -3,10 +3,10 @@
 Maps of a material
 ==================
 
-A texture with height and normal maps that match it: ``python material_maps.py [FOLDER] [--size 256]``.
+Synthesise a texture with matching height and normal maps: ``python material_maps.py [FOLDER] [--size 256]``.
 
-The maps are made from the sample here, because there are no measured ones. They only need to lie over the sample: the
-source map arranges any such map.
+Here the maps are computed from the sample, because no measured ones are available. The source map arranges any map
+that is aligned with the sample.
 """
 
 import argparse

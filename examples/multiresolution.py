@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-Multiresolution sampling at several thresholds
-==============================================
+Multiresolution sampling
+========================
 
-Gravel by the method ``multires``: ``python multiresolution.py [FOLDER] [--size 256]``.
+Compare thresholds of the method ``multires`` on gravel: ``python multiresolution.py [FOLDER] [--size 256]``.
 
-The threshold alpha says how alike two places must be to be exchanged. sheet.png shows what it does, and
-candidates.png shows among how many candidates each pixel of each level was drawn: the more, the brighter.
+The threshold alpha is the largest difference of two places that may be exchanged. sheet.png shows its effect.
+candidates.png shows the number of candidates of each pixel at each level: brighter means more.
 """
 
 import argparse
@@ -40,7 +40,7 @@ for alpha in (0, 0.1, 0.2, 0.3, 0.4):
     pictures.append((f"alpha {alpha:g}", texture))
 contact_sheet(pictures, folder / "sheet.png", columns=3)
 
-# The last of them is shown level by level; brightness is the logarithm of the number of candidates.
+# Show the last texture level by level; brightness is the logarithm of the number of candidates.
 most = np.log(max(2, max(stage.candidates.max() for stage in output.stages)))
 maps = [
     (f"level {stage.level}", magnified(temperature_colours(np.log(stage.candidates) / most), 2**stage.level))
@@ -48,7 +48,7 @@ maps = [
 ]
 contact_sheet(maps, folder / "candidates.png", columns=4)
 
-# Another map of the material follows its source map, which is shown in false colours.
+# Arrange another map of the material by the source map, and show the source map in false colours.
 height = gravel.astype(np.uint16) * 257
 write(folder / "texture.png", texture)
 write(folder / "height.png", apply_source_map(output.source, height, gravel.shape))

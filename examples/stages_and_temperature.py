@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-A texture takes shape
-=====================
+Levels, sweeps and temperature
+==============================
 
-Every level and sweep of a run, with its temperatures: ``python stages_and_temperature.py [FOLDER] [--size 256]``.
+Save the picture and the temperatures after every sweep of a run:
+``python stages_and_temperature.py [FOLDER] [--size 256]``.
 """
 
 import argparse

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """
-Stone: flat, solid and mixed
-============================
+Pyramid matching: flat, solid and mixed
+=======================================
 
-Stone by pyramid matching: ``python stone_block.py [FOLDER] [--size 128]``.
+Synthesise stone with the method ``pyramid``: ``python stone_block.py [FOLDER] [--size 128]``.
 
-flat.png is a larger picture of the grain, iterations.png shows how noise becomes grain, solid.png shows a block of it
-with a ball carved out, and mixed.png shows the grain in the colours of wood.
+* flat.png is a larger picture of the grain.
+* iterations.png shows how noise converges to grain.
+* solid.png shows a block of the grain, whole and cut, a ball carved from it, and slices.
+* mixed.png is the grain in the colours of wood.
 """
 
 import argparse
@@ -28,14 +30,14 @@ args = parser.parse_args()
 folder = args.folder or Path(tempfile.mkdtemp(prefix="simdtex-"))
 folder.mkdir(exist_ok=True)
 
-# Gravel from four times as far away is grain: no stone is larger than what the filters see of it.
+# Reduce gravel to a quarter of its size: no stone is then larger than the filters.
 far = downscale_local_mean(data.gravel(), (4, 4)).astype("uint8")
 grain = far[: args.size, : args.size]
 pictures = []
 
 
 def keep(progress):
-    """Keep each iteration's picture."""
+    """Keep the picture of each iteration."""
     if progress.end_of_iteration:
         pictures.append((progress.doing, progress.image()))
 

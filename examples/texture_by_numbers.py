@@ -3,10 +3,10 @@
 Texture by numbers
 ==================
 
-Guides say what goes where: ``python texture_by_numbers.py [FOLDER] [--size 256]``.
+Control with guides which material appears where: ``python texture_by_numbers.py [FOLDER] [--size 256]``.
 
-river.png: a river of pebbles winds through grass. Labels say where the sample has pebbles, and where the output is to
-have them. portrait.png: a portrait in gravel. The gravel's own smoothed brightness and the photograph are the guides.
+* river.png is a river of pebbles through grass. Labels mark the pebbles in the sample and in the output.
+* portrait.png is a portrait in gravel. The guides are the smoothed brightness of the gravel, and a photograph.
 """
 
 import argparse
@@ -30,13 +30,13 @@ folder = args.folder or Path(tempfile.mkdtemp(prefix="simdtex-"))
 folder.mkdir(exist_ok=True)
 half, shape = args.size // 2, (args.size, args.size)
 
-# The sample: a pond of pebbles in darker grass. Being round, it shows banks of every direction.
+# The sample: a pond of pebbles in darker grass. It is round, so it contains banks in every direction.
 grass, pebbles = data.grass()[:half, :half] * 0.7, data.gravel()[:half, :half] * 1.1
 row, col = np.indices((half, half)) / half
 pond = (np.hypot(row - 0.5, col - 0.5) < 0.36).astype(np.uint8)
 sample = np.where(pond, pebbles, grass).clip(0, 255).astype(np.uint8)
 
-# The output: where the river is to be.
+# The labels of the output: a river.
 row, col = np.indices(shape) / args.size
 river = (abs(col - 0.5 - 0.25 * np.sin(2 * np.pi * row)) < 0.12 + 0.03 * np.cos(9 * row)).astype(np.uint8)
 picture = simdtex.synthesize(sample, shape, guide=(pond, river), boundary="open", rng=1)
@@ -46,7 +46,7 @@ contact_sheet(
     folder / "river-sheet.png",
 )
 
-# The photograph takes on the range of the gravel's smoothed brightness, so that each of its tones has a like.
+# Map the tones of the photograph to those of the smoothed gravel, so that each has a counterpart in the sample.
 gravel = data.gravel()[: args.size, : args.size]
 tone = gaussian_filter(gravel.astype(float), 2)
 photograph = resize(data.camera(), shape, anti_aliasing=True)
