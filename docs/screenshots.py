@@ -78,6 +78,26 @@ def main():
         script("page.brush.end()")
         made(before + 1)
         keep(driver, "classes")
+        script("page.clear(); page.tool.value = ''; page.auto.checked = false; page.job.value = 'synth'; page.showJob()")
+        drop(driver, sample)
+        made(before + 2)
+        for count, schedule in enumerate(("coloring", "checkerboard"), before + 3):
+            script(
+                "page.width.value = page.height.value = 128; page.options.mrf.values = {schedule: arguments[0]}; page.make()",
+                schedule,
+            )
+            made(count)
+        script("page.inside.element.open = true")
+        until(lambda: script("return page.inside.open"))
+        script("page.inside.open_(arguments[0])", before + 3)
+        until(lambda: script("return page.inside.panes.length") == 2)
+        script("page.showLayer('sets'); page.inside.seek(page.inside.sweeps.findIndex(([level]) => level === 0) + 2, 1)")
+        until(lambda: script("return !page.inside.waiting"))
+        script("page.inside.pick(60, 64)")
+        until(lambda: script("return page.view.panes.every(({why}) => why)"))
+        shown(driver, width=1400, height=1500)
+        script("scrollTo(0, 0)")
+        keep(driver, "inside")
 
 
 if __name__ == "__main__":

@@ -524,10 +524,24 @@ JSON = st.recursive(
     max_leaves=6,
 )
 FIELDS = ("name", "result", "what", "layer", "left", "top", "width", "height", "step", "tiled", "job", "method", "seed")
-FIELDS += ("options", "part", "guide", "hole", "of")
+FIELDS += ("options", "part", "guide", "hole", "of", "open", "beside", "level", "sweep", "sets", "row", "col")
+
+
+def test_a_page_without_a_picture_gets_a_small_run_to_play(page, monkeypatch):
+    monkeypatch.setattr(sessions, "DEMO_SIDE", 20)
+    message, pictures = page.ask("demo", kind="demo")
+    assert len(pictures) > 15 and len(set(pictures)) > 15
+    assert {len(one) for one in pictures} == {4 * message["width"] * message["height"]}
+
+
+def test_a_picture_ends_the_small_run(page):
+    page.say(kind="demo")
+    assert page.ask("picture", png(texture()), kind="open", name="t.png", timeout=10)[0]["new"]
+    assert "demo" not in page.kinds()
 
 
 KINDS = ["hello", "open", "example", "map", "unmap", "pause", "resume", "cancel", "view", "shown", "select", "download"]
+KINDS += ["inside", "seek", "explain"]
 
 
 @given(

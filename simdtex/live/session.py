@@ -34,6 +34,7 @@ from simdtex.machine import Machine
 from simdtex.methods import mrf
 from simdtex.model.colours import temperature_colours
 from simdtex.options import one_of, resolve
+from simdtex.synthesis import synthesize
 
 __all__ = ["MAX_BYTES", "MAX_PIXELS", "Message", "Send", "Session"]
 
@@ -62,6 +63,9 @@ PREVIEW = 512
 
 LARGE = 1024
 """The middle of a picture with a longer side is the sample at first."""
+
+DEMO_SIDE = 160
+"""Rows and columns of the run that a page without a picture plays."""
 
 INTERVAL = 4
 """Time between two frames of a run in units of what the last one took: frames take at most a quarter of a run."""
@@ -234,6 +238,25 @@ class Session:
         self._wanted, self._selected, self._stale, self._paused = None, None, True, False
         self._asked = None
         self._send_picture(new=True)
+
+    def _on_demo(self, message: Message, buffers: Sequence[Any]) -> None:
+        """Send the pictures of a small run, which the page plays while it has no picture; any message ends the run."""
+        if self._picture is not None:
+            return
+        side, shape = 3 * DEMO_SIDE // 5, (DEMO_SIDE, DEMO_SIDE)
+        sample = example("gravel")[:side, :side]
+        pictures: list[bytes] = []
+
+        def keep(progress: Any) -> None:
+            if self._closed or not self._messages.empty():
+                raise Cancelled
+            if progress.end_of_sweep and (progress.level < progress.levels - 1 or progress.sweep % 4 == 0):
+                layer = frames.picture(progress.image(), sample, shape)
+                pictures.append(frames.thumbnail(layer, DEMO_SIDE).pixels)
+
+        with suppress(Cancelled):
+            synthesize(sample, shape, rng=1, device=self._machine, callback=keep)
+            self.send({"kind": "demo", "width": DEMO_SIDE, "height": DEMO_SIDE}, pictures)
 
     def _on_map(self, message: Message, buffers: Sequence[Any]) -> None:
         given = _read(message, buffers)

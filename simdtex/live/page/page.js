@@ -63,9 +63,11 @@ class Page {
   /** What the page begins with. */
   startSection() {
     this.examples = make("div", { class: "examples" });
+    this.demo = make("canvas", { class: "demo", width: 1, height: 1, role: "img", "aria-label": "A run: large shapes settle first." });
     this.start = make(
       "section",
       { "aria-label": "Start", class: "start" },
+      this.demo,
       make("h2", {}, "Drop a picture of a texture here"),
       make("p", {}, "or paste one, or choose a file:"),
       this.fileInput("A picture", "open"),
@@ -792,6 +794,7 @@ class Page {
       this.showJob();
     }
     this.say("Ready.");
+    if (message.fresh) setTimeout(() => !this.start.hidden && this.send({ kind: "demo" }), 300); // any message ends its run
     this.strip.replaceChildren(this.currentItem);
     this.results.clear();
     this.shown = null;
@@ -815,6 +818,22 @@ class Page {
     if (this.given.bytes) this.send({ kind: "open", name: this.given.name }, [this.given.bytes]);
     else this.send({ kind: "example", name: this.given.name });
     for (const { name, bytes } of this.given.maps.values()) this.send({ kind: "map", name }, [bytes]);
+  }
+
+  /** Play the pictures of a small run until there is a picture. */
+  on_demo({ width, height }, pictures) {
+    const shown = pictures.map((bytes) => bitmap(bytes, width, height));
+    [this.demo.width, this.demo.height] = [width, height];
+    const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+    let number = still ? shown.length - 1 : 0;
+    const next = () => {
+      this.demo.getContext("2d").drawImage(shown[number], 0, 0);
+      if (still || this.start.hidden) return;
+      const last = number === shown.length - 1;
+      number = last ? 0 : number + 1;
+      setTimeout(next, last ? 2000 : 120);
+    };
+    next();
   }
 
   example(name) {
