@@ -78,12 +78,13 @@ def main():
         script("page.brush.end()")
         made(before + 1)
         keep(driver, "classes")
-        script("page.clear(); page.tool.value = ''; page.auto.checked = false; page.job.value = 'synth'; page.showJob()")
+        script("page.clear(); page.tool.value = ''; page.job.value = 'synth'; page.showJob()")
         drop(driver, sample)
         made(before + 2)
         for count, schedule in enumerate(("coloring", "checkerboard"), before + 3):
             script(
-                "page.width.value = page.height.value = 128; page.options.mrf.values = {schedule: arguments[0]}; page.make()",
+                "page.width.value = page.height.value = 128;"
+                "page.options.mrf.values = {schedule: arguments[0]}; page.make()",
                 schedule,
             )
             made(count)
@@ -91,7 +92,8 @@ def main():
         until(lambda: script("return page.inside.open"))
         script("page.inside.open_(arguments[0])", before + 3)
         until(lambda: script("return page.inside.panes.length") == 2)
-        script("page.showLayer('sets'); page.inside.seek(page.inside.sweeps.findIndex(([level]) => level === 0) + 2, 1)")
+        script("page.showLayer('sets')")
+        script("page.inside.seek(page.inside.sweeps.findIndex(([level]) => level === 0) + 2, 1)")
         until(lambda: script("return !page.inside.waiting"))
         script("page.inside.pick(60, 64)")
         until(lambda: script("return page.view.panes.every(({why}) => why)"))
