@@ -130,11 +130,13 @@ def test_what_cannot_be_looked_into(page):
 
 
 def test_the_lattice_and_its_faults_are_sent():
-    i, j = np.indices((48, 48))
+    i, j = np.indices((50, 50))
     bricks = np.where(((i % 8 < 2) | ((j + 6 * (i // 8 % 2)) % 12 < 2)), 230, 90).astype(np.uint8)
     bricks += np.random.default_rng(0).integers(0, 9, bricks.shape, np.uint8)
     page = Fake(Picture("bricks.png", bricks, None))
     try:
+        cols, rows = page.ask("picture", kind="hello")[0]["size"]
+        assert (cols % 12, rows % 16) == (0, 0), "a lattice of bricks fits the first size"
         told = page.result(width=48, height=48)
         assert len(told["lattice"]["vectors"]) == 2 and "faults" in told["layers"]
         page.say(kind="view", layer="faults", left=0, top=0, width=48, height=48, step=1)

@@ -26,13 +26,15 @@ from simdtex.io.examples import EXAMPLES, example
 from simdtex.io.image import read_bytes
 from simdtex.live import frames
 from simdtex.live.inside import Inside
-from simdtex.live.job import LABELS, Hint, Job, Message, Picture, file_stem
+from simdtex.live.job import LABELS, MIN_REGION, Hint, Job, Message, Picture, file_stem
 from simdtex.live.levels import Levels
 from simdtex.live.results import THUMBNAIL, Result, Results
 from simdtex.live.words import METHODS, TABLES, controls
 from simdtex.machine import Machine
 from simdtex.methods import mrf
 from simdtex.model.colours import temperature_colours
+from simdtex.model.pictures import Pictures
+from simdtex.model.regularity import plain, regular
 from simdtex.options import one_of, resolve
 from simdtex.synthesis import synthesize
 
@@ -56,7 +58,7 @@ MAX_QUEUE = 64
 """Messages that wait to be handled, at most."""
 
 STARTING_SIDE = 512
-"""The first output is twice as large as its sample, and no side of it is longer than this, pixels."""
+"""The first output is about twice as large as its sample, and no side is much longer than this, pixels."""
 
 PREVIEW = 512
 """The longest side of the preview of the picture, pixels."""
@@ -487,11 +489,21 @@ def _examples() -> dict[str, NDArray[np.uint8]]:
 
 
 def _beginning(picture: Picture) -> tuple[list[int] | None, list[int]]:
-    """Return the part of a picture that is the sample at first, None if all is, and the output's width and height."""
+    """Return the part of a picture that is the sample at first, None if all is, and the output's width and height.
+
+    The output of a regular sample has a size that its lattice fits.
+    """
     rows, cols = picture.pixels.shape[:2]
     width, height = min(cols, LARGE), min(rows, LARGE)
     part = [(cols - width) // 2, (rows - height) // 2, width, height] if max(rows, cols) > LARGE else None
-    return part, [min(2 * width, STARTING_SIDE), min(2 * height, STARTING_SIDE)]
+    size = (min(2 * height, STARTING_SIDE), min(2 * width, STARTING_SIDE))
+    if max(rows, cols) <= STARTING_SIDE and min(rows, cols) >= MIN_REGION:
+        pixels = picture.pixels.reshape(rows, cols, -1)
+        if np.isfinite(pixels).all():
+            (grey,), (known,) = plain(Pictures((pixels,)))
+            lattice = regular(grey, known)
+            size = lattice.fitting(size) if lattice else size
+    return part, [size[1], size[0]]
 
 
 def _read(message: Message, buffers: Sequence[Any]) -> Picture:
