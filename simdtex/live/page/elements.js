@@ -89,10 +89,13 @@ class Options {
     }
     const [least, most, step] = control.span;
     const input = number({ step: "any", min: control.least, placeholder: control.empty || null, onchange });
-    const slider = make("input", { type: "range", min: least, max: most, step, "aria-label": `${label}, slider` });
+    const usual = control.usual ?? least;
+    const mark = make("datalist", { id: `simdtex-${++count}` }, make("option", { value: usual }));
+    const attributes = { type: "range", min: least, max: most, step, list: mark.id, title: "Double-click for the default" };
+    const slider = make("input", { ...attributes, "aria-label": `${label}, slider` });
     const note = make("small", { class: "beyond", role: "status" });
     const follow = () => {
-      slider.value = input.value === "" ? (control.usual ?? least) : input.value;
+      slider.value = input.value === "" ? usual : input.value;
       slider.classList.toggle("automatic", input.value === "");
       const beyond = Number(input.value) > most;
       note.textContent = beyond ? `More than ${most}: a run can take many times as long, or need too much memory.` : "";
@@ -102,6 +105,10 @@ class Options {
       follow();
     });
     slider.addEventListener("change", onchange);
+    slider.addEventListener("dblclick", () => {
+      set(control.default);
+      onchange();
+    });
     input.addEventListener("input", follow);
     const get = () => (input.value === "" ? null : Number(input.value));
     const set = (value) => {
@@ -111,7 +118,7 @@ class Options {
     this.fields.set(name, { get, set });
     set(control.default);
     const field = labelled(label, input, hint);
-    input.after(slider, note);
+    input.after(slider, mark, note);
     return field;
   }
 
