@@ -140,7 +140,7 @@ BAD_FILL = {
     "maps beside a sample": ([*MASKED, "--sample", "texture.png", "--also", "normal.png=n.png"], "leave --also out"),
     "a map of another size": ([*MASKED, "--also", "small.png=n.png"], "32x24"),
     "a source map that holds no -1": ([*MASKED, "--sample", "texture.png", "--source-map", "s.png"], ".npz"),
-    "weights in words": ([*MASKED, "--weights", "much"], "numbers parted by commas"),
+    "weights in words": ([*MASKED, "--weights", "much"], "numbers separated by commas"),
 }
 
 

@@ -58,7 +58,7 @@ def test_a_folder_that_is_gone_is_named(folder):
     command = ["synth", "sample.png", *SYNTH[2:]]
     line = " ".join(["mkdir gone && cd gone && rmdir ../gone &&", sys.executable, "-m", "simdtex", *command])
     done = subprocess.run(line, shell=True, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
-    said = "simdtex: the working folder does not exist any more: change to another one\n"
+    said = "simdtex: the current folder no longer exists: change to another one\n"
     assert (done.returncode, done.stderr) == (2, said)
 
 

@@ -216,7 +216,7 @@ def _maps(maps: dict[str, Any], plan: Plan) -> dict[str, list[NDArray[Any]]]:
     """Return further maps as lists with one for each picture of the sample; raise if they do not fit."""
     found, sizes = {}, [picture.shape[:2] for picture in plan.sample.pictures.pixels]
     if maps and plan.given is not None:
-        raise ValueError("known pixels are from no sample, and nothing says what a map has there; leave the maps out")
+        raise ValueError("the maps have no values for known pixels, which are not from the sample; leave the maps out")
     for name, given in maps.items():
         if not name.isidentifier() or name in TAKEN:
             raise ValueError(f"{name!r} is no name of a map; give a word other than {', '.join(TAKEN)}")
@@ -233,7 +233,9 @@ def _made(store: PathLike) -> Iterator[str]:
     """Yield where to make a store, so that it exists completely or not at all."""
     path = Path(store)
     if path.exists():
-        raise ValueError(f"{path} is there already; remove it, give another name, or go on with: simdtex resume {path}")
+        raise ValueError(
+            f"{path} is there already; remove it, give another name, or continue with: simdtex resume {path}"
+        )
     if not path.parent.is_dir():
         raise ValueError(f"the folder {path.parent} does not exist; make it first")
     with atomic_folder(path) as temporary:
@@ -280,7 +282,7 @@ def _mending(store: Any) -> Iterator[None]:
     try:
         yield
     except NotWritten as error:
-        raise ValueError(f"{error}, and go on with: simdtex resume {store.where}") from None
+        raise ValueError(f"{error}, and continue with: simdtex resume {store.where}") from None
     except Damaged as error:
         where, part = store.where, str(error)
         if not os.path.exists(os.path.join(where, "zarr.json")):
