@@ -167,7 +167,7 @@ BAD = {
         "opacity.png is 5x4 and brick_albedo.png 24x20",
         "brick/opacity.png",
     ),
-    "no albedo": (["extend", "none", *TO], "has no albedo: end the name of one in _albedo", "none/b_normal.png"),
+    "no albedo": (["extend", "none", *TO], "has no albedo: end the name of a map in _albedo", "none/b_normal.png"),
     "no maps at all": (["extend", "none", *TO], "no albedo (b.png is of unknown kind): end", "none/b.png"),
     "a file as output": (["extend", "brick", "-o", "out.png", *SEAMLESS], "give a folder for the output", None),
     "a store as output": (["synth", "brick", "-o", "out.zarr"], "give a folder for the output", None),

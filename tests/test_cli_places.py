@@ -215,7 +215,7 @@ def test_a_missing_input_is_named(folder, pair):
         rest += ["--mask", "map.png"]
     if name == "extend":
         rest += ["--left", "3"]
-    refused(folder, name, [*reading(given, missing), *rest], "does not exist: check the path of")
+    refused(folder, name, [*reading(given, missing), *rest], "does not exist: check the path")
     if isinstance(given.type, Place) and given.type.role == "read":
         refused(folder, name, [*words(given, "in"), *rest], "is a folder")
     empty = CliRunner().invoke(cli.main, [name, *words(given, ""), *rest])

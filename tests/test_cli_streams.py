@@ -43,7 +43,7 @@ def test_a_closed_stream_takes_nothing_away(folder, closed):
 def test_a_full_standard_output_is_one_sentence(folder, words, unbuffered):
     done = run(folder, [*words, ">/dev/full"], PYTHONUNBUFFERED=unbuffered, SIMDTEX_DEVICE="reference")
     assert done.returncode == 2
-    said = b"simdtex: standard output could not be written (No space left on device): send it elsewhere\n"
+    said = b"simdtex: standard output could not be written (No space left on device): redirect it\n"
     assert done.stderr == said
     assert (folder / "out.png").exists() == (words is SYNTH)
 
