@@ -213,7 +213,7 @@ def test_a_path_wins_over_a_number(folder):
     np.testing.assert_array_equal(picture(), expected)
 
 
-P = "give the path of one as it stands in the command, or its number, 1 to 2"
+P = "give the path of one as in the command, or its number, 1 to 2"
 BAD_MIX = {k: v for k, v in BAD_PYRAMID.items() if k != "overwritten sample"} | {
     "unknown palette": (["--palette", "grey.png"], f"--palette grey.png is none of the samples; {P}"),
     "pattern 0": (["--pattern", 0], f"--pattern 0 is none of the samples; {P}"),

@@ -112,7 +112,7 @@ def _sides(text: str, sides: dict[str, int], shape: tuple[int, int]) -> dict[str
     from simdtex.io.image import parse_size
 
     if any(sides.values()):
-        raise ValueError("--size excludes --left, --right, --top and --bottom; give it or them")
+        raise ValueError("--size cannot be used with --left, --right, --top or --bottom; leave them out")
     more = [new - old for new, old in zip(parse_size(text), shape, strict=True)]
     if min(more) < 0:
         raise ValueError(
