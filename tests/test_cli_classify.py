@@ -100,7 +100,7 @@ def test_the_report_shows_labels_fits_and_the_confusion(folder):
     assert numbers["confusion"] == confusion
     right = (labels == truth)[truth < 3].mean()
     assert numbers["accuracy"] == pytest.approx(right)
-    assert f"{right:.1%} as in --truth" in result.output
+    assert f"{right:.1%} of the pixels agree with --truth" in result.output
     page = read_page(folder / "page/index.html")
     assert_needs_nothing_else(page)
     text = (folder / "page/index.html").read_text()

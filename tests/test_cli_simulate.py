@@ -268,7 +268,7 @@ BAD = {
     "a report of next to nothing": (["grey.png", "-o", "out.npz", "--size", "9x3", "--report", "report"], "4x4 pixels"),
     "a report of colour": (["colour.png", "-o", "out.npz", "--report", "report"], "one variable"),
     "a report of vast values": (["huge.npy", "-o", "out.npz", "--report", "report"], "up to 1e+100; give them in"),
-    "a report of gaps": (["holed.tif", "-o", "out.npz", "--report", "report"], "known everywhere"),
+    "a report of gaps": (["holed.tif", "-o", "out.npz", "--report", "report"], "without unknown cells"),
 }
 
 
@@ -348,7 +348,7 @@ def test_cells_outside_of_the_region_are_unknown_in_a_grid(folder, maps):
         (["--scale", "nowhere.npy"], "nowhere.npy does not exist"),
         (["--image-map", "numbers.npy"], "image_map has 1 and there is 1 training image"),
         (["--source", "-o", "out.gslib"], "is a grid, which holds no source map: end its name in .zarr, .nc or .npz"),
-        (["--source", "--report", "report"], "leave --source and --region out"),
+        (["--source", "--report", "report"], "--report cannot be used with --source or --region"),
     ],
 )
 def test_maps_that_do_not_fit_are_refused_before_the_run(folder, maps, words, sentence):

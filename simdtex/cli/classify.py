@@ -169,5 +169,5 @@ def _summary(true: NDArray[Any] | None, names: dict[int, str], labels: NDArray[A
     text = ", ".join(f"{name} {share:.1%}" for name, share in shares)
     if true is not None:
         there = true != UNLABELLED
-        text += f"; {(labels == true)[there].mean():.1%} as in --truth"
+        text += f"; {(labels == true)[there].mean():.1%} of the pixels agree with --truth"
     return text

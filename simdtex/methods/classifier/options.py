@@ -62,6 +62,7 @@ class Options:
         Number(0, 100),
         "Set the weight of neighbouring labels: 0 labels each pixel by its own evidence",
         slider=(0, 20, 0.5),
+        label="Weight of neighbours",
     )
     sweeps: int = field(10, Whole(0, 1000), "Relax labels in at most this many sweeps: fewer if no label changes")
     schedule: str | schedules.Schedule = field(
@@ -75,6 +76,7 @@ class Options:
         Number(0, 1),
         "Label a pixel unknown if its fit, a probability, is below this",
         slider=(0, 0.5, 0.01),
+        label="Unknown below a fit of",
         shown=ALL,
     )
     window: float = rejection(

@@ -252,6 +252,7 @@ class Options:
         symbol="xi of equation (13)",
         paper=-1.0,
         slider=(-4, -0.25, 0.25),
+        label="Cooling (xi)",
     )
     free_sweeps: int = sampling(
         2,

@@ -28,6 +28,7 @@ class Options:
         more="0 tiles the sample, except for parts that are equal to the bit; infinity samples every band separately.",
         symbol="alpha of T = alpha / k^beta, equation (13)",
         slider=(0, 1, 0.01),
+        label="Threshold (alpha)",
     )
     beta: float = appearance(
         0.0,
