@@ -63,7 +63,7 @@ def synthesize(
     note: Callable[[str], None] | None = None,
     **options: Any,
 ) -> Any:
-    """Make more of a texture than one machine holds: the bytes of `simdtex.synthesize` with ``method="mrf"``.
+    """Synthesise an output larger than one machine: the bytes of `simdtex.synthesize` with ``method="mrf"``.
 
     Parameters
     ----------
@@ -72,12 +72,12 @@ def synthesize(
     shape : (int, int)
         Rows and columns of the output.
     store : path
-        Folder of the Zarr store to make, which every worker reaches. `resume` goes on from it if the run is stopped.
+        Folder of the Zarr store to make, which every worker can reach. `resume` continues an interrupted run.
     tiles : int
-        Sites to the side of a tile, which determine the memory of a worker and not the result.
+        Sites on a side of a tile. They determine the memory of a worker and not the result.
     workers : int, str or distributed.Client, optional
-        What does the tiles: so many processes on this machine, which divide its cores among them; the workers of the
-        Dask scheduler at an address; those of a client. Each opens its own device. None: this process, one by one.
+        The workers that make the tiles: a number of processes on this machine, which share its cores; the address of a
+        Dask scheduler; or a client. Each worker opens its own device. None: this process makes the tiles one by one.
     source_map : bool
         Also write ``source``, for every output pixel the (row, column[, picture]) of the sample pixel it is from.
     maps : dict, optional
@@ -108,8 +108,8 @@ def synthesize(
 
     Notes
     -----
-    A tile relaxes in a window that is as much larger as a sweep reaches, so the cost is that of `simdtex.synthesize`
-    and the redundant work that `plan` states. Memory of a worker: what `plan` states, whatever the output's size.
+    A tile relaxes in a window that is larger by the reach of a sweep, so the cost is that of `simdtex.synthesize` plus
+    the redundant work in `plan`. The memory of a worker is that in `plan`, for any size of output.
     """
     size = check_shape(shape)
     inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
