@@ -329,7 +329,7 @@ def explain(
     >>> from skimage import data
     >>> import simdtex
     >>> why = simdtex.explain(data.brick()[:32, :32], (32, 32), (5, 7), order=2, rng=1)
-    >>> why.drawn, why.candidates.rank[why.taken]
+    >>> why.drawn, int(why.candidates.rank[why.taken])
     (False, 0)
     """
     size = check_shape(shape)

@@ -96,7 +96,7 @@ def estimate(
     >>> known[2, 1] = 1
     >>> found = simdtex.estimate(training, known=known, categorical=True)
     >>> found.probability.sel(category=1)[2].values.round(2).tolist()
-    [0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+    [0.0, 1.0, 0.0, 0.0, 0.0, 0.88]
     """
     xr = require_xarray()
     whole("nearest", nearest, 0, MOST)
