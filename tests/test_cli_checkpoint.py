@@ -136,7 +136,7 @@ def test_resume_writes_the_files_of_a_run_that_was_never_stopped(name, place, tm
 
     again = run("resume", "begun/kept")
     assert again.exit_code == 2
-    assert "begun/kept does not exist: check the path, or the run is finished" in again.output
+    assert "begun/kept does not exist: check the path (a finished run has no checkpoint)" in again.output
     assert made(place) == expected
 
 
@@ -189,7 +189,7 @@ def test_a_file_whose_name_looks_like_an_option(place, monkeypatch):
 
 
 def test_what_is_no_checkpoint(place):
-    refused(place, "nothing does not exist: check the path, or the run is finished", "resume", "nothing")
+    refused(place, "nothing does not exist: check the path (a finished run has no checkpoint)", "resume", "nothing")
     (place / "other").mkdir()
     refused(place, "other is a folder; give the file of --checkpoint, or the store of --tiles", "resume", "other")
     refused(place, "sample.png is no checkpoint, or is damaged; remove it", "resume", "sample.png")

@@ -200,7 +200,7 @@ BAD_EXTEND = {
     "smaller": ([*PHOTO, "--size", "30x40"], "smaller than the picture of 32x24"),
     "the size it has": ([*PHOTO, "--size", "32x24"], "nothing to add"),
     "a size and sides": ([*PHOTO, "--size", "40x40", "--left", 3], "--size cannot be used with --left"),
-    "a direction": ([*PHOTO, "--seamless", "z"], "--seamless z is no direction; give x, y or both"),
+    "a direction": ([*PHOTO, "--seamless", "z"], "--seamless z is not a direction; give x, y or both"),
     "a band of nothing": ([*PHOTO, "--left", 3, "--band", 3], "--seamless"),
 }
 

@@ -60,7 +60,7 @@ def test_a_command_has_the_options_of_the_tables_that_it_shows(name):
 def test_a_group_names_its_method():
     said = help_of("synth")
     assert re.search(r"Method multires: appearance:\n  --alpha FLOAT +Exchange places", said)
-    assert re.search(r"--known FILE +mrf: keep these", said), "a group of several methods names each method"
+    assert re.search(r"--known FILE +mrf: Keep these", said), "a group of several methods names each method"
     assert "Method" not in help_of("fill") and "\nSearch:\n" in help_of("fill")
     assert said.index("Job:") < said.index("Scales and edges:") < said.index("Device and messages:")
 

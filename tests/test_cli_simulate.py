@@ -385,7 +385,7 @@ def test_an_estimate_is_that_of_the_function(folder, out):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["grey.png"], "there is nothing to estimate from; give --known"),
+        (["grey.png"], "an estimate requires data; give --known"),
         (["colour.png", "--known", "wells.csv"], "has several channels; give a training image of one variable"),
         (["grey.png", "--known", "wells.csv", "--nearest", 99], "nearest is 99; give 64 or fewer"),
     ],

@@ -72,7 +72,7 @@ def estimate(
     data = None if known is None else read_known(known, material)
     shape = output_shape(size, material.pixels[0], data, material.pixels[0])
     if data is None:
-        raise ValueError("there is nothing to estimate from; give --known")
+        raise ValueError("an estimate requires data; give --known")
     lies = lies_of(material, options.pop("origin"), options.pop("cell"))
     grid = check_realisations_path(output) in SUFFIXES
     if grid:

@@ -78,7 +78,7 @@ def extend(
     if size is not None:
         sides = _sides(size, sides, (rows, cols))
     if seamless not in (None, "x", "y", "both"):
-        raise ValueError(f"--seamless {seamless} is no direction; give x, y or both")
+        raise ValueError(f"--seamless {seamless} is not a direction; give x, y or both")
     tiling: bool | str = seamless if seamless in ("x", "y") else bool(seamless)
     if not (tiling or any(sides.values())):
         raise ValueError("there is nothing to add; give --left, --right, --top, --bottom or --size, or --seamless")

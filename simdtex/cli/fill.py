@@ -53,7 +53,7 @@ from simdtex.cli.places import READ, WRITE
 @click.option(
     "--reach",
     type=int,
-    help="Fill a hole from the surroundings up to this far away, in pixels.  [128, or twice its longer side]",
+    help="Fill a hole from the surroundings up to this far away, in pixels.  [128, or twice the hole's longer side]",
 )
 @ALSO
 @SOURCE_MAP
@@ -80,7 +80,7 @@ def fill(
     if texture:
         check_profiles([picture, samples[0]], [whole.metadata, texture.metadata])
     if texture and also:
-        raise ValueError("with --sample no pixel comes from the picture, nor from its maps; leave --also out")
+        raise ValueError("--also cannot be used with --sample, since no pixel comes from the picture; leave --also out")
     others = read_also(also, whole)
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, texture or whole, everywhere=not texture)

@@ -54,7 +54,7 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tupl
             more = f" and {len(strange) - 1} more" if len(strange) > 1 else ""
             raise ValueError(
                 f"{out} has the colour {tuple(strange[0].tolist())}{more}, which {', '.join(map(str, paths))} "
-                f"{'has' if len(paths) == 1 else 'have'} not; paint with the colours of the labels, without soft "
+                f"{'does' if len(paths) == 1 else 'do'} not have; paint with the colours of the labels, without soft "
                 "edges, or give --no-labels"
             )
         own, wanted, labels = [_numbers(one, known) for one in own], _numbers(wanted, known), True

@@ -295,7 +295,7 @@ def check_source_map(path: Path | None, samples: Material, *, everywhere: bool =
     image.check_writable(path, suffixes=SOURCE_SUFFIXES)
     far = max(max(sides) for sides in samples.sizes) > 2**16
     if path.suffix.lower() == ".png" and (far or not everywhere):
-        what = "positions over 65535" if far else "pixels that are from no sample"
+        what = "positions over 65535" if far else "pixels that are not from the sample"
         raise ValueError(f"{path} cannot hold {what}; end its name in .npz instead")
 
 

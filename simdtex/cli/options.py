@@ -31,19 +31,35 @@ class Option(click.Option):
     """An option in a ``group`` of the help.
 
     The shell completes ``words``, which are the metavar if they are few; ``kind`` is the declared kind of an option of
-    a method.
+    a method. The help names ``method`` in a command that has several, and ends in ``with_tiles`` in one with tiles.
     """
 
     def __init__(
-        self, *names: Any, group: str = JOB, words: Iterable[str] = (), kind: Any = None, **given: Any
+        self,
+        *names: Any,
+        group: str = JOB,
+        words: Iterable[str] = (),
+        kind: Any = None,
+        method: str = "",
+        with_tiles: str = "",
+        **given: Any,
     ) -> None:
         super().__init__(*names, **given)
         self.group, self.words, self.kind = group, list(dict.fromkeys(words)), kind
+        self.method, self.with_tiles = method, with_tiles
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Return the words that begin so; else what the type completes."""
         found = [CompletionItem(word) for word in self.words if word.startswith(incomplete)]
         return found or super().shell_complete(ctx, incomplete)
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """Return the names and the help in this command."""
+        found, names = super().get_help_record(ctx), {one.name for one in ctx.command.params}
+        if found is None:
+            return None
+        help = f"{self.method}: {found[1]}" if self.method and "method" in names else found[1]
+        return found[0], f"{help} {self.with_tiles}".rstrip() if "tiles" in names else help
 
     def make_metavar(self, ctx: click.Context) -> str:
         """Return the words, if they are few."""
@@ -159,14 +175,16 @@ SAMPLE_MASK = option(
     multiple=True,
     type=READ,
     metavar="FILE",
-    help="mrf: take pixels only from the white parts of this mask, of the sample's size; give one for each sample.",
+    method="mrf",
+    help="Take pixels only from the white parts of this mask, of the sample's size; give one for each sample.",
 )
 KNOWN = option(
     "--known",
     group=DATA,
     type=READ,
     metavar="FILE",
-    help="mrf: keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of "
+    method="mrf",
+    help="Keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of "
     "Geo-EAS, or a picture or a grid whose unknown pixels are transparent or NaN.",
 )
 GUIDE = option(
@@ -174,7 +192,8 @@ GUIDE = option(
     group=DATA,
     type=READ_PAIR,
     metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
-    help="mrf: take each pixel from places where SAMPLE-GUIDE is like OUTPUT-GUIDE at the pixel: two pictures of "
+    method="mrf",
+    help="Take each pixel from places where SAMPLE-GUIDE is like OUTPUT-GUIDE at the pixel: two pictures of "
     "labels or numbers. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples.",
 )
 PLACES = (
@@ -213,7 +232,8 @@ SOURCE_MAP = option(
     group=OUTPUTS,
     type=WRITE,
     metavar="FILE",
-    help="Write the position in the sample of each pixel: .npz, .npy or .png; with --tiles STORE/source.",
+    help="Write the position in the sample of each pixel: .npz, .npy or .png.",
+    with_tiles="With --tiles FILE is STORE/source.",
 )
 ALSO = option(
     "--also",
@@ -221,8 +241,8 @@ ALSO = option(
     multiple=True,
     type=WRITE_PAIR,
     metavar="MAP=OUT",
-    help="Arrange another map of the material (normal, height) like the output; may be repeated. Give "
-    "MAP0,MAP1=OUT for several samples. With --tiles OUT is STORE/NAME.",
+    help="Arrange another map of the material (normal, height) like the output; may be repeated.",
+    with_tiles="Give MAP0,MAP1=OUT for several samples. With --tiles OUT is STORE/NAME.",
 )
 
 

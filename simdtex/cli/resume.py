@@ -38,7 +38,7 @@ def resume(path: Path, workers: str | None, device: str | None, quiet: bool) -> 
     if workers is not None:
         raise ValueError("--workers requires the .zarr store of --tiles; leave it out")
     if not path.exists():
-        raise ValueError(f"{path} does not exist: check the path, or the run is finished")
+        raise ValueError(f"{path} does not exist: check the path (a finished run has no checkpoint)")
     if path.is_dir():
         raise ValueError(f"{path} is a folder; give the file of --checkpoint, or the store of --tiles")
     repeat_command(path, [*(["--device", device] if device else []), *(["--quiet"] if quiet else [])])

@@ -88,7 +88,7 @@ def block_shape(text: str) -> tuple[int, int, int]:
     sides = [int(side or match[1]) for side in match.groups()] if match else [0]
     if 0 in sides:
         raise ValueError(
-            f"size {text!r} is not DEPTHxHEIGHTxWIDTH: give slices x rows x columns of 1 or more, as 64x128x128, or "
-            "one number for a cube"
+            f"size {text!r} is not DEPTHxHEIGHTxWIDTH: give slices x rows x columns of 1 or more, such as 64x128x128, "
+            "or one number for a cube"
         )
     return sides[0], sides[1], sides[2]

@@ -31,7 +31,8 @@ def tiles_options(command: Callable[..., Any]) -> Callable[..., Any]:
             group=RUNS,
             type=int,
             metavar="SIDE",
-            help="mrf: make the output in tiles of this many pixels a side, in a .zarr store, for outputs larger than "
+            method="mrf",
+            help="Make the output in tiles of this many pixels a side, in a .zarr store, for outputs larger than "
             "one machine. The pixels are the same.",
         ),
     ):
