@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""More of a texture from a sample of it, by parallel relaxation on any OpenCL device."""
+"""Texture synthesis from samples, by parallel relaxation on any OpenCL device."""
 
 from __future__ import annotations
 

@@ -59,32 +59,33 @@ class Checkpointing:
 class Checkpoint:
     """A file that keeps the latest state of one run.
 
-    Public functions take one, or the file's path, as ``checkpoint``. If the file exists, the run goes on from its
-    state, and the result has the bytes of a run that was never stopped. With a path, the file is removed when the
-    function returns; with a Checkpoint, by `remove`.
+    Public functions take one, or the file's path, as ``checkpoint``. If the file exists, the run continues from its
+    state, and the result has the bytes of an uninterrupted run. With a path, the file is removed when the function
+    returns; with a Checkpoint, by `remove`.
 
     Parameters
     ----------
     path : path
         The file; its folder must exist. One process at a time uses it.
     every : float, optional
-        Seconds between two writes at least; 0 writes after every step. None: a second, and 75 times what the last write
-        took, so that writing takes less than 2 % of the time; but five minutes at most.
+        Least number of seconds between two writes; 0 writes after every step. None: 75 times as long as the last write
+        took, so that writing takes less than 2 % of the time, but at least a second and at most five minutes.
     command : dict, optional
         The command line, for ``simdtex resume``.
     note : callable, optional
-        Receives a sentence for the user. None: a warning.
+        Receives messages for the user. None: they are warnings.
 
     Attributes
     ----------
     running : bool
-        Whether a run is going on, which `stop` stops after its present step.
+        Whether a run is in progress; `stop` stops it after the current step.
     resumed : bool
-        Whether that run went on from a state.
+        Whether that run continued from a state.
 
     Notes
     -----
-    A state takes on disk about what the run takes on the device. If writing fails, the run goes on and tries again.
+    A state takes about as much space on disk as the run takes on the device. If a write fails, the run continues and
+    tries again later.
     """
 
     def __init__(

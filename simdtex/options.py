@@ -201,7 +201,7 @@ PRESETS = ("default", "paper")
 PRESET = Option(
     "default",
     Choice(PRESETS),
-    "Begin with the defaults of the method (default), or with the rules of its paper (paper)",
+    "Start from the defaults of the method (default), or from the rules of its paper (paper)",
     group="Job",
 )
 """The option ``preset``, which every method has in addition to its table."""

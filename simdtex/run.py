@@ -21,14 +21,14 @@ class Progress:
     Attributes
     ----------
     level, levels : int
-        The present level (0 is the finest, and the last) and their number.
+        The current level (0 is the finest, and the last) and the number of levels.
     fraction : float
-        Share of the expected work that is done, 0 to 1; an estimate.
+        Estimated share of the work that is done, 0 to 1.
     image : callable
         ``image()`` reads back a picture, (rows, cols[, channels]) in the sample's type: that of the level, or of the
         level before if this one has none before its end.
     doing : str
-        The present work, in words.
+        Description of the current work.
     stage : str or None
         The name of the picture that is complete now: the end of a sweep, of a level that has none, or of an iteration.
     """
@@ -270,16 +270,16 @@ class Stage:
 
 @dataclass(frozen=True, repr=False)
 class Output:
-    """What ``full_output=True`` returns with the image.
+    """The additional results of ``full_output=True``.
 
     Attributes
     ----------
     source : (rows, cols, 2) int32 array or None
-        For every output pixel the (row, column) of the sample pixel it was taken from; with ``multires``, of the one
-        that its highest frequencies were taken from. With ``mrf`` and a finish, pixels near seams are means of that
-        pixel and of what their neighbours' sources say. None with ``pyramid``, which takes no pixel from anywhere.
+        For every output pixel the (row, column) of its source pixel in the sample; with ``multires``, of the source of
+        its highest frequencies. With ``mrf`` and a finish, pixels near seams are means of that pixel and of the pixels
+        that continue their neighbours' sources. None with ``pyramid``, which takes no pixel from the sample.
     temperature : (rows, cols) float64 array or None
-        ``mrf``: what is left of the pixel temperatures, 0 to 1.
+        ``mrf``: the remaining pixel temperatures, 0 to 1.
     stages : list of Stage
         Each level's picture at its end, the coarsest first; of ``mrf`` without the finish. None with ``pyramid``; its
         callback sees every iteration.
@@ -304,15 +304,14 @@ class Output:
     Notes
     -----
     A level of ``mrf`` has ``sweeps``, ``steps``, ``relaxations``, ``fma`` (of equation (12)), ``skipped`` (those of
-    them that a bound made needless; docs/concepts/search.rst), and ``equilibrium``: the
-    ``sweeps``, ``steps`` and ``relaxations`` until no temperature was left, free sweeps not counted. Its statistics
-    also have ``accounting`` if the option ``array`` is given, what the run costs on that processor array:
-    ``array``, ``mapping``; ``layers``, virtual layers; ``shifts``, X-Net shifts of a word that bring
-    every pixel of the finest level all its neighbours, for either mapping; ``steps``; ``passes``, SIMD steps: one for
-    each virtual layer of a step that has an active site; ``active``, the mean number of active PEs per pass;
-    ``utilisation``, that over all PEs; ``sites``, relaxations; ``moved``, words that each PE shifted; ``flop``,
-    32-bit operations in the distances; ``model_seconds``, the time of a MasPar MP-1 by the model of
-    `simdtex.maspar.accounting.Account`; and ``launches``, kernels enqueued on the device.
+    them that a bound made needless; docs/concepts/search.rst), and ``equilibrium``: the ``sweeps``, ``steps`` and
+    ``relaxations`` until no temperature was left, free sweeps not counted. Its statistics also have ``accounting`` if
+    the option ``array`` is given, what the run costs on that processor array: ``array``, ``mapping``; ``layers``,
+    virtual layers; ``shifts``, X-Net shifts of a word that bring every pixel of the finest level all its neighbours,
+    for either mapping; ``steps``; ``passes``, SIMD steps: one for each virtual layer of a step that has an active site;
+    ``active``, the mean number of active PEs per pass; ``utilisation``, that over all PEs; ``sites``, relaxations;
+    ``moved``, words that each PE shifted; ``flop``, 32-bit operations in the distances; ``model_seconds``, the time of
+    a MasPar MP-1 by the model of `simdtex.maspar.accounting.Account`; and ``launches``, kernels enqueued on the device.
 
     A level of ``multires`` has the mean number of ``candidates`` of a pixel and ``most`` of them; ``nodes``, pixels of
     the levels above in the sample's pyramid, and ``compared``, the mean number of them that a pixel was compared with

@@ -91,13 +91,13 @@ def synthesize(
     checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
-    """Make more of a texture from a sample of it.
+    """Synthesise a picture of any size with the texture of a sample.
 
     Parameters
     ----------
     sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array; or a list of such
-        The texture; any real type, any size that holds a neighbourhood. With ``mrf`` a float sample may have NaN where
-        it is unknown, or any be a masked array, and there may be several samples of one type, of any sizes.
+        The texture; any real type, any size that holds a neighbourhood. With ``mrf`` unknown pixels may be NaN or
+        masked, and there may be several samples of one type, of any sizes.
     shape : (int, int)
         Rows and columns of the output, each 1 or more; smaller or larger than the sample.
     method : {"mrf", "multires", "pyramid"}
@@ -106,30 +106,30 @@ def synthesize(
     channel_axis : int, optional
         The axis of the sample that holds channels; None for a grey sample.
     mask : (rows, cols) bool array, or a list of such, optional
-        ``mrf``: where pixels of the sample may be taken from; the others are still neighbours.
+        ``mrf``: True for pixels of the sample that may be taken; the others are still neighbours.
     known : array of `shape` (and the channel axis), HardData or path, optional
-        ``mrf``: values of the output that are given, and stay as they are to the bit: a masked array, or floats with
-        NaN where nothing is known; or a table (`simdtex.read_hard_data`) or its file. Of several variables (channels)
-        some may be known and others not.
+        ``mrf``: conditioning data, values of the output that do not change by a bit: a masked array, floats with NaN
+        for unknown values, a table (`simdtex.read_hard_data`) or its file. Some variables (channels) of a pixel may be
+        known and others not.
     known_source : (rows, cols, 2) int array, optional
-        ``mrf``: the (row, column) of the sample that known pixels are from, -1 for those from elsewhere; of several
-        samples (row, column, sample). Such pixels suggest how to go on.
+        ``mrf``: the (row, column) in the sample of known pixels, with several samples (row, column, sample); -1 for
+        pixels from elsewhere. Known pixels with a position suggest candidates that continue it.
     guide : (array, array), optional
-        ``mrf``: a picture of labels or numbers, (rows, cols) or (rows, cols, G), of the sample's size, and another of
-        the output's: where the latter has what, pixels come from where the former has the same. NaN in the latter
-        leaves it open. Of several samples, a list of pictures.
+        ``mrf``: two pictures of labels or numbers, (rows, cols) or (rows, cols, G), of the sample's size and of the
+        output's. A pixel comes from places where the first is like the second at the pixel; NaN in the second means no
+        guide. With several samples, the first is a list of pictures.
     rng : int or numpy.random.Generator, optional
-        The seed. The same seed gives the same bytes on every device. None takes a fresh one.
+        The seed. The same seed gives the same bytes on every device. None draws a random seed.
     device : str, optional
         Part of a device's name or platform, an index of ``simdtex devices``, or ``"reference"``. None takes
         SIMDTEX_DEVICE, else a GPU, else a CPU.
     callback : callable, optional
         Called with a `simdtex.run.Progress` several times a second.
     full_output : bool
-        Return statistics, stages, the source map and, of ``mrf``, temperatures too; of ``pyramid`` statistics alone.
+        Return statistics, stages, the source map and, with ``mrf``, temperatures too; with ``pyramid`` only statistics.
     checkpoint : path or simdtex.Checkpoint, optional
-        A file that keeps the state of the run. If the file is of a run of the same call that was stopped, the run goes
-        on from there, to the same bytes. The file is removed when the function returns.
+        A file that keeps the state of the run. If the file has the state of an interrupted run of the same call, the
+        run continues from it, to the same bytes. The file is removed when the function returns.
     **options
         Of the method, and ``preset``: see `simdtex.methods.mrf.Options`, `simdtex.methods.multires.Options` and
         `simdtex.methods.pyramid.Options`.
@@ -137,24 +137,24 @@ def synthesize(
     Returns
     -------
     image : array of the sample's type
-        `shape` plus the channel axis, where the sample has it.
+        `shape` plus the channel axis, if the sample has one.
     output : simdtex.run.Output
         Only with ``full_output=True``.
 
     Raises
     ------
     ValueError, TypeError
-        What is wrong and what would be right, in one sentence.
+        An argument is invalid; the message names the remedy.
 
     Notes
     -----
     Cost of ``mrf``: by default some 100 fma for every output pixel, neighbour and channel, whatever the sample's size,
-    since a site weighs about six candidates; the structure channel is a channel more. With ``search="exact"`` it is
-    about 14 fma for every output pixel, sample pixel, neighbour and channel, less what is proved to be needless; nearly
-    all of it at the finest level, since each coarser one has a quarter of the sites and of the candidates.
-    ``multires``: some hundred comparisons for every output pixel, growing slowly with the sample and quickly with
-    alpha. ``pyramid``: some 1700 multiply-adds and 8 sorted values for every output pixel, channel and iteration,
-    whatever the sample's size. Memory grows with output pixels plus sample pixels, never with their product.
+    since a site evaluates about six candidates; the structure channel is one more channel. With ``search="exact"`` it
+    is about 14 fma for every output pixel, sample pixel, neighbour and channel, less those that bounds skip; nearly all
+    of it at the finest level, since each coarser one has a quarter of the sites and of the candidates. ``multires``:
+    some hundred comparisons for every output pixel, growing slowly with the sample and quickly with alpha. ``pyramid``:
+    some 1700 multiply-adds and 8 sorted values for every output pixel, channel and iteration, whatever the sample's
+    size. Memory grows with output pixels plus sample pixels, never with their product.
 
     Examples
     --------
@@ -221,7 +221,7 @@ def synthesize_solid(
     Parameters
     ----------
     sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
-        The texture; isotropic ones work, since every slice of the block is to look like it.
+        The texture. It should be isotropic, since every slice of the block looks like it.
     shape : (int, int, int)
         Depth, rows and columns of the block, each 1 or more. It repeats without a seam in every direction.
     channel_axis : int, optional
@@ -236,8 +236,8 @@ def synthesize_solid(
         As in `synthesize`.
     **options
         See `simdtex.methods.pyramid.solid.Options`; ``start`` is a block, channels last. With ``pyramid="steerable"``
-        the 3-D Laplacian pyramid and the steerable pyramids of all x-y, x-z and y-z slices are matched;
-        ``"laplacian"`` is the first alone.
+        the 3-D Laplacian pyramid and the steerable pyramids of all x-y, x-z and y-z slices are matched; ``"laplacian"``
+        matches only the first.
 
     Returns
     -------
@@ -249,7 +249,7 @@ def synthesize_solid(
     Raises
     ------
     ValueError, TypeError
-        What is wrong and what would be right, in one sentence.
+        An argument is invalid; the message names the remedy.
 
     Notes
     -----
@@ -285,10 +285,10 @@ def explain(
     device: str | Machine | None = None,
     **arguments: Any,
 ) -> Explanation:
-    """Return why a site of a synthesis by the method ``mrf`` takes what it takes.
+    """Explain why a site takes its candidate, in a synthesis by the method ``mrf``.
 
-    The run is that of `synthesize` with the same arguments. It goes as far as the sweep, and in it to the step in which
-    the site relaxes; the explanation is of that relaxation, with the field as it is just before.
+    The run is that of `synthesize` with the same arguments, up to the step of the sweep in which the site relaxes. The
+    explanation describes that relaxation, with the field just before it.
 
     Parameters
     ----------
@@ -301,7 +301,7 @@ def explain(
     sweep : int, optional
         A sweep of the level, from 1, in which the site relaxes. None: the last one, which made the pixel.
     rng, device
-        As in `synthesize`; give the seed of the run that is to be explained.
+        As in `synthesize`; give the seed of the run to explain.
     **arguments
         ``channel_axis``, ``mask``, ``known``, ``known_source`` and ``guide`` as in `synthesize`, and the options of
         `simdtex.methods.mrf.Options`.
@@ -313,19 +313,20 @@ def explain(
     Raises
     ------
     ValueError, TypeError
-        What is wrong and what would be right, in one sentence; also where the site does not relax there, as one whose
-        value is known, or that keeps that of the level above.
+        An argument is invalid, or the site does not relax there, because its value is known or is that of the level
+        above.
 
     Notes
     -----
-    Cost: the run up to the end of the level, of whose sweeps a copy goes to the host; up to the sweep if one is given.
+    Cost: the run up to the end of the level, with a copy to the host after each of its sweeps; with `sweep`, the run up
+    to that sweep.
 
     Examples
     --------
     >>> from skimage import data
     >>> import simdtex
     >>> why = simdtex.explain(data.brick()[:32, :32], (32, 32), (5, 7), order=2, rng=1)
-    >>> why.drawn, why.candidates.rank[why.taken]
+    >>> why.drawn, int(why.candidates.rank[why.taken])
     (False, 0)
     """
     whole("level", level, 0)
@@ -406,9 +407,9 @@ def lcpdf(
     Parameters
     ----------
     image : (rows, cols) array of integers, 0 .. greys - 1
-        x, whose neighbourhoods are looked at.
+        x, the image whose neighbourhoods are compared.
     sample : (rows, cols) array of integers, 0 .. greys - 1
-        y, which the density is estimated from.
+        y, the sample from which the density is estimated.
     sites : (S, 2) array of integers
         (row, column) of the sites s.
     order : int

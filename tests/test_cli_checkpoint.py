@@ -122,7 +122,7 @@ def test_resume_writes_the_files_of_a_run_that_was_never_stopped(name, place, tm
         stopping(patch, 2)
         result = given(*RUNS[name], "--checkpoint", "kept")
         assert result.exit_code == 128 + signal.SIGTERM, result.output
-        assert "stopped; go on with: simdtex resume kept" in result.output
+        assert "stopped; continue with: simdtex resume kept" in result.output
         assert not {"out.png", "out.npz"} & set(os.listdir(place))
         monkeypatch.chdir(tmp_path)  # paths mean what they meant where the command was given
         for _ in range(40):
@@ -136,7 +136,7 @@ def test_resume_writes_the_files_of_a_run_that_was_never_stopped(name, place, tm
 
     again = run("resume", "begun/kept")
     assert again.exit_code == 2
-    assert "begun/kept does not exist: check the path of the run, or it is finished" in again.output
+    assert "begun/kept does not exist: check the path (a finished run has no checkpoint)" in again.output
     assert made(place) == expected
 
 
@@ -189,7 +189,7 @@ def test_a_file_whose_name_looks_like_an_option(place, monkeypatch):
 
 
 def test_what_is_no_checkpoint(place):
-    refused(place, "nothing does not exist: check the path of the run, or it is finished", "resume", "nothing")
+    refused(place, "nothing does not exist: check the path (a finished run has no checkpoint)", "resume", "nothing")
     (place / "other").mkdir()
     refused(place, "other is a folder; give the file of --checkpoint, or the store of --tiles", "resume", "other")
     refused(place, "sample.png is no checkpoint, or is damaged; remove it", "resume", "sample.png")
@@ -207,11 +207,13 @@ def test_what_was_begun_elsewhere(place, monkeypatch):
         kept._write(tree)
 
     edited(about["command"] | {"folder": "/nowhere"})
-    refused(place, "/nowhere, where the run in kept was begun, is not there; put it back", "resume", "kept")
+    refused(
+        place, "/nowhere, the folder in which the run in kept was started, does not exist; restore it", "resume", "kept"
+    )
     edited(about["command"] | {"name": "bench"})
-    refused(place, "is of no command that keeps one; remove", "resume", "kept")
+    refused(place, "is of a command that cannot be resumed; remove", "resume", "kept")
     edited(None)
-    refused(place, "was begun in Python; make the same call with checkpoint='kept'", "resume", "kept")
+    refused(place, "was started in Python; make the same call with checkpoint='kept'", "resume", "kept")
 
 
 def test_an_output_that_cannot_be_written_leaves_the_checkpoint(place, monkeypatch):

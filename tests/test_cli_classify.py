@@ -100,7 +100,7 @@ def test_the_report_shows_labels_fits_and_the_confusion(folder):
     assert numbers["confusion"] == confusion
     right = (labels == truth)[truth < 3].mean()
     assert numbers["accuracy"] == pytest.approx(right)
-    assert f"{right:.1%} as in --truth" in result.output
+    assert f"{right:.1%} of the pixels agree with --truth" in result.output
     page = read_page(folder / "page/index.html")
     assert_needs_nothing_else(page)
     text = (folder / "page/index.html").read_text()
@@ -148,7 +148,7 @@ BAD = {
     "grey": (["--texture", "left=grey.png"], "grey.png has 1 channel of uint8 and picture.png 3 channels of uint8"),
     "no file": (["--texture", "left=none.png"], "none.png"),
     "truth of another size": ([*SAMPLES, "--truth", "small.png"], "small.png is 40x3 and picture.png 40x24"),
-    "truth of no class": ([*SAMPLES, "--truth", "far.png"], "far.png has the label 9; give those of the classes, 0"),
+    "truth of no class": ([*SAMPLES, "--truth", "far.png"], "far.png has the label 9; give labels of the classes, 0"),
     "colours for strokes": (["--strokes", "picture.png"], "picture.png is no picture of labels"),
     "fits in a png": ([*SAMPLES, "--confidence", "fit.png"], "fit.png ends in .png: end its name in one of .npy"),
     "an input overwritten": (["--texture", "left=labels.png"], "labels.png is an input and would be overwritten"),

@@ -140,7 +140,7 @@ BAD_FILL = {
     "maps beside a sample": ([*MASKED, "--sample", "texture.png", "--also", "normal.png=n.png"], "leave --also out"),
     "a map of another size": ([*MASKED, "--also", "small.png=n.png"], "32x24"),
     "a source map that holds no -1": ([*MASKED, "--sample", "texture.png", "--source-map", "s.png"], ".npz"),
-    "weights in words": ([*MASKED, "--weights", "much"], "numbers parted by commas"),
+    "weights in words": ([*MASKED, "--weights", "much"], "numbers separated by commas"),
 }
 
 
@@ -199,8 +199,8 @@ BAD_EXTEND = {
     "nothing to add": (PHOTO, "--seamless"),
     "smaller": ([*PHOTO, "--size", "30x40"], "smaller than the picture of 32x24"),
     "the size it has": ([*PHOTO, "--size", "32x24"], "nothing to add"),
-    "a size and sides": ([*PHOTO, "--size", "40x40", "--left", 3], "leave --left"),
-    "a direction": ([*PHOTO, "--seamless", "z"], "--seamless z is no direction; give x, y or both"),
+    "a size and sides": ([*PHOTO, "--size", "40x40", "--left", 3], "--size cannot be used with --left"),
+    "a direction": ([*PHOTO, "--seamless", "z"], "--seamless z is not a direction; give x, y or both"),
     "a band of nothing": ([*PHOTO, "--left", 3, "--band", 3], "--seamless"),
 }
 

@@ -192,7 +192,7 @@ CATEGORIES = ["facies.tif", *OUT, "--categorical"]
 BAD = {
     "samples of another method": ([*TWO, "--method", "pyramid"], "takes one sample"),
     "an option of another method": ([*ONE, "--method", "multires", "--order", 1], "unknown option 'order'"),
-    "a mask too few": ([*TWO, "--sample-mask", "left.png"], "once for each sample"),
+    "a mask too few": ([*TWO, "--sample-mask", "left.png"], "give one for each sample"),
     "a mask of another size": ([*ONE, "--sample-mask", "all.png"], "20 x 24"),
     "maps of two kinds": ([*TWO, "--also", "normal.png,second.png=n.png"], "convert them to one type"),
     "maps of another size": ([*TWO, "--also", "normal.png,normal.png=n.png"], "28x16"),

@@ -105,7 +105,7 @@ def test_what_has_no_role_is_left_out_and_named(folder):
     image.write("brick/preview.png", np.zeros((3, 3), np.uint8))
     (folder / "brick" / "licence.txt").touch()
     done = run("extend", "brick", "-o", "tiled", *SEAMLESS)
-    assert "simdtex: the name does not say what map it is, so it is left out: preview.png\n" in done.output
+    assert "simdtex: left out, because the name does not show the kind of map: preview.png\n" in done.output
     assert names(folder / "tiled") == NAMES
 
 
@@ -167,8 +167,8 @@ BAD = {
         "opacity.png is 5x4 and brick_albedo.png 24x20",
         "brick/opacity.png",
     ),
-    "no albedo": (["extend", "none", *TO], "has no albedo: end the name of one in _albedo", "none/b_normal.png"),
-    "no maps at all": (["extend", "none", *TO], "no albedo (b.png does not say what it is): end", "none/b.png"),
+    "no albedo": (["extend", "none", *TO], "has no albedo: end the name of a map in _albedo", "none/b_normal.png"),
+    "no maps at all": (["extend", "none", *TO], "no albedo (b.png is of unknown kind): end", "none/b.png"),
     "a file as output": (["extend", "brick", "-o", "out.png", *SEAMLESS], "give a folder for the output", None),
     "a store as output": (["synth", "brick", "-o", "out.zarr"], "give a folder for the output", None),
     "a suffix": (["extend", "brick/brick_ao.jpg", "-o", "out.pgn", *SEAMLESS], "ends in .pgn: end its name", None),
@@ -196,4 +196,4 @@ def test_a_map_that_is_a_link_into_the_output_is_refused(folder):
     (folder / "tiled").mkdir()
     os.rename("brick/brick_normal.png", "tiled/brick_normal.png")
     (folder / "brick" / "brick_normal.png").symlink_to(folder / "tiled" / "brick_normal.png")
-    refused(folder, ["extend", "brick", *TO], "is an input and lies in tiled, which is written anew")
+    refused(folder, ["extend", "brick", *TO], "is an input and is in tiled, which would be replaced")

@@ -170,7 +170,7 @@ def test_no_folder_that_is_made_anew_holds_an_input(folder, pair):
         ("way/given.png", "in/."),
     ]:
         args = [*reading(given, one), *rest, *writing(out, other)]
-        refused(folder, name, args, "is an input and lies in")
+        refused(folder, name, args, "is an input and is in")
 
 
 OUTPUTS = [
@@ -190,7 +190,7 @@ def test_no_output_is_another(folder, pair):
     for outer, inner in ((one, other), (other, one)):
         if outer.type.role != "write":
             args = [*rest, *writing(outer, "new"), *writing(inner, "new/x.npz")]
-            refused(folder, name, args, "would be written into new, which another output has for itself")
+            refused(folder, name, args, "would be written into new, the folder of another output")
 
 
 def test_names_that_differ_are_let_be(folder):
@@ -215,7 +215,7 @@ def test_a_missing_input_is_named(folder, pair):
         rest += ["--mask", "map.png"]
     if name == "extend":
         rest += ["--left", "3"]
-    refused(folder, name, [*reading(given, missing), *rest], "does not exist: check the path of")
+    refused(folder, name, [*reading(given, missing), *rest], "does not exist: check the path")
     if isinstance(given.type, Place) and given.type.role == "read":
         refused(folder, name, [*words(given, "in"), *rest], "is a folder")
     empty = CliRunner().invoke(cli.main, [name, *words(given, ""), *rest])

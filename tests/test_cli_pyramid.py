@@ -213,7 +213,7 @@ def test_a_path_wins_over_a_number(folder):
     np.testing.assert_array_equal(picture(), expected)
 
 
-P = "give the path of one as it stands in the command, or its number, 1 to 2"
+P = "give the path of one as in the command, or its number, 1 to 2"
 BAD_MIX = {k: v for k, v in BAD_PYRAMID.items() if k != "overwritten sample"} | {
     "unknown palette": (["--palette", "grey.png"], f"--palette grey.png is none of the samples; {P}"),
     "pattern 0": (["--pattern", 0], f"--pattern 0 is none of the samples; {P}"),
@@ -222,7 +222,7 @@ BAD_MIX = {k: v for k, v in BAD_PYRAMID.items() if k != "overwritten sample"} | 
     "no number": (["--high", "1.0", "--low", 1], f"--high 1.0 is none of the samples; {P}"),
     "low alone": (["--low", 1], "low and high go together; give both, or neither"),
     "two patterns": (["--pattern", 1, "--average", "1,1"], "a mixture has one pattern"),
-    "weights in words": (["--average", "much,little"], "--average much,little must be numbers parted by commas"),
+    "weights in words": (["--average", "much,little"], "--average much,little must be numbers separated by commas"),
     "overwritten sample": (["-o", "other.png"], "other.png is an input and would be overwritten"),
 }
 

@@ -254,7 +254,7 @@ BAD = {
         ["ti.gslib", "-o", "out.npz", "--known", "wells.eas", "--categorical"],
         "line 8 and line 10 of the hard data are both at row 7, column 10",
     ),
-    "an origin in words": ([*GREY, "--origin", "here"], "--origin here must be numbers parted by commas"),
+    "an origin in words": ([*GREY, "--origin", "here"], "--origin here must be numbers separated by commas"),
     "an origin of one number": ([*GREY, "--origin", "1"], "origin is [1.0]; give (x, y) or (x, y, z)"),
     "no origin": ([*GREY, "--origin", ""], "must be numbers"),
     "a negative cell": ([*GREY, "--cell", "1,-1"], "give sizes above 0"),
@@ -262,13 +262,13 @@ BAD = {
     "a grid that holds no such number": (["huge.npy", "-o", "out.sgems"], "end its name in .gslib"),
     "a grid too far away": (["ti.gslib", "-o", "out.sgems", "--origin", "4500000.3,0"], "x = 4500000.3"),
     "an unknown suffix": (["grey.png", "-o", "out.xyz"], "names no format of realisations"),
-    "proportions in words": ([*FACIES, "--proportions", "half"], "numbers parted by commas"),
+    "proportions in words": ([*FACIES, "--proportions", "half"], "numbers separated by commas"),
     "no realisation": ([*GREY, "-n", 0], "n is 0; give 1 or more"),
     "a report of several": (["grey.png", "second.png", "-o", "out.npz", "--report", "report"], "leave it out"),
     "a report of next to nothing": (["grey.png", "-o", "out.npz", "--size", "9x3", "--report", "report"], "4x4 pixels"),
     "a report of colour": (["colour.png", "-o", "out.npz", "--report", "report"], "one variable"),
     "a report of vast values": (["huge.npy", "-o", "out.npz", "--report", "report"], "up to 1e+100; give them in"),
-    "a report of gaps": (["holed.tif", "-o", "out.npz", "--report", "report"], "known everywhere"),
+    "a report of gaps": (["holed.tif", "-o", "out.npz", "--report", "report"], "without unknown cells"),
 }
 
 
@@ -348,7 +348,7 @@ def test_cells_outside_of_the_region_are_unknown_in_a_grid(folder, maps):
         (["--scale", "nowhere.npy"], "nowhere.npy does not exist"),
         (["--image-map", "numbers.npy"], "image_map has 1 and there is 1 training image"),
         (["--source", "-o", "out.gslib"], "is a grid, which holds no source map: end its name in .zarr, .nc or .npz"),
-        (["--source", "--report", "report"], "leave --source and --region out"),
+        (["--source", "--report", "report"], "--report cannot be used with --source or --region"),
     ],
 )
 def test_maps_that_do_not_fit_are_refused_before_the_run(folder, maps, words, sentence):
@@ -385,7 +385,7 @@ def test_an_estimate_is_that_of_the_function(folder, out):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["grey.png"], "there is nothing to estimate from; give --known"),
+        (["grey.png"], "an estimate requires data; give --known"),
         (["colour.png", "--known", "wells.csv"], "has several channels; give a training image of one variable"),
         (["grey.png", "--known", "wells.csv", "--nearest", 99], "nearest is 99; give 64 or fewer"),
     ],

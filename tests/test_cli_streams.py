@@ -43,7 +43,7 @@ def test_a_closed_stream_takes_nothing_away(folder, closed):
 def test_a_full_standard_output_is_one_sentence(folder, words, unbuffered):
     done = run(folder, [*words, ">/dev/full"], PYTHONUNBUFFERED=unbuffered, SIMDTEX_DEVICE="reference")
     assert done.returncode == 2
-    said = b"simdtex: standard output could not be written (No space left on device): send it elsewhere\n"
+    said = b"simdtex: standard output could not be written (No space left on device): redirect it\n"
     assert done.stderr == said
     assert (folder / "out.png").exists() == (words is SYNTH)
 
@@ -58,7 +58,7 @@ def test_a_folder_that_is_gone_is_named(folder):
     command = ["synth", "sample.png", *SYNTH[2:]]
     line = " ".join(["mkdir gone && cd gone && rmdir ../gone &&", sys.executable, "-m", "simdtex", *command])
     done = subprocess.run(line, shell=True, cwd=folder, capture_output=True, text=True, timeout=120, check=False)
-    said = "simdtex: the working folder does not exist any more: change to another one\n"
+    said = "simdtex: the current folder no longer exists: change to another one\n"
     assert (done.returncode, done.stderr) == (2, said)
 
 

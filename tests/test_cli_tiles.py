@@ -79,25 +79,25 @@ def test_a_dry_run_prints_the_plan_and_makes_nothing(folder):
 @pytest.mark.parametrize(
     ("args", "words"),
     [
-        (["-o", "o.png", "--tiles", 16], "o.png is no .zarr store, which tiles are written to; end its name in .zarr"),
-        (["-o", "o.png", "--workers", 2], "--workers goes with --tiles"),
-        (["-o", "o.png", "--dry-run"], "--dry-run goes with --tiles"),
+        (["-o", "o.png", "--tiles", 16], "o.png is not a .zarr store, which --tiles requires; end its name in .zarr"),
+        (["-o", "o.png", "--workers", 2], "--workers requires --tiles"),
+        (["-o", "o.png", "--dry-run"], "--dry-run requires --tiles"),
         (["-o", "o.zarr", "--tiles", 0], "tiles is 0; give 1 or more"),
         (["-o", "o.zarr", "--tiles", 16, "--workers", 0], "workers is 0; give 1 or more"),
         (["-o", "o.zarr", "--tiles", 16, "--workers", "x"], "--workers x is neither a number nor an address"),
         (["-o", "o.zarr", "--tiles", 16, "--method", "pyramid"], "the method pyramid needs the whole output at once"),
         (
             ["-o", "o.zarr", "--tiles", 16, "--stages", "s"],
-            "--stages is of an output at once; leave it out",
+            "--stages cannot be used with --tiles; leave out one of them",
         ),
         (["-o", "o.zarr", "--tiles", 16, "--source-map", "s.npz"], "of the store; give --source-map o.zarr/source"),
         (
             ["-o", "o.zarr", "--tiles", 16, "--also", "grey.png=x.png"],
-            "x.png is no array of the store; end --also in =o.zarr/x",
+            "x.png is not an array of the store; end --also in =o.zarr/x",
         ),
         (["-o", "o.zarr", "--tiles", 16, "--schedule", "raster"], "schedule raster needs the whole output at once"),
         (["-o", "no/o.zarr", "--tiles", 16], "does not exist; make it first"),
-        (["-o", "there.zarr", "--tiles", 16], "is there already; remove it, give another name, or go on with"),
+        (["-o", "there.zarr", "--tiles", 16], "is there already; remove it, give another name, or continue with"),
         (
             ["-o", "o.zarr", "--tiles", 16, "--workers", "nonsense://a"],
             "no scheduler answers at nonsense://a; start one",
@@ -129,13 +129,13 @@ def test_a_run_that_is_stopped_goes_on(folder, how):
         said = process.stderr.read()
     assert process.returncode == (130 if how == "interrupt" else -signal.SIGKILL), said
     if how == "interrupt":
-        assert said.strip().splitlines()[-1] == "simdtex: stopped; go on with: simdtex resume o.zarr"
+        assert said.strip().splitlines()[-1] == "simdtex: stopped; continue with: simdtex resume o.zarr"
     result = run("resume", "o.zarr", "--device", "reference")
     assert result.exit_code == 0, result.output
     assert_same_bits(pixels("o.zarr"), image.read("whole.png").pixels)
     again = run("resume", "o.zarr")
     assert again.exit_code == 0
-    assert "o.zarr is finished; there is nothing to go on with" in again.stdout
+    assert "o.zarr is finished already" in again.stdout
 
 
 STOPPED = """
@@ -161,7 +161,7 @@ cli.main(["synth", "colour.png", "-o", "o.zarr", "--tiles", "16", "--size", "40x
 def test_how_to_go_on_is_the_last_thing_said(folder, name, code):
     """Whatever Zarr had begun when the signal came."""
     done = subprocess.run([sys.executable, "-c", STOPPED, name], capture_output=True, text=True, timeout=60)
-    assert (done.returncode, done.stderr) == (code, "simdtex: stopped; go on with: simdtex resume o.zarr\n")
+    assert (done.returncode, done.stderr) == (code, "simdtex: stopped; continue with: simdtex resume o.zarr\n")
 
 
 def test_resume_says_what_it_cannot_go_on_with(folder):

@@ -426,7 +426,11 @@ def test_further_maps_are_carried_along(tmp_path, several):
         ({"image": SAMPLE}, {}, "'image' is no name of a map; give a word other than image, source, work"),
         ({"../a": SAMPLE}, {}, "'../a' is no name of a map"),
         ({"n": SAMPLE[1:]}, {}, "the other map is 25 x 21 pixels .* and the sample 25 x 22: bring it to the"),
-        ({"n": SAMPLE}, {"known": np.ma.masked_array(np.ones((20, 20)), np.eye(20) < 1)}, "known pixels are from no"),
+        (
+            {"n": SAMPLE},
+            {"known": np.ma.masked_array(np.ones((20, 20)), np.eye(20) < 1)},
+            "the maps have no values for known pixels",
+        ),
     ],
 )
 def test_maps_that_do_not_fit_are_said(tmp_path, maps, options, words):

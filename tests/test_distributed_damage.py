@@ -211,9 +211,7 @@ def test_a_full_disk_is_said_and_the_run_goes_on_later(tmp_path, stopped, whole,
     forget()
     with monkeypatch.context() as patch:
         patch.setattr(atomic, "_sync", lambda *_: (_ for _ in ()).throw(OSError(28, "No space left on device")))
-        words = (
-            r"could not be written \(No space left on device\): free some space, and go on with: simdtex resume .*zarr"
-        )
+        words = r"could not be written \(No space left on device\): free some space, and continue with: simdtex resume "
         with pytest.raises(ValueError, match=words):
             distributed.resume(path, device=REFERENCE)
     assert_same_bits(distributed.resume(path, device=REFERENCE).compute(), whole)

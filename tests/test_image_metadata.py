@@ -239,7 +239,7 @@ def test_a_lossy_output_of_what_is_to_stay_is_told_once(folder, command):
     assert result.exit_code == 0, result.output
     told = [line for line in result.output.splitlines() if "JPEG changes all pixels" in line]
     assert len(told) == (command in ("fill", "extend"))
-    assert all(line.endswith("end its name in .png to keep the known ones to the bit") for line in told)
+    assert all(line.endswith("end its name in .png to keep the known pixels exactly") for line in told)
 
 
 def test_a_lossy_output_of_known_values_is_told(folder):
@@ -258,7 +258,7 @@ def test_that_an_animation_has_more_frames_is_told_once(folder, command):
     for name in ("a.gif", "one.gif"):
         result = run(folder, command, name, *more, "-o", "out.png")
         assert result.exit_code == 0, result.output
-        assert result.output.count("a.gif has several frames or pages, of which the first is read") == (name == "a.gif")
+        assert result.output.count("a.gif has several frames or pages; only the first is read") == (name == "a.gif")
 
 
 def test_a_second_frame_that_is_damaged_takes_nothing_from_the_first(tmp_path):

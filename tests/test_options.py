@@ -26,9 +26,9 @@ STRANGE = [
     *(None, True, False, "", "x", "nan", "a" * 10**4, b"0", (), [], [[]], {}, object(), np.zeros(0), np.zeros((2, 2))),
 ]
 VERBS = {
-    *("account", "begin", "blend", "break", "bring", "check", "compare", "cool", "count", "cover", "exchange"),
-    *("follow", "give", "go", "keep", "launch", "lay", "let", "look", "make", "match", "prefer", "relax", "run"),
-    *("split", "sweep", "take", "use", "weigh", "be"),
+    *("blend", "compare", "count", "cover", "evaluate", "exchange", "fade", "follow", "give"),
+    *("keep", "look", "lower", "match", "penalise", "prefer", "reflect", "relax", "scale"),
+    *("set", "split", "start", "sweep", "take", "treat", "use", "wrap"),
 }
 METHODS = {"mrf": mrf, "multires": multires, "pyramid": pyramid, "solid": solid}
 OPTIONS = [

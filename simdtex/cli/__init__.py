@@ -12,46 +12,45 @@ import click
 from simdtex.cli.command import write_examples
 
 GROUPS = {
-    "More of a texture": {
-        "live": "Watch a texture take shape in the browser, and steer it.",
-        "synth": "Make more of the texture SAMPLE.",
-        "fill": "Fill the holes of PICTURE with more of what is around them.",
+    "Textures": {
+        "live": "Synthesise, fill, extend and classify on a page in the browser.",
+        "synth": "Synthesise a picture of any size with the texture of SAMPLE.",
+        "fill": "Fill the holes of PICTURE with the texture around them.",
         "extend": "Continue PICTURE beyond its edges, or make it seamless.",
-        "mix": "Mix the textures SAMPLE...: a picture that looks a bit like each of them.",
-        "solid": "Make a solid of the texture SAMPLE: a block whose slices look like it.",
+        "mix": "Mix the textures SAMPLE... into one picture.",
+        "solid": "Make a solid block whose slices have the texture of SAMPLE.",
     },
     "Realisations of a training image": {
-        "simulate": "Simulate what TRAINING_IMAGE shows: realisations that look like it and honour data.",
-        "estimate": "Estimate what data say of each cell: probabilities of categories, or mean and variance, from "
-        "TRAINING_IMAGE.",
+        "simulate": "Simulate realisations that look like TRAINING_IMAGE and honour data.",
+        "estimate": "Estimate each cell from data and TRAINING_IMAGE: category probabilities, or mean and variance.",
     },
-    "What is where": {
+    "Classification": {
         "classify": "Label each pixel of PICTURE with the texture around it, or as unknown.",
     },
-    "Runs that were stopped": {
-        "resume": "Go on with the run whose state is in FILE, and write what its command writes.",
+    "Interrupted runs": {
+        "resume": "Continue the run whose state is in FILE, and write the outputs of its command.",
     },
     "Studies": {
         "schedules": "Run the same job under several schedules and compare them in a report.",
         "ising": "Relax Ising spins by each schedule and compare with the exact energy.",
     },
     "This machine": {
-        "demo": "Synthesise brick, grass and gravel from scikit-image's own pictures.",
-        "devices": "List every OpenCL device, whether it works, and which one would be chosen.",
-        "bench": "Measure how long the methods take on devices, and how many times longer in NumPy.",
+        "demo": "Synthesise brick, grass and gravel from pictures of scikit-image.",
+        "devices": "List all OpenCL devices, whether they work, and the default device.",
+        "bench": "Measure the time of each method on each device, and compare with NumPy.",
     },
 }
 """The commands by what they are for, each in the module of its name, and their first sentences."""
 
 COMMANDS = {name: sentence for group in GROUPS.values() for name, sentence in group.items()}
 
-WHAT = "More of a texture from a sample of it, by parallel relaxation on any OpenCL device."
+WHAT = "Texture synthesis from samples, by parallel relaxation on any OpenCL device."
 
 EXAMPLES = (
-    ("synth gravel.png -o more.png", "More of a texture; it tiles."),
-    ("extend photo.png -o tile.png --seamless", "A photo that tiles."),
-    ("extend brick -o tiled --seamless", "All maps of a material, from a folder to another."),
-    ("fill photo.png -o whole.png --mask hole.png", "A hole that is filled."),
+    ("synth gravel.png -o more.png", "Make a larger texture that tiles."),
+    ("extend photo.png -o tile.png --seamless", "Make a photo tile."),
+    ("extend brick -o tiled --seamless", "Make all maps of a material tile, from one folder to another."),
+    ("fill photo.png -o whole.png --mask hole.png", "Fill a hole."),
 )
 
 
@@ -105,7 +104,7 @@ def _versions(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     is_eager=True,
     expose_value=False,
     callback=_versions,
-    help="Show what runs here, and on which device.",
+    help="Print the versions and the default device.",
 )
 def main() -> None:
     """Run a command."""

@@ -14,21 +14,21 @@ from simdtex.cli.places import WRITE
 
 
 @command(
-    ("bench --quick", "A first look, within a minute."),
+    ("bench --quick", "Measure small sizes, within a minute."),
 )
 @click.option(
     "--device",
     metavar="TEXT",
-    help="Measure that device alone whose name or platform has this in it, or a number of `simdtex devices`.  "
-    "[all usable]",
+    help="Measure only this device: a part of its name or platform, or its index in `simdtex devices`.  "
+    "[all usable devices]",
 )
-@click.option("--quick", is_flag=True, help="Take small sizes: a minute instead of some four.")
-@click.option("--json", "path", type=WRITE, metavar="FILE", help="Write all that was measured.")
-@click.option("-q", "--quiet", is_flag=True, help="Say nothing on what is being measured, and show no tables.")
+@click.option("--quick", is_flag=True, help="Use small sizes, which take a minute instead of about four.")
+@click.option("--json", "path", type=WRITE, metavar="FILE", help="Write all measurements.")
+@click.option("-q", "--quiet", is_flag=True, help="Print no progress and no tables.")
 def bench(device: str | None, quick: bool, path: Path | None, quiet: bool) -> None:
-    """Measure how long the methods take on devices, and how many times longer in NumPy.
+    """Measure the time of each method on each device, and compare with NumPy.
 
-    Everything is measured in one run. Leave the machine alone meanwhile.
+    All times are from one run. Do not use the machine for other work during the run.
     """
     from simdtex.bench import run as benchmark
     from simdtex.io.atomic import atomic_path

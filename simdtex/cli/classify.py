@@ -27,13 +27,13 @@ UNLABELLED = 255
 @job(
     (
         "classify photo.png --texture brick=brick.png --texture grass=grass.png -o labels.png",
-        "Two classes, or unknown.",
+        "Label pixels as one of two classes, or as unknown.",
     ),
-    ("classify photo.png --strokes strokes.png -o labels.png", "Classes painted on the picture itself."),
+    ("classify photo.png --strokes strokes.png -o labels.png", "Learn the classes from strokes on the picture."),
     profile=True,
 )
 @click.argument("picture", type=READ)
-@click.option("-o", "--output", required=True, type=WRITE, help="Write the labels here, 0 where unknown, 1, 2...")
+@click.option("-o", "--output", required=True, type=WRITE, help="Write the labels: 1, 2..., and 0 for unknown.")
 @option(
     "--texture",
     "textures",
@@ -41,15 +41,15 @@ UNLABELLED = 255
     multiple=True,
     metavar="NAME=FILE",
     group=DATA,
-    help="Label what looks like this sample; once for each class. Give NAME=FILE0,FILE1 for several samples. What is "
-    "transparent is not used.",
+    help="Learn the class NAME from this sample; give one for each class, NAME=FILE0,FILE1 for several samples. "
+    "Transparent pixels are not used.",
 )
 @option(
     "--strokes",
     type=READ,
     metavar="FILE",
     group=DATA,
-    help="Learn classes where this picture, of the size of PICTURE, is 1, 2..., instead of from samples.",
+    help="Learn the classes from strokes with the values 1, 2... in this picture, of the size of PICTURE.",
 )
 @option(
     "--validation",
@@ -57,21 +57,21 @@ UNLABELLED = 255
     multiple=True,
     metavar="NAME=FILE",
     group=DATA,
-    help="Judge by this picture of a class how much it differs from its samples.",
+    help="Measure with this picture of a class how much the class varies.",
 )
 @option(
     "--truth",
     type=READ,
     metavar="FILE",
     group=DATA,
-    help="Compare with these labels; 255 where they are not known.",
+    help="Compare with these labels; 255 is unknown.",
 )
 @option(
     "--confidence",
     type=WRITE,
     metavar="FILE",
     group=OUTPUTS,
-    help="Write how well each class fits each pixel, 0 to 1, a band for each: .tif or .npy.",
+    help="Write the fit of each class at each pixel, 0 to 1, one band for each class: .tif or .npy.",
 )
 @report_option("labels, fits and, with --truth, the confusion matrix")
 def classify(
@@ -87,8 +87,7 @@ def classify(
 ) -> Task:
     """Label each pixel of PICTURE with the texture around it, or as unknown.
 
-    `simdtex classify photo.png --texture brick=brick.png --texture grass=grass.png -o labels.png` writes 1 where there
-    is brick, 2 where there is grass, and 0 where there is neither.
+    Classes are numbered from 1 in the order of --texture; unknown pixels are 0.
     """
     from simdtex import classify
     from simdtex.io import image
@@ -114,8 +113,8 @@ def classify(
         image.check_writable(confidence, suffixes=FITS)
     if true is not None and (strange := np.setdiff1d(true, [0, *names, UNLABELLED])).size:
         raise ValueError(
-            f"{truth} has the label {strange[0]}; give those of the classes, 0 for unknown, and {UNLABELLED} "
-            "where it is not known"
+            f"{truth} has the label {strange[0]}; give labels of the classes, 0 for unknown textures, and {UNLABELLED} "
+            "for pixels without a known label"
         )
     writers: list[Any] = [lambda made, run: write_labels(output, made)]
     if confidence:
@@ -170,5 +169,5 @@ def _summary(true: NDArray[Any] | None, names: dict[int, str], labels: NDArray[A
     text = ", ".join(f"{name} {share:.1%}" for name, share in shares)
     if true is not None:
         there = true != UNLABELLED
-        text += f"; {(labels == true)[there].mean():.1%} as in --truth"
+        text += f"; {(labels == true)[there].mean():.1%} of the pixels agree with --truth"
     return text

@@ -18,16 +18,16 @@ SOFTWARE = "simdtex demo"
 
 
 @command(
-    ("demo", "Three textures, and a sheet of them, in the folder demo."),
+    ("demo", "Make three textures, and a sheet of them, in the folder demo."),
 )
 @click.option("-o", "--output", default="demo", show_default=True, type=FOLDER, help="Write into this folder.")
 @click.option(
     "--size", default="256x256", show_default=True, metavar="WIDTHxHEIGHT", help="Make outputs of this size, in pixels."
 )
-@click.option("--seed", type=int, default=1, show_default=True, help="Make the pictures from this seed.")
+@click.option("--seed", type=int, default=1, show_default=True, help="Use this seed.")
 @DEVICE
 def demo(output: Path, size: str, seed: int, device: str | None) -> None:
-    """Synthesise brick, grass and gravel from scikit-image's own pictures."""
+    """Synthesise brick, grass and gravel from pictures of scikit-image."""
     import PIL.Image
     from PIL.ExifTags import Base
 
@@ -42,7 +42,7 @@ def demo(output: Path, size: str, seed: int, device: str | None) -> None:
         raise ValueError(f"{output} is a file; give --output a folder")
     for path in (output / f"{name}.png" for name in (*EXAMPLES, "sheet")):
         if path.exists() and not _made_here(path):
-            raise ValueError(f"{path} is not one that this command has made; give another folder")
+            raise ValueError(f"{path} was not made by this command; give another folder")
     exif = PIL.Image.Exif()
     exif[Base.Software] = SOFTWARE
     own = image.Metadata(exif=exif.tobytes())
@@ -60,7 +60,7 @@ def demo(output: Path, size: str, seed: int, device: str | None) -> None:
         pictures += [(f"{name}, the sample", sample), (f"{name}, {seconds:.1f} s", made)]
         click.echo(f"{output / name}.png: {shape[1]}x{shape[0]} from 128x128 in {seconds:.1f} s")
     image.write(output / "sheet.png", contact_sheet(pictures, columns=2), own)
-    click.echo(f"all of them: {output / 'sheet.png'}")
+    click.echo(f"sheet of all pictures: {output / 'sheet.png'}")
 
 
 def _made_here(path: Path) -> bool:

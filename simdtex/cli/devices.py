@@ -20,7 +20,7 @@ COLUMNS = ("", "index", "platform", "device", "kind", "OpenCL", "units", "memory
 
 @command()
 def devices() -> None:
-    """List every OpenCL device, whether it works, and which one would be chosen."""
+    """List all OpenCL devices, whether they work, and the default device."""
     from rich.console import Console
 
     from simdtex.machine.devices import devices

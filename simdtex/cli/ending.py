@@ -47,7 +47,7 @@ def reporting() -> Iterator[None]:
     except (ValueError, TypeError, OSError) as error:
         settle(error)
     except MemoryError:
-        note("the memory does not suffice for this; give a smaller size")
+        note("there is not enough memory; give a smaller size")
         sys.exit(2)
     except KeyboardInterrupt as signalled:
         give_up(context, signalled.args[0] if signalled.args else signal.SIGINT)
@@ -57,7 +57,7 @@ def reporting() -> Iterator[None]:
 def give_up(context: click.Context, number: int) -> NoReturn:
     """Say that the command was stopped, and how to go on, and exit with the code of a signal."""
     path: Path | None = context.meta.get(RESUME)
-    how = f"go on with: simdtex resume {path}" if path and path.exists() else "nothing but stages may have been written"
+    how = f"continue with: simdtex resume {path}" if path and path.exists() else "only stages may have been written"
     warnings.filterwarnings("ignore", "coroutine .* was never awaited")  # which Zarr had begun
     note(f"stopped; {how}")
     sys.exit(128 + number)
@@ -77,7 +77,7 @@ def catch_signals(context: click.Context) -> Iterator[None]:
         if context.obj and context.obj.running and not caught:
             caught.append(number)
             context.obj.stop()
-            os.write(2, b"\nsimdtex: stopping after the present step; once more stops at once\n")
+            os.write(2, b"\nsimdtex: stopping after the current step; a second signal stops at once\n")
             return
         if number == signal.SIGINT and postponed(frame):
             return
@@ -152,9 +152,9 @@ def _sentence(error: Exception) -> str:
     if error.filename:  # without the number of the error
         return f"{error.filename}: {error.strerror}"
     if _printing(error):
-        return f"standard output could not be written ({error.strerror}): send it elsewhere"
+        return f"standard output could not be written ({error.strerror}): redirect it"
     try:
         os.getcwd()
     except OSError:
-        return "the working folder does not exist any more: change to another one"
+        return "the current folder no longer exists: change to another one"
     return error.strerror

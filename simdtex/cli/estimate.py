@@ -17,8 +17,11 @@ from simdtex.cli.simulate import lies_of
 
 
 @command(
-    ("estimate facies.png -o probabilities.nc --known wells.csv --categorical", "Of each category, and the entropy."),
-    ("estimate facies.gslib -o probabilities.sgems --known wells.csv --categorical", "The same from a grid to a grid."),
+    (
+        "estimate facies.png -o probabilities.nc --known wells.csv --categorical",
+        "Estimate the probability of each category, and the entropy.",
+    ),
+    ("estimate facies.gslib -o probabilities.sgems --known wells.csv --categorical", "Read a grid, and write a grid."),
 )
 @click.argument("training_image", nargs=-1, required=True, type=READ)
 @click.option(
@@ -32,10 +35,18 @@ from simdtex.cli.simulate import lies_of
 @KNOWN
 @places
 @SAMPLE_MASK
-@option("--categorical", is_flag=True, group=DATA, help="Take values for names of categories.")
-@option("--nearest", default=8, show_default=True, type=int, help="Look at this many data of each cell, the nearest.")
-@option("--reach", type=int, help="Look at data so many cells away.  [an eighth of the smaller side of TRAINING_IMAGE]")
-@option("--bandwidth", default=1.0, show_default=True, type=float, help="Give the Parzen kernel this width, in h_opt.")
+@option("--categorical", is_flag=True, group=DATA, help="Treat values as categories.")
+@option("--nearest", default=8, show_default=True, type=int, help="Use this many data for each cell, the nearest.")
+@option(
+    "--reach", type=int, help="Use data up to this many cells away.  [an eighth of the smaller side of TRAINING_IMAGE]"
+)
+@option(
+    "--bandwidth",
+    default=1.0,
+    show_default=True,
+    type=float,
+    help="Set the width of the Parzen kernel, in units of h_opt.",
+)
 @DEVICE
 @click.option("-q", "--quiet", is_flag=True, help="Show no summary.")
 def estimate(
@@ -46,9 +57,9 @@ def estimate(
     quiet: bool,
     **options: Any,
 ) -> None:
-    """Estimate what data say of each cell: probabilities of categories, or mean and variance, from TRAINING_IMAGE.
+    """Estimate each cell from data and TRAINING_IMAGE: category probabilities, or mean and variance.
 
-    No realisation is drawn, so nothing is noise.
+    It draws no realisations, so the estimates have no sampling noise.
     """
     from simdtex import estimate
     from simdtex.io.grids import SUFFIXES, check_grid, write_grid
@@ -61,7 +72,7 @@ def estimate(
     data = None if known is None else read_known(known, material)
     shape = output_shape(size, material.pixels[0], data, material.pixels[0])
     if data is None:
-        raise ValueError("there is nothing to estimate from; give --known")
+        raise ValueError("an estimate requires data; give --known")
     lies = lies_of(material, options.pop("origin"), options.pop("cell"))
     grid = check_realisations_path(output) in SUFFIXES
     if grid:

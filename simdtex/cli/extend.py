@@ -20,8 +20,8 @@ SIDES = ("top", "bottom", "left", "right")
 
 @job(
     ("extend photo.png -o tile.png --seamless", "Make a photo tile."),
-    ("extend photo.png -o wide.png --left 200 --right 200", "Continue it at both sides."),
-    ("extend brick -o tiled --seamless", "All maps in the folder brick: albedo, normal, roughness..."),
+    ("extend photo.png -o wide.png --left 200 --right 200", "Add pixels on two sides."),
+    ("extend brick -o tiled --seamless", "Make all maps in the folder brick tile: albedo, normal, roughness..."),
     stages="every level and sweep",
 )
 @click.argument("picture", type=ENTER)
@@ -33,7 +33,7 @@ SIDES = ("top", "bottom", "left", "right")
 @click.option(
     "--size",
     metavar="WIDTHxHEIGHT",
-    help="Make an output of this size, in pixels, instead: add at the right and at the bottom.",
+    help="Make an output of this size, in pixels: add pixels at the right and at the bottom.",
 )
 @option(
     "--seamless",
@@ -41,17 +41,17 @@ SIDES = ("top", "bottom", "left", "right")
     flag_value="both",
     metavar="[x|y|both]",
     words=("both", "x", "y"),
-    help="Make the output tile: left and right (x), top and bottom (y), or both. In a direction in which nothing is "
-    "added, a band along the edges is made anew.  [both, if no direction is given]",
+    help="Make the output tile: left and right (x), top and bottom (y), or both. If no pixels are added in a "
+    "direction, a band along the edges is replaced.  [both, if no direction is given]",
 )
 @click.option(
     "--band",
     type=int,
-    help="Make this many pixels anew along each edge, with --seamless.  [an eighth of the shorter side, 8 to 64]",
+    help="Replace this many pixels along each edge, with --seamless.  [an eighth of the shorter side, 8 to 64]",
 )
 @ALSO
 @SOURCE_MAP
-@report_option("pictures, and how evenly it uses the picture")
+@report_option("its pictures, and how evenly it uses the picture")
 def extend(
     picture: Path,
     output: Path,
@@ -64,9 +64,9 @@ def extend(
 ) -> Task:
     """Continue PICTURE beyond its edges, or make it seamless.
 
-    PICTURE may be a folder with the maps of a material, whose names end in what they are, as brick_albedo.png and
-    brick_normal.png; the output is a folder, too, then. The albedo decides the arrangement. If another map should,
-    give its path in place of the folder's.
+    PICTURE may be a folder with the maps of a material, whose names end in their kind, such as brick_albedo.png and
+    brick_normal.png; the output is then a folder too. The albedo decides the arrangement. To let another map decide,
+    give its path instead of the folder's.
     """
     from simdtex import extend
     from simdtex.io import image
@@ -78,12 +78,12 @@ def extend(
     if size is not None:
         sides = _sides(size, sides, (rows, cols))
     if seamless not in (None, "x", "y", "both"):
-        raise ValueError(f"--seamless {seamless} is no direction; give x, y or both")
+        raise ValueError(f"--seamless {seamless} is not a direction; give x, y or both")
     tiling: bool | str = seamless if seamless in ("x", "y") else bool(seamless)
     if not (tiling or any(sides.values())):
         raise ValueError("there is nothing to add; give --left, --right, --top, --bottom or --size, or --seamless")
     if options["band"] is not None and not tiling:
-        raise ValueError("--band is what --seamless makes anew; leave it out, or give --seamless")
+        raise ValueError("--band requires --seamless; leave it out, or give --seamless too")
     others = read_also(also, whole)
     check_source_map(source_map, whole)
     if folder:
@@ -112,7 +112,7 @@ def _sides(text: str, sides: dict[str, int], shape: tuple[int, int]) -> dict[str
     from simdtex.io.image import parse_size
 
     if any(sides.values()):
-        raise ValueError("--size says how much is added; leave --left, --right, --top and --bottom out")
+        raise ValueError("--size cannot be used with --left, --right, --top or --bottom; leave them out")
     more = [new - old for new, old in zip(parse_size(text), shape, strict=True)]
     if min(more) < 0:
         raise ValueError(

@@ -26,11 +26,11 @@ from simdtex.cli.places import READ, WRITE
 
 
 @job(
-    ("fill photo.png -o whole.png --mask hole.png", "What is white in the mask is made anew."),
-    ("fill cutout.png -o whole.png", "So is what is transparent in the picture."),
+    ("fill photo.png -o whole.png --mask hole.png", "Fill the white parts of a mask."),
+    ("fill cutout.png -o whole.png", "Fill the transparent parts of a picture."),
     (
         "fill photo.png -o grass.png --mask car.png --sample meadow.png",
-        "With another texture than what is around.",
+        "Fill with another texture.",
     ),
 )
 @click.argument("picture", type=READ)
@@ -39,8 +39,8 @@ from simdtex.cli.places import READ, WRITE
     "--mask",
     type=READ,
     metavar="FILE",
-    help="Fill where this picture, of the same size, is white.  [where PICTURE is transparent or NaN; "
-    "the output has no alpha then]",
+    help="Fill the white parts of this mask, of the same size.  [the parts of PICTURE that are transparent or NaN; "
+    "the output then has no alpha]",
 )
 @click.option(
     "--sample",
@@ -48,12 +48,12 @@ from simdtex.cli.places import READ, WRITE
     multiple=True,
     type=READ,
     metavar="FILE",
-    help="Fill with this texture, not with what is around; may be repeated.",
+    help="Fill with this texture, not with that around the hole; may be repeated.",
 )
 @click.option(
     "--reach",
     type=int,
-    help="Fill a hole from what is this near, in pixels.  [128, or twice its longer side]",
+    help="Fill a hole from the surroundings up to this far away, in pixels.  [128, or twice the hole's longer side]",
 )
 @ALSO
 @SOURCE_MAP
@@ -67,9 +67,9 @@ def fill(
     source_map: Path | None,
     **options: Any,
 ) -> Task:
-    """Fill the holes of PICTURE with more of what is around them.
+    """Fill the holes of PICTURE with the texture around them.
 
-    Everything outside the holes stays as it is, to the bit.
+    Pixels outside the holes do not change.
     """
     from simdtex import fill
     from simdtex.io import image
@@ -80,7 +80,7 @@ def fill(
     if texture:
         check_profiles([picture, samples[0]], [whole.metadata, texture.metadata])
     if texture and also:
-        raise ValueError("with --sample no pixel comes from the picture, nor from its maps; leave --also out")
+        raise ValueError("--also cannot be used with --sample, since no pixel comes from the picture; leave --also out")
     others = read_also(also, whole)
     image.check_writable(output, pixels.dtype, channels(pixels))
     check_source_map(source_map, texture or whole, everywhere=not texture)

@@ -17,7 +17,7 @@ def read_data(samples: Material, options: dict[str, Any]) -> dict[str, Any]:
     These options are taken out; ``labels`` is set if the guides decide it.
     """
     if samples.deep and (options["sample_mask"] or options["guide"]):
-        raise ValueError("--sample-mask and --guide are of pictures; give those of a volume to simdtex.simulate")
+        raise ValueError("--sample-mask and --guide take no volumes; use simdtex.simulate in Python")
     masks = read_masks(options.pop("sample_mask"), samples)
     file, guide = options.pop("known"), options.pop("guide")
     found: dict[str, Any] = {
@@ -54,8 +54,8 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tupl
             more = f" and {len(strange) - 1} more" if len(strange) > 1 else ""
             raise ValueError(
                 f"{out} has the colour {tuple(strange[0].tolist())}{more}, which {', '.join(map(str, paths))} "
-                f"{'has' if len(paths) == 1 else 'have'} not; paint with the labels' own colours, without soft edges, "
-                "or say --no-labels"
+                f"{'does' if len(paths) == 1 else 'do'} not have; paint with the colours of the labels, without soft "
+                "edges, or give --no-labels"
             )
         own, wanted, labels = [_numbers(one, known) for one in own], _numbers(wanted, known), True
     elif labels is None and free.any():  # in floats, that they are whole numbers would no longer be seen

@@ -115,7 +115,7 @@ def note_lossy(path: Path, pixels: NDArray[Any]) -> None:
 
     if path.suffix.lower() in LOSSY:
         suffix = suitable_suffix(pixels.dtype, channels(pixels))
-        note(f"{path}: JPEG changes all pixels a little; end its name in {suffix} to keep the known ones to the bit")
+        note(f"{path}: JPEG changes all pixels a little; end its name in {suffix} to keep the known pixels exactly")
 
 
 def read_picture(path: Path) -> Image:
@@ -124,7 +124,7 @@ def read_picture(path: Path) -> Image:
 
     found = image.read(path)
     if found.metadata.more:
-        note(f"{path} has several frames or pages, of which the first is read")
+        note(f"{path} has several frames or pages; only the first is read")
     return found
 
 
@@ -177,7 +177,7 @@ def read_material(paths: Sequence[Path], deep: bool = False) -> Material:
     check_profiles(paths, metadata)
     volumes = [one.ndim == 4 for one in pictures]
     if len(paths) > 1 and any(volumes):
-        raise ValueError(f"{paths[volumes.index(True)]} is a volume, of which one is taken: give it alone")
+        raise ValueError(f"{paths[volumes.index(True)]} is a volume: give one volume only")
     pixels = [one[..., 0] if one.shape[-1] == 1 and one.ndim > 2 else one for one in pictures]
     plain = pixels[0].ndim == 2 + volumes[0]
     return Material(tuple(paths), pixels, None if plain else -1, lie[0], volumes[0], metadata[0])
@@ -191,8 +191,7 @@ def read_masks(paths: Sequence[Path], samples: Material) -> list[NDArray[np.bool
         return None
     if len(paths) != len(samples.pixels):
         raise ValueError(
-            f"--sample-mask is given {len(paths)} times and the number of samples is {len(samples.pixels)}; "
-            "give it once for each sample"
+            f"there are {len(paths)} --sample-mask and {len(samples.pixels)} samples; give one for each sample"
         )
     return [image.read_mask(path, shape) for path, shape in zip(paths, samples.sizes, strict=True)]
 
@@ -206,7 +205,7 @@ def read_pair(option: str, form: str, text: str, samples: Material) -> tuple[lis
     if len(names) != len(samples.pixels):
         raise ValueError(
             f"{option} {text} names {len(names)} files and there are {len(samples.pixels)} samples; "
-            f"give one for each, parted by commas"
+            f"give one for each, separated by commas"
         )
     return [Path(one) for one in names], Path(out)
 
@@ -296,7 +295,7 @@ def check_source_map(path: Path | None, samples: Material, *, everywhere: bool =
     image.check_writable(path, suffixes=SOURCE_SUFFIXES)
     far = max(max(sides) for sides in samples.sizes) > 2**16
     if path.suffix.lower() == ".png" and (far or not everywhere):
-        what = "positions over 65535" if far else "pixels that are from no sample"
+        what = "positions over 65535" if far else "pixels that are not from the sample"
         raise ValueError(f"{path} cannot hold {what}; end its name in .npz instead")
 
 

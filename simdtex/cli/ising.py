@@ -24,10 +24,16 @@ PICTURE_SWEEPS = 50
 
 
 @command(
-    ("ising -o page", "All schedules, and a report."),
-    ("ising --schedule coloring,synchronous --temperature 2.3", "Two schedules at one temperature."),
+    ("ising -o page", "Compare all schedules, and write a report."),
+    ("ising --schedule coloring,synchronous --temperature 2.3", "Compare two schedules at one temperature."),
 )
-@click.option("--schedule", "names", default=SCHEDULES, metavar="A,B,...", help="Try these.  [all kinds there are]")
+@click.option(
+    "--schedule",
+    "names",
+    default=SCHEDULES,
+    metavar="A,B,...",
+    help="Compare these schedules.  [one or more of each kind]",
+)
 @click.option(
     "--temperature",
     "temperatures",
@@ -37,18 +43,18 @@ PICTURE_SWEEPS = 50
     metavar="T",
     help="Relax at this temperature, in units of J / k_B, where T_c is 2.269; may be repeated.  [2.0, 2.3 and 2.6]",
 )
-@click.option(
-    "--size", default="24", show_default=True, metavar="WIDTHxHEIGHT", help="Use a lattice of this size, a torus."
-)
+@click.option("--size", default="24", show_default=True, metavar="WIDTHxHEIGHT", help="Use a torus of this size.")
 @click.option(
     "--seeds", default=32, show_default=True, help="Run this many independent chains at each temperature, 2 or more."
 )
 @click.option("--sweeps", default=300, show_default=True, help="Measure this many sweeps, 2 or more.")
-@click.option("--burn-in", default=600, show_default=True, help="Leave out this many sweeps before them.")
-@click.option("--start", default="up", show_default=True, help="Begin with all spins up, or random.")
-@click.option("--seed", default=1, show_default=True, help="Get the same numbers from the same seed, on every device.")
+@click.option("--burn-in", default=600, show_default=True, help="Run this many sweeps before the measurement.")
+@click.option("--start", default="up", show_default=True, help="Start with all spins up (up), or random (random).")
+@click.option(
+    "--seed", default=1, show_default=True, help="Use this seed: the same seed gives the same numbers on every device."
+)
 @DEVICE
-@click.option("-o", "--output", type=FOLDER, metavar="DIR", help="Write a report there.")
+@click.option("-o", "--output", type=FOLDER, metavar="DIR", help="Write a report into this folder.")
 @click.option("-q", "--quiet", is_flag=True, help="Show no progress and no table.")
 def ising(
     names: str,

@@ -15,28 +15,29 @@ from simdtex.cli.options import DEVICE
 from simdtex.cli.places import READ
 from simdtex.machine import Machine
 
-EXTRA = "simdtex live needs packages of its own ({}); install them with: pip install 'simdtex[live]'"
+EXTRA = "simdtex live needs additional packages ({}); install them with: pip install 'simdtex[live]'"
 
 
 @command(
-    ("live", "A page in the browser; drop a picture on it."),
-    ("live gravel.png", "It begins with this one."),
-    ("live --no-browser --port 8080", "It prints its address alone, for a browser of your choice."),
+    ("live", "Open the page; drop a picture on it."),
+    ("live gravel.png", "Start with this picture."),
+    ("live --no-browser --port 8080", "Print the address of the page and open no browser."),
 )
 @click.argument("picture", required=False, type=READ)
-@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Listen to this port.  [a free one]")
+@click.option("--port", type=click.IntRange(0, 65535), default=0, help="Listen on this port.  [a free one]")
 @click.option(
     "--host",
     default="127.0.0.1",
     show_default=True,
-    help="Listen to this address. With another one, whoever can reach it and knows the page's address can use it.",
+    help="Listen on this address. With another one, anybody who can reach it and knows the page's address can use "
+    "the page.",
 )
-@click.option("--browser/--no-browser", default=True, help="Open the page, or print its address alone.")
+@click.option("--browser/--no-browser", default=True, help="Open the page in the browser, or only print its address.")
 @DEVICE
 def live(picture: Path | None, port: int, host: str, browser: bool, device: str | None) -> None:
-    """Watch a texture take shape in the browser, and steer it.
+    """Synthesise, fill, extend and classify on a page in the browser.
 
-    The page is for this machine alone, and ends with this command.
+    Only this machine can open the page. The page ends with this command.
     """
     try:
         from simdtex.live.job import Picture

@@ -46,7 +46,7 @@ class Folder:
         names = [self.name, *(one.out.name for one in self.others)]
         earlier_files(self.output, "the maps", names.__contains__)
         if self.unknown:
-            note(f"the name does not say what map it is, so it is left out: {', '.join(self.unknown)}")
+            note(f"left out, because the name does not show the kind of map: {', '.join(self.unknown)}")
 
     def write(self, made: NDArray[Any], run: Any, metadata: Metadata | None) -> None:
         """Write all maps into the folder, or none; normals that are means of several get the length 1 again."""
@@ -80,10 +80,10 @@ def folder_of(picture: Path, output: Path) -> Folder | None:
         role = "albedo"
     if role is None or role not in found.files:
         there = next(iter(found.files.values()), picture / "brick_normal.png")
-        what = f" ({found.unknown[0]} does not say what it is)" if found.unknown else ""
+        what = f" ({found.unknown[0]} is of unknown kind)" if found.unknown else ""
         raise ValueError(
-            f"{picture} has no albedo{what}: end the name of one in _albedo, or give the map that decides the "
-            f"arrangement, as {there}"
+            f"{picture} has no albedo{what}: end the name of a map in _albedo, or give the map that decides the "
+            f"arrangement, such as {there}"
         )
     if output.suffix.lower() in (*READABLE, ".zarr") and not output.is_dir():
         raise ValueError(f"{picture} is a folder of maps and {output} a file: give a folder for the output")

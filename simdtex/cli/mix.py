@@ -19,8 +19,8 @@ CHOSEN = ("palette", "pattern", "low", "high")
 
 
 @job(
-    ("mix wood.png stone.png -o both.png", "A bit of each."),
-    ("mix wood.png stone.png -o both.png --palette wood.png --pattern stone.png", "Stone in the colours of wood."),
+    ("mix wood.png stone.png -o both.png", "Average the patterns of two samples."),
+    ("mix wood.png stone.png -o both.png --palette wood.png --pattern stone.png", "Make stone in the colours of wood."),
     stages="every iteration",
     profile=True,
 )
@@ -29,14 +29,14 @@ CHOSEN = ("palette", "pattern", "low", "high")
 @size_option("twice the first sample")
 @click.option("--palette", metavar="SAMPLE", help="Take the colours of this sample.  [those of the pattern]")
 @click.option("--pattern", metavar="SAMPLE", help="Take the pattern of this sample.  [the average of all]")
-@click.option("--average", metavar="W,W,...", help="Take the average of the patterns, a weight for each sample.")
+@click.option("--average", metavar="W,W,...", help="Average the patterns with these weights, one for each sample.")
 @click.option("--low", metavar="SAMPLE", help="Take the low frequencies of this sample, with --high.")
 @click.option("--high", metavar="SAMPLE", help="Take the high frequencies of this sample, with --low.")
 def mix(samples: tuple[Path, ...], output: Path, size: str | None, average: str | None, **options: Any) -> Task:
-    """Mix the textures SAMPLE...: a picture that looks a bit like each of them.
+    """Mix the textures SAMPLE... into one picture.
 
-    A sample is named in options by its path as it stands in the command, or by its number from 1. The method is Heeger
-    and Bergen's (1995).
+    Options name a sample by its path as in the command, or by its number from 1. The method is Heeger and Bergen's
+    (1995).
     """
     from simdtex.io import image
     from simdtex.methods.pyramid.mixtures import mix
@@ -68,6 +68,6 @@ def sample_number(name: str, text: str | None, samples: tuple[Path, ...]) -> int
     if text.isdecimal() and 1 <= int(text) <= len(samples):
         return int(text) - 1
     raise ValueError(
-        f"--{name} {text} is none of the samples; give the path of one as it stands in the command, "
+        f"--{name} {text} is none of the samples; give the path of one as in the command, "
         f"or its number, 1 to {len(samples)}"
     )

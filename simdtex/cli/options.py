@@ -31,19 +31,35 @@ class Option(click.Option):
     """An option in a ``group`` of the help.
 
     The shell completes ``words``, which are the metavar if they are few; ``kind`` is the declared kind of an option of
-    a method.
+    a method. The help names ``method`` in a command that has several, and ends in ``with_tiles`` in one with tiles.
     """
 
     def __init__(
-        self, *names: Any, group: str = JOB, words: Iterable[str] = (), kind: Any = None, **given: Any
+        self,
+        *names: Any,
+        group: str = JOB,
+        words: Iterable[str] = (),
+        kind: Any = None,
+        method: str = "",
+        with_tiles: str = "",
+        **given: Any,
     ) -> None:
         super().__init__(*names, **given)
         self.group, self.words, self.kind = group, list(dict.fromkeys(words)), kind
+        self.method, self.with_tiles = method, with_tiles
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Return the words that begin so; else what the type completes."""
         found = [CompletionItem(word) for word in self.words if word.startswith(incomplete)]
         return found or super().shell_complete(ctx, incomplete)
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """Return the names and the help in this command."""
+        found, names = super().get_help_record(ctx), {one.name for one in ctx.command.params}
+        if found is None:
+            return None
+        help = f"{self.method}: {found[1]}" if self.method and "method" in names else found[1]
+        return found[0], f"{help} {self.with_tiles}".rstrip() if "tiles" in names else help
 
     def make_metavar(self, ctx: click.Context) -> str:
         """Return the words, if they are few."""
@@ -122,24 +138,26 @@ def numbers(name: str, text: str) -> list[float]:
     try:
         return [float(word) for word in text.split(",")]
     except ValueError:
-        raise ValueError(f"{name} {text} must be numbers parted by commas, as 0.1,0.2") from None
+        raise ValueError(f"{name} {text} must be numbers separated by commas, such as 0.1,0.2") from None
 
 
 SEED = option(
-    "--seed", type=int, help="Make the same picture from the same seed, on every device.  [a fresh one, printed]"
+    "--seed",
+    type=int,
+    help="Use this seed: the same seed gives the same output on every device.  [a random one, printed]",
 )
 DEVICE = option(
     "--device",
     metavar="TEXT",
     group=DEVICE_GROUP,
-    help="Run on the device whose name or platform contains this text, on that of a number of `simdtex devices`, or "
-    "on `reference`.  [SIMDTEX_DEVICE, else a GPU, else a CPU]",
+    help="Run on this device: a part of its name or platform, its index in `simdtex devices`, or `reference`.  "
+    "[SIMDTEX_DEVICE, else a GPU, else a CPU]",
 )
 PROFILE = option(
     "--profile",
     is_flag=True,
     group=DEVICE_GROUP,
-    help="Print the time of each kernel, and what is left to the host.",
+    help="Print the time of each kernel, and of the host.",
 )
 QUIET = option("-q", "--quiet", is_flag=True, group=DEVICE_GROUP, help="Show no progress bar and no summary.")
 CHECKPOINT = option(
@@ -157,30 +175,33 @@ SAMPLE_MASK = option(
     multiple=True,
     type=READ,
     metavar="FILE",
-    help="mrf: take pixels only where this picture of the sample's size is white; once for each sample.",
+    method="mrf",
+    help="Take pixels only from the white parts of this mask, of the sample's size; give one for each sample.",
 )
 KNOWN = option(
     "--known",
     group=DATA,
     type=READ,
     metavar="FILE",
-    help="mrf: keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of "
-    "Geo-EAS, or a picture or a grid that is transparent or NaN where nothing is known.",
+    method="mrf",
+    help="Keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of "
+    "Geo-EAS, or a picture or a grid whose unknown pixels are transparent or NaN.",
 )
 GUIDE = option(
     "--guide",
     group=DATA,
     type=READ_PAIR,
     metavar="SAMPLE-GUIDE=OUTPUT-GUIDE",
-    help="mrf: take each pixel from places whose sample guide equals the output guide there: two pictures of labels or "
-    "numbers. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples.",
+    method="mrf",
+    help="Take each pixel from places where SAMPLE-GUIDE is like OUTPUT-GUIDE at the pixel: two pictures of "
+    "labels or numbers. Give GUIDE0,GUIDE1=OUTPUT-GUIDE for several samples.",
 )
 PLACES = (
     option(
         "--origin",
         metavar="X,Y[,Z]",
         group=DATA,
-        help="Begin at this centre of the first cell, in the units of the table of --known.  [that of a grid "
+        help="Place the centre of the first cell here, in the units of the table of --known.  [that of a grid "
         "TRAINING_IMAGE, else 0,0]",
     ),
     option(
@@ -193,8 +214,8 @@ PLACES = (
         "--several",
         words=("refuse", "mean", "most"),
         group=DATA,
-        help="Take this for data of a table that lie in one cell and differ: an error, their mean, or the most "
-        "frequent.  [refuse]",
+        help="Resolve different data of a table in one cell: by an error (refuse), their mean (mean), or the most "
+        "frequent value (most).  [refuse]",
     ),
 )
 
@@ -211,7 +232,8 @@ SOURCE_MAP = option(
     group=OUTPUTS,
     type=WRITE,
     metavar="FILE",
-    help="Write where in the sample each pixel is from: .npz, .npy or .png; with --tiles STORE/source.",
+    help="Write the position in the sample of each pixel: .npz, .npy or .png.",
+    with_tiles="With --tiles FILE is STORE/source.",
 )
 ALSO = option(
     "--also",
@@ -219,14 +241,14 @@ ALSO = option(
     multiple=True,
     type=WRITE_PAIR,
     metavar="MAP=OUT",
-    help="Carry the arrangement over to another map of the material (normal, height); may be repeated. Give "
-    "MAP0,MAP1=OUT for several samples. With --tiles OUT is STORE/NAME.",
+    help="Arrange another map of the material (normal, height) like the output; may be repeated.",
+    with_tiles="Give MAP0,MAP1=OUT for several samples. With --tiles OUT is STORE/NAME.",
 )
 
 
 def report_option(what: str) -> Callable[[Command], Command]:
     """Return ``--report``, which writes a page with this on it."""
-    return option("--report", type=FOLDER, metavar="DIR", group=OUTPUTS, help=f"Write a page of the run: {what}.")
+    return option("--report", type=FOLDER, metavar="DIR", group=OUTPUTS, help=f"Write a page about the run: {what}.")
 
 
 def size_option(default: str, of: str = "an output") -> Callable[[Command], Command]:

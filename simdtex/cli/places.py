@@ -78,7 +78,7 @@ def check_places(context: click.Context) -> None:
                 array = context.params.get("tiles") is not None and inner.path.parent == outer.path
                 if outer.role != "write" and _within(inner.path, outer.path) and not array:
                     raise ValueError(
-                        f"{inner.path} would be written into {outer.path}, which another output has for itself; "
+                        f"{inner.path} would be written into {outer.path}, the folder of another output; "
                         "give it another folder"
                     )
 
@@ -95,7 +95,7 @@ def _check_input(out: _Named, one: _Named) -> None:
     folder = out.role == "folder" or (out.role == "either" and out.path.is_dir())
     link = _real(one.path.parent) / one.path.name  # a link in the folder would be removed
     if folder and (_within(one.path, out.path) or link.is_relative_to(_real(out.path))):
-        raise ValueError(f"{one.path} is an input and lies in {out.path}, which is written anew; give another folder")
+        raise ValueError(f"{one.path} is an input and is in {out.path}, which would be replaced; give another folder")
     if one.role == "enter" and _within(out.path, one.path):
         raise ValueError(f"{out.path} would be written into {one.path}, which is an input; give another folder")
 

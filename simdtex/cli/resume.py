@@ -20,25 +20,25 @@ COMMANDS = ("classify", "extend", "fill", "mix", "simulate", "solid", "synth")
 
 
 @command(
-    ("resume state", "The run of --checkpoint state."),
-    ("resume more.zarr --workers 4", "An output in tiles, with four processes."),
+    ("resume state", "Continue the run of --checkpoint state."),
+    ("resume more.zarr --workers 4", "Continue an output in tiles with four processes."),
 )
 @click.argument("path", metavar="FILE", type=ENTER)
 @workers_option
 @DEVICE
 @QUIET
 def resume(path: Path, workers: str | None, device: str | None, quiet: bool) -> None:
-    """Go on with the run whose state is in FILE, and write what its command writes.
+    """Continue the run whose state is in FILE, and write the outputs of its command.
 
-    FILE is that of --checkpoint, or the .zarr store of --tiles.
+    FILE is the file of --checkpoint, or the .zarr store of --tiles.
     """
     if (path / "zarr.json").is_file() or (path / "work").is_dir():
         resume_tiles(path, workers, device, quiet)
         return
     if workers is not None:
-        raise ValueError("--workers goes with the .zarr store of --tiles; leave it out")
+        raise ValueError("--workers requires the .zarr store of --tiles; leave it out")
     if not path.exists():
-        raise ValueError(f"{path} does not exist: check the path of the run, or it is finished")
+        raise ValueError(f"{path} does not exist: check the path (a finished run has no checkpoint)")
     if path.is_dir():
         raise ValueError(f"{path} is a folder; give the file of --checkpoint, or the store of --tiles")
     repeat_command(path, [*(["--device", device] if device else []), *(["--quiet"] if quiet else [])])
@@ -51,11 +51,13 @@ def repeat_command(path: Path, more: list[str]) -> None:
 
     command: dict[str, Any] | None = read(path)[0]["command"]
     if command is None:
-        raise ValueError(f"the run in {path} was begun in Python; make the same call with checkpoint={str(path)!r}")
+        raise ValueError(f"the run in {path} was started in Python; make the same call with checkpoint={str(path)!r}")
     if command["name"] not in COMMANDS:
-        raise ValueError(f"the checkpoint in {path} is of no command that keeps one; remove it")
+        raise ValueError(f"the checkpoint in {path} is of a command that cannot be resumed; remove it")
     if not os.path.isdir(command["folder"]):
-        raise ValueError(f"{command['folder']}, where the run in {path} was begun, is not there; put it back")
+        raise ValueError(
+            f"{command['folder']}, the folder in which the run in {path} was started, does not exist; restore it"
+        )
     own = ["--checkpoint", str(path.resolve())]
     with chdir(command["folder"]):
         words = [*command["options"], *more, *own, "--", *command["arguments"]]

@@ -19,8 +19,11 @@ from simdtex.schedules import TOGETHER
 
 
 @command(
-    ("schedules", "Compare them on a picture of brick, in the folder schedules-report."),
-    ("schedules gravel.png -o page --schedule coloring,synchronous --seeds 5", "Two of them, with five seeds."),
+    ("schedules", "Compare schedules on a picture of brick, in the folder schedules-report."),
+    (
+        "schedules gravel.png -o page --schedule coloring,synchronous --seeds 5",
+        "Compare two schedules with five seeds.",
+    ),
 )
 @click.argument("sample", required=False, type=READ)
 @click.option(
@@ -36,15 +39,15 @@ from simdtex.schedules import TOGETHER
     "names",
     default=",".join(TOGETHER),
     metavar="A,B,...",
-    help="Compare these.  [those of many sites a step]",
+    help="Compare these schedules.  [those that relax many sites in a step]",
 )
 @click.option(
     "--seeds",
     default=3,
     show_default=True,
-    help="Run each schedule this many times, with seeds one after another.",
+    help="Run each schedule this many times, with consecutive seeds.",
 )
-@click.option("--seed", default=1, show_default=True, help="Begin with this seed.")
+@click.option("--seed", default=1, show_default=True, help="Start with this seed.")
 @click.option(
     "--size", default="96x96", show_default=True, metavar="WIDTHxHEIGHT", help="Make outputs of this size, in pixels."
 )
@@ -63,7 +66,7 @@ def schedules(
 ) -> None:
     """Run the same job under several schedules and compare them in a report.
 
-    Without SAMPLE it is 128x128 pixels of the brick of scikit-image.
+    The default SAMPLE is 128x128 pixels of the brick of scikit-image.
     """
     from simdtex import schedules as known
     from simdtex.experiments.comparison import compare

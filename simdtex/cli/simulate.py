@@ -23,10 +23,16 @@ from simdtex.cli.places import EITHER, READ
 @job(
     (
         "simulate facies.png -o many.nc --number 50 --categorical --known wells.csv",
-        "50 that honour the data of wells.",
+        "Simulate 50 realisations that honour the data of wells.",
     ),
-    ("simulate facies.png -o many.zarr --number 10 --size 500x500 --report page", "A size, and a page of statistics."),
-    ("simulate facies.gslib -o many.sgems --known wells.csv --origin 5,5 --cell 10,10", "From a grid to a grid."),
+    (
+        "simulate facies.png -o many.zarr --number 10 --size 500x500 --report page",
+        "Set the size, and write a page of statistics.",
+    ),
+    (
+        "simulate facies.gslib -o many.sgems --known wells.csv --origin 5,5 --cell 10,10",
+        "Read a grid, and write a grid.",
+    ),
 )
 @click.argument("training_image", nargs=-1, required=True, type=READ)
 @click.option(
@@ -37,7 +43,7 @@ from simdtex.cli.places import EITHER, READ
     help="Write the realisations here: .zarr, .nc or .npz, or as a grid: .gslib or .sgems.",
 )
 @click.option("-n", "--number", default=1, show_default=True, type=int, help="Make this many realisations.")
-@click.option("--first", default=0, show_default=True, type=int, help="Begin with the realisation of this number.")
+@click.option("--first", default=0, show_default=True, type=int, help="Start with the realisation of this number.")
 @size_option("that of --known or of a map, else of TRAINING_IMAGE", "realisations")
 @places
 @KNOWN
@@ -48,30 +54,30 @@ from simdtex.cli.places import EITHER, READ
     type=READ,
     metavar="FILE",
     group=DATA,
-    help="Make cells only where this picture or grid of the size of a realisation is white, or above 0 in a grid.",
+    help="Make only cells in the white parts of this picture, or above 0 in this grid, of the size of a realisation.",
 )
 @option(
     "--probabilities",
     type=READ,
     metavar="FILE",
     group=DATA,
-    help="Follow these probabilities of the categories, in ascending order: a table of x, y and one for each, or a "
-    ".npy, .tif or grid with one channel for each; NaN where nothing is said.",
+    help="Follow these probabilities of the categories, in ascending order of category: a table of x, y and one "
+    "column for each, or a .npy, .tif or grid with one channel for each; unknown ones are NaN.",
 )
 @option(
     "--image-map",
     type=READ,
     metavar="FILE",
     group=DATA,
-    help="Take each cell from the TRAINING_IMAGE of this number, from 0 on; or, with a channel for each, follow these "
-    "weights.",
+    help="Take each cell from the TRAINING_IMAGE of this number, counted from 0; a file with a channel for each gives "
+    "their weights.",
 )
 @option(
     "--rotation",
     type=READ,
     metavar="FILE",
     group=DATA,
-    help="Draw each cell from TRAINING_IMAGE turned by so many degrees from x to y, in eighths of a turn.",
+    help="Draw each cell from TRAINING_IMAGE turned by this many degrees from x to y, in eighths of a turn.",
 )
 @option(
     "--scale",
@@ -84,7 +90,7 @@ from simdtex.cli.places import EITHER, READ
     "--source",
     is_flag=True,
     group=OUTPUTS,
-    help="Write where in TRAINING_IMAGE each cell is from, too: .zarr, .nc or .npz.",
+    help="Write the position in TRAINING_IMAGE of each cell too: .zarr, .nc or .npz.",
 )
 @option(
     "--jobs",
@@ -105,9 +111,9 @@ def simulate(
     source: bool,
     **options: Any,
 ) -> Task:
-    """Simulate what TRAINING_IMAGE shows: realisations that look like it and honour data.
+    """Simulate realisations that look like TRAINING_IMAGE and honour data.
 
-    A realisation depends on the seed and on its own number alone.
+    A realisation depends only on the seed and on its number.
     """
     from simdtex import simulate
     from simdtex.io.grids import SUFFIXES, check_grid
@@ -129,7 +135,7 @@ def simulate(
     writers: list[Any] = [lambda made, run: write_realisations(output, made)]
     if report:
         if source or "region" in maps:
-            raise ValueError("--report is of values of all cells alone; leave --source and --region out")
+            raise ValueError("--report cannot be used with --source or --region; leave them out")
         _check_report(report, material, shape, getattr(known, "values", known))
         rows = partial(_rows, known, shape, place)
         flat = known is not None and not material.deep
@@ -177,14 +183,14 @@ def _check_report(folder: Path, material: Material, shape: tuple[int, ...], know
     from simdtex.report.page import check_folder
 
     if len(pictures) > 1 or material.channel_axis is not None:
-        raise ValueError("--report is of one training image of one variable; leave it out")
+        raise ValueError("--report requires one training image of one variable; leave it out")
     if pictures[0].dtype.kind == "f" and np.isnan(pictures[0]).any():
-        raise ValueError("--report is of a training image that is known everywhere; leave it out")
+        raise ValueError("--report requires a training image without unknown cells; leave it out")
     given = [pictures[0]] if known is None else [pictures[0], known]
     if not material.deep and min(*shape, *pictures[0].shape) < LEAST:
-        raise ValueError(f"--report is of {LEAST}x{LEAST} pixels or more; give a larger size, or leave it out")
+        raise ValueError(f"--report requires {LEAST}x{LEAST} pixels or more; give a larger size, or leave it out")
     if any(np.fmax.reduce(np.abs(np.ma.getdata(one), dtype=np.float64), None) > LARGEST for one in given):
-        raise ValueError(f"--report is of values up to {LARGEST:g}; give them in a larger unit, or leave it out")
+        raise ValueError(f"--report requires values up to {LARGEST:g}; give them in a larger unit, or leave it out")
     if not material.deep and find_spec("gstools") is None:
         raise ValueError("gstools is not installed; pip install 'simdtex[simulate]', or leave --report out")
     check_folder(folder)

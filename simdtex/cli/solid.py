@@ -24,9 +24,9 @@ SIDE = 128
 @job(
     (
         "solid marble.png -o block.npz --size 64 --view block.png",
-        "A cube of 64^3 voxels, and a picture of it.",
+        "Make a cube of 64^3 voxels, and a picture of it.",
     ),
-    ("solid marble.png -o slices --size 16x64x64", "A folder of 16 slices."),
+    ("solid marble.png -o slices --size 16x64x64", "Make a folder of 16 slices."),
     stages="the middle slice of every iteration",
     profile=True,
 )
@@ -38,12 +38,12 @@ SIDE = 128
     multiple=True,
     required=True,
     type=EITHER,
-    help="Write this block: .npz, .npy, .nrrd, .tif, or without suffix a folder of slices; may be repeated.",
+    help="Write the block: .npz, .npy, .nrrd, .tif, or, without suffix, a folder of slices; may be repeated.",
 )
 @click.option(
     "--size",
     metavar="DEPTHxHEIGHTxWIDTH",
-    help=f"Make a block of this many slices, rows and columns, the depth first, or a cube of one number.  [{SIDE}]",
+    help=f"Make a block of this many slices, rows and columns; one number makes a cube.  [{SIDE}]",
 )
 @option(
     "--view",
@@ -51,10 +51,10 @@ SIDE = 128
     group=OUTPUTS,
     type=WRITE,
     metavar="PNG",
-    help="Write a picture of it: a cube, a sphere and three slices.",
+    help="Write a picture of the block: a cube, a sphere and three slices.",
 )
 def solid(sample: Path, outputs: tuple[Path, ...], size: str | None, picture: Path | None, **options: Any) -> Task:
-    """Make a solid of the texture SAMPLE: a block whose slices look like it.
+    """Make a solid block whose slices have the texture of SAMPLE.
 
     The method is Heeger and Bergen's (1995), for textures that look alike in all directions.
     """
@@ -88,7 +88,7 @@ def block_shape(text: str) -> tuple[int, int, int]:
     sides = [int(side or match[1]) for side in match.groups()] if match else [0]
     if 0 in sides:
         raise ValueError(
-            f"size {text!r} is not DEPTHxHEIGHTxWIDTH: give slices x rows x columns of 1 or more, as 64x128x128, or "
-            "one number for a cube"
+            f"size {text!r} is not DEPTHxHEIGHTxWIDTH: give slices x rows x columns of 1 or more, such as 64x128x128, "
+            "or one number for a cube"
         )
     return sides[0], sides[1], sides[2]

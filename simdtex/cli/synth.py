@@ -39,12 +39,12 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 
 
 @job(
-    ("synth gravel.png -o more.png", "Twice as much, and it tiles."),
+    ("synth gravel.png -o more.png", "Make a texture of twice the size that tiles."),
     (
         "synth gravel.png -o more.png --size 1024x512 --seed 7 --also normal.png=more-normal.png",
-        "A size, a seed for the same pixels anywhere, a map carried along.",
+        "Set the size and the seed, and arrange a normal map like the output.",
     ),
-    ("synth gravel.png -o more.zarr --size 32768x32768 --tiles 2048", "More than the memory holds."),
+    ("synth gravel.png -o more.zarr --size 32768x32768 --tiles 2048", "Make an output larger than the memory."),
     stages="every level, sweep or iteration",
     profile=True,
 )
@@ -69,7 +69,7 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 @GUIDE
 @SOURCE_MAP
 @ALSO
-@report_option("pictures, and how evenly it uses the sample")
+@report_option("its pictures, and how evenly it uses the sample")
 @tiles_options
 def synth(
     samples: tuple[Path, ...],
@@ -81,10 +81,10 @@ def synth(
     report: Path | None,
     **options: Any,
 ) -> Task | None:
-    """Make more of the texture SAMPLE.
+    """Synthesise a picture of any size with the texture of SAMPLE.
 
-    The method mrf takes several samples of one type, and their pixels may be NaN where they are unknown. SAMPLE may
-    be a folder with the maps of a material, as PICTURE of `simdtex extend`.
+    The method mrf takes several samples of one type; unknown pixels may be NaN. SAMPLE may be a folder with the maps
+    of a material, as in `simdtex extend`.
     """
     from simdtex.io import image
     from simdtex.synthesis import synthesize
@@ -113,7 +113,7 @@ def synth(
     others = read_also(also, material)
     if (others or folder) and known is not None:
         what = "give one picture" if folder else "leave --also out"
-        raise ValueError(f"known pixels are from no sample, and nothing says what a map has there; {what}")
+        raise ValueError(f"the maps have no values for known pixels, which are not from the sample; {what}")
     if known is not None:
         note_lossy(output, pixels)
     like = material.metadata and material.metadata._replace(exif=None)  # a new picture was taken by no camera
@@ -123,7 +123,7 @@ def synth(
         from simdtex.report.synthesis import write_synthesis
 
         if material.several or known is not None or not material.known:
-            raise ValueError("--report shows one sample, all of it known, and what is taken from it; leave it out")
+            raise ValueError("--report requires one sample without unknown pixels, and no --known; leave it out")
         check_folder(report)
         writers.append(lambda made, run: write_synthesis(report, pixels, made, run, command_line()))
 

@@ -24,14 +24,15 @@ ALONE = ("stages", "report", "profile", "array")
 def tiles_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add ``--tiles`` and what goes with it."""
     for one in (
-        option("--dry-run", group=RUNS, is_flag=True, help="Print the plan of --tiles, and do nothing."),
+        option("--dry-run", group=RUNS, is_flag=True, help="Print the plan of --tiles and end."),
         workers_option,
         option(
             "--tiles",
             group=RUNS,
             type=int,
             metavar="SIDE",
-            help="mrf: make the output in tiles of this many pixels to the side, into a .zarr store: for sizes beyond "
+            method="mrf",
+            help="Make the output in tiles of this many pixels a side, in a .zarr store, for outputs larger than "
             "one machine. The pixels are the same.",
         ),
     ):
@@ -43,8 +44,7 @@ workers_option = option(
     "--workers",
     group=RUNS,
     metavar="N|ADDRESS",
-    help="Start N processes on this machine to make the tiles, or use the workers of the Dask scheduler at "
-    "tcp://HOST:8786.",
+    help="Use N processes on this machine for the tiles, or the workers of the Dask scheduler at tcp://HOST:8786.",
 )
 
 
@@ -55,7 +55,7 @@ def workers_of(text: str | None) -> int | str | None:
     try:
         return int(text)
     except ValueError:
-        raise ValueError(f"--workers {text} is neither a number nor an address as tcp://HOST:8786") from None
+        raise ValueError(f"--workers {text} is neither a number nor an address such as tcp://HOST:8786") from None
 
 
 def check_tiles(context: click.Context) -> None:
@@ -64,19 +64,23 @@ def check_tiles(context: click.Context) -> None:
     if given["tiles"] is None:
         for name in ("workers", "dry_run"):
             if given[name]:
-                raise ValueError(f"--{name.replace('_', '-')} goes with --tiles; give the side of a tile, as 2048")
+                raise ValueError(
+                    f"--{name.replace('_', '-')} requires --tiles; give the side of a tile, such as --tiles 2048"
+                )
         return
     if given["method"] != "mrf":
         raise ValueError(f"the method {given['method']} needs the whole output at once; leave --tiles out")
     for name in ALONE:
         if given.get(name):
-            raise ValueError(f"--{name.replace('_', '-')} is of an output at once; leave it out, or --tiles")
+            raise ValueError(f"--{name.replace('_', '-')} cannot be used with --tiles; leave out one of them")
     if given["output"].suffix.lower() != ".zarr":
-        raise ValueError(f"{given['output']} is no .zarr store, which tiles are written to; end its name in .zarr")
+        raise ValueError(f"{given['output']} is not a .zarr store, which --tiles requires; end its name in .zarr")
     if given["source_map"] not in (None, given["output"] / "source"):
-        raise ValueError(f"the source map is an array of the store; give --source-map {given['output'] / 'source'}")
+        raise ValueError(
+            f"with --tiles the source map is an array of the store; give --source-map {given['output'] / 'source'}"
+        )
     if given.get("checkpoint"):
-        raise ValueError("the store of --tiles is a checkpoint itself; leave --checkpoint out")
+        raise ValueError("the store of --tiles is also the checkpoint; leave --checkpoint out")
 
 
 def synthesize_in_tiles(
@@ -96,7 +100,7 @@ def synthesize_in_tiles(
         return
     for one in others:
         if one.out.parent != output:
-            raise ValueError(f"{one.out} is no array of the store; end --also in ={output / one.out.stem}")
+            raise ValueError(f"{one.out} is not an array of the store; end --also in ={output / one.out.stem}")
     options |= {"rng": given["seed"], "device": given["device"], "source_map": given["source_map"] is not None}
     options["maps"] = {one.out.name: one.maps.array for one in others}
     with _progress(output, given["quiet"]) as callback:
@@ -114,7 +118,7 @@ def resume_tiles(store: Path, workers: str | None, device: str | None, quiet: bo
     with _progress(store, quiet) as callback:
         distributed.resume(store, workers=workers_of(workers), device=device, callback=callback, note=note)
     if finished:
-        click.echo(f"{store} is finished; there is nothing to go on with")
+        click.echo(f"{store} is finished already")
     else:
         _done(store, quiet, began)
 

@@ -68,7 +68,7 @@ def across(client: Client, store: Store, device: str | Machine | None, note: Cal
         except distributed.KilledWorker:
             raise DeviceError(
                 "the workers that took a tile ended one after another; give smaller tiles, or workers more "
-                f"memory, and go on with: simdtex resume {store.where}"
+                f"memory, and continue with: simdtex resume {store.where}"
             ) from None
         except distributed.CancelledError:
             raise DeviceError(

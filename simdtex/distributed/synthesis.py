@@ -63,7 +63,7 @@ def synthesize(
     note: Callable[[str], None] | None = None,
     **options: Any,
 ) -> Any:
-    """Make more of a texture than one machine holds: the bytes of `simdtex.synthesize` with ``method="mrf"``.
+    """Synthesise an output larger than one machine: the bytes of `simdtex.synthesize` with ``method="mrf"``.
 
     Parameters
     ----------
@@ -72,12 +72,12 @@ def synthesize(
     shape : (int, int)
         Rows and columns of the output.
     store : path
-        Folder of the Zarr store to make, which every worker reaches. `resume` goes on from it if the run is stopped.
+        Folder of the Zarr store to make, which every worker can reach. `resume` continues an interrupted run.
     tiles : int
-        Sites to the side of a tile, which determine the memory of a worker and not the result.
+        Sites on a side of a tile. They determine the memory of a worker and not the result.
     workers : int, str or distributed.Client, optional
-        What does the tiles: so many processes on this machine, which divide its cores among them; the workers of the
-        Dask scheduler at an address; those of a client. Each opens its own device. None: this process, one by one.
+        The workers that make the tiles: a number of processes on this machine, which share its cores; the address of a
+        Dask scheduler; or a client. Each worker opens its own device. None: this process makes the tiles one by one.
     source_map : bool
         Also write ``source``, for every output pixel the (row, column[, picture]) of the sample pixel it is from.
     maps : dict, optional
@@ -108,8 +108,8 @@ def synthesize(
 
     Notes
     -----
-    A tile relaxes in a window that is as much larger as a sweep reaches, so the cost is that of `simdtex.synthesize`
-    and the redundant work that `plan` states. Memory of a worker: what `plan` states, whatever the output's size.
+    A tile relaxes in a window that is larger by the reach of a sweep, so the cost is that of `simdtex.synthesize` plus
+    the redundant work in `plan`. The memory of a worker is that in `plan`, for any size of output.
     """
     size = check_shape(shape)
     inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
@@ -216,7 +216,7 @@ def _maps(maps: dict[str, Any], plan: Plan) -> dict[str, list[NDArray[Any]]]:
     """Return further maps as lists with one for each picture of the sample; raise if they do not fit."""
     found, sizes = {}, [picture.shape[:2] for picture in plan.sample.pictures.pixels]
     if maps and plan.given is not None:
-        raise ValueError("known pixels are from no sample, and nothing says what a map has there; leave the maps out")
+        raise ValueError("the maps have no values for known pixels, which are not from the sample; leave the maps out")
     for name, given in maps.items():
         if not name.isidentifier() or name in TAKEN:
             raise ValueError(f"{name!r} is no name of a map; give a word other than {', '.join(TAKEN)}")
@@ -233,7 +233,9 @@ def _made(store: PathLike) -> Iterator[str]:
     """Yield where to make a store, so that it exists completely or not at all."""
     path = Path(store)
     if path.exists():
-        raise ValueError(f"{path} is there already; remove it, give another name, or go on with: simdtex resume {path}")
+        raise ValueError(
+            f"{path} is there already; remove it, give another name, or continue with: simdtex resume {path}"
+        )
     if not path.parent.is_dir():
         raise ValueError(f"the folder {path.parent} does not exist; make it first")
     with atomic_folder(path) as temporary:
@@ -280,7 +282,7 @@ def _mending(store: Any) -> Iterator[None]:
     try:
         yield
     except NotWritten as error:
-        raise ValueError(f"{error}, and go on with: simdtex resume {store.where}") from None
+        raise ValueError(f"{error}, and continue with: simdtex resume {store.where}") from None
     except Damaged as error:
         where, part = store.where, str(error)
         if not os.path.exists(os.path.join(where, "zarr.json")):

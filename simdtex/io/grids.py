@@ -128,10 +128,9 @@ def read_grid(path: PathLike, *, missing: Iterable[float] = MISSING, max_pixels:
     ----------
     path : path
         A text: a title, the number of variables, their names, each in a line, and a value of each variable for each
-        cell, x fastest, then y, then z. Or a Cartesian grid that SGeMS has saved. What headers are understood is in the
-        notes.
+        cell, x fastest, then y, then z. Or a Cartesian grid that SGeMS has saved. The notes describe the headers.
     missing : iterable of float
-        Numbers that stand for an unknown value, which becomes NaN.
+        Numbers that mean an unknown value; they become NaN.
     max_pixels : int, optional
         The most values that are read. None: ``SIMDTEX_MAX_PIXELS`` of the environment, else 2**27.
 
@@ -143,12 +142,12 @@ def read_grid(path: PathLike, *, missing: Iterable[float] = MISSING, max_pixels:
     Raises
     ------
     ValueError
-        The file is missing, no grid, too large, or its header and its length disagree. Nothing of the size that the
-        header says is asked for before the length of the file has been looked at.
+        The file is missing, is not a grid, is too large, or its header and its length disagree. The length is compared
+        before memory is allocated.
 
     Notes
     -----
-    A text says how many cells there are in one of three ways:
+    A text gives the number of cells in one of three ways:
 
     * its first line is ``nx ny nz``, as of MPSlib, or ``nx ny nz sx sy sz ox oy oz``, as of DeeSse and geone: sizes of
       a cell, and the corner of the grid, half a cell before the first centre;
@@ -156,8 +155,8 @@ def read_grid(path: PathLike, *, missing: Iterable[float] = MISSING, max_pixels:
       centre of the first cell, and sizes; a last number is that of realisations, which follow each other;
     * its title ends in ``(NXxNYxNZ)``, as of SGeMS.
 
-    Where it does not say so, the origin is 0 and a cell 1. Files of SGeMS hold 32-bit floats, of which the shortest
-    decimal number is taken for origin and size. Regions and groups of SGeMS are passed over.
+    Without these numbers the origin is 0 and the size of a cell 1. Files of SGeMS hold 32-bit floats, of which the
+    shortest decimal number is taken for origin and size. Regions and groups of SGeMS are passed over.
     """
     name = os.fspath(path)
     most = max_pixels_or_default(max_pixels)

@@ -71,15 +71,15 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
     Parameters
     ----------
     path : path
-        A text with a datum in each line: x, y and a value, or one value for each of several variables. Cells are
-        separated by semicolons, tabs, commas or blanks: the first of these, in this order, that is in the first line.
-        Numbers have a decimal point. An empty cell, or NaN, is an unknown value. A first line with names for x and y
-        is a header, which names the variables; if it calls the third of four or more columns z, that is the third
+        A text with a datum in each line: x, y and a value, or one value for each of several variables. Columns are
+        separated by semicolons, tabs, commas or blanks: the first of these, in this order, that occurs in the first
+        line. Numbers have a decimal point. An empty cell, or NaN, is an unknown value. A first line with names for x
+        and y is a header, which names the variables; if it calls the third of four or more columns z, that is the third
         coordinate. From ``#`` to the end of a line is a comment.
 
-        Or a point set of Geo-EAS, told by a second line of one number: a title, the number of columns, their names,
-        each in a line, and a datum in each line, with blanks between numbers. The first columns are x and y and, if it
-        is called so, z; a number of `simdtex.io.grids.MISSING` is an unknown value.
+        Or a point set of Geo-EAS, recognised by a second line of one number: a title, the number of columns, their
+        names, each in a line, and a datum in each line, with blanks between numbers. The first columns are x and y and,
+        if it is called so, z; a number of `simdtex.io.grids.MISSING` is an unknown value.
 
         Or a NumPy ``.npy`` of real numbers, (data, 3 or more), with the columns x, y and values.
     max_pixels : int, optional
@@ -243,10 +243,10 @@ def place_hard_data(
     ----------
     table : HardData or array_like, (data, 3 or more)
         x, y and the value of each datum, or one value for each of several variables; NaN is unknown. x grows with the
-        column, y with the row and z with the layer. A datum belongs to the cell that it lies in, and on the border of
-        two to the one of the larger coordinate (without `origin` and `cell`, 1.5 goes to 2, -0.5 to 0).
+        column, y with the row and z with the layer. A datum belongs to the cell that contains it; on the border of two
+        cells, to that of the larger coordinate (without `origin` and `cell`, 1.5 goes to 2, -0.5 to 0).
     shape : (rows, cols) or (layers, rows, cols)
-        The size of the grid. With two numbers z, if the data have it, must lie in the one layer that there is.
+        The size of the grid. With two numbers, z of the data, if any, must be in the only layer.
     dtype : dtype, optional
         The type of the values, which must be the training image's; None is float64. Integers must be exact; floats
         are rounded to the type.
@@ -255,15 +255,15 @@ def place_hard_data(
     cell : (x, y) or (x, y, z), optional
         The size of a cell. None is 1: coordinates are in pixels.
     several : {"refuse", "mean", "most"}
-        What becomes of data of one cell that differ: an error; their mean, rounded to the nearest integer (halves up)
-        if the type is not of floats; or the most frequent value, of those that are equally frequent the one that is
-        first in the table. Each variable is treated for itself.
+        Value for different data in one cell: an error; their mean, rounded to the nearest integer (halves up) unless
+        the type is a float; or the most frequent value, the first in the table if several are equally frequent. Each
+        variable is treated separately.
 
     Returns
     -------
-    MaskedArray, of `shape`, with several variables an axis more
-        The known values; unknown ones are masked. A single variable has no last axis. ``filled()`` replaces unknown
-        values by NaN, or by 0 if the type is not of floats.
+    MaskedArray of `shape`, with a last axis for several variables
+        The known values; unknown ones are masked. ``filled()`` replaces unknown values by NaN, or by 0 if the type is
+        not a float.
 
     Raises
     ------

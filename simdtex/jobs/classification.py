@@ -74,15 +74,15 @@ def classify(
     Parameters
     ----------
     image : (rows, cols) or, with `channel_axis`, (rows, cols, bands) array
-        The picture; any real type, up to 14 bands. Pixels that are NaN or masked are labelled 0.
+        The picture; any real type, up to 14 bands. Pixels that are NaN or masked get the label 0.
     textures : mapping of str to array or list of arrays, or (rows, cols) array of integers
         The samples of each class, of the picture's type, by the name of the class. Or training regions of the picture
         itself: 1, 2, ... where a pixel is of a class, and 0 elsewhere.
     masks : mapping of str to (rows, cols) bool array or list of arrays, optional
-        Where the samples of a class may be used; a class that is not named is used whole.
+        True for pixels of the samples that may be used; a class without masks is used whole.
     validation : mapping of str to array or list of arrays, optional
-        Further pictures of a class, which are not compared with. They say how much the class differs from its samples,
-        which decides what is unknown.
+        Further pictures of a class, from which no exemplars are drawn. They measure how much the class varies, which
+        decides when a pixel is unknown.
     channel_axis : int, optional
         The axis that holds bands; None for a grey picture.
     rng, device, callback, checkpoint
@@ -95,21 +95,21 @@ def classify(
     Returns
     -------
     labels : (rows, cols) uint8 array
-        0 where the texture is unknown; 1 the first class, 2 the second... With training regions, their own numbers.
+        0 for unknown textures, 1 for the first class, 2 for the second... With training regions, their numbers.
     output : simdtex.run.Output
         Only with ``full_output=True``; it has ``fit`` and ``probability``.
 
     Raises
     ------
     ValueError, TypeError
-        What is wrong and what would be right, in one sentence.
+        An argument is invalid; the message names the remedy.
 
     Notes
     -----
     Equation (6) with the bandwidth of the nearest neighbour, of whole neighbourhoods, at up to three levels, raw and
     with compressed contrast; a Potts field of labels; and Hotelling's test for the unknown: see
-    ``docs/classification.rst``. The same labels on every device. A texture that is turned, enlarged or lit otherwise is
-    another one, and strips narrower than the coupling vanish.
+    ``docs/classification.rst``. The same labels on every device. A turned, enlarged or differently lit texture is
+    another texture, and strips narrower than the coupling vanish.
 
     Cost: pixels x exemplars x classes x 66 multiply-adds for each band; 512x512 pixels and five classes take some 5 s
     on two cores. Memory: 48 bytes for each pixel and class, 90 for each pixel, and 100 MB.
@@ -229,7 +229,7 @@ class TextureClassifier:
     channel_axis : int, optional
         The axis of pictures that holds bands; None for grey ones.
     rng : int or Generator, optional
-        Which exemplars are drawn, as in `simdtex.synthesize`.
+        The seed of the exemplars, as in `simdtex.synthesize`.
     device : str or Machine, optional
         As in `simdtex.synthesize`.
     **options

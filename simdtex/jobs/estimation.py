@@ -47,7 +47,7 @@ def estimate(
     bandwidth: float = 1.0,
     device: str | None = None,
 ) -> xarray.Dataset:
-    """Return how probable each category is at each cell, or mean and variance, given data alone: the LCPDF.
+    """Estimate the probability of each category at each cell, or mean and variance, from data: the LCPDF.
 
     Parameters
     ----------
@@ -56,15 +56,15 @@ def estimate(
     known : array, HardData or path
         The data, as in `simdtex.simulate`.
     shape : (int, int), optional
-        Rows and columns of the result. None: those of `known`, where that is an array, else of the training image.
+        Rows and columns of the result. None: those of `known` if it is an array, else of the training image.
     several, origin, cell, mask
         As in `simdtex.simulate`.
     categorical : bool
-        Whether numbers name categories.
+        Whether values are categories.
     nearest : int
-        How many data a cell looks at, 0 to 64: the nearest.
+        Number of data for a cell, the nearest, 0 to 64.
     reach : int, optional
-        How far away a datum may be, in cells. None: an eighth of the smaller side of the training image.
+        Largest distance of a datum, in cells. None: an eighth of the smaller side of the training image.
     bandwidth : float
         h in units of h_opt, equation (8).
     device : str, optional
@@ -80,13 +80,13 @@ def estimate(
     Raises
     ------
     ValueError, TypeError
-        What is wrong and what would be right, in one sentence.
+        An argument is invalid; the message names the remedy.
 
     Notes
     -----
-    Equations (6), (7) and (12): neighbours that are no data have t = 1, so they have no weight, and each datum is
-    compared where it lies, at its offset from the cell. h is that of equation (8) for so many data. The result has no
-    sampling noise, and the same bits on every device. Cost: cells x pixels of the training image x `nearest` fma.
+    Equations (6), (7) and (12): neighbours without data have t = 1, so they have no weight, and each datum is compared
+    at its own offset from the cell. h is that of equation (8) for this number of data. The result has no sampling
+    noise, and the same bits on every device. Cost: cells x pixels of the training image x `nearest` fma.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def estimate(
     >>> known[2, 1] = 1
     >>> found = simdtex.estimate(training, known=known, categorical=True)
     >>> found.probability.sel(category=1)[2].values.round(2).tolist()
-    [0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+    [0.0, 1.0, 0.0, 0.0, 0.0, 0.88]
     """
     xr = require_xarray()
     whole("nearest", nearest, 0, MOST)

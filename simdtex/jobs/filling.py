@@ -116,19 +116,19 @@ def fill(
     checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
-    """Fill the holes of a picture with more of what is around them.
+    """Fill the holes of a picture with the texture around them.
 
     Parameters
     ----------
     image : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array
         The picture; any real type.
     mask : (rows, cols) bool array, optional
-        True where the picture is to be made. None: where `image` is NaN or, in a masked array, masked.
+        True in the holes. None: the pixels of `image` that are NaN or, in a masked array, masked.
     sample : array of the image's type, optional
         The texture to fill with, or a list of several. None: the rest of the picture.
     reach : int, optional
-        How far around a hole the picture is its sample, pixels. None: 128, or twice the hole's longer side if that is
-        more. It makes no difference where there is a `sample`.
+        Distance around a hole up to which the picture is its sample, pixels. None: 128, or twice the hole's longer side
+        if that is more. It has no effect with `sample`.
     channel_axis : int, optional
         The axis of the image that holds channels; None for a grey one.
     rng, device, callback, checkpoint
@@ -136,29 +136,29 @@ def fill(
     full_output : bool
         Return the source map, temperatures and statistics too.
     **options
-        Of the method ``mrf``: see `simdtex.methods.mrf.Options`, which says what defaults differ in ``fill``.
+        Of the method ``mrf``: see `simdtex.methods.mrf.Options`, which lists the defaults that differ in ``fill``.
 
     Returns
     -------
     image : array of the image's shape and type
-        Outside the holes the image itself, to the bit.
+        Pixels outside the holes are those of the image, to the bit.
     output : simdtex.run.Output
-        Only with ``full_output=True``. ``source`` is in pixels of the image, where there is no `sample`: known pixels
-        are from themselves. With one it is in pixels of that, and -1 at known ones.
+        Only with ``full_output=True``. ``source`` has positions in the image, and known pixels have their own. With
+        `sample` it has positions in the sample, and -1 at known pixels.
 
     Raises
     ------
     ValueError, TypeError
-        What is wrong and what would be right, in one sentence.
+        An argument is invalid; the message names the remedy.
 
     Notes
     -----
-    Known pixels are sites of temperature 0 that nothing relaxes: Algorithm 1 does the rest. Each hole, with as much
-    around it as its sites look at, is a lattice of its own, unless the picture wraps around
-    (``boundary="torus"``) or holes are many. The smooth colours around a hole, continued into it, and the place in the
-    picture are a guide (`simdtex.model.guide.Surroundings`), so that nothing foreign comes in; not with a `sample`,
-    with categories or with 16 different pixels or fewer. Cost: that of `simdtex.synthesize` for the holes' pixels, and
-    of a sample of the surroundings' size.
+    Known pixels are sites of temperature 0 that are never relaxed. Each hole, with the surroundings in reach of its
+    sites, has a separate lattice, unless the picture wraps around (``boundary="torus"``) or there are many holes. The
+    smooth colours around a hole, continued into it, and the place in the picture are a guide
+    (`simdtex.model.guide.Surroundings`), so that the hole gets the texture of its surroundings. There is no such guide
+    with a `sample`, with categories or with 16 different pixels or fewer. Cost: that of `simdtex.synthesize` for the
+    holes' pixels, and of a sample of the surroundings' size.
 
     Examples
     --------
@@ -242,8 +242,8 @@ def extend(
     top, bottom, left, right : int
         Pixels to add on each side.
     seamless : bool or {"x", "y"}
-        Whether the result wraps around: in both directions, or along the columns (x) or rows (y) alone. Where nothing
-        is added in such a direction, a band along its edges is made anew.
+        Whether the result wraps around: in both directions, or only left and right (x) or top and bottom (y). If no
+        pixels are added in such a direction, a band along its edges is replaced.
     band : int, optional
         Width of that band on either side of the seam, pixels. None: an eighth of the shorter side, 8 to 64.
     channel_axis : int, optional
@@ -254,14 +254,14 @@ def extend(
     Returns
     -------
     image : array of the image's type
-        ``top + rows + bottom`` by ``left + cols + right``; the image itself, but for the bands, at (top, left).
+        ``top + rows + bottom`` by ``left + cols + right``; the image, except for the bands, is at (top, left).
     output : simdtex.run.Output
         Only with ``full_output=True``; ``source`` is in pixels of the image.
 
     Raises
     ------
     ValueError, TypeError
-        What is wrong and what would be right, in one sentence.
+        An argument is invalid; the message names the remedy.
 
     Examples
     --------

@@ -70,58 +70,57 @@ def simulate(
     checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> xarray.DataArray | xarray.Dataset:
-    """Simulate realisations that look like a training image and honour data: multiple-point simulation.
+    """Simulate realisations that look like a training image and honour data (multiple-point simulation).
 
     Parameters
     ----------
     training : (rows, cols) or (layers, rows, cols) array, or a list of (rows, cols) arrays
-        The training image, a picture or a volume, NaN where it is unknown. With ``categorical=True`` its numbers name
-        categories. With `channel_axis` it has an axis more, of variables.
+        The training image, a picture or a volume; unknown values are NaN. With ``categorical=True`` its values are
+        categories. With `channel_axis` it has one more axis, for variables.
     n : int
-        How many realisations, 1 or more.
+        Number of realisations, 1 or more.
     shape : (int, int) or (int, int, int), optional
-        Rows and columns of each, or layers, rows and columns. None: those of `known`, or of the first map below, where
+        Rows and columns of each, or layers, rows and columns. None: those of `known`, or of the first map below, if
         that is an array, else of the training image.
     known : array, HardData or path, optional
-        What is known: a masked array, or floats with NaN where nothing is known, of `shape`; or a table ``x,y,value``
+        Hard data: a masked array of `shape`, floats with NaN for unknown values, a table ``x,y,value``
         (`simdtex.read_hard_data`) or its file. Every realisation has these values, to the bit.
     several : {"refuse", "mean", "most"}
-        What becomes of data of a table that lie in one cell and differ: an error, their mean, or the most frequent
-        value, as in `simdtex.place_hard_data`.
+        Value for different data of a table in one cell: an error, their mean, or the most frequent value, as in
+        `simdtex.place_hard_data`.
     origin : (x, y) or (x, y, z), optional
         The centre of the first cell of a realisation, in the units of the table and of the result's coordinates. None
         is 0.
     cell : (x, y) or (x, y, z), optional
         The size of a cell. None is 1; without `origin` and `cell`, coordinates are columns and rows.
     guide, mask
-        As in `simdtex.synthesize`: secondary data of the training image and of the realisations, and what of the
-        training image may be used.
+        As in `simdtex.synthesize`: secondary data of the training image and of the realisations, and the part of the
+        training image that may be used.
     region : (rows, cols) or (layers, rows, cols) bool array, optional
-        True where cells are simulated. The others take no part, and have no value: NaN in floats, else the attribute
-        ``missing``.
+        True for cells that are simulated. The others have no value: NaN in floats, else the attribute ``missing``.
     probabilities : (categories, rows, cols) array, or table or its path, optional
-        Soft data, of a volume (categories, layers, rows, cols): how probable each category, in ascending order, of the
-        first variable is at each cell, adding up to 1; NaN where nothing is said. A table has the columns x, y, and one
-        for each category. See `soft_weight`.
+        Soft data, of a volume (categories, layers, rows, cols): the probability at each cell of each category of the
+        first variable, in ascending order of category; the sum is 1, and unknown probabilities are NaN. A table has the
+        columns x, y, and one for each category. See `soft_weight`.
     image_map : (rows, cols) or (training images, rows, cols) array, optional
-        The number of the training image, from 0 on, that each cell is from, or the weight of each training image there.
-        NaN: any. This and the next two are of pictures alone.
+        The number, from 0, of the training image of each cell, or the weight of each training image at each cell. NaN:
+        any training image. This and the next two parameters are not for volumes.
     rotation : (rows, cols) array, optional
-        How far the training image is turned at each cell, in degrees from x to y (from columns to rows), rounded to
-        eighths of a turn. NaN: as anywhere else.
+        Rotation of the training image at each cell, in degrees from x to y (from columns to rows), rounded to eighths
+        of a turn. NaN: any rotation of another cell.
     scale : (rows, cols) array, optional
-        By which factor the training image is enlarged at each cell, 1/2 to 2, rounded to powers of the square root of
-        2. NaN likewise.
+        Factor by which the training image is enlarged at each cell, 1/2 to 2, rounded to powers of the square root of
+        2. NaN: any factor of another cell.
     source : bool
-        Return where in the training image each cell of each realisation is from, too.
+        Return the position in the training image of each cell of each realisation too.
     first : int
         Number of the first realisation.
     jobs : int, optional
-        Realisations at a time. None: one for each core of a processor, at most 4; on a GPU 1.
+        Number of realisations at a time. None: one for each core of a CPU, at most 4; on a GPU 1.
     channel_axis : int, optional
         The axis of the training image that holds variables; None for one variable.
     rng : int or numpy.random.Generator, optional
-        The seed. A realisation depends on it and on its own number alone, whatever `n`, `first` and `jobs` are.
+        The seed. A realisation depends only on the seed and on its number, not on `n`, `first` and `jobs`.
     device : str, optional
         As in `simdtex.synthesize`.
     callback : callable, optional
@@ -129,7 +128,7 @@ def simulate(
     checkpoint
         As in `simdtex.synthesize`; it keeps the realisations that are finished.
     **options
-        Of the method ``mrf``: see `simdtex.methods.mrf.Options`, which says what defaults differ in ``simulate``.
+        Of the method ``mrf``: see `simdtex.methods.mrf.Options`, which lists the defaults that differ in ``simulate``.
 
     Returns
     -------
@@ -137,7 +136,7 @@ def simulate(
         Dimensions ``realisation``, ``z`` of a volume, ``y`` (row 0 is the smallest y), ``x`` and, with `channel_axis`,
         ``variable``, in the training image's type. The coordinates ``z``, ``y`` and ``x`` are those of the centres of
         cells; of a picture, a third number of `origin` and `cell` is ``z``. The coordinate ``seed`` is that of each:
-        `simdtex.synthesize` with it gives the same, but for what `simulate` alone has: `region` and what follows it.
+        `simdtex.synthesize` with it gives the same map, unless `region` or a later parameter of `simulate` is used.
         Attributes: ``seed``, ``options`` (a JSON text), ``version``, ``device``, SHA-256 digests of the arrays
         ``training_image``, ``hard_data``, ``guide``, ``mask`` and those from `region` to `scale` that are given, and
         with `origin` or `cell` the sizes ``cell_x``, ``cell_y``, ``cell_z``. All are texts and numbers, so that
@@ -152,7 +151,7 @@ def simulate(
     Raises
     ------
     ValueError, TypeError
-        What is wrong and what would be right, in one sentence.
+        An argument is invalid; the message names the remedy.
 
     Notes
     -----

@@ -29,19 +29,19 @@ except ModuleNotFoundError:
 
 
 class Live(AnyWidget):
-    """The live page in a notebook: watch a texture take shape, and steer it.
+    """The live page in a notebook: synthesise, fill, extend and classify interactively.
 
-    It is the page of ``simdtex live``, in Jupyter, JupyterLab, marimo and VS Code; the work is done where the kernel
-    is. It needs the extra ``notebook``: ``pip install 'simdtex[notebook]'``.
+    It is the page of ``simdtex live``, in Jupyter, JupyterLab, marimo and VS Code; the run is in the process of the
+    kernel. It needs the extra ``notebook``: ``pip install 'simdtex[notebook]'``.
 
     Parameters
     ----------
     sample : (rows, cols) or, with `channel_axis`, (rows, cols, channels) array, optional
-        The picture to begin with; None leaves it to the page.
+        The first picture; None starts without one.
     channel_axis : int, optional
         The axis of the sample that holds channels; None for a grey sample.
     name : str
-        What its file is called in the command line that makes a result again.
+        Name of its file in the command line that repeats a result.
     device : str, optional
         As of `simdtex.synthesize`.
 
@@ -59,7 +59,7 @@ class Live(AnyWidget):
     Raises
     ------
     ValueError, TypeError
-        The sample is none; the sentence says what is wrong.
+        The sample is invalid.
     simdtex.DeviceError
         No device matches, or none is usable.
 

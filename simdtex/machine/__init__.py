@@ -17,7 +17,7 @@ def open_machine(device: str | Machine | None = None, *, profile: bool = False) 
         Part of a name or platform, an index of ``simdtex devices``, or ``"reference"``; None takes the device that
         SIMDTEX_DEVICE names, else a GPU, else a CPU. A machine is returned as it is.
     profile : bool
-        Whether an OpenCL machine measures the time of every kernel.
+        Whether an OpenCL device measures the time of every kernel.
 
     Raises
     ------
@@ -25,7 +25,7 @@ def open_machine(device: str | Machine | None = None, *, profile: bool = False) 
         No device matches, several do, or none is usable; or OpenCL was in use before this process was forked. The
         message names the remedy.
     TypeError
-        `device` is none of these.
+        `device` has another type.
     """
     if callable(getattr(device, "running", None)):
         return device  # type: ignore[return-value]

@@ -51,7 +51,7 @@ _building = RLock()
 
 
 class DeviceError(ValueError):
-    """No device, or no single device, matches a request, or the device cannot do what is asked of it."""
+    """No device, or more than one, matches a request, or the device cannot do the work."""
 
 
 def _note_fork() -> None:

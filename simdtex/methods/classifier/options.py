@@ -24,30 +24,30 @@ class Options:
     order: int = comparison(
         2,
         Whole(1, 64),
-        "Compare neighbourhoods of this order: all pixels within its square root",
-        more="Those with compressed contrast have twice this order.",
+        "Compare neighbourhoods of this order, all pixels within sqrt(order)",
+        more="Neighbourhoods with compressed contrast have twice this order.",
         symbol="o of equation (3)",
         shown=ALL,
     )
     levels: int = comparison(
         3,
         Whole(1, 5),
-        "Compare at this many levels, at most: as many as have 32 pixels a side in every sample",
+        "Compare at no more than this many levels: every sample needs 32 pixels a side at each of them",
         shown=ALL,
     )
     exemplars: int = comparison(
         1500,
         Whole(16, 2**16),
-        "Keep this many neighbourhoods of each class, drawn at random",
+        "Keep this many random neighbourhoods of each class as exemplars",
         slider=(100, 4000, 100),
         shown=ALL,
     )
     typical: float = comparison(
         0.25,
         Number(0, 1),
-        "Take away this share of the distances that a class has to itself",
-        more="At 0 a class of fine grain, whose neighbourhoods are many, loses to a class of few; at 1 every class "
-        "explains as much as it explains of itself.",
+        "Subtract this share of the mean distance between a class and its own exemplars",
+        more="With 0 a class of fine grain, which has many different neighbourhoods, loses pixels to a class of few. "
+        "With 1 only the distance beyond that mean counts.",
         shown=(),
     )
     coupling: float = field(
@@ -60,27 +60,29 @@ class Options:
     weight: float = field(
         7.0,
         Number(0, 100),
-        "Let neighbouring labels count so much: 0 labels each pixel by its own evidence",
+        "Set the weight of neighbouring labels: 0 labels each pixel by its own evidence",
         slider=(0, 20, 0.5),
+        label="Weight of neighbours",
     )
-    sweeps: int = field(10, Whole(0, 1000), "Relax labels in this many sweeps, at most: fewer if no label changes")
+    sweeps: int = field(10, Whole(0, 1000), "Relax labels in at most this many sweeps: fewer if no label changes")
     schedule: str | schedules.Schedule = field(
         "synchronous",
         Other(schedules.get, "str or simdtex.schedules.Schedule", valid=tuple(schedules.SCHEDULES)),
-        "Relax labels together by this schedule",
-        more="Each step of a sweep takes a pass over the picture.",
+        "Relax labels by this schedule",
+        more="Each step of a sweep is a pass over the picture.",
     )
     unknown: float = rejection(
         0.05,
         Number(0, 1),
-        "Call a pixel unknown if a texture of its class would look so different with less than this probability",
+        "Label a pixel unknown if its fit, a probability, is below this",
         slider=(0, 0.5, 0.01),
+        label="Unknown below a fit of",
         shown=ALL,
     )
     window: float = rejection(
         10.0,
         Number(1, 100),
-        "Judge by the mean over this distance, the standard deviation of a Gaussian, within a segment",
+        "Average distances for the fit over a Gaussian of this standard deviation, within a segment",
         unit="pixels",
         shown=(),
     )

@@ -80,8 +80,9 @@ class Options:
     order: int = appearance(
         18,
         Whole(1, MOST_ORDER),
-        "Compare neighbours within sqrt(order) pixels: 8 has 24 of them, 18 has 60; more keep larger shapes",
-        more="The time grows with the number of neighbours. In three dimensions 8 has 92 and 12 has 178.",
+        "Compare neighbours within sqrt(order) pixels: order 8 has 24, order 18 has 60; a larger order keeps larger "
+        "shapes",
+        more="The time grows with the number of neighbours. In three dimensions order 8 has 92 and order 12 has 178.",
         symbol="o of equation (3)",
         jobs={"simulate 3-D": 12},
         slider=(2, 40, 1),
@@ -89,20 +90,22 @@ class Options:
     structure: float = appearance(
         2.0,
         Number(0),
-        "Follow the sample's outlines: more keeps joints and contours whole",
-        more="It is the weight of a channel that holds the distance from the border between the sample's bright and "
-        "dark parts, is matched like the others and is not shown: its standard deviation in units of the sample's, or "
-        'less if grey levels would not hold it. With 0, and with ``pixel="density"``, there is no such channel.',
+        "Match the sample's outlines with this weight: more keeps joints and contours whole",
+        more="It is the weight of an additional channel that is matched like the others and is not in the output: the "
+        "signed distance from the border between the sample's bright and dark parts. The weight is its standard "
+        "deviation in units of the sample's; it is smaller if grey levels cannot hold the channel. With 0, and with "
+        '``pixel="density"``, there is no such channel.',
         paper=0.0,
         slider=(0, 6, 0.25),
     )
     lattice: str | tuple[tuple[float, float], tuple[float, float]] = option(
         "auto",
         Other(parse_lattice, "str or two vectors", valid=LATTICES),
-        "Keep regular textures on a lattice: the sample's own (auto), none, or two vectors DY,DX,DY,DX in pixels",
+        "Keep a regular texture on the lattice of the sample (auto), on that of two vectors DY,DX,DY,DX in pixels, or "
+        "on none",
         more="``auto`` finds the lattice of a sample of 32 or more rows and columns, if it has one. A pixel's place "
         "within a cell is then a guide, as in `guide`, of weight 1. On a torus the lattice is deformed to fit, by 15 % "
-        'at most. Categories, and ``pixel="density"``, have none.',
+        'at most. With categories, and with ``pixel="density"``, there is no lattice.',
         paper="none",
         group="Appearance",
         shown=DATA,
@@ -110,7 +113,7 @@ class Options:
     coherence: float = appearance(
         0.5,
         Number(0),
-        "Prefer to continue a neighbour's source: more keeps pieces together",
+        "Prefer candidates that continue a neighbour's source: more keeps larger pieces of the sample",
         more="The squared distance of a candidate that continues a neighbour's source is divided by 1 + coherence.",
         paper=0.0,
         jobs={"simulate": 0.0, "simulate 3-D": 0.5},
@@ -119,9 +122,9 @@ class Options:
     balance: float = appearance(
         0.5,
         Number(0),
-        "Use all of the sample evenly: more repeats its pieces less",
-        more="A candidate whose surroundings serve more sites than their share costs lambda N C sigma^2 "
-        "min(4, u - 1): lambda is the balance, u the use over the fair share.",
+        "Penalise parts of the sample that are used often: more repeats them less",
+        more="A candidate whose surroundings are used more than their fair share costs lambda N C sigma^2 "
+        "min(4, u - 1): lambda is the balance, u the use divided by the fair share.",
         paper=0.0,
         jobs={"fill": 0.0, "extend": 0.0, "simulate": 1.0, "simulate 3-D": 0.5},
         slider=(0, 4, 0.1),
@@ -129,10 +132,10 @@ class Options:
     novelty: float = appearance(
         1.0,
         Number(0),
-        "Break up the sample's layout: more keeps less of it",
-        more="At the coarsest level, of n candidates, one costs mu C sigma^2 min(1, 256 / n, (n / 128)^2) for each "
-        "neighbour whose source it continues, and four times that for each whose source it is: mu is the novelty. This "
-        "holds if sites take pixels of the sample and n is 1024 or less.",
+        "Penalise copies of the sample's layout: more departs further from it",
+        more="At the coarsest level, with n candidates, a candidate costs mu C sigma^2 min(1, 256 / n, (n / 128)^2) "
+        "for each neighbour whose source it continues, and four times that for each neighbour whose source it is: mu "
+        "is the novelty. This applies if sites take pixels of the sample and n is 1024 or less.",
         paper=0.0,
         jobs={"fill": 0.0, "extend": 0.0, "simulate 3-D": 0.25},
         slider=(0, 4, 0.25),
@@ -140,11 +143,11 @@ class Options:
     finish: float | None = appearance(
         None,
         Number(0, WIDEST),
-        "Blend seams over this many pixels; 0 keeps every pixel as one of the sample's",
-        more="Each output pixel is the mean of what its neighbours' sources say of it, with Gaussian weights of this "
-        "standard deviation, 0.01 to 16 or 0. A sample of 16 different pixels or fewer is taken for categories, which "
-        "have no mean.",
-        none="1.5; 0 for samples of 16 different pixels or fewer, and for pixels of the density",
+        "Blend seams over this many pixels; with 0 every pixel is one of the sample's",
+        more="Each output pixel is the mean of the pixels that continue its neighbours' sources, with Gaussian weights "
+        "of this standard deviation, 0.01 to 16 or 0. A sample of at most 16 different pixels is a map of categories, "
+        "which have no mean.",
+        none="1.5; 0 for samples of at most 16 different pixels, and for pixels of the density",
         unit="pixels",
         paper=0.0,
         slider=(0, 4, 0.25),
@@ -152,9 +155,9 @@ class Options:
     overview: int = appearance(
         128,
         Whole(1),
-        "Keep this many candidates of the sample at the coarsest of the default levels, at least; the fewer, the more "
-        "of its layout comes out again",
-        more="32 are enough for four levels or fewer: the coarsest spacing of a small sample is 8 pixels, too.",
+        "Keep at least this many candidates at the coarsest of the default levels; fewer repeat more of the sample's "
+        "layout",
+        more="For four levels or fewer 32 are enough, so that the coarsest spacing is 8 pixels for a small sample too.",
         paper=64,
         shown=(),
         slider=(16, 1024, 16),
@@ -162,9 +165,9 @@ class Options:
     levels: int | None = scales(
         None,
         Whole(1),
-        "Go through this many levels, from coarse to fine",
+        "Use this many levels, from coarse to fine",
         more="By default the sample has `overview` candidates or more at the coarsest level, and the output's lattice "
-        "holds a whole neighbourhood; in ``fill`` the hole decides.",
+        "holds a whole neighbourhood; in ``fill`` the number depends on the size of the hole.",
         none="as many as sample and output allow",
         symbol="M of Algorithm 1",
         slider=(1, 8, 1),
@@ -172,24 +175,25 @@ class Options:
     boundary: str = scales(
         "torus",
         Choice(("torus", "open")),
-        "Let the output wrap around, so that it tiles (torus), or not (open)",
+        "Wrap the output around, so that it tiles (torus), or not (open)",
         jobs={"fill": "open", "simulate": "open"},
         shown=("synth", "fill", "simulate", "schedules"),
     )
     edges: str = scales(
         "auto",
         Choice(("auto", "reflect", "whole")),
-        "Take candidates whose whole neighbourhood is in the sample (whole), or all, completed by reflection "
-        "(reflect), or reflect at all levels but the finest (auto)",
+        "Take only candidates whose neighbourhood is inside the sample (whole), reflect the sample to take all "
+        "(reflect), or reflect it at all levels but the finest (auto)",
         more="``auto`` reflects at the finest level too if fewer than three quarters of the positions have a whole "
-        "neighbourhood.",
+        "neighbourhood in the sample.",
         symbol="equation (4)",
         paper="whole",
     )
     phases: str = scales(
         "decimated",
         Choice(("all", "decimated")),
-        "Take candidates at coarse levels from all positions of the sample, or from the decimated sample",
+        "Take candidates at coarse levels from all positions of the sample (all), or from the decimated sample "
+        "(decimated)",
         symbol="equation (10)",
         paper="decimated",
         shown=(),
@@ -197,8 +201,9 @@ class Options:
     search: str = searching(
         "auto",
         Choice(("auto", "exact", "coherent")),
-        "Weigh all candidates (exact), or only a few, which is much faster (coherent), or as it suits (auto)",
-        more="``coherent`` weighs, at all but the coarsest level, the candidates that continue the source of a "
+        "Evaluate all candidates (exact), a few of them, which is much faster (coherent), or as the relaxation "
+        "requires (auto)",
+        more="``coherent`` evaluates, at all but the coarsest level, the candidates that continue the source of a "
         "neighbour, the site's own source and some more, unless a level has 64 candidates or fewer. ``auto`` is "
         '``coherent`` for ``relaxation="icm"``, and ``exact`` if a site draws.',
         paper="exact",
@@ -207,7 +212,7 @@ class Options:
     chance: int = searching(
         4,
         Whole(0, CHANCE),
-        "Weigh this many more candidates at random, in a coherent search",
+        "Evaluate this many random candidates more, in a coherent search",
         jobs={"fill": 16, "extend": 16},
         slider=(0, 32, 1),
         shown=(),
@@ -215,9 +220,9 @@ class Options:
     coarse_chance: int = searching(
         0,
         Whole(0, CHANCE),
-        "Weigh this many at random where sites are 4 pixels apart or more, if that is more than chance",
-        more="More connects better what bends around data, and copies less of the sample; the finest two levels, which "
-        "take most of the time, are left as they are.",
+        "Evaluate this many random candidates where sites are 4 pixels apart or more, if that is more than chance",
+        more="More candidates keep shapes connected around data, and copy less of the sample. The finest two levels, "
+        "which take most of the time, use ``chance``.",
         jobs={"simulate": 64, "simulate 3-D": 0},
         slider=(0, 128, 4),
         shown=(),
@@ -225,15 +230,15 @@ class Options:
     relaxation: str = sampling(
         "icm",
         Choice(("icm", "gibbs")),
-        "Take the LCPDF's mode (icm), or draw from it (gibbs); the coarsest level always draws",
-        more="Its mode says nothing while all is unknown.",
+        "Take the mode of the LCPDF (icm), or draw from it (gibbs); the coarsest level always draws",
+        more="The mode carries no information while all sites are unknown.",
         symbol="Algorithm 1",
         paper="gibbs",
     )
     bandwidth: float = sampling(
         0.15,
         Number(0, above=True),
-        "Give the Parzen kernel this width; wider is freer",
+        "Set the width of the Parzen kernel: a wider kernel lets more candidates count",
         unit="units of h_opt",
         symbol="h / h_opt of equation (8)",
         paper=1.0,
@@ -242,16 +247,17 @@ class Options:
     xi: float = sampling(
         -1.0,
         Number(-1e6, 0, below=True),
-        "Cool at this pace: further below 0 is fewer sweeps",
+        "Set the pace of cooling: further below 0 takes fewer sweeps",
         more="The paper gives no number.",
         symbol="xi of equation (13)",
         paper=-1.0,
         slider=(-4, -0.25, 0.25),
+        label="Cooling (xi)",
     )
     free_sweeps: int = sampling(
         2,
         Whole(0),
-        "Sweep over all sites, also those of the coarser level, this many times after the equilibrium of a level",
+        "Sweep this many times over all sites, including those of the coarser level, after the equilibrium of a level",
         paper=0,
         slider=(0, 8, 1),
         shown=("fill", "extend", "simulate", "schedules"),
@@ -259,58 +265,59 @@ class Options:
     pixel: str = sampling(
         "source",
         Choice(("source", "density")),
-        "Take pixels of the sample (source), or draw grey levels of the Parzen density, whose kernel also spreads over "
-        "the site itself (density)",
-        more='``density`` goes with ``relaxation="gibbs"``.',
+        "Take pixels of the sample (source), or draw grey levels from the Parzen density, whose kernel also spreads "
+        "over the site itself (density)",
+        more='``density`` requires ``relaxation="gibbs"``.',
         paper="density",
     )
     schedule: str | schedules.Schedule = parallel(
         "coloring",
         Other(schedules.get, "str or simdtex.schedules.Schedule", valid=tuple(schedules.SCHEDULES)),
-        "Relax sites together by this schedule: coloring, coloring-fixed, luby, checkerboard, synchronous, "
+        "Relax sites by this schedule: coloring, coloring-fixed, luby, checkerboard, synchronous, "
         "random-subset[:P], raster, random-scan or block[:ROWSxCOLS]",
         symbol="equation (14)",
     )
     array: str | None = parallel(
         None,
         Other(parse_array, "str", valid=tuple(ARRAYS)),
-        "Account for the run on this processor array: ROWSxCOLS or maspar-mp1-1k to -16k, and maybe :hierarchical",
-        more="No byte of the result depends on it.",
-        none="no account",
+        "Count the work of the run on this processor array: ROWSxCOLS or maspar-mp1-1k to -16k, with :hierarchical for "
+        "the hierarchical mapping",
+        more="The result does not depend on it.",
+        none="no array",
         jobs={"schedules": "maspar-mp1-16k"},
         shown=("synth", "schedules"),
     )
     categorical: bool | tuple[int, ...] = data(
         False,
         Other(check_categorical, "bool or tuple of int", flag=True),
-        "Take values for names of categories, which differ or not, and are never mixed",
-        more="A tuple names the channels (variables) of which this is so.",
+        "Treat values as categories, which are equal or different and are never mixed",
+        more="A tuple names the channels (variables) that are categories.",
     )
     weights: tuple[float, ...] | None = data(
         None,
         Numbers(),
-        "Bring all channels to one spread, times these weights, one for each channel (variable)",
-        none="all but categories are on one scale, as colours are",
+        "Scale all channels (variables) to one spread, times these weights, one for each channel",
+        none="channels that are not categories keep one scale, as colours do",
         shown=("fill", "extend", "simulate"),
     )
     shares: tuple[float, ...] | None = data(
         None,
         Numbers(),
-        "Use each of several samples this much, kept by the penalty on use",
-        none="every pixel of all samples counts alike",
+        "Use several samples in these proportions, one number for each, by the penalty on use",
+        none="every pixel of all samples counts equally",
         shown=("synth", "fill", "simulate"),
     )
     proportions: tuple[float, ...] | None = data(
         None,
         Numbers(),
-        "Make this much of the output of each category, in ascending order, kept by a penalty",
-        none="as follows from the sample and the known pixels; in a volume of one variable those of the sample",
+        "Give the categories, in ascending order, these shares of the output, by a penalty",
+        none="no penalty; in a volume of one variable the shares of the sample",
         shown=("simulate",),
     )
     data_weight: float = data(
         16.0,
         Number(0),
-        "Count a known pixel that is from no sample for this many neighbours",
+        "Count a known pixel that is not from a sample as this many neighbours",
         jobs={"fill": 4.0, "extend": 4.0},
         shown=("fill", "extend", "simulate"),
     )
@@ -318,21 +325,22 @@ class Options:
         1.0,
         Number(0),
         "Follow probabilities, and weights of training images, with this strength",
-        more="A kind of probability p and share q of the sample costs its candidates w N C sigma^2 / 16 "
-        "(m - ln(p / q)): w is the soft weight, and m the greatest ln(p / q) of the cell. With 0, only zeros count.",
+        more="Candidates of a category, or of a training image, with probability p and share q of the sample cost "
+        "w N C sigma^2 / 16 (m - ln(p / q)): w is the soft weight, and m the greatest ln(p / q) of the cell. With 0, "
+        "only probabilities of 0 count.",
         shown=("simulate",),
     )
     guide_weight: float = data(
         10.0,
         Number(0),
-        "Give the guide this variance, in units of the sample's; more follows it more closely",
+        "Set the variance of the guide, in units of the sample's: more follows the guide more closely",
         shown=("synth", "simulate"),
     )
     labels: bool | None = data(
         None,
         Switch(),
-        "Take the guide's values for names, or for numbers",
-        none="names if they are integers of at most 16 different values",
+        "Treat the values of the guide as labels, or as numbers",
+        none="labels if they are integers of at most 16 different values",
         shown=("synth", "simulate"),
     )
 

@@ -24,29 +24,30 @@ class Options:
     alpha: float = appearance(
         0.3,
         Number(0, inf),
-        "Exchange places that differ by no more than this: 0 tiles the sample, more is freer",
-        more="0 tiles the sample but for parts that are equal to the bit, infinity samples every band on its own.",
+        "Exchange places whose features differ by at most this: 0 tiles the sample, more departs further from it",
+        more="0 tiles the sample, except for parts that are equal to the bit; infinity samples every band separately.",
         symbol="alpha of T = alpha / k^beta, equation (13)",
         slider=(0, 1, 0.01),
+        label="Threshold (alpha)",
     )
     beta: float = appearance(
         0.0,
         Number(0),
-        "Be stricter at high frequencies, by alpha / k^beta; k counts levels from the lowest frequency upward",
+        "Lower the threshold at high frequencies to alpha / k^beta; k counts levels from the lowest frequency up",
         symbol="beta of equation (13)",
         shown=(),
     )
     seams: str = appearance(
         "blend",
         Choice(("blend", "cut")),
-        "Let the bands of pieces that meet fade into each other over a pixel of each level (blend), or end there (cut)",
+        "Fade the bands of adjacent pieces into each other over a pixel of each level (blend), or cut them (cut)",
         paper="cut",
         shown=(),
     )
     parity: str = appearance(
         "match",
         Choice(("match", "free")),
-        "Take a candidate from even or odd rows and columns, as the pixel's are (match), or from any (free)",
+        "Take a candidate from rows and columns of the pixel's parity, even or odd (match), or from any (free)",
         symbol="equation (8)",
         paper="free",
         shown=(),
@@ -54,20 +55,20 @@ class Options:
     levels: int | None = scales(
         None,
         Whole(1),
-        "Go through this many levels of the pyramids, from coarse to fine",
+        "Use this many levels of the pyramids, from coarse to fine",
         none="down to a single pixel",
         slider=(1, 10, 1),
     )
     boundary: str = scales(
         "torus",
         Choice(("torus", "open")),
-        "Let pyramids wrap around, so that the output tiles (torus), or continue as in a mirror (open)",
+        "Wrap the pyramids around, so that the output tiles (torus), or reflect the sample at its edges (open)",
     )
     edges: str = scales(
         "mend",
         Choice(("mend", "keep")),
-        "Cover the edges of a sample that does not wrap around with a piece of itself, so that it does (mend), or keep "
-        "them",
+        "Cover the seam of a sample that does not wrap around with a strip of the sample (mend), or keep its edges "
+        "(keep)",
         more="See `simdtex.methods.multires.mend.mend`.",
         paper="keep",
     )
@@ -75,7 +76,7 @@ class Options:
         4,
         Whole(0, DIRECTIONS),
         "Look for edges and lines in this many directions; 0 compares the bands alone",
-        more="The filter bank has so many first and second derivatives of a Gaussian.",
+        more="The filter bank has this many first, and as many second, derivatives of a Gaussian.",
         symbol="equation (7)",
         slider=(0, 12, 1),
     )

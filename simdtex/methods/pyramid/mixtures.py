@@ -80,7 +80,7 @@ def mix(
     checkpoint: Any = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
-    """Make a texture that looks a bit like each of several, by pyramid matching.
+    """Mix several textures into one, by pyramid matching.
 
     Its pattern is that of one sample (`pattern`), the average of several (`average`, the default), or the low
     frequencies of one with the high ones of another (`low`, `high`). Its colours are those of its pattern, or of
@@ -97,29 +97,29 @@ def mix(
     pattern : int, optional
         The sample whose subband histograms are matched.
     average : sequence of float, optional
-        A weight for every sample, 0 or more. By default all weigh the same.
+        A weight for every sample, 0 or more. By default all weights are equal.
     low, high : int, optional
         The samples that low and high frequencies are taken from.
     split : int, optional
-        With these, how many levels, from the finest on, are high frequencies; by default half of them.
+        Number of levels, from the finest on, that are high frequencies; by default half of them.
     channel_axis : int, optional
         The axis that holds channels; None for grey samples.
     rng, device, callback, full_output, checkpoint
         As in `simdtex.synthesize`.
     **options
-        See `simdtex.methods.pyramid.Options`; ``start`` is a picture to begin with in place of noise.
+        See `simdtex.methods.pyramid.Options`; ``start`` is a picture to start from instead of noise.
 
     Returns
     -------
     image : array of the samples' type
-        `shape` plus the channel axis, where the samples have it.
+        `shape` plus the channel axis, if the samples have one.
     output : simdtex.run.Output
         Only with ``full_output=True``.
 
     Raises
     ------
     ValueError, TypeError
-        What is wrong and what would be right, in one sentence.
+        An argument is invalid; the message names the remedy.
 
     Notes
     -----

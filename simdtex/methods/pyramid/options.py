@@ -28,8 +28,8 @@ class Options:
         "steerable",
         Choice(KINDS),
         "Match histograms of every scale and direction (steerable), or of every scale (laplacian)",
-        more='A solid texture matches a Laplacian pyramid in any case, and with ``"steerable"`` the steerable pyramids '
-        "of all its slices as well.",
+        more='A solid texture always matches a Laplacian pyramid; with ``"steerable"`` it also matches the steerable '
+        "pyramids of all its slices.",
     )
     iterations: int = appearance(
         5,
@@ -40,34 +40,34 @@ class Options:
     match: str = appearance(
         "rank",
         Choice(("rank", "lookup")),
-        "Match histograms exactly, by rank, or by the paper's lookup tables",
+        "Match histograms exactly by rank (rank), or by the paper's lookup tables (lookup)",
         paper="lookup",
         shown=(),
     )
     color: str = appearance(
         "decorrelate",
         Choice(("decorrelate", "channels")),
-        "Match the decorrelated channels, or the channels as they are",
+        "Match decorrelated channels (decorrelate), or the channels as they are (channels)",
         shown=("mix", "solid"),
     )
     start: ArrayLike | None = appearance(
         None,
         Other(partial(real_array, "start"), "array"),
-        "Begin with this, of the output's shape, with the sample's channels",
+        "Start from this array, of the output's shape and with the sample's channels",
         none="noise",
         shown=(),
     )
     levels: int | None = scales(
         None,
         Whole(0),
-        "Go through this many levels of the pyramids",
+        "Use this many levels of the pyramids",
         none="as many as leave 8 pixels a side",
         slider=(0, 8, 1),
     )
     edges: str = scales(
         "reflect",
         Choice(("reflect", "wrap")),
-        "Let the sample continue beyond its edges as in a mirror (reflect), or wrap around (wrap)",
+        "Reflect the sample at its edges (reflect), or wrap it around (wrap)",
     )
     orientations: int = scales(
         4,

@@ -47,8 +47,8 @@ class Options(pyramid.Options):
     solids: str = option(
         "turns",
         Choice(("turns", "average")),
-        "Match the families of slices in turns, each of what the one before has made, or match all of the same block "
-        "and average the solids",
+        "Match the families of slices one after another (turns), or match each in the same block and average the "
+        "blocks (average)",
         more='This matters with ``pyramid="steerable"``: the Laplacian pyramid of the block comes first.',
         paper="average",
         group="Appearance",
@@ -56,7 +56,7 @@ class Options(pyramid.Options):
     slices: str = option(
         "together",
         Choice(("each", "together")),
-        "Match the histograms of a family's slices together, or each alone",
+        "Match the histograms of a family's slices together (together), or of each slice separately (each)",
         paper="each",
         group="Appearance",
     )
