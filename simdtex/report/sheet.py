@@ -52,13 +52,14 @@ def contact_sheet(
     below = [""] * len(pictures) if captions is None else captions
     shown = [_scaled(rgb(picture), scale) for _, picture in pictures]
     font = PIL.ImageFont.load_default(TEXT)
-    height = max(len(picture) for picture in shown) + STRIP * (1 if captions is None else 2) + GAP
+    heights = [len(picture) + STRIP * (1 if captions is None else 2) + GAP for picture in shown]
     width = GAP + max(*(len(p[0]) for p in shown), *(ceil(font.getlength(text)) for text in (*labels, *below)))
-    across = min(columns or max(1, round((len(shown) * height / width) ** 0.5)), len(shown))
-    sheet = PIL.Image.new("RGB", (GAP + across * width, GAP + ceil(len(shown) / across) * height), "white")
+    across = min(columns or max(1, round((len(shown) * max(heights) / width) ** 0.5)), len(shown))
+    rows = [max(heights[first : first + across]) for first in range(0, len(shown), across)]
+    sheet = PIL.Image.new("RGB", (GAP + across * width, GAP + sum(rows)), "white")
     draw = PIL.ImageDraw.Draw(sheet)
     for number, (label, picture, caption) in enumerate(zip(labels, shown, below, strict=True)):
-        top, left = GAP + number // across * height, GAP + number % across * width
+        top, left = GAP + sum(rows[: number // across]), GAP + number % across * width
         draw.text((left, top), label, fill="black", font=font)
         sheet.paste(PIL.Image.fromarray(picture), (left, top + STRIP))
         draw.text((left, top + STRIP + len(picture) + 2), caption, fill="black", font=font)

@@ -16,13 +16,14 @@ from simdtex.model.colours import source_colours, use_colours
 from simdtex.model.regularity import lattice_sentence
 from simdtex.model.use import counts, use_of
 from simdtex.report.page import Figure, Part, Section, write_report
-from simdtex.report.sheet import contact_sheet, magnified, parts, read_fitted, reduction, rgb
+from simdtex.report.sheet import GAP, MOST_SIDE, contact_sheet, magnified, parts, read_fitted, reduction, rgb
 from simdtex.report.tables import Table
 from simdtex.run import Output
 
 Picture = NDArray[np.uint8]
 
 SHOWN_SIDE = 256  # smaller samples are enlarged by a whole factor, pixels
+PAGE = 1120  # the width of a page's pictures; a wider sheet is shrunk, and its labels with it, pixels
 CORNER = 512  # of an output that is reduced, so much is shown as it is, pixels a side
 FRAME = (0, 200, 255)  # the colour of the frame around the most used piece, sRGB; no colour of the map of use is blue
 
@@ -54,7 +55,7 @@ def write_synthesis(
     on = f"in {statistics['tiles']}" if "tiles" in statistics else f"on {statistics['device']}"
     lead = f"{width} x {height} pixels from a sample of {cols} x {rows}, {on}."
     results: dict[str, Any] = {"sample_shape": sample.shape, "shape": (height, width), "statistics": statistics}
-    pair = contact_sheet([("the sample", shown), *made], columns=2)
+    pair = _sheet([("the sample", shown), *made], 2)
     factor = reduction(image.shape)
     reduced = f"The output is reduced: one pixel is the mean of {factor} x {factor}." if factor > 1 else ""
     caption = " ".join(["The sample and the output.", reduced, lattice_sentence(statistics.get("lattice"))])
@@ -78,6 +79,12 @@ def _views(name: str, array: Any, show: Any) -> list[tuple[str, Picture]]:
     if reduction(array.shape) > 1:
         found.append(("its upper left corner, not reduced", show(array[:CORNER, :CORNER])))
     return found
+
+
+def _sheet(pictures: list[tuple[str, Picture]], columns: int) -> Picture:
+    """Return a sheet of so many columns, or of fewer if its labels would be too small to read."""
+    widest = min(MOST_SIDE, max(picture.shape[1] for _, picture in pictures))
+    return contact_sheet(pictures, columns=max(1, min(columns, PAGE // (widest + GAP))))
 
 
 def _counted(source: Any, shape: tuple[int, int]) -> tuple[NDArray[np.intp], float | None]:
@@ -134,7 +141,7 @@ def _use(
         ),
         Figure(
             "arrangement.png",
-            contact_sheet([("places in the sample", places), *arranged, *made], columns=3),
+            _sheet([("places in the sample", places), *arranged, *made], 3),
             "The arrangement: a colour for each place in the sample, and the output's pixels in the colours of the "
             "places that they were taken from. A piece taken whole is smooth, and a joint is an edge.",
         ),
