@@ -1,5 +1,6 @@
 """``simdtex synth --tiles`` and ``simdtex resume`` of a store, end to end."""
 
+import json
 import os
 import signal
 import subprocess
@@ -11,9 +12,12 @@ import pytest
 from cases import assert_same_bits, texture
 from click.testing import CliRunner
 
+from simdtex import distributed
 from simdtex.cli import main
+from simdtex.distributed.store import Checked, Sources
 from simdtex.io import image
 from simdtex.model.source_map import load_source_map
+from simdtex.report import sheet, synthesis
 
 zarr = pytest.importorskip("zarr")
 
@@ -68,6 +72,81 @@ def test_the_source_map_and_other_maps_are_arrays_of_the_store(folder):
     assert_same_bits(store["colour"][...], image.read("whole-colour.png").pixels)
 
 
+@pytest.fixture
+def small_sheets(monkeypatch):
+    """Reports whose pictures are reduced and read in several parts; return the pixels of each part that is read."""
+    read = []
+    for module, name, value in ((sheet, "MOST_SIDE", 20), (sheet, "PART", 16), (synthesis, "CORNER", 12)):
+        monkeypatch.setattr(module, name, value)
+    for kind in (Checked, Sources):
+        get = kind.__getitem__
+
+        def recorded(self, where, get=get):
+            part = get(self, where)
+            if isinstance(self, Sources) or self._name == "image":
+                read.append(part.shape[0] * part.shape[1])
+            return part
+
+        monkeypatch.setattr(kind, "__getitem__", recorded)
+    return read
+
+
+@pytest.mark.parametrize("more", [[], ["--source-map", "o.zarr/source"]], ids=["alone", "with a source map"])
+@pytest.mark.parametrize("sample", ["grey.png", "colour.png"])
+def test_the_report_is_that_of_a_whole_run(folder, small_sheets, sample, more):
+    whole = run("synth", sample, "-o", "whole.png", "--report", "w", *OPTIONS)
+    tiles = run("synth", sample, "-o", "o.zarr", "--tiles", 16, "--report", "t", *more, *OPTIONS)
+    assert (whole.exit_code, tiles.exit_code) == (0, 0), whole.output + tiles.output
+    names = ["arrangement.png", "index.html", "picture.png", "results.json", "use.png"]
+    assert sorted(os.listdir("t")) == names
+    for name in names:
+        if name.endswith(".png"):
+            assert (folder / "t" / name).read_bytes() == (folder / "w" / name).read_bytes(), name
+    ours, theirs = (json.loads((folder / one / "results.json").read_text()) for one in ("t", "w"))
+    for name in ("taken", "copied", "shape", "sample_shape"):
+        assert ours[name] == theirs[name], name
+    for name in ("use", "lattice", "options", "seed"):
+        assert ours["statistics"][name] == theirs["statistics"][name], name
+    assert "device" not in ours["statistics"]
+    page = (folder / "t" / "index.html").read_text(encoding="utf-8")
+    assert "in 16 tiles of at most 16 x 16" in page and "one pixel is the mean of 4 x 4" in page
+    assert ours["command"].startswith(f"simdtex synth {sample} ") and "--tiles 16" in ours["command"]
+    assert len(small_sheets) > 20 and max(small_sheets) <= (16 + 15) ** 2 < 50 * 61 / 3
+
+
+def test_resume_writes_the_report(folder):
+    """Of a run that is stopped, ends where it cannot write its report, and then finds a damaged picture."""
+
+    class Stop(Exception):
+        pass
+
+    def stop(progress):
+        if progress.phase == "show":
+            raise Stop
+
+    sample, options = image.read("grey.png").pixels, {"order": 1, "xi": -6.0, "device": "reference", "tiles": 24}
+    with pytest.raises(Stop):
+        distributed.synthesize(
+            sample, (50, 61), "o.zarr", rng=3, report="page", command="as given", callback=stop, **options
+        )
+    (folder / "page").mkdir()
+    (folder / "page" / "mine.txt").write_text("mine")
+    result = run("resume", "o.zarr", "--device", "reference")
+    assert result.exit_code == 2
+    assert "page holds other files (mine.txt): give an empty or a new one; then go on with: simdtex" in result.stderr
+    assert os.listdir("page") == ["mine.txt"] and not distributed.finished("o.zarr")
+    (folder / "page" / "mine.txt").unlink()
+    (folder / "o.zarr" / "image" / "c" / "0" / "1").write_bytes(b"")
+    result = run("resume", "o.zarr", "--device", "reference")
+    assert result.exit_code == 0, result.output
+    whole = run("synth", "grey.png", "-o", "whole.png", "--report", "w", *OPTIONS)
+    assert whole.exit_code == 0, whole.output
+    assert_same_bits(pixels("o.zarr"), image.read("whole.png").pixels)
+    assert (folder / "page" / "picture.png").read_bytes() == (folder / "w" / "picture.png").read_bytes()
+    assert json.loads((folder / "page" / "results.json").read_text())["command"] == "as given"
+    assert distributed.finished("o.zarr") and not (folder / "o.zarr" / "work").exists()
+
+
 def test_a_dry_run_prints_the_plan_and_makes_nothing(folder):
     before = sorted(os.listdir())
     result = run("synth", "grey.png", "-o", "o.zarr", "--tiles", 16, "--dry-run", "--workers", 2, *OPTIONS)
@@ -76,9 +155,23 @@ def test_a_dry_run_prints_the_plan_and_makes_nothing(folder):
     assert sorted(os.listdir()) == before
 
 
+def test_a_dry_run_counts_the_arrays_of_the_store(folder):
+    plain = ["synth", "grey.png", "-o", "o.zarr", "--tiles", 512, "--dry-run", "--size", "2048x1024", "--order", "1"]
+    more = ["--source-map", "o.zarr/source", "--also", "colour.png=o.zarr/colour"]
+    small, large = (float(run(*plain, *args).stdout.split("the store ")[1].split(" MiB")[0]) for args in ([], more))
+    assert large - small == 2 * (2 * 4 + 3)
+
+
 @pytest.mark.parametrize(
     ("args", "words"),
     [
+        (["-o", "o.zarr", "--tiles", 16, "--report", "there.zarr"], "there.zarr holds other files (mine)"),
+        (["-o", "o.zarr", "--tiles", 16, "--report", "grey.png"], "grey.png is an input and would be overwritten"),
+        (["-o", "o.zarr", "--tiles", 16, "--report", "o.zarr/page"], "would be written into o.zarr, which another"),
+        (
+            ["-o", "o.zarr", "--tiles", 16, "--report", "page", "--known", "known.png"],
+            "the report shows one sample, all of it known, and what is taken from it; leave it out",
+        ),
         (["-o", "o.png", "--tiles", 16], "o.png is not a .zarr store, which --tiles requires; end its name in .zarr"),
         (["-o", "o.png", "--workers", 2], "--workers requires --tiles"),
         (["-o", "o.png", "--dry-run"], "--dry-run requires --tiles"),
@@ -107,6 +200,7 @@ def test_a_dry_run_prints_the_plan_and_makes_nothing(folder):
 )
 def test_what_is_wrong_is_said_before_anything_is_made(folder, args, words):
     (folder / "there.zarr").mkdir()
+    (folder / "there.zarr" / "mine").touch()
     before = sorted(os.listdir())
     result = run("synth", "grey.png", *args, *OPTIONS)
     assert result.exit_code == 2

@@ -41,6 +41,14 @@ def test_contact_sheet_shows_every_picture_at_its_own_size(tmp_path):
     assert os.listdir(tmp_path) == ["sheet.png"]
 
 
+def test_a_row_of_a_sheet_is_as_high_as_its_pictures():
+    low, high = (np.full((rows, 200), rows, np.uint8) for rows in (100, 150))
+    laid = sheet.contact_sheet([("a", low), ("b", high), ("c", low)], columns=1)
+    assert len(laid) == sheet.GAP + 3 * (sheet.STRIP + sheet.GAP) + 350
+    assert contains(laid, sheet.rgb(high))
+    assert len(sheet.contact_sheet([("a", low), ("b", high)], columns=2)) == 2 * sheet.GAP + sheet.STRIP + 150
+
+
 def test_a_scale_neither_fits_nor_smooths():
     rng = np.random.default_rng(1)
     small, large = (rng.integers(0, 256, (3, side, 3), dtype=np.uint8) for side in (20, 1100))

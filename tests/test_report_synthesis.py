@@ -16,9 +16,9 @@ from simdtex.io import image
 from simdtex.model.colours import source_colours, temperature_colours, use_colours
 from simdtex.model.regularity import lattice_sentence
 from simdtex.model.use import counts, effective_use
+from simdtex.report import sheet, synthesis
 from simdtex.report.page import Figure
 from simdtex.report.synthesis import FRAME, _frame, _use, use_sentences
-from simdtex.run import Output
 
 OPTIONS = {"mrf": {"order": 2, "lattice": "9,0,0,9"}, "multires": {"alpha": 0.5}}
 
@@ -58,10 +58,10 @@ def test_statistics_tell_the_use(method):
 def test_the_map_of_use():
     source = np.array([[[0, 0], [0, 0], [0, 0]], [[1, 2], [0, 0], [0, 0]], [[0, 0], [0, 0], [0, 1]]])
     expected = np.log1p([[7, 1, 0], [0, 0, 1]]) / np.log(8)
-    np.testing.assert_array_equal(use_colours(source, (2, 3)), temperature_colours(expected))
+    np.testing.assert_array_equal(use_colours(counts(source, (2, 3))), temperature_colours(expected))
     assert expected[0, 0] == pytest.approx(1) and expected[1, 0] == 0
     with pytest.raises(ValueError, match="outside a sample of 2 x 2"):
-        use_colours(source, (2, 2))
+        counts(source, (2, 2))
 
 
 def test_use_in_words():
@@ -76,7 +76,8 @@ def test_pictures_of_use_show_the_map_the_frame_and_the_arrangement():
     source = rng.integers(0, (130, 132), (150, 160, 2)) ** 2 // (130, 132)
     use = effective_use(source, (130, 132))
     sample, made = (rng.integers(0, 256, shape).astype(np.uint8) for shape in ((130, 132), (150, 160)))
-    text, used, arranged = _use(sample, made, Output(source, statistics={"use": use.as_dict()}))
+    results = {"statistics": {"use": use.as_dict()}}
+    text, used, arranged = _use(sample, counts(source, (130, 132)), [("the output", made)], source, results)
     assert text == use_sentences(use.as_dict())
     assert isinstance(used, Figure) and used.file == "use.png" and arranged.file == "arrangement.png"
     most = int(counts(source, (130, 132)).max())
@@ -94,7 +95,35 @@ def test_pictures_of_use_show_the_map_the_frame_and_the_arrangement():
 
     assert stands_in(arranged, source_colours(source, (130, 132)))
     assert stands_in(arranged, np.stack([made] * 3, axis=-1))
-    assert stands_in(used, use_colours(source, (130, 132))[20:])  # below the frame
+    assert stands_in(used, use_colours(counts(source, (130, 132)))[20:])  # below the frame
+
+
+def test_what_is_counted_part_by_part_is_that_of_the_whole(monkeypatch):
+    """A map of 40 x 37 windows: those that cross from one piece into the other are no piece of the sample."""
+    source = np.moveaxis(np.indices((55, 52)), 0, -1).astype(np.int32)
+    source[:, 30:] += 3, 5
+    whole = {}
+    for part in (1024, 20, 7):
+        monkeypatch.setattr(sheet, "PART", part)
+        whole[part] = synthesis._counted(source, (60, 60))
+        assert whole[part][0].tolist() == counts(source, (60, 60)).tolist()
+    assert {copied for _, copied in whole.values()} == {(37 - 15) / 37}
+    assert synthesis._counted(source[:15], (60, 60))[1] is None
+
+
+@pytest.mark.parametrize(("rows", "cols"), [(50, 61), (20, 9), (3, 128)])
+def test_a_picture_that_is_read_part_by_part_is_reduced_as_a_whole(monkeypatch, rows, cols):
+    monkeypatch.setattr(sheet, "MOST_SIDE", 20)
+    monkeypatch.setattr(sheet, "PART", 16)
+    picture = np.random.default_rng(1).integers(0, 256, (rows, cols, 3)).astype(np.uint8)
+    sizes = []
+
+    def show(part):
+        sizes.append(max(part.shape[:2]))
+        return part
+
+    np.testing.assert_array_equal(sheet.read_fitted(picture, show), sheet.fitted(picture, 20))
+    assert max(sizes) <= 16
 
 
 def test_the_frame_is_around_the_piece():
@@ -119,6 +148,8 @@ def test_a_report(folder, method):
     results = json.loads((folder / "r" / "results.json").read_text(encoding="utf-8"))
     assert results["shape"] == [48, 40] and results["sample_shape"] == [24, 20, 3]
     assert use_sentences(results["statistics"]["use"]) in page.text
+    assert f"{results['taken']:.0%} of the sample's pixels" in page.text
+    assert f"windows of 16 x 16 pixels, {results['copied']:.1%} are one piece" in page.text
     note = lattice_sentence(results["statistics"].get("lattice"))
     assert (note != "") == (method == "mrf") and note in page.text and note in result.output
     assert results["command"] in page.text and f"--method {method}" in results["command"]

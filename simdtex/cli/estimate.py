@@ -10,8 +10,9 @@ from typing import Any
 import click
 
 from simdtex.cli.command import DATA, command
-from simdtex.cli.inputs import output_shape, read_known, read_masks, read_material
-from simdtex.cli.options import DEVICE, KNOWN, SAMPLE_MASK, option, places, size_option
+from simdtex.cli.guides import read_data
+from simdtex.cli.inputs import output_shape, read_material
+from simdtex.cli.options import DEVICE, KNOWN, SAMPLE_MASK, given, option, places, size_option
 from simdtex.cli.places import EITHER, READ
 from simdtex.cli.simulate import lies_of
 
@@ -53,7 +54,6 @@ def estimate(
     training_image: tuple[Path, ...],
     output: Path,
     size: str | None,
-    known: Path | None,
     quiet: bool,
     **options: Any,
 ) -> None:
@@ -68,18 +68,16 @@ def estimate(
     began, material = time.perf_counter(), read_material(training_image)
     if material.channel_axis is not None:
         raise ValueError(f"{training_image[0]} has several channels; give a training image of one variable")
-    masks = read_masks(options.pop("sample_mask"), material)
-    data = None if known is None else read_known(known, material)
-    shape = output_shape(size, material.pixels[0], data, material.pixels[0])
-    if data is None:
+    data = read_data(material, options)
+    known, mask = data["known"], data["mask"]
+    shape = output_shape(size, material.pixels[0], known, material.pixels[0])
+    if known is None:
         raise ValueError("an estimate requires data; give --known")
     lies = lies_of(material, options.pop("origin"), options.pop("cell"))
-    grid = check_realisations_path(output) in SUFFIXES
-    if grid:
+    if grid := check_realisations_path(output) in SUFFIXES:
         check_grid(output, material.pixels, **lies)
-    given = {name: value for name, value in options.items() if value is not None} | lies
-    mask = masks and (masks if material.several else masks[0])
-    made = estimate(material.array, known=data, shape=(shape[0], shape[1]), mask=mask, **given)
+    inputs = given(options) | lies
+    made = estimate(material.array, known=known, shape=(shape[0], shape[1]), mask=mask, **inputs)
     if grid:
         variables = {str(name): one.values for name, one in made.data_vars.items() if name != "probability"}
         if "probability" in made:

@@ -97,7 +97,7 @@ def extend(
         from simdtex.report.synthesis import write_synthesis
 
         check_folder(report)
-        writers.append(lambda made, run: write_synthesis(report, pixels, made, run, command_line()))
+        writers.append(lambda made, run: write_synthesis(report, pixels, made, run, command_line(), continued=True))
     return Task(
         partial(extend, pixels, seamless=tiling, channel_axis=whole.channel_axis, **sides, **given(options)),
         lambda made: f"{made.shape[1]}x{made.shape[0]} from {cols}x{rows}",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Masks, known values and guides: what ``synth`` and ``simulate`` read beside the samples."""
+"""Masks, known values and guides: what ``synth``, ``simulate`` and ``estimate`` read beside the samples."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def read_data(samples: Material, options: dict[str, Any]) -> dict[str, Any]:
     if samples.deep and (options["sample_mask"] or options["guide"]):
         raise ValueError("--sample-mask and --guide take no volumes; use simdtex.simulate in Python")
     masks = read_masks(options.pop("sample_mask"), samples)
-    file, guide = options.pop("known"), options.pop("guide")
+    file, guide = options.pop("known"), options.pop("guide", None)
     found: dict[str, Any] = {
         "channel_axis": samples.channel_axis,
         "mask": masks and (masks if samples.several else masks[0]),

@@ -75,7 +75,7 @@ def check_places(context: click.Context) -> None:
             if _same(out.path, other.path):
                 raise ValueError(f"{out.path} would be written twice; give each output a file of its own")
             for inner, outer in ((out, other), (other, out)):
-                array = context.params.get("tiles") is not None and inner.path.parent == outer.path
+                array = context.params.get("tiles") and inner.role == "write" and inner.path.parent == outer.path
                 if outer.role != "write" and _within(inner.path, outer.path) and not array:
                     raise ValueError(
                         f"{inner.path} would be written into {outer.path}, the folder of another output; "

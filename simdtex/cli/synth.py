@@ -69,7 +69,7 @@ from simdtex.cli.tiles import check_tiles, synthesize_in_tiles, tiles_options
 @GUIDE
 @SOURCE_MAP
 @ALSO
-@report_option("its pictures, and how evenly it uses the sample")
+@report_option("its pictures, how evenly it uses the sample, and how much it copies")
 @tiles_options
 def synth(
     samples: tuple[Path, ...],

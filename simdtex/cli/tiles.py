@@ -14,10 +14,10 @@ import click
 from simdtex.cli.command import RUNS
 from simdtex.cli.ending import RESUME, note
 from simdtex.cli.inputs import Also
-from simdtex.cli.job import progress_bar
+from simdtex.cli.job import command_line, progress_bar
 from simdtex.cli.options import option
 
-ALONE = ("stages", "report", "profile", "array")
+ALONE = ("stages", "profile", "array")
 """Options that are of a picture which one process holds."""
 
 
@@ -92,17 +92,18 @@ def synthesize_in_tiles(
     given, began = context.params, time.perf_counter()
     output: Path = given["output"]
     workers = workers_of(given["workers"])
+    for one in others:
+        if one.out.parent != output:
+            raise ValueError(f"{one.out} is not an array of the store; end --also in ={output / one.out.stem}")
+    options |= {"source_map": given["source_map"] is not None}
+    options |= {"maps": {one.out.name: one.maps.array for one in others}}
     plan = distributed.plan(sample, shape, tiles=given["tiles"], **options)
     if given["dry_run"] or not given["quiet"]:
         for line in plan.lines():
             click.echo(line, err=not given["dry_run"])
     if given["dry_run"]:
         return
-    for one in others:
-        if one.out.parent != output:
-            raise ValueError(f"{one.out} is not an array of the store; end --also in ={output / one.out.stem}")
-    options |= {"rng": given["seed"], "device": given["device"], "source_map": given["source_map"] is not None}
-    options["maps"] = {one.out.name: one.maps.array for one in others}
+    options |= {"rng": given["seed"], "device": given["device"], "report": given["report"], "command": command_line()}
     with _progress(output, given["quiet"]) as callback:
         distributed.synthesize(
             sample, shape, output, tiles=given["tiles"], workers=workers, callback=callback, note=note, **options

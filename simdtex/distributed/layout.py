@@ -6,6 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil, prod
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.tiles import Tile
@@ -33,6 +37,12 @@ SITE = 110, 12
 
 PIXEL = 400, 40
 """The same for each pixel of the sample with its margin."""
+
+Maps = dict[str, list[NDArray[Any]]]
+"""Further maps of the material, (rows, cols[, channels]), for each picture of the sample one, by their names."""
+
+Arrays = dict[str, tuple[tuple[int, ...], np.dtype[Any]]]
+"""The axes after rows and columns, and the types, of arrays of the output by their names."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +144,7 @@ class Layout:
         Bytes that a worker needs at most, whatever the output's size.
     disk : int
         Bytes that the store needs at most, uncompressed: two states of the finest level, one of each
-        other level, and the output without a source map and further maps.
+        other level, and the output with its source map and further maps.
     """
 
     levels: tuple[LevelLayout, ...]
@@ -154,8 +164,14 @@ class Layout:
         return [*found, f"a worker needs at most {memory:.0f} MiB, the store {disk:.0f} MiB before compression"]
 
 
-def planned(plan: Plan, seed: int, tile: int) -> Layout:
-    """Return the layout of an output in tiles of at most ``tile`` sites to the side.
+def further(plan: Plan, source: bool, maps: Maps) -> Arrays:
+    """Return the arrays that the output has beside the picture: the source map if it is wanted, and other maps."""
+    found: Arrays = {"source": ((2 + (len(plan.sample.boxes) > 1),), np.dtype(np.int32))} if source else {}
+    return found | {name: (one[0].shape[2:], one[0].dtype) for name, one in maps.items()}
+
+
+def planned(plan: Plan, seed: int, tile: int, more: Arrays | None = None) -> Layout:
+    """Return the layout of an output in tiles of at most ``tile`` sites to the side, with ``more`` arrays.
 
     Raises ValueError if the schedule does not relax a window as it does the whole, or if there are too many tiles.
     """
@@ -173,7 +189,9 @@ def planned(plan: Plan, seed: int, tile: int) -> Layout:
     window = max(*(one.window for one in levels), min(shown, levels[0].rows) * min(shown, levels[0].cols))
     each, pixel = (fixed + more * channels for fixed, more in (SITE, PIXEL))
     memory = PROCESS + window * each + sample.rows * sample.cols * pixel
-    disk = int(prod(plan.shape) * ((6 + 2 * channels) * 7 / 3 + sample.shown * sample.pixels.dtype.itemsize))
+    arrays = [((sample.shown,), sample.pixels.dtype), *(more or {}).values()]
+    shown_bytes = sum(prod(axes) * dtype.itemsize for axes, dtype in arrays)
+    disk = int(prod(plan.shape) * ((6 + 2 * channels) * 7 / 3 + shown_bytes))
     return Layout(levels, channels, memory, disk)
 
 

@@ -38,25 +38,22 @@ from numpy.typing import NDArray
 
 from simdtex.checkpoint import read_state, write_state
 from simdtex.distributed.description import described, restored
-from simdtex.distributed.layout import Layout, LevelLayout, planned
+from simdtex.distributed.layout import Arrays, Layout, LevelLayout, Maps, further, planned
 from simdtex.io.atomic import Damaged, write_durable
 from simdtex.methods.mrf.conditioning import Conditioning, Conditions, Data, Held
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.tiles import Tally, Tile
 from simdtex.model.lattice import Grid
+from simdtex.model.sample import Sample
 from simdtex.ops.neighbourhood import Confidences, Field
 
-FORMAT = 6
+FORMAT = 7
 """Format of the store; another one is refused."""
 
 TOGETHER = 2**22
 """Numbers of tallies that are read at a time."""
 
 PLANES = ("values", "source", "temperature")
-
-
-Maps = dict[str, list[NDArray[Any]]]
-"""Further maps of the material, (rows, cols[, channels]), by the names of their arrays."""
 
 
 class Turn(NamedTuple):
@@ -99,13 +96,12 @@ class Work(NamedTuple):
     maps: Maps
 
     @property
-    def outputs(self) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+    def outputs(self) -> Arrays:
         """The axes after rows and columns, and the types, of the arrays that the output has."""
         sample = self.plan.sample
-        found = {"image": ((sample.shown,) * self.channels, sample.pixels.dtype)}
-        if self.source:
-            found["source"] = (2 + (len(sample.boxes) > 1),), np.dtype(np.int32)
-        return found | {name: (maps[0].shape[2:], maps[0].dtype) for name, maps in self.maps.items()}
+        return {"image": ((sample.shown,) * self.channels, sample.pixels.dtype)} | further(
+            self.plan, self.source, self.maps
+        )
 
 
 class Files(zarr.storage.LocalStore):
@@ -153,12 +149,25 @@ class Checked:
         return f"{self._name}/zarr.json"
 
 
+class Sources:
+    """The source map of a state, (rows, cols, 2 or 3), a part of which is read when it is sliced."""
+
+    def __init__(self, array: Checked, sample: Sample) -> None:
+        self._array, self._sample = array, sample
+        self.shape = (*array.shape, 2 + (len(sample.boxes) > 1))
+
+    def __getitem__(self, where: Any) -> NDArray[np.int32]:
+        place: NDArray[np.int32] = self._sample.place(self._array[where])
+        return place
+
+
 class Store:
     """A store: ``where`` is a folder that all workers reach. Methods raise Damaged with the name of a damaged part."""
 
     def __init__(self, where: str) -> None:
         self.where = where
         self._arrays: dict[str, Checked] = {}
+        self._work: Work | None = None
         try:
             self.root: Any = zarr.open_group(Files(where), mode="r+")
         except Exception:  # of JSON, of its members, of the files
@@ -168,11 +177,22 @@ class Store:
             self.root = zarr.open_group(Files(where), mode="a")
 
     @staticmethod
-    def create(where: str, plan: Plan, seed: int, layout: Layout, *, channels: bool, source: bool, maps: Maps) -> Store:
+    def create(
+        where: str,
+        plan: Plan,
+        seed: int,
+        layout: Layout,
+        *,
+        channels: bool,
+        source: bool,
+        maps: Maps,
+        report: dict[str, str] | None = None,
+    ) -> Store:
         """Make a store, ready for its first turn.
 
         ``channels``: whether the image has a channel axis; ``source``: whether the source map is written too, and
-        ``maps`` likewise, for each picture of the sample one.
+        ``maps`` likewise, for each picture of the sample one; ``report``: the ``folder`` that a report is written to at
+        the end, and the ``command`` that it shows.
         """
         root: Any = zarr.open_group(Files(where), mode="w")
         root.create_group("work")
@@ -195,7 +215,7 @@ class Store:
         about = {
             **{"format": FORMAT, "version": version("simdtex"), "name": secrets.token_hex(8), "seed": seed},
             **{"tile": layout.levels[0].side, "confidences": [float(one) for one in conditions.confidences]},
-            **{"held": held, "given": given is not None, "channels": channels, "source": source},
+            **{"held": held, "given": given is not None, "channels": channels, "source": source, "report": report},
         }
         write_state(store._file("run"), about, [described(plan), scattered, maps])
         store.save(first_turn(layout))
@@ -207,7 +227,9 @@ class Store:
         return self._state("run")[0]
 
     def work(self) -> Work:
-        """Return the plan and all that belongs to it."""
+        """Return the plan and all that belongs to it, which is read once."""
+        if self._work is not None:
+            return self._work
         about, (tree, scattered, maps) = self._state("run")
         plan, seed = restored(tree), about["seed"]
         guides, own, centre, hard = about["confidences"]
@@ -215,7 +237,8 @@ class Store:
         layout = planned(plan, seed, about["tile"])
         between = {number: Data(*data) for number, data in scattered.items()}
         held, given, channels, source = (about[name] for name in ("held", "given", "channels", "source"))
-        return Work(plan, seed, layout, confidences, held, given, between, channels, source, maps)
+        self._work = Work(plan, seed, layout, confidences, held, given, between, channels, source, maps)
+        return self._work
 
     @property
     def finished(self) -> bool:
@@ -261,6 +284,10 @@ class Store:
     def forget(self, level: int, which: int) -> None:
         """Remove a state of a level."""
         self._remove(f"level{level}/{which}/")
+
+    def picture(self, turn: Turn, work: Work) -> tuple[Any, Any]:
+        """Return the picture of an output that is written, and its source map, whether that is written or not."""
+        return self._at("image"), Sources(self._at(f"work/level0/{turn.read}/source"), work.plan.sample)
 
     def finish(self, work: Work) -> None:
         """Note that the output is complete, and what it is."""

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from simdtex.checkpoint import warn
-from simdtex.distributed.layout import Layout, planned
+from simdtex.distributed.layout import Layout, Maps, further, planned
 from simdtex.driver import check_shape, drive
 from simdtex.io.atomic import Damaged, NotWritten, atomic_folder, exclusive
 from simdtex.jobs.inputs import Inputs, check_inputs
@@ -27,7 +27,7 @@ from simdtex.methods.mrf.plan import plan as planned_run
 from simdtex.model.source_map import apply_source_map
 from simdtex.options import resolve
 from simdtex.random import as_seed
-from simdtex.run import Callback
+from simdtex.run import Callback, Output
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -61,6 +61,8 @@ def synthesize(
     device: str | Machine | None = None,
     callback: Callback | None = None,
     note: Callable[[str], None] | None = None,
+    report: PathLike | None = None,
+    command: str = "",
     **options: Any,
 ) -> Any:
     """Synthesise an output larger than one machine: the bytes of `simdtex.synthesize` with ``method="mrf"``.
@@ -91,6 +93,11 @@ def synthesize(
         Called with a `simdtex.run.Tiling` after every tile.
     note : callable, optional
         Receives a sentence while the run waits for workers. None: a warning.
+    report : path, optional
+        Folder for a page of the run, ``index.html`` with pictures and figures, which is written at the end, also by
+        `resume`. The sample is one picture without unknown pixels, and nothing of the output is known.
+    command : str
+        The command line that the page shows.
     **options
         Of the method, see `simdtex.methods.mrf.Options`; only schedules that relax a window as they do the whole.
 
@@ -114,7 +121,8 @@ def synthesize(
     size = check_shape(shape)
     inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
     run, seed = _plan(inputs, size, options), as_seed(rng)
-    layout, further = planned(run, seed, tiles), _maps(maps or {}, run)
+    layout, more = planned(run, seed, tiles), _maps(maps or {}, run)
+    page = None if report is None else {"folder": _checked_report(report, store, inputs), "command": command}
     _libraries()
     from simdtex.distributed.cluster import check_workers, connected
     from simdtex.distributed.store import Store
@@ -125,7 +133,7 @@ def synthesize(
     with connected(workers) as client:
         with _made(store) as temporary:
             channels = channel_axis is not None
-            Store.create(temporary, run, seed, layout, channels=channels, source=source_map, maps=further)
+            Store.create(temporary, run, seed, layout, channels=channels, source=source_map, maps=more, report=page)
         return resume(store, workers=client, channel_axis=channel_axis, device=device, callback=callback, note=note)
 
 
@@ -170,7 +178,9 @@ def resume(
             with connected(workers) as client:
                 each = here(opened, device) if client is None else across(client, opened, device, note or warn)
                 with _mending(opened):
-                    drive(Tiles(opened, each), Reference(), 0, callback)
+                    image, output = drive(Tiles(opened, each), Reference(), opened.about["seed"], callback)
+                    _write_report(opened, image, output)
+                    opened.finish(opened.work())
         opened.clean()
     return _array(opened.where, channel_axis)
 
@@ -186,13 +196,15 @@ def plan(
     *,
     tiles: int = TILES,
     channel_axis: int | None = None,
+    source_map: bool = False,
+    maps: dict[str, Any] | None = None,
     **options: Any,
 ) -> Layout:
     """Return the layout of an output in tiles, and the memory and disk that it needs.
 
     Parameters
     ----------
-    sample, shape, tiles, channel_axis, **options
+    sample, shape, tiles, channel_axis, source_map, maps, **options
         As of `synthesize`; ``mask``, ``known`` and the like may be among the options.
 
     Returns
@@ -202,7 +214,8 @@ def plan(
     """
     size = check_shape(shape)
     given = {name: options.pop(name, None) for name in ("mask", "known", "known_source", "guide")}
-    return planned(_plan(check_inputs(sample, size, channel_axis, **given), size, options), 0, tiles)
+    run = _plan(check_inputs(sample, size, channel_axis, **given), size, options)
+    return planned(run, 0, tiles, further(run, source_map, _maps(maps or {}, run)))
 
 
 def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any]) -> Plan:
@@ -212,7 +225,7 @@ def _plan(inputs: Inputs, size: tuple[int, int], options: dict[str, Any]) -> Pla
     return planned_run(inputs.pictures, size, chosen, inputs.given, inputs.guide)
 
 
-def _maps(maps: dict[str, Any], plan: Plan) -> dict[str, list[NDArray[Any]]]:
+def _maps(maps: dict[str, Any], plan: Plan) -> Maps:
     """Return further maps as lists with one for each picture of the sample; raise if they do not fit."""
     found, sizes = {}, [picture.shape[:2] for picture in plan.sample.pictures.pixels]
     if maps and plan.given is not None:
@@ -226,6 +239,39 @@ def _maps(maps: dict[str, Any], plan: Plan) -> dict[str, list[NDArray[Any]]]:
         apply_source_map(last, given, sizes if len(sizes) > 1 else sizes[0])
         found[name] = [np.asarray(one) for one in (given if len(sizes) > 1 else [given])]
     return found
+
+
+def _checked_report(report: PathLike, store: PathLike, inputs: Inputs) -> str:
+    """Return where a report is to be written; raise before long work if it cannot be."""
+    from simdtex.report.page import check_folder
+
+    pictures, folder, own = inputs.pictures, *(Path(os.path.realpath(path)) for path in (report, store))
+    if inputs.given or len(pictures.pixels) > 1 or pictures.known:
+        raise ValueError("the report shows one sample, all of it known, and what is taken from it; leave it out")
+    if folder.is_relative_to(own) or own.is_relative_to(folder):
+        raise ValueError(f"the report and the store {own} are one inside the other; give another folder for the report")
+    check_folder(folder)
+    return str(folder)
+
+
+def _write_report(store: Any, image: Any, output: Output) -> None:
+    """Write the report of an output that is complete, if one is wanted."""
+    about = store.about
+    if about["report"] is None:
+        return
+    from simdtex.report.page import check_folder
+    from simdtex.report.synthesis import write_synthesis
+
+    folder, command = about["report"]["folder"], about["report"]["command"]
+    try:
+        check_folder(folder)
+    except ValueError as error:
+        raise ValueError(f"{error}; then go on with: simdtex resume {store.where}") from None
+    for name in ("device", "device_seconds"):  # of the process that leads
+        del output.statistics[name]
+    pixels = store.work().plan.sample.pictures.pixels[0]
+    sample = pixels if about["channels"] else pixels[..., 0]
+    write_synthesis(folder, sample, image, output, command)
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from simdtex.distributed.layout import LevelLayout
 from simdtex.distributed.store import Store, Stored, Turn, phase_of
 from simdtex.machine import Machine
 from simdtex.methods.mrf.level import Lattices
-from simdtex.methods.mrf.record import expected_work, fraction_done
+from simdtex.methods.mrf.record import expected_work, fraction_done, known_before
 from simdtex.methods.mrf.tiles import Tile
 from simdtex.ops.use import use_penalty
 from simdtex.run import Callback, Output, Tiling
@@ -64,10 +64,12 @@ class Run:
         """Return whether the output is written."""
         return turn.phase == "done"
 
-    def result(self, turn: Turn, observer: Any) -> tuple[NDArray[Any], Output]:
-        """Return nothing: the store holds the picture, and notes that it is complete."""
-        self.store.finish(self.work)
-        return np.zeros((0, 0, 0)), Output(None)
+    def result(self, turn: Turn, observer: Any) -> tuple[Any, Output]:
+        """Return the picture and its source map as arrays of the store, which are read when they are sliced."""
+        level = self.work.layout.levels[0]
+        tiles = f"{level.count} tile{'s' * (level.count > 1)} of at most {level.side} x {level.side}"
+        image, source = self.store.picture(turn, self.work)
+        return image, Output(source, statistics=known_before(self.lattices) | {"tiles": tiles})
 
     def save(self, turn: Turn) -> Turn:
         """Return the turn: the store holds everything else."""
@@ -90,7 +92,7 @@ class Run:
         """Return the turn after a complete one, and have the store go on to it."""
         store, lattices, levels = self.store, self.lattices, self.work.layout.levels
         if turn.phase == "show":
-            return store.save(turn._replace(number=turn.number + 1, phase="done"))
+            return turn._replace(number=turn.number + 1, phase="done")  # which only `finish` notes
         counts, active, temperature_sum = store.total(turn)
         cooling = turn.cooling + (turn.phase == "sweep" and turn.active > 0)
         free = turn.free + (turn.phase == "sweep" and turn.active == 0)

@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.checkpoint import digest
 from simdtex.driver import check_shape
-from simdtex.io.grids import frame
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.jobs.inputs import as_known, check_known, check_samples
-from simdtex.jobs.simulation import grid_coordinates, require_xarray
+from simdtex.jobs.simulation import digests, grid_axes, require_xarray
 from simdtex.machine import memory, open_machine
 from simdtex.methods import mrf
 from simdtex.methods.mrf.density import Data, given_data
@@ -108,7 +106,8 @@ def estimate(
     known = as_known(known)
     size = pictures.pixels[0].shape[:2] if shape is None else shape
     size = check_shape(known.shape if shape is None and isinstance(known, np.ndarray) and known.ndim == 2 else size)
-    lies, place = frame(origin, cell), partial(place_hard_data, origin=origin, cell=cell, several=several)
+    along, sides_of_cells = grid_axes(size, origin, cell)
+    place = partial(place_hard_data, origin=origin, cell=cell, several=several)
     given = check_known(known, size, None, pictures, place=place)
     mrf.check_categories(pictures, given)
     sample, machine = Sample(pictures, pictures.channels * (nearest + 1), reach), open_machine(device)
@@ -128,18 +127,14 @@ def estimate(
     dims = ("y", "x")
     maps = found.reshape(-1, *size)
     variables: dict[str, Any] = {"mean": (dims, maps[0]), "variance": (dims, maps[1])}
-    along = grid_coordinates(size, lies if origin is not None or cell is not None else None)
     if categorical:
         entropy = 0 - (maps * np.log2(np.where(maps > 0, maps, 1))).cumsum(0)[-1]
         variables = {"probability": (("category", *dims), maps), "entropy": (dims, entropy)}
         along["category"] = names
     attributes = {
         **{"version": version("simdtex"), "device": machine.name, "nearest": nearest, "reach": reach},
-        **{"bandwidth": bandwidth, "training_image": digest(*pictures.pixels, *(pictures.known or ()))},
-        "hard_data": digest(np.where(given.known, given.values, 0), given.known),
+        **{"bandwidth": bandwidth, **digests(pictures, given), **sides_of_cells},
     }
-    if origin is not None or cell is not None:
-        attributes |= {f"cell_{axis}": side for axis, side in zip("xyz", lies.cell, strict=False)}
     result: xarray.Dataset = xr.Dataset(variables, along, attributes)
     return result
 

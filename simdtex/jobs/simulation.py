@@ -19,12 +19,14 @@ from numpy.typing import ArrayLike
 
 from simdtex.checkpoint import Checkpoint, Checkpointing, digest, opened
 from simdtex.driver import check_sides, drive, restored
-from simdtex.io.grids import Frame, frame
+from simdtex.io.grids import frame
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.jobs.inputs import Inputs, as_known, check_inputs, check_samples
 from simdtex.jobs.maps import Maps, check_region, missing_value
 from simdtex.machine import Machine, memory, open_machine
 from simdtex.methods import mrf
+from simdtex.model.given import Given
+from simdtex.model.pictures import Pictures
 from simdtex.model.soft import Soft
 from simdtex.options import resolve, whole, within_32_bits
 from simdtex.run import Callback, Simulating
@@ -178,7 +180,7 @@ def simulate(
     sides = ("layers", "rows", "columns")[-axes:]
     if shape is not None:
         within_32_bits(check_sides(shape, sides), 1)
-    lies = frame(origin, cell)
+    frame(origin, cell)  # which raises early
     pictures = check_samples(training, channel_axis, mask, axes)
     known = None if known is None else as_known(known)
     given = {"region": region, "probabilities": probabilities, "image_map": image_map, "rotation": rotation}
@@ -257,18 +259,13 @@ def simulate(
     dims, arrays = ["realisation", *"zyx"[-axes:], "variable"], made
     if channel_axis is None:
         dims, arrays = dims[:-1], made[..., 0]
-    lying = grid_coordinates(size, lies if origin is not None or cell is not None else None)
-    coordinates: dict[str, Any] = {
-        "realisation": np.arange(first, first + n),
-        **lying,
-        "seed": ("realisation", seeds),
-    }
+    along, sides_of_cells = grid_axes(size, origin, cell)
+    coordinates: dict[str, Any] = {"realisation": np.arange(first, first + n), **along, "seed": ("realisation", seeds)}
     attributes = _attributes(seed, chosen, machines[0].name, inputs) | maps.digests()
     if inputs.given and inputs.given.outside is not None:
         coordinates["region"] = (dims[1 : 1 + axes], ~inputs.given.outside)
         attributes |= {} if pixels.dtype.kind == "f" else {"missing": missing.item()}
-    if origin is not None or cell is not None:
-        attributes |= {f"cell_{axis}": side for axis, side in zip("xyz", lies.cell, strict=False)}
+    attributes |= sides_of_cells
     result: xarray.DataArray = xr.DataArray(arrays, coords=coordinates, dims=dims, name="simulation", attrs=attributes)
     if not source:
         return result
@@ -279,13 +276,13 @@ def simulate(
     return both
 
 
-def grid_coordinates(size: tuple[int, ...], lies: Frame | None) -> dict[str, Any]:
-    """Return the coordinates y, x and, if cells have it, z; rows and columns if nothing is said of the ground."""
-    axes = "zyx"[-len(size) :]
-    found: dict[str, Any] = {axis: np.arange(side) for axis, side in zip(axes, size, strict=True)}
-    for axis, at, side in zip("xyz", *(lies or ((), ())), strict=False):
-        found[axis] = at + side * found[axis] if axis in found else at
-    return found
+def grid_axes(size: tuple[int, ...], origin: Any, cell: Any) -> tuple[dict[str, Any], dict[str, float]]:
+    """Return the coordinates of cells, and the sizes of a cell as attributes; rows and columns if neither is given."""
+    at, sides = ((), ()) if origin is None and cell is None else frame(origin, cell)
+    found: dict[str, Any] = {axis: np.arange(n) for axis, n in zip("zyx"[-len(size) :], size, strict=True)}
+    for axis, first, side in zip("xyz", at, sides, strict=False):
+        found[axis] = first + side * found[axis] if axis in found else first
+    return found, {f"cell_{axis}": side for axis, side in zip("xyz", sides, strict=False)}
 
 
 def realisation_seed(seed: int, number: int) -> int:
@@ -323,19 +320,24 @@ def _in_turn(one: Callable[[int, Machine], None], numbers: list[int], machines: 
             raise
 
 
+def digests(pictures: Pictures, given: Given | None) -> dict[str, str]:
+    """Return the digests of training images, whose pixels are completed where they are unknown, and of hard data."""
+    found = {"training_image": digest(*pictures.pixels, *(pictures.known or ()))}
+    if given and given.told.any():
+        found["hard_data"] = digest(np.where(given.told, given.values, 0), given.told)
+    return found
+
+
 def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) -> dict[str, Any]:
     text = json.dumps(
         vars(options), default=lambda value: value.tolist() if isinstance(value, np.generic) else str(value)
     )
     found: dict[str, Any] = {"seed": seed, "version": version("simdtex"), "device": device, "options": text}
-    pictures = inputs.pictures  # whose pixels are completed where they are unknown
-    found["training_image"] = digest(*pictures.pixels, *(pictures.known or ()))
-    if inputs.given and inputs.given.told.any():
-        found["hard_data"] = digest(np.where(inputs.given.told, inputs.given.values, 0), inputs.given.told)
+    found |= digests(inputs.pictures, inputs.given)
     if inputs.guide:
         found["guide"] = digest(*inputs.guide[0], inputs.guide[1])
-    if pictures.usable:
-        found["mask"] = digest(*pictures.usable)
+    if inputs.pictures.usable:
+        found["mask"] = digest(*inputs.pictures.usable)
     return found
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from simdtex.io.image import to_display
 from simdtex.model.colours import source_colours, temperature_colours, use_colours
+from simdtex.model.use import counts
 from simdtex.options import true_or_false, whole
 
 Array = NDArray[Any]
@@ -141,7 +142,7 @@ def layers(
         colours = partial(source_colours, sample_shape=sample.shape)
         found["arrangement"] = lambda: Layer(shape, source()[..., :2], colours)
         used = (sample.shape[0], sample.shape[1])
-        found["use"] = lambda: Layer(used, use_colours(source()[..., :2], sample.shape), np.asarray)
+        found["use"] = lambda: Layer(used, use_colours(counts(source()[..., :2], sample.shape)), np.asarray)
     if temperature:
         found["temperature"] = lambda: Layer(shape, temperature(), temperature_colours)
     return found

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.model.use import counts
-
 Picture = NDArray[np.uint8]
 
 OKABE_ITO = (
@@ -53,14 +51,14 @@ def source_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
     return colours
 
 
-def use_colours(source: ArrayLike, sample_shape: tuple[int, ...]) -> Picture:
+def use_colours(counts: NDArray[np.intp]) -> Picture:
     """Return a colour for each pixel of the sample by how often it was taken, (sample rows, sample cols, 3) uint8.
 
-    The colours are those of `temperature_colours` for log(1 + u) / log(1 + max u), where u is how often: near black for
-    a pixel that was never taken, pale yellow for the one that was taken most. Raises ValueError if ``source`` (rows,
-    cols, 2) is no source map, or points outside the sample.
+    The colours are those of `temperature_colours` for log(1 + u) / log(1 + max u), where u is one of
+    `simdtex.model.use.counts`: near black for a pixel that was never taken, pale yellow for the one that was taken
+    most.
     """
-    uses = np.log1p(counts(source, sample_shape))
+    uses = np.log1p(counts)
     return temperature_colours(uses / (uses.max() or 1.0))
 
 

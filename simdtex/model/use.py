@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.options import unmasked
 
-__all__ = ["MostUsed", "SourceMap", "Use", "checked", "counts", "effective_use"]
+__all__ = ["MostUsed", "SourceMap", "Use", "checked", "counts", "effective_use", "use_of"]
 
 SourceMap = NDArray[np.int32]
 
@@ -156,9 +156,13 @@ def effective_use(
     About 1 ms for an output of 256 x 256 pixels. Where pieces are taken by chance a piece of n
     output pixels varies by sqrt(n), so a small output has a lower share than a large one.
     """
+    return use_of(counts(source, sample_shape, sample=sample), piece)
+
+
+def use_of(uses: NDArray[np.intp], piece: int = PIECE) -> Use:
+    """Return `effective_use` from `counts`, which add up over the parts of a source map."""
     if piece < 1:
         raise ValueError(f"piece is {piece}: give its side in pixels, 1 or more")
-    uses = counts(source, sample_shape, sample=sample)
     if not uses.any():
         raise ValueError("no pixel was taken from the sample, so its use has no figures: pass the map of another run")
     row, col = (_starts(length, piece) for length in uses.shape)

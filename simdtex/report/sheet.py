@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from math import ceil
+from typing import Any
 
 import numpy as np
 import PIL.Image
@@ -21,6 +22,7 @@ PathLike = str | os.PathLike[str]
 
 LEAST_SIDE = 96  # a smaller picture is enlarged on a sheet, pixels
 MOST_SIDE = 1024  # a larger picture is reduced on a sheet, pixels
+PART = 1024  # of a picture that is read part by part, this much at a time, pixels a side
 GAP = 8  # between the cells of a sheet, pixels
 TEXT = 13  # height of a label's letters, pixels
 STRIP = TEXT + 6  # height of a line of text, pixels
@@ -50,13 +52,14 @@ def contact_sheet(
     below = [""] * len(pictures) if captions is None else captions
     shown = [_scaled(rgb(picture), scale) for _, picture in pictures]
     font = PIL.ImageFont.load_default(TEXT)
-    height = max(len(picture) for picture in shown) + STRIP * (1 if captions is None else 2) + GAP
+    heights = [len(picture) + STRIP * (1 if captions is None else 2) + GAP for picture in shown]
     width = GAP + max(*(len(p[0]) for p in shown), *(ceil(font.getlength(text)) for text in (*labels, *below)))
-    across = min(columns or max(1, round((len(shown) * height / width) ** 0.5)), len(shown))
-    sheet = PIL.Image.new("RGB", (GAP + across * width, GAP + ceil(len(shown) / across) * height), "white")
+    across = min(columns or max(1, round((len(shown) * max(heights) / width) ** 0.5)), len(shown))
+    rows = [max(heights[first : first + across]) for first in range(0, len(shown), across)]
+    sheet = PIL.Image.new("RGB", (GAP + across * width, GAP + sum(rows)), "white")
     draw = PIL.ImageDraw.Draw(sheet)
     for number, (label, picture, caption) in enumerate(zip(labels, shown, below, strict=True)):
-        top, left = GAP + number // across * height, GAP + number % across * width
+        top, left = GAP + sum(rows[: number // across]), GAP + number % across * width
         draw.text((left, top), label, fill="black", font=font)
         sheet.paste(PIL.Image.fromarray(picture), (left, top + STRIP))
         draw.text((left, top + STRIP + len(picture) + 2), caption, fill="black", font=font)
@@ -96,5 +99,35 @@ def fitted(picture: Picture, side: int) -> Picture:
 
     A picture that fits is returned itself.
     """
-    factor = -(-max(picture.shape[:2]) // side)
+    factor = reduction(picture.shape, side)
     return picture if factor == 1 else np.array(PIL.Image.fromarray(picture).reduce(factor))
+
+
+def reduction(shape: tuple[int, ...], side: int | None = None) -> int:
+    """Return by which factor a picture of this shape is reduced to such a side, by default that of a sheet."""
+    return -(-max(shape[:2]) // (side or MOST_SIDE))
+
+
+def parts(shape: tuple[int, ...], multiple: int = 1) -> Iterator[tuple[slice, slice]]:
+    """Yield squares that a picture of this shape consists of, row by row; their sides are about `PART`.
+
+    They begin at a multiple of `multiple`, also where that is larger.
+    """
+    side = multiple * max(1, PART // multiple)
+    for top in range(0, shape[0], side):
+        for left in range(0, shape[1], side):
+            yield slice(top, min(top + side, shape[0])), slice(left, min(left + side, shape[1]))
+
+
+def read_fitted(array: Any, show: Callable[[NDArray[Any]], Picture]) -> Picture:
+    """Return a picture that fits on a sheet, (rows, cols, 3), of an array of any size: `fitted` of ``show(array)``.
+
+    The array is read part by part: a NumPy array, or one of a store, (rows, cols[, ...]). ``show`` returns the picture
+    of a part, (rows, cols, 3).
+    """
+    factor = reduction(array.shape)
+    found = np.zeros((ceil(array.shape[0] / factor), ceil(array.shape[1] / factor), 3), np.uint8)
+    for rows, cols in parts(array.shape, factor):
+        small = PIL.Image.fromarray(show(array[rows, cols])).reduce(factor)
+        found[rows.start // factor :, cols.start // factor :][: small.height, : small.width] = np.asarray(small)
+    return found

@@ -8,45 +8,108 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter, minimum_filter
 
+from simdtex.experiments.ensemble.copies import WINDOW
 from simdtex.io.image import to_display
 from simdtex.model.colours import source_colours, use_colours
 from simdtex.model.regularity import lattice_sentence
-from simdtex.model.use import counts
+from simdtex.model.use import counts, use_of
 from simdtex.report.page import Figure, Part, Section, write_report
-from simdtex.report.sheet import contact_sheet, magnified
+from simdtex.report.sheet import GAP, MOST_SIDE, contact_sheet, magnified, parts, read_fitted, reduction, rgb
 from simdtex.report.tables import Table
 from simdtex.run import Output
 
 Picture = NDArray[np.uint8]
 
 SHOWN_SIDE = 256  # smaller samples are enlarged by a whole factor, pixels
+PAGE = 1120  # the width of a page's pictures; a wider sheet is shrunk, and its labels with it, pixels
+CORNER = 512  # of an output that is reduced, so much is shown as it is, pixels a side
 FRAME = (0, 200, 255)  # the colour of the frame around the most used piece, sRGB; no colour of the map of use is blue
 
 
 def write_synthesis(
-    folder: str | os.PathLike[str], sample: NDArray[Any], image: NDArray[Any], output: Output, command: str = ""
+    folder: str | os.PathLike[str],
+    sample: NDArray[Any],
+    image: Any,
+    output: Output,
+    command: str = "",
+    *,
+    continued: bool = False,
 ) -> None:
     """Write the report of a run: ``index.html``, PNG pictures, ``results.json``.
 
     ``picture.png`` shows sample and output, both (rows, cols[, channels]). If there is a source map, ``use.png`` shows
     how often each pixel of the sample was taken, and ``arrangement.png`` from where each pixel of the output was taken.
+    Image and source map are arrays, or of a store; they are read part by part. ``continued``: the image contains the
+    sample, so that figures of the whole image say little.
     """
-    statistics = output.statistics
+    statistics = dict(output.statistics)
     limits = float(sample.min()), float(sample.max())
-    shown, made = to_display(sample, limits), to_display(image, limits)
+
+    def show(part: NDArray[Any]) -> Picture:
+        return rgb(to_display(part, limits))
+
+    shown, made = to_display(sample, limits), _views("output", image, show)
     (height, width), (rows, cols) = image.shape[:2], sample.shape[:2]
-    lead = f"{width} x {height} pixels from a sample of {cols} x {rows}, on {statistics['device']}."
-    pair = contact_sheet([("the sample", shown), ("the output", made)], columns=2)
-    caption = f"The sample and the output. {lattice_sentence(statistics.get('lattice'))}".strip()
-    sections = [Section("The picture", [Figure("picture.png", pair, caption)])]
+    on = f"in {statistics['tiles']}" if "tiles" in statistics else f"on {statistics['device']}"
+    lead = f"{width} x {height} pixels from a sample of {cols} x {rows}, {on}."
+    results: dict[str, Any] = {"sample_shape": sample.shape, "shape": (height, width), "statistics": statistics}
+    pair = _sheet([("the sample", shown), *made], 2)
+    factor = reduction(image.shape)
+    reduced = f"The output is reduced: one pixel is the mean of {factor} x {factor}." if factor > 1 else ""
+    caption = " ".join(["The sample and the output.", reduced, lattice_sentence(statistics.get("lattice"))])
+    sections = [Section("The picture", [Figure("picture.png", pair, " ".join(caption.split()))])]
     if output.source is not None:
-        sections.append(Section("Use of the sample", _use(shown, made, output)))
-    job = {"seed": statistics["seed"], "seconds": f"{statistics['seconds']:.2f}", **statistics["options"]}
+        uses, whole = _counted(output.source, (rows, cols))
+        statistics["use"] = statistics.get("use") or use_of(uses).as_dict()
+        if not continued:
+            results |= {"taken": np.count_nonzero(uses) / uses.size, "copied": whole}
+        sections.append(Section("Use of the sample", _use(shown, uses, made, output.source, results)))
+    job: dict[str, Any] = {name: statistics[name] for name in ("seed", "tiles") if name in statistics}
+    job |= {"seconds": f"{statistics['seconds']:.2f}", **statistics["options"]}
     settings = [{"What": k, "Value": str(v)} for k, v in job.items() if not isinstance(v, np.ndarray)]
     sections.append(Section("The job", [Table("The run and the options of its method", settings)]))
-    results = {"sample_shape": sample.shape, "shape": (height, width), "statistics": statistics}
     write_report(folder, "A texture and its sample", lead, sections, results, command)
+
+
+def _views(name: str, array: Any, show: Any) -> list[tuple[str, Picture]]:
+    """Return the picture of an array, (rows, cols[, ...]), with its label; if it is reduced, a corner of it, too."""
+    found = [(f"the {name}", read_fitted(array, show))]
+    if reduction(array.shape) > 1:
+        found.append(("its upper left corner, not reduced", show(array[:CORNER, :CORNER])))
+    return found
+
+
+def _sheet(pictures: list[tuple[str, Picture]], columns: int) -> Picture:
+    """Return a sheet of so many columns, or of fewer if its labels would be too small to read."""
+    widest = min(MOST_SIDE, max(picture.shape[1] for _, picture in pictures))
+    return contact_sheet(pictures, columns=max(1, min(columns, PAGE // (widest + GAP))))
+
+
+def _counted(source: Any, shape: tuple[int, int]) -> tuple[NDArray[np.intp], float | None]:
+    """Return `counts` of a source map, and the share of its windows that are one piece of the sample.
+
+    The windows have `WINDOW` x `WINDOW` pixels; None if the map is smaller.
+    """
+    uses, whole, more = np.zeros(shape, np.intp), 0, WINDOW - 1
+    for rows, cols in parts(source.shape):
+        part = source[rows.start : rows.stop + more, cols.start : cols.stop + more]
+        uses += counts(part[: rows.stop - rows.start, : cols.stop - cols.start], shape)
+        whole += int(np.count_nonzero(_pieces(part)))
+    windows = [side - more for side in source.shape[:2]]
+    return uses, whole / (windows[0] * windows[1]) if min(windows) > 0 else None
+
+
+def _pieces(source: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """Return whether each window of a source map is one piece of the sample, (rows - 15, cols - 15)."""
+    rows, cols = source.shape[:2]
+    if min(rows, cols) < WINDOW:
+        return np.zeros((0, 0), bool)
+    offset = source - np.moveaxis(np.indices((rows, cols)), 0, -1)
+    size, inside = (WINDOW, WINDOW, 1), tuple(slice(WINDOW // 2, n - (WINDOW - 1) // 2) for n in (rows, cols))
+    same = minimum_filter(offset, size)[inside] == maximum_filter(offset, size)[inside]
+    return np.asarray(same.all(-1))
 
 
 def use_sentences(use: dict[str, Any]) -> str:
@@ -59,29 +122,39 @@ def use_sentences(use: dict[str, Any]) -> str:
     )
 
 
-def _use(sample: Picture, made: Picture, output: Output) -> list[Part]:
-    shape, use = sample.shape[:2], output.statistics["use"]
-    source: Any = output.source
+def _use(
+    sample: Picture, uses: NDArray[np.intp], made: list[tuple[str, Picture]], source: Any, results: dict[str, Any]
+) -> list[Part]:
+    shape, use = uses.shape, results["statistics"]["use"]
     factor = max(1, SHOWN_SIDE // max(shape))
-    used = magnified(use_colours(source, shape), factor)
+    used = magnified(use_colours(uses), factor)
     _frame(used, use["most_used"], factor)
     places = magnified(source_colours(np.moveaxis(np.indices(shape), 0, -1), shape), factor)
-    arrangement = [("places in the sample", places), ("source places", source_colours(source, shape))]
+    arranged = _views("source places", source, lambda part: source_colours(part, shape))
     return [
-        use_sentences(use),
+        " ".join([use_sentences(use), *_shares(results)]),
         Figure(
             "use.png",
             contact_sheet([("the sample", magnified(sample, factor)), ("its use", used)], columns=2),
-            f"How often each pixel of the sample was taken, from never (black) to {counts(source, shape).max():,} "
+            f"How often each pixel of the sample was taken, from never (black) to {uses.max():,} "
             "times (pale yellow), on a logarithmic scale. The frame is around the piece that is used most.",
         ),
         Figure(
             "arrangement.png",
-            contact_sheet([*arrangement, ("the output", made)], columns=3),
+            _sheet([("places in the sample", places), *arranged, *made], 3),
             "The arrangement: a colour for each place in the sample, and the output's pixels in the colours of the "
             "places that they were taken from. A piece taken whole is smooth, and a joint is an edge.",
         ),
     ]
+
+
+def _shares(results: dict[str, Any]) -> list[str]:
+    """Return sentences on how much of the sample was taken at all, and how much of the output in whole pieces."""
+    found = [f"{results['taken']:.0%} of the sample's pixels are taken at least once."] if "taken" in results else []
+    if results.get("copied") is not None:
+        size = f"{WINDOW} x {WINDOW}"
+        found.append(f"Of the output's windows of {size} pixels, {results['copied']:.1%} are one piece of the sample.")
+    return found
 
 
 def _frame(picture: Picture, piece: dict[str, Any], factor: int) -> None:

@@ -167,12 +167,7 @@ class Record:
 def output(run: Lattices, state: State, source: NDArray[np.int32], record: Record) -> Output:
     """Return the source map, temperatures, stages and statistics of a run that has ended."""
     place, t = run.sample.place(source), run.grid(0).view(run.machine.get(state.temperature))
-    statistics = {
-        "options": vars(run.options) | {"levels": run.levels, "schedule": run.plan.schedule.name},
-        "levels": record.reports,
-        "use": None,
-        "lattice": run.sample.phases and run.sample.phases.statistics((run.plan.shape[-2], run.plan.shape[-1])),
-    }
+    statistics = known_before(run) | {"levels": record.reports, "use": None}
     if record.account:
         launches = run.machine.launches - record.launches
         statistics["accounting"] = record.account.report() | {"launches": launches}
@@ -183,6 +178,14 @@ def output(run: Lattices, state: State, source: NDArray[np.int32], record: Recor
     if given and given.place is not None:
         place = np.where(given.data[..., None], given.place, place)
     return Output(place, t / 1024, record.stages, statistics)
+
+
+def known_before(run: Lattices) -> dict[str, Any]:
+    """Return the statistics that are known before a run begins."""
+    return {
+        "options": vars(run.options) | {"levels": run.levels, "schedule": run.plan.schedule.name},
+        "lattice": run.sample.phases and run.sample.phases.statistics((run.plan.shape[-2], run.plan.shape[-1])),
+    }
 
 
 def picture(run: Lattices, grid: Grid, field: Field) -> NDArray[Any]:
