@@ -110,7 +110,7 @@ tables = [table("What it takes: brick", by_sample["brick"], COST)]
 tables += [table(name.capitalize(), rows, RESULT) for name, rows in by_sample.items()]
 (HERE / "generated" / "schedules.txt").write_text("\n".join(tables), encoding="utf-8")
 
-# The page on fuzzing shows what `make fuzz RECORD=--record` has written.
+# The page on testing shows the record of `make fuzz RECORD=--record`.
 with open(HERE / "fuzzing.json", encoding="utf-8") as file:
     fuzzed = json.load(file)
 counts = {
