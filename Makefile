@@ -24,9 +24,6 @@ help:
 	@echo "make clean   remove what these commands made, except $(VENV)"
 	@echo "Another Python: make PYTHON=python3.12 ..."
 
-# within the arguments of a call
-comma := ,
-
 # $(call install,NAME,EXTRAS): install once, again only when pyproject.toml or Python's version changed.
 define install
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
@@ -61,7 +58,7 @@ test:
 	@$(PY) -m pytest --numprocesses $(JOBS) --maxprocesses 4 --dist worksteal
 
 slow:
-	$(call install,slow,[test$(comma)release])
+	$(call install,slow,[slow])
 	$(device)
 	@$(PY) -m pytest -m slow
 
@@ -100,7 +97,7 @@ mutants:
 	set -f; OCL_ICD_VENDORS=/nonexistent $(PY) -m mutmut run --max-children 1 $(MUTANTS)
 	$(PY) -m mutmut results
 
-# MINUTES=1 SEED=7 give others; RECORD=--record writes docs/fuzzing.json, which the page on it shows.
+# MINUTES=1 SEED=7 give others; RECORD=--record writes docs/fuzzing.json, which docs/testing.rst shows.
 MINUTES ?= 10
 SEED ?= 1
 RECORD ?=
@@ -111,7 +108,7 @@ fuzz:
 # What goes to the package index: built, checked, and tried in an empty environment.
 .PHONY: dist
 dist:
-	$(call install,slow,[test$(comma)release])
+	$(call install,slow,[slow])
 	$(device)
 	rm -rf dist
 	$(PY) -m build --outdir dist

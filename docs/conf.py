@@ -131,7 +131,7 @@ lines += [f"   {'  -' if column else '* -'} {text}" for row in rows for column, 
 notes = [line for line in part.splitlines() if not line.startswith("|")]
 (HERE / "generated" / "comparison.txt").write_text("\n".join([*lines, *notes]) + "\n", encoding="utf-8")
 
-# The page on fuzzing shows what `make fuzz RECORD=--record` has written.
+# The page on testing shows the record of `make fuzz RECORD=--record`.
 with open(HERE / "fuzzing.json", encoding="utf-8") as file:
     fuzzed = json.load(file)
 counts = {

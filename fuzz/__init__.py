@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A fuzzer of the command line: `make fuzz`, and docs/fuzzing.rst."""
+"""A fuzzer of the command line: `make fuzz`, and docs/testing.rst."""

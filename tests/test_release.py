@@ -1,4 +1,4 @@
-"""What a release needs: one version everywhere, a changelog, and workflows that call what there is."""
+"""Releases: one version everywhere, a changelog, a conda recipe, and workflows that call existing commands."""
 
 import re
 import tomllib
@@ -15,6 +15,8 @@ CITATION = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
 CHANGELOG = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 WORKFLOWS = {path.stem: path for path in sorted((ROOT / ".github" / "workflows").glob("*.yml"))}
 TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+
+RECIPE = ROOT / "conda" / "recipe.yaml"
 
 CHECKOUT = pytest.mark.skipif(not (ROOT / ".ci").exists(), reason="a source distribution has no .ci")
 
@@ -108,5 +110,29 @@ def test_nothing_is_published_that_was_not_tried():
         "actions/download-artifact",
         "pypa/gh-action-pypi-publish",
     ]
-    systems = {each["os"].partition("-")[0] for each in jobs["try"]["strategy"]["matrix"]["include"]}
-    assert systems == {"ubuntu", "windows", "macos"}
+    tried = jobs["try"]["strategy"]["matrix"]["include"]
+    assert {each["os"].partition("-")[0] for each in tried} == {"ubuntu", "windows", "macos"}
+    linux = [each["python"] for each in tried if each["os"].startswith("ubuntu")]
+    assert linux == read("ci")["jobs"]["all"]["strategy"]["matrix"]["python"]
+
+
+def test_the_conda_recipe_is_that_of_the_project():
+    recipe = yaml.safe_load(RECIPE.read_text(encoding="utf-8"))
+    assert recipe["context"]["version"] == PROJECT["version"]
+    assert f">={recipe['context']['python_min']}" == PROJECT["requires-python"]
+    assert recipe["about"]["license"] == PROJECT["license"]
+    assert recipe["about"]["summary"] == PROJECT["description"]
+    (script,) = recipe["build"]["python"]["entry_points"]
+    assert dict([script.split(" = ")]) == PROJECT["scripts"]
+    names = {"matplotlib": "matplotlib-base"}  # without Qt
+    needed = {name: bound for name, bound in (line.split(">=") for line in PROJECT["dependencies"])}
+    wanted = [f"{names.get(name, name)} >={bound}" for name, bound in needed.items()]
+    assert sorted(recipe["requirements"]["run"][1:]) == sorted(wanted)
+
+
+@pytest.mark.slow
+def test_the_conda_recipe_renders():
+    rattler_build = pytest.importorskip("rattler_build")
+    recipe = rattler_build.Stage0Recipe.from_file(RECIPE)
+    (variant,) = recipe.render(rattler_build.VariantConfig())
+    assert (variant.recipe.package.name, variant.recipe.package.version) == (PROJECT["name"], PROJECT["version"])

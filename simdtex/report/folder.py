@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from simdtex.io.atomic import is_leftover
@@ -25,6 +26,8 @@ def earlier_files(folder: Path, what: str, own: Callable[[str], bool]) -> list[P
         elif not folder.parent.is_dir():
             raise ValueError(f"the folder {folder.parent} does not exist: create it first")
         else:
+            with suppress(FileNotFoundError):
+                os.lstat(folder)  # raises for a name that is too long, which `exists` hides since Python 3.14
             found = []
     except OSError as error:
         raise ValueError(f"{folder} cannot be used ({error.strerror}): give another folder") from None
