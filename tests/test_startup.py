@@ -24,6 +24,7 @@ PUBLIC = {
     *("DeviceError", "Live", "Output", "Progress", "devices", "lcpdf", "mix", "open_machine", "quality"),
     *("place_hard_data", "read_hard_data", "synthesize", "synthesize_solid", "__version__", "Checkpoint", "extend"),
     "explain",
+    "replay",
     *("TextureClassifier", "classify", "estimate", "fill", "simulate", "read_grid", "write_grid"),
 }
 COMMAND_LINE = """
