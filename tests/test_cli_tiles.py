@@ -127,7 +127,7 @@ def test_resume_writes_the_report(folder):
     sample, options = image.read("grey.png").pixels, {"order": 1, "xi": -6.0, "device": "reference", "tiles": 24}
     with pytest.raises(Stop):
         distributed.synthesize(
-            sample, (50, 61), "o.zarr", rng=3, report="page", command="as given", callback=stop, **options
+            sample, (50, 61), "o.zarr", rng=3, command={"report": "page", "line": "as given"}, callback=stop, **options
         )
     (folder / "page").mkdir()
     (folder / "page" / "mine.txt").write_text("mine")
@@ -170,7 +170,7 @@ def test_a_dry_run_counts_the_arrays_of_the_store(folder):
         (["-o", "o.zarr", "--tiles", 16, "--report", "o.zarr/page"], "would be written into o.zarr, the folder of another output"),
         (
             ["-o", "o.zarr", "--tiles", 16, "--report", "page", "--known", "known.png"],
-            "the report shows one sample, all of it known, and what is taken from it; leave it out",
+            "--report shows one sample, all of it known, and what is taken from it; leave it out",
         ),
         (["-o", "o.png", "--tiles", 16], "o.png is not a .zarr store, which --tiles requires; end its name in .zarr"),
         (["-o", "o.png", "--workers", 2], "--workers requires --tiles"),

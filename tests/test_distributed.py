@@ -291,13 +291,6 @@ def test_the_plan_says_what_is_needed():
     assert f"{plan.memory / 2**20:.0f} MiB" in lines[-1]
 
 
-@pytest.mark.parametrize("report", ["o.zarr", "o.zarr/page", "."])
-def test_a_report_and_its_store_are_two_folders(tmp_path, report):
-    with pytest.raises(ValueError, match=r"the report and the store .*o\.zarr are one inside the other"):
-        distributed.synthesize(SAMPLE, (20, 20), tmp_path / "o.zarr", report=tmp_path / report, order=1)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_memory_of_a_worker_does_not_grow_with_the_output():
     plans = [distributed.plan(SAMPLE, (side, side), tiles=512, order=2) for side in (4000, 40_000, 1_000_000)]
     assert len({plan.memory for plan in plans}) == 1

@@ -101,6 +101,12 @@ def synth(
     known, guide = data["known"], data["guide"]
     shape = output_shape(size, pixels, known, guide and guide[1])
     inputs = data | given(options, without=("tiles", "workers", "dry_run"))
+    if report:
+        from simdtex.report.page import check_folder
+
+        if material.several or known is not None or not material.known:
+            raise ValueError("--report shows one sample, all of it known, and what is taken from it; leave it out")
+        check_folder(report)
     if options["tiles"] is not None:
         others = read_also(also, material, files=False)
         synthesize_in_tiles(context, material.array, (shape[0], shape[1]), others, inputs)
@@ -119,12 +125,8 @@ def synth(
     like = material.metadata and material.metadata._replace(exif=None)  # a new picture was taken by no camera
     writers = write_arranged(folder or output, others, source_map, like)
     if report:
-        from simdtex.report.page import check_folder
         from simdtex.report.synthesis import write_synthesis
 
-        if material.several or known is not None or not material.known:
-            raise ValueError("--report requires one sample without unknown pixels, and no --known; leave it out")
-        check_folder(report)
         writers.append(lambda made, run: write_synthesis(report, pixels, made, run, command_line()))
 
     def more(statistics: dict[str, Any]) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -103,7 +104,9 @@ def synthesize_in_tiles(
             click.echo(line, err=not given["dry_run"])
     if given["dry_run"]:
         return
-    options |= {"rng": given["seed"], "device": given["device"], "report": given["report"], "command": command_line()}
+    options |= {"rng": given["seed"], "device": given["device"], "ended": _write_report}
+    if given["report"]:
+        options["command"] = {"report": os.path.realpath(given["report"]), "line": command_line()}
     with _progress(output, given["quiet"]) as callback:
         distributed.synthesize(
             sample, shape, output, tiles=given["tiles"], workers=workers, callback=callback, note=note, **options
@@ -117,11 +120,28 @@ def resume_tiles(store: Path, workers: str | None, device: str | None, quiet: bo
 
     began, finished = time.perf_counter(), distributed.finished(store)
     with _progress(store, quiet) as callback:
-        distributed.resume(store, workers=workers_of(workers), device=device, callback=callback, note=note)
+        distributed.resume(
+            store, workers=workers_of(workers), device=device, callback=callback, note=note, ended=_write_report
+        )
     if finished:
         click.echo(f"{store} is finished already")
     else:
         _done(store, quiet, began)
+
+
+def _write_report(samples: list[Any], image: Any, output: Any, command: dict[str, str] | None) -> None:
+    """Write the report of an output that is complete, if the command that began it has ``--report``."""
+    if command is None:
+        return
+    from simdtex.report.page import check_folder
+    from simdtex.report.synthesis import write_synthesis
+
+    try:
+        check_folder(command["report"])
+    except ValueError as error:
+        store = click.get_current_context().meta[RESUME]
+        raise ValueError(f"{error}; then go on with: simdtex resume {store}") from None
+    write_synthesis(command["report"], samples[0], image, output, command["line"])
 
 
 @contextmanager

@@ -186,13 +186,12 @@ class Store:
         channels: bool,
         source: bool,
         maps: Maps,
-        report: dict[str, str] | None = None,
+        command: Any = None,
     ) -> Store:
         """Make a store, ready for its first turn.
 
         ``channels``: whether the image has a channel axis; ``source``: whether the source map is written too, and
-        ``maps`` likewise, for each picture of the sample one; ``report``: the ``folder`` that a report is written to at
-        the end, and the ``command`` that it shows.
+        ``maps`` likewise, for each picture of the sample one; ``command``: what is kept for who began the run.
         """
         root: Any = zarr.open_group(Files(where), mode="w")
         root.create_group("work")
@@ -215,7 +214,7 @@ class Store:
         about = {
             **{"format": FORMAT, "version": version("simdtex"), "name": secrets.token_hex(8), "seed": seed},
             **{"tile": layout.levels[0].side, "confidences": [float(one) for one in conditions.confidences]},
-            **{"held": held, "given": given is not None, "channels": channels, "source": source, "report": report},
+            **{"held": held, "given": given is not None, "channels": channels, "source": source, "command": command},
         }
         write_state(store._file("run"), about, [described(plan), scattered, maps])
         store.save(first_turn(layout))
@@ -288,6 +287,11 @@ class Store:
     def picture(self, turn: Turn, work: Work) -> tuple[Any, Any]:
         """Return the picture of an output that is written, and its source map, whether that is written or not."""
         return self._at("image"), Sources(self._at(f"work/level0/{turn.read}/source"), work.plan.sample)
+
+    def samples(self) -> list[NDArray[Any]]:
+        """Return the pictures of the sample, with a channel axis if the image has one."""
+        pixels = self.work().plan.sample.pictures.pixels
+        return [one if self.work().channels else one[..., 0] for one in pixels]
 
     def finish(self, work: Work) -> None:
         """Note that the output is complete, and what it is."""

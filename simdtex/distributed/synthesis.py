@@ -42,6 +42,9 @@ TAKEN = ("image", "source", "work")
 
 PathLike = str | os.PathLike[str]
 
+Ended = Callable[[list[Any], Any, Output, Any], object]
+"""Is called with the samples, the image, the rest of the output, and what the store keeps for it."""
+
 
 def synthesize(
     sample: ArrayLike,
@@ -61,8 +64,8 @@ def synthesize(
     device: str | Machine | None = None,
     callback: Callback | None = None,
     note: Callable[[str], None] | None = None,
-    report: PathLike | None = None,
-    command: str = "",
+    ended: Ended | None = None,
+    command: Any = None,
     **options: Any,
 ) -> Any:
     """Synthesise an output larger than one machine: the bytes of `simdtex.synthesize` with ``method="mrf"``.
@@ -93,11 +96,12 @@ def synthesize(
         Called with a `simdtex.run.Tiling` after every tile.
     note : callable, optional
         Receives a sentence while the run waits for workers. None: a warning.
-    report : path, optional
-        Folder for a page of the run, ``index.html`` with pictures and figures, which is written at the end, also by
-        `resume`. The sample is one picture without unknown pixels, and nothing of the output is known.
-    command : str
-        The command line that the page shows.
+    ended : callable, optional
+        ``ended(samples, image, output, command)`` is called when the output is written. ``samples`` are a list; image
+        and source map of the `simdtex.run.Output` are arrays of the store, a part of which is read when it is sliced.
+        If it raises an error, the run is not finished, and `resume` calls it again.
+    command : optional
+        What the store keeps for ``ended``, of texts, numbers, lists and dicts.
     **options
         Of the method, see `simdtex.methods.mrf.Options`; only schedules that relax a window as they do the whole.
 
@@ -122,7 +126,6 @@ def synthesize(
     inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
     run, seed = _plan(inputs, size, options), as_seed(rng)
     layout, more = planned(run, seed, tiles), _maps(maps or {}, run)
-    page = None if report is None else {"folder": _checked_report(report, store, inputs), "command": command}
     _libraries()
     from simdtex.distributed.cluster import check_workers, connected
     from simdtex.distributed.store import Store
@@ -133,8 +136,9 @@ def synthesize(
     with connected(workers) as client:
         with _made(store) as temporary:
             channels = channel_axis is not None
-            Store.create(temporary, run, seed, layout, channels=channels, source=source_map, maps=more, report=page)
-        return resume(store, workers=client, channel_axis=channel_axis, device=device, callback=callback, note=note)
+            Store.create(temporary, run, seed, layout, channels=channels, source=source_map, maps=more, command=command)
+        how: dict[str, Any] = {"device": device, "callback": callback, "note": note, "ended": ended}
+        return resume(store, workers=client, channel_axis=channel_axis, **how)
 
 
 def resume(
@@ -145,6 +149,7 @@ def resume(
     device: str | Machine | None = None,
     callback: Callback | None = None,
     note: Callable[[str], None] | None = None,
+    ended: Ended | None = None,
 ) -> Any:
     """Resume an output that was stopped; the bytes are those of a run that was never stopped.
 
@@ -152,7 +157,7 @@ def resume(
     ----------
     store : path
         As of `synthesize`.
-    workers, device, callback, note
+    workers, device, callback, note, ended
         As of `synthesize`; they may be others than before.
     channel_axis : int, optional
         Where the channels of the array that is returned are, if it has any.
@@ -179,7 +184,10 @@ def resume(
                 each = here(opened, device) if client is None else across(client, opened, device, note or warn)
                 with _mending(opened):
                     image, output = drive(Tiles(opened, each), Reference(), opened.about["seed"], callback)
-                    _write_report(opened, image, output)
+                    for name in ("device", "device_seconds"):  # of the process that leads
+                        del output.statistics[name]
+                    if ended:
+                        ended(opened.samples(), image, output, opened.about["command"])
                     opened.finish(opened.work())
         opened.clean()
     return _array(opened.where, channel_axis)
@@ -239,39 +247,6 @@ def _maps(maps: dict[str, Any], plan: Plan) -> Maps:
         apply_source_map(last, given, sizes if len(sizes) > 1 else sizes[0])
         found[name] = [np.asarray(one) for one in (given if len(sizes) > 1 else [given])]
     return found
-
-
-def _checked_report(report: PathLike, store: PathLike, inputs: Inputs) -> str:
-    """Return where a report is to be written; raise before long work if it cannot be."""
-    from simdtex.report.page import check_folder
-
-    pictures, folder, own = inputs.pictures, *(Path(os.path.realpath(path)) for path in (report, store))
-    if inputs.given or len(pictures.pixels) > 1 or pictures.known:
-        raise ValueError("the report shows one sample, all of it known, and what is taken from it; leave it out")
-    if folder.is_relative_to(own) or own.is_relative_to(folder):
-        raise ValueError(f"the report and the store {own} are one inside the other; give another folder for the report")
-    check_folder(folder)
-    return str(folder)
-
-
-def _write_report(store: Any, image: Any, output: Output) -> None:
-    """Write the report of an output that is complete, if one is wanted."""
-    about = store.about
-    if about["report"] is None:
-        return
-    from simdtex.report.page import check_folder
-    from simdtex.report.synthesis import write_synthesis
-
-    folder, command = about["report"]["folder"], about["report"]["command"]
-    try:
-        check_folder(folder)
-    except ValueError as error:
-        raise ValueError(f"{error}; then go on with: simdtex resume {store.where}") from None
-    for name in ("device", "device_seconds"):  # of the process that leads
-        del output.statistics[name]
-    pixels = store.work().plan.sample.pictures.pixels[0]
-    sample = pixels if about["channels"] else pixels[..., 0]
-    write_synthesis(folder, sample, image, output, command)
 
 
 @contextmanager
