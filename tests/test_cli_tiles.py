@@ -167,10 +167,10 @@ def test_a_dry_run_counts_the_arrays_of_the_store(folder):
     [
         (["-o", "o.zarr", "--tiles", 16, "--report", "there.zarr"], "there.zarr holds other files (mine)"),
         (["-o", "o.zarr", "--tiles", 16, "--report", "grey.png"], "grey.png is an input and would be overwritten"),
-        (["-o", "o.zarr", "--tiles", 16, "--report", "o.zarr/page"], "would be written into o.zarr, the folder of another output"),
+        (["-o", "o.zarr", "--tiles", 16, "--report", "o.zarr/page"], "into o.zarr, the folder of another output"),
         (
             ["-o", "o.zarr", "--tiles", 16, "--report", "page", "--known", "known.png"],
-            "--report shows one sample, all of it known, and what is taken from it; leave it out",
+            "--report requires one sample without unknown pixels, and no --known; leave it out",
         ),
         (["-o", "o.png", "--tiles", 16], "o.png is not a .zarr store, which --tiles requires; end its name in .zarr"),
         (["-o", "o.png", "--workers", 2], "--workers requires --tiles"),

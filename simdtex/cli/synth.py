@@ -105,7 +105,7 @@ def synth(
         from simdtex.report.page import check_folder
 
         if material.several or known is not None or not material.known:
-            raise ValueError("--report shows one sample, all of it known, and what is taken from it; leave it out")
+            raise ValueError("--report requires one sample without unknown pixels, and no --known; leave it out")
         check_folder(report)
     if options["tiles"] is not None:
         others = read_also(also, material, files=False)
