@@ -90,7 +90,7 @@ def main():
             made(count)
         script("page.inside.element.open = true")
         until(lambda: script("return page.inside.open"))
-        script("page.inside.open_(arguments[0])", before + 3)
+        script("page.inside.look(arguments[0])", before + 3)
         until(lambda: script("return page.inside.panes.length") == 2)
         script("page.showLayer('sets')")
         script("page.inside.seek(page.inside.sweeps.findIndex(([level]) => level === 0) + 2, 1)")

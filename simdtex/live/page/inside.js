@@ -32,7 +32,7 @@ class Inside {
     this.setRange = range("Set of sites", () => this.seek(this.at[0], Number(this.setRange.value)));
     this.moment = make("output", { class: "moment" });
     this.playing = button("Play", () => this.play());
-    this.choice = choice([], () => this.open_(this.choice.value ? Number(this.choice.value) : null));
+    this.choice = choice([], () => this.look(Number(this.choice.value) || null));
     this.reasons = [0, 1].map(() => make("div", { class: "reason" }));
     const step = (text, label, by) => button(text, () => this.step(by), { "aria-label": label });
     const sweepStep = (text, label, by) => button(text, () => this.stepSweep(by), { "aria-label": label });
@@ -67,29 +67,35 @@ class Inside {
   }
 
   toggled() {
-    if (this.element.open) this.open_(this.beside);
+    if (this.element.open) this.look(this.beside);
     else this.close();
   }
 
   /** Ask for the run of the selected result, and of the one beside it. */
-  open_(beside = null) {
+  look(beside = null) {
     if (!this.element.open) return;
     this.status.textContent = this.page.shown === null ? "Look inside when there is a result." : "The run is repeated …";
     this.beside = beside;
     if (this.page.shown !== null) this.page.send({ kind: "inside", open: true, beside });
   }
 
-  /** Close the time line; `keep` keeps the panel open for the next result. */
-  close(keep = false) {
+  /** Close the time line. */
+  close() {
     this.stop();
     if (!this.body.hidden) this.page.send({ kind: "inside", open: false });
     this.body.hidden = true;
     this.at = this.beside = null;
+    this.waiting = false;
     this.unpick();
     this.page.view.split(false);
     if (this.page.layer === "sets") this.page.showLayer("picture");
     this.page.offerLayers();
-    this.status.textContent = keep ? "Look inside when there is a result." : "";
+  }
+
+  /** Show why there is nothing to look into. */
+  failed(text) {
+    this.waiting = false;
+    if (this.element.open && this.body.hidden) this.status.textContent = text;
   }
 
   on_inside({ panes }) {
@@ -105,7 +111,6 @@ class Inside {
     const [at] = panes.map(({ moment }) => moment);
     this.at = null;
     this.show(at);
-    this.page.offerLayers();
     if (panes.length > 1 && at) this.seek(...at);
     if (this.pixel) this.explain();
     else this.hint();
@@ -310,8 +315,8 @@ class Inside {
       const texts = [`${one.rank}${one.taken ? ", taken" : ""}`, one.place.join(", "), one.continues, ...costs];
       const [middle, ...around] = one.pixels;
       const tile = make("td", {}, this.tile(offsets, around, middle));
-      const bar_ = make("td", { class: "bars" }, make("span", {}, one.probability.toPrecision(3)), share);
-      return make("tr", { class: one.taken ? "taken" : null }, tile, bar_, ...texts.map((text) => make("td", {}, `${text}`)));
+      const chance = make("td", { class: "bars" }, make("span", {}, one.probability.toPrecision(3)), share);
+      return make("tr", { class: one.taken ? "taken" : null }, tile, chance, ...texts.map((text) => make("td", {}, `${text}`)));
     };
     return make(
       "div",

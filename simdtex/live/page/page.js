@@ -439,9 +439,9 @@ class Page {
     this.mark(result, true);
     const found = this.results.get(result);
     this.downloads.hidden = !found;
-    this.inside.close(true);
+    this.inside.close();
     this.offerLayers();
-    this.inside.open_();
+    this.inside.look();
     this.showClasses();
   }
 
@@ -525,7 +525,7 @@ class Page {
     this.inside.element.open = true;
     await this.next("inside");
     if (numbers.length > 1) {
-      this.inside.open_(numbers[1]);
+      this.inside.look(numbers[1]);
       await this.next("inside");
     }
     if (moment) {
@@ -796,6 +796,7 @@ class Page {
     this.say("Ready.");
     if (message.fresh) setTimeout(() => !this.start.hidden && this.send({ kind: "demo" }), 300); // any message ends its run
     this.strip.replaceChildren(this.currentItem);
+    this.inside.close();
     this.results.clear();
     this.shown = null;
     this.setRunning(false);
@@ -844,6 +845,7 @@ class Page {
   /** Say what is wrong; with a `job`, that could not be done. */
   on_error({ text, job }) {
     this.warn(text);
+    this.inside.failed(text);
     if (!job) return;
     this.refused = true;
     this.say("Nothing was made.");
