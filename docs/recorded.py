@@ -49,9 +49,9 @@ def record():
             size += len(one)
         return [message, places]
 
-    def shown(layer):
+    def shown(layer, side=SIDE):
         after = len(page.got)
-        page.say(kind="view", layer=layer, left=0, top=0, width=SIDE, height=SIDE, step=1)
+        page.say(kind="view", layer=layer, left=0, top=0, width=side, height=side, step=1)
         return kept(*page.wait("frame", after=after, layer=layer))
 
     page.ask("hello", kind="hello")
@@ -77,7 +77,7 @@ def record():
         for pixel in PIXELS:
             found, _ = page.ask("explained", kind="explain", row=pixel[0], col=pixel[1])
             explained[f"{pixel[0]},{pixel[1]} {key}"] = found
-    frames["sample null"] = shown("sample")
+    frames["sample null"] = shown("sample", len(sample()))
     for key, _ in moments[1:]:
         frames[f"sample {key}"] = frames["sample null"]
     page.session.close(10)

@@ -441,6 +441,7 @@ def test_a_page_that_loses_its_connection_keeps_what_is_not_asked_for_yet(page, 
     page.script("page.connection.socket.close()")
     until(lambda: page.status == "Not connected.")
     until(lambda: page.status == "Result 1 is ready." and "seed" in page.one(".doing").text)
+    assert page.script("return page.layer") == "picture"
     assert page.script("return [page.part, page.guide.sample.length]") == [[8, 4, 50, 60], 1]
     assert page.labelled("Coherence").get_attribute("value") == "1.5"
 
@@ -819,6 +820,7 @@ def test_the_recording_of_the_docs_plays_without_a_server(page, tmp_path):
     )
     page.driver.get((tmp_path / "page.html").as_uri())
     until(lambda: page.all(".reason p") and page.one(".moment").text == "The result.")
+    until(lambda: page.script("return document.querySelector('canvas.view').width") and page.canvas()[..., 3].any())
     before = page.canvas()
     page.one("[aria-label='A sweep back']").click()
     level, sweep, sets = moments[-1][1]

@@ -68,7 +68,10 @@ class Inside {
 
   toggled() {
     if (this.element.open) this.look(this.beside);
-    else this.close();
+    else {
+      this.close();
+      this.page.offerLayers();
+    }
   }
 
   /** Ask for the run of the selected result, and of the one beside it. */
@@ -89,7 +92,6 @@ class Inside {
     this.unpick();
     this.page.view.split(false);
     if (this.page.layer === "sets") this.page.showLayer("picture");
-    this.page.offerLayers();
   }
 
   /** Show why there is nothing to look into. */
