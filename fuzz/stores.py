@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Damage what runs keep, go on with it, and check the result.
 
-    python -m fuzz.stores [--tries 200] [--seed 1]
+    python -m fuzz.stores [--tries 200] [--seed 1] [--first 0] [--record]
 
-Each try takes a run in tiles, or one with a checkpoint, that was stopped at a random moment; flips bits of one of its
-files, cuts, empties or removes it; and goes on. It passes if the picture has its bytes, or a sentence says that
-the run has to begin anew. Every fault is printed with the try's number.
+Each try takes a run in tiles, or one with a checkpoint, as it was at a random moment or when it was finished; flips bits
+of one of its files, cuts, empties or removes it, or copies another file over it; and goes on. It passes if the picture
+has its bytes, or a sentence says that the run has to begin anew. Every fault is printed with the try's number.
 """
 
 import argparse
+import asyncio
+import json
 import shutil
+import subprocess
 import sys
 import tempfile
+import time
 import warnings
 from collections import Counter
 from pathlib import Path
@@ -20,81 +24,93 @@ import numpy as np
 
 import simdtex
 from simdtex import Checkpoint, distributed
+from simdtex.distributed import layout
 from simdtex.distributed.tasks import forget
 
+RECORD = Path(__file__).resolve().parent.parent / "docs" / "fuzzing-stores.json"
+
 SHAPE = 26, 31
-SAMPLE = np.random.default_rng(2).integers(0, 9, (20, 22)).astype(np.uint8).repeat(2, 1)[:, :22]
+GREY = np.random.default_rng(2).integers(0, 9, (20, 22)).astype(np.uint8).repeat(2, 1)[:, :22]
+COLOUR = np.stack([GREY, GREY[::-1], 9 - GREY], -1)
 KNOWN = np.ma.masked_array(np.full(SHAPE, 4, np.uint8), np.indices(SHAPE).sum(0) % 9 > 0)
-OPTIONS = {"order": 1, "levels": 2, "xi": -6.0, "rng": 11, "known": KNOWN, "device": "reference"}
+GUIDE = GREY // 4, np.indices(SHAPE).sum(0).astype(np.uint8) // 20
+SMALL = {"order": 1, "levels": 2, "xi": -6.0, "rng": 11, "device": "reference"}
+
+TILED = {
+    "known values": (GREY, 12, SMALL | {"known": KNOWN}),
+    "seam": (GREY, 16, SMALL | {"boundary": "torus", "finish": 1.0}),
+    "colour": (COLOUR, 18, SMALL | {"channel_axis": -1, "xi": -8.0}),
+    "guide": (GREY, 16, SMALL | {"guide": GUIDE, "xi": -8.0}),
+}
+"""Runs in tiles: the sample, the side of a tile, and options."""
+
+HOWS = ("bit", "bits", "cut", "empty", "remove", "another")
+"""Kinds of damage."""
+
 RESUMES = 6
 """Times that a run is gone on with: each level begins again once, and more would be a fault."""
 
 
-class Stop(Exception):
-    """Stops a run."""
+class Run:
+    """A run, kept as it was at every moment: ``moments`` are folders, and ``expected`` is the picture."""
 
+    def __init__(self, name, folder):
+        self.name, self.folder = name, folder
+        folder.mkdir()
+        self.moments, self.place = [], folder / "run"
+        self.place.mkdir()
+        if name == "checkpoint":
+            options = SMALL | {"known": KNOWN}
+            self._again = lambda kept, **how: simdtex.synthesize(GREY, SHAPE, checkpoint=kept, **how, **options)
+            self.expected = self._again(Checkpoint(self.place / "state", every=0), callback=self._keep)
+        else:
+            sample, tile, options = TILED[name]
+            store = self.place / "o.zarr"
+            distributed.synthesize(
+                sample, SHAPE, store, tiles=tile, source_map=True, callback=self._keep, **options
+            )
+            self._keep(None)  # the finished store
+            self.expected = simdtex.synthesize(sample, SHAPE, **options)
 
-def stop_after(count):
-    """Return a callback that raises after so many calls."""
-    left = [count]
+    def _keep(self, progress):
+        """Keep the present moment; files that a thread of Zarr writes now have hidden names."""
+        self.moments.append(self.folder / str(len(self.moments)))
+        shutil.copytree(self.place, self.moments[-1], ignore=shutil.ignore_patterns("*.lock", ".simdtex-*"))
 
-    def callback(progress):
-        left[0] -= 1
-        if not left[0]:
-            raise Stop
-
-    return callback
-
-
-def tiles(folder, count):
-    """Begin a run in tiles, which is stopped."""
-    distributed.synthesize(
-        SAMPLE, SHAPE, folder / "o.zarr", tiles=12, source_map=True, callback=stop_after(count), **OPTIONS
-    )
-
-
-def go_on_with_tiles(folder):
-    """Return the picture of a run in tiles."""
-    forget()
-    return distributed.resume(folder / "o.zarr", device="reference").compute()
-
-
-def checkpoint(folder, count):
-    """Begin a run with a checkpoint, which is stopped."""
-    kept = Checkpoint(folder / "state", every=0)
-    simdtex.synthesize(SAMPLE, SHAPE, checkpoint=kept, callback=stop_after(count), **OPTIONS)
-
-
-def go_on_with_a_checkpoint(folder):
-    """Return the picture of a run with a checkpoint."""
-    return simdtex.synthesize(SAMPLE, SHAPE, checkpoint=Checkpoint(folder / "state"), **OPTIONS)
-
-
-RUNS = (tiles, go_on_with_tiles, 60), (checkpoint, go_on_with_a_checkpoint, 12)
-"""What begins a run, what goes on with it, and after how many calls it is over."""
+    def go_on(self, folder):
+        """Return the picture that the run in a folder makes."""
+        if self.name == "checkpoint":
+            return self._again(Checkpoint(folder / "state"))
+        forget()
+        return distributed.resume(folder / "o.zarr", device="reference").compute()
 
 
 def damaged(folder, rng):
     """Damage a file of a folder, and return how and which."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file() and not path.name.endswith(".lock"))
-    path = files[rng.integers(len(files))]
-    how, data = str(rng.choice(["bit", "bits", "cut", "empty", "remove"])), bytearray(path.read_bytes())
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    path, how = files[rng.integers(len(files))], str(rng.choice(HOWS))
+    data = bytearray(path.read_bytes())
     if how in ("bit", "bits"):
         for _ in range(1 if how == "bit" else 20):
             data[rng.integers(len(data))] ^= 1 << rng.integers(8)
     elif how == "cut":
         data = data[: rng.integers(len(data))]
+    elif how == "another":  # most likely of the same array
+        near = [one for one in files if one != path and one.parent.parent == path.parent.parent] or files
+        data = near[rng.integers(len(near))].read_bytes()
     path.unlink() if how == "remove" else path.write_bytes(b"" if how == "empty" else data)
     return f"{how} {path.relative_to(folder)}"
 
 
-def tried(go_on, folder, expected):
+def tried(run, folder):
     """Go on with a damaged run; return how it ended."""
     for _ in range(RESUMES):
         try:
-            return "the bytes" if np.array_equal(go_on(folder), expected) else "ANOTHER PICTURE"
+            return "the bytes" if np.array_equal(run.go_on(folder), run.expected) else "ANOTHER PICTURE"
         except ValueError as error:
             if any(words in str(error) for words in ("begin anew", "run the command again", "give another")):
+                return "begins anew"
+            if str(error).startswith("Stored and computed checksum"):  # Zarr's, of the array that was returned
                 return "begins anew"
             if "simdtex resume" not in str(error):
                 return f"NO REMEDY: {error}"
@@ -103,31 +119,43 @@ def tried(go_on, folder, expected):
     return "NO END"
 
 
+async def at_once(function, *args, **named):
+    """Call a function in this thread: Zarr has a thread for each file, which takes longer than the file."""
+    return function(*args, **named)
+
+
 def main():
     parser = argparse.ArgumentParser(prog="python -m fuzz.stores", description=__doc__.splitlines()[0])
     parser.add_argument("--tries", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="the number of the first try")
+    parser.add_argument("--record", action="store_true", help=f"write docs/{RECORD.name}")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
-    expected, ends = simdtex.synthesize(SAMPLE, SHAPE, **OPTIONS), Counter()
-    for number in range(given.tries):
-        rng = np.random.default_rng((given.seed, number))
-        begin, go_on, most = RUNS[int(rng.random() < 0.2)]
-        with tempfile.TemporaryDirectory() as place:
-            folder, kept = Path(place, "kept"), Path(place, "run")
-            kept.mkdir()
-            try:
-                begin(kept, int(rng.integers(1, most)))
-            except Stop:
-                shutil.copytree(kept, folder)
-                what = damaged(folder, rng)
-                end = tried(go_on, folder, expected)
-            else:
-                what, end = "", "over before"
-        ends[end if end.islower() else "fault"] += 1
-        if not end.islower():
-            print(f"try {number}: {begin.__name__}, {what}: {end}", flush=True)
+    asyncio.to_thread, layout.CHUNK, began = at_once, 8, time.monotonic()
+    ends, hows = Counter(), Counter()
+    with tempfile.TemporaryDirectory() as place:
+        runs = [Run(name, Path(place, name)) for name in (*TILED, "checkpoint")]
+        for number in range(given.first, given.first + given.tries):
+            rng = np.random.default_rng((given.seed, number))
+            run, folder = runs[rng.integers(len(runs))], Path(place, "try")
+            shutil.copytree(run.moments[rng.integers(len(run.moments))], folder)
+            what = damaged(folder, rng)
+            end = tried(run, folder)
+            shutil.rmtree(folder)
+            hows[what.split()[0]] += 1
+            ends[end if end.islower() else "fault"] += 1
+            if not end.islower():
+                print(f"try {number}: {run.name}, {what}: {end}", flush=True)
     print(f"{given.tries} tries, seed {given.seed}: " + ", ".join(f"{ends[end]} {end}" for end in sorted(ends)))
+    if given.record:
+        version = ["git", "-C", str(RECORD.parent), "rev-parse", "--short", "HEAD"]
+        found = {
+            **{"seed": given.seed, "tries": given.tries, "seconds": round(time.monotonic() - began, 1)},
+            **{"ends": dict(sorted(ends.items())), "damage": dict(sorted(hows.items()))},
+            "version": subprocess.run(version, capture_output=True, text=True, check=False).stdout.strip(),
+        }
+        RECORD.write_text(json.dumps(found, indent=1) + "\n")
     return bool(ends["fault"])
 
 
