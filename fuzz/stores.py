@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Damage what runs keep, go on with it, and check the result.
 
-    python -m fuzz.stores [--tries 200] [--seed 1] [--first 0] [--record]
+    python -m fuzz.stores [--tries 200] [--seed 1] [--first 0] [--workers N] [--record]
 
 Each try takes a run in tiles, or one with a checkpoint, as it was at a random moment or when it was finished; flips bits
 of one of its files, cuts, empties or removes it, or copies another file over it; and goes on. It passes if the picture
@@ -9,8 +9,8 @@ has its bytes, or a sentence says that the run has to begin anew. Every fault is
 """
 
 import argparse
-import asyncio
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -18,6 +18,9 @@ import tempfile
 import time
 import warnings
 from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from itertools import repeat
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -66,9 +69,7 @@ class Run:
         else:
             sample, tile, options = TILED[name]
             store = self.place / "o.zarr"
-            distributed.synthesize(
-                sample, SHAPE, store, tiles=tile, source_map=True, callback=self._keep, **options
-            )
+            distributed.synthesize(sample, SHAPE, store, tiles=tile, source_map=True, callback=self._keep, **options)
             self._keep(None)  # the finished store
             self.expected = simdtex.synthesize(sample, SHAPE, **options)
 
@@ -119,9 +120,48 @@ def tried(run, folder):
     return "NO END"
 
 
-async def at_once(function, *args, **named):
-    """Call a function in this thread: Zarr has a thread for each file, which takes longer than the file."""
-    return function(*args, **named)
+def in_one_thread():
+    """Have Zarr and Dask do all in this thread: handing a small file over takes longer than reading it."""
+    import asyncio
+    from concurrent.futures import Future
+
+    import dask
+
+    loop = asyncio.new_event_loop()
+
+    async def at_once(function, *args, **named):
+        return function(*args, **named)
+
+    def run(coroutine, _):
+        future = Future()
+        future.set_result(loop.run_until_complete(coroutine))
+        return future
+
+    asyncio.to_thread, asyncio.run_coroutine_threadsafe = at_once, run
+    dask.config.set(scheduler="synchronous")
+
+
+_place, _runs = [], []
+
+
+def begin(place):
+    """Prepare a process for tries."""
+    in_one_thread()
+    warnings.simplefilter("ignore")
+    layout.CHUNK = 16  # a tile of 18 has four chunks
+    _place.append(tempfile.mkdtemp(dir=place))
+    _runs.extend(Run(name, Path(_place[0], name)) for name in (*TILED, "checkpoint"))
+
+
+def one_try(seed, number):
+    """Return the run of a try, what was damaged, and how it ended."""
+    rng = np.random.default_rng((seed, number))
+    run, folder = _runs[rng.integers(len(_runs))], Path(_place[0], "try")
+    shutil.copytree(run.moments[rng.integers(len(run.moments))], folder)
+    what = damaged(folder, rng)
+    end = tried(run, folder)
+    shutil.rmtree(folder)
+    return run.name, what, end
 
 
 def main():
@@ -129,24 +169,23 @@ def main():
     parser.add_argument("--tries", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="the number of the first try")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--record", action="store_true", help=f"write docs/{RECORD.name}")
     given = parser.parse_args()
-    warnings.simplefilter("ignore")
-    asyncio.to_thread, layout.CHUNK, began = at_once, 8, time.monotonic()
-    ends, hows = Counter(), Counter()
-    with tempfile.TemporaryDirectory() as place:
-        runs = [Run(name, Path(place, name)) for name in (*TILED, "checkpoint")]
-        for number in range(given.first, given.first + given.tries):
-            rng = np.random.default_rng((given.seed, number))
-            run, folder = runs[rng.integers(len(runs))], Path(place, "try")
-            shutil.copytree(run.moments[rng.integers(len(run.moments))], folder)
-            what = damaged(folder, rng)
-            end = tried(run, folder)
-            shutil.rmtree(folder)
+    ends, hows, began = Counter(), Counter(), time.monotonic()
+    numbers = range(given.first, given.first + given.tries)
+    with (
+        tempfile.TemporaryDirectory() as place,
+        ProcessPoolExecutor(given.workers, get_context("spawn"), begin, (place,)) as pool,
+    ):
+        found = pool.map(one_try, repeat(given.seed), numbers, chunksize=10)
+        for number, (name, what, end) in zip(numbers, found, strict=True):
             hows[what.split()[0]] += 1
             ends[end if end.islower() else "fault"] += 1
             if not end.islower():
-                print(f"try {number}: {run.name}, {what}: {end}", flush=True)
+                print(f"try {number}: {name}, {what}: {end}", flush=True)
+            if sys.stderr.isatty() and not number % 10:
+                print(f"\r{number} ", end="", file=sys.stderr, flush=True)
     print(f"{given.tries} tries, seed {given.seed}: " + ", ".join(f"{ends[end]} {end}" for end in sorted(ends)))
     if given.record:
         version = ["git", "-C", str(RECORD.parent), "rev-parse", "--short", "HEAD"]
