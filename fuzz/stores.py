@@ -3,9 +3,9 @@
 
     python -m fuzz.stores [--tries 200] [--seed 1] [--first 0] [--workers N] [--record]
 
-Each try takes a run in tiles, or one with a checkpoint, as it was at a random moment or when it was finished; flips bits
-of one of its files, cuts, empties or removes it, or copies another file over it; and goes on. It passes if the picture
-has its bytes, or a sentence says that the run has to begin anew. Every fault is printed with the try's number.
+Each try takes a run in tiles, or one with a checkpoint, as it was at a random moment or when it was finished; flips
+bits of one of its files, cuts, empties or removes it, or copies another file over it; and goes on. It passes if the
+picture has its bytes, or a sentence says that the run has to begin anew. Every fault is printed with the try's number.
 """
 
 import argparse

@@ -17,8 +17,8 @@ in one write.
 
 Every chunk that is read must be there and have its checksum, and the three files have theirs; a chunk is on the disk
 before its task has a row. A file of an array of ``work`` ends with a checksum of its content and its place. A chunk of
-another array has that of Zarr, of its content alone, and ``checksums`` has the checksum of each place. A level whose state is damaged begins again, from the
-state of the level above.
+another array has that of Zarr, of its content alone, and ``checksums`` has the checksum of each place. A level whose
+state is damaged begins again, from the state of the level above.
 """
 
 from __future__ import annotations
