@@ -138,6 +138,8 @@ def test_a_flipped_bit_is_damage(tmp_path, stopped, whole):
         ("sweep", "work/level0/0/values/c/0/0/0", "work/level0/1/values/c/0/0/0", "level 0 begins again with"),
         ("sweep", "work/level0/1/source/c/0/0", "work/level0/0/source/c/0/0", None),  # the present turn writes it
         ("sweep", "work/tally*/c/0/0", "work/tally*/c/1/0", None),
+        ("sweep", "work/begun0", "work/turn", "level 0 begins again with"),
+        ("sweep", "work/turn", "work/run", "and nothing makes it again"),
         ("begin", "work/given/held0/known/c/0/0", "work/given/held0/known/c/1/1", "and nothing makes it again"),
         ("show", "image/c/0/0", "image/c/0/1", None),
         ("show", "source/c/0/1/0", "source/c/0/2/0", None),

@@ -219,7 +219,7 @@ class Store:
             **{"tile": layout.levels[0].side, "confidences": [float(one) for one in conditions.confidences]},
             **{"held": held, "given": given is not None, "channels": channels, "source": source},
         }
-        write_state(store._file("run"), about, [described(plan), scattered, maps])
+        store._keep("run", about, [described(plan), scattered, maps])
         store.save(first_turn(layout))
         return store
 
@@ -259,8 +259,8 @@ class Store:
         """Go on to a turn, and return it."""
         state = [list(turn), penalty]
         if turn.phase in ("begin", "whole"):
-            write_state(self._file(f"begun{turn.level}"), {}, state)
-        write_state(self._file("turn"), {}, state)
+            self._keep(f"begun{turn.level}", {}, state)
+        self._keep("turn", {}, state)
         self._remove(f"tally{turn.number - 1}/")
         return turn
 
@@ -424,12 +424,19 @@ class Store:
     def _file(self, name: str) -> Path:
         return Path(self.where, "work", name)
 
+    def _keep(self, name: str, about: dict[str, Any], state: Any) -> None:
+        """Write a checked file of ``work``, which has its name in it."""
+        write_state(self._file(name), {"file": name, **about}, state)
+
     def _state(self, name: str) -> tuple[dict[str, Any], Any]:
         """Return the content of a checked file of ``work``."""
         try:
-            return read_state(self._file(name))
+            about, state = read_state(self._file(name))
         except (Damaged, OSError):
             raise Damaged(f"work/{name}") from None
+        if about.get("file") != name:
+            raise Damaged(f"work/{name}")
+        return about, state
 
     def _remove(self, name: str) -> None:
         """Remove arrays of ``work``, whatever is left of them."""
