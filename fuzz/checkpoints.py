@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Damage the checkpoints of every command, go on with other options, and check the result.
 
-    python -m fuzz.checkpoints [--damages 20] [--draws 2] [--seed 1] [COMMAND...]
+    python -m fuzz.checkpoints [--damages 20] [--draws 2] [--seed 1] [--record] [COMMAND...]
 
 Each command runs once, and its checkpoint is kept after every write. A checkpoint is cut, emptied or removed, or a bit
 of it is flipped, and `simdtex resume` goes on: it writes the files of a run that was never stopped, or ends with exit
@@ -30,6 +30,8 @@ from simdtex.checkpoint import Checkpoint
 from simdtex.cli import load, main
 from simdtex.io import image
 
+RECORD = Path(__file__).resolve().parent.parent / "docs" / "fuzzing" / "checkpoints.csv"
+
 SIZED = ("--size", "14x13")
 SHORT = ("--order", "1", "--levels", "2", "--xi", "-6")
 RUNS = {
@@ -43,7 +45,7 @@ RUNS = {
     "simulate": ("simulate", "L.png", "-o", "out.npz", *SIZED, "-n", "3", "--order", "1", "--jobs", "1"),
     "classify": ("classify", "L.png", "-o", "out.png", "--texture", "a=L.png", "--texture", "b=M.png"),
 }
-ALWAYS = ("--seed", "5", "--device", "reference")
+ALWAYS = ("--seed", "5", "--device", "reference", "--quiet")
 FREE = ("output", "checkpoint", "help", "seed", "device", "quiet")
 """Options that are not changed, as they say where the result is, or are tried otherwise."""
 
@@ -206,6 +208,7 @@ def run():
     parser.add_argument("--moments", type=int, default=3, help="kept states of each command that are damaged")
     parser.add_argument("--draws", type=int, default=2, help="values of each option")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--record", action="store_true", help=f"write docs/fuzzing/{RECORD.name}")
     parser.add_argument("--verbose", action="store_true", help="print each option that went on or was refused")
     parser.add_argument("commands", nargs="*", default=list(RUNS))
     given = parser.parse_args()
@@ -222,6 +225,20 @@ def run():
             print(name, json.dumps(results[name]), flush=True)
             for fault in wrong + more:
                 print(fault, flush=True)
+    if given.record:
+        columns = {
+            "states that were damaged": ("damage", ("went on", "said", "fault")),
+            "of these refused in a sentence": ("damage", ("said",)),
+            "options that were added": ("options", ("went on", "refused", "wrong anyway", "fault")),
+            "of these refused by the checkpoint": ("options", ("refused",)),
+            "refused without a checkpoint too": ("options", ("wrong anyway",)),
+            "accepted: files as without a checkpoint": ("options", ("went on",)),
+        }
+        lines = [",".join(f'"{one}"' for one in ("run", *columns, "faults"))]
+        for name, one in results.items():
+            counts = [sum(one[what].get(end, 0) for end in ends) for what, ends in columns.values()]
+            lines.append(",".join(map(str, (name, *counts, sum(ends.get("fault", 0) for ends in one.values())))))
+        RECORD.write_text("\n".join(lines) + "\n")
     return any("fault" in ends for one in results.values() for ends in one.values())
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Damage what runs keep, go on with it, and check the result.
 
-    python -m fuzz.stores [--tries 200] [--seed 1] [--first 0] [--workers N] [--record]
+    python -m fuzz.stores [--tries 200 | --every 1] [--seed 1] [--first 0] [--workers N] [--record]
 
 Each try takes a run in tiles, or one with a checkpoint, as it was at a random moment or when it was finished; flips
 bits of one of its files, cuts, empties or removes it, or copies another file over it; and goes on. It passes if the
@@ -9,16 +9,15 @@ picture has its bytes, or a sentence says that the run has to begin anew. Every 
 """
 
 import argparse
-import json
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 import time
 import warnings
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
+from functools import cache
 from itertools import repeat
 from multiprocessing import get_context
 from pathlib import Path
@@ -30,7 +29,7 @@ from simdtex import Checkpoint, distributed
 from simdtex.distributed import layout
 from simdtex.distributed.tasks import forget
 
-RECORD = Path(__file__).resolve().parent.parent / "docs" / "fuzzing-stores.json"
+RECORD = Path(__file__).resolve().parent.parent / "docs" / "fuzzing" / "stores.csv"
 
 SHAPE = 20, 21
 GREY = np.random.default_rng(2).integers(0, 9, (20, 22)).astype(np.uint8).repeat(2, 1)[:, :22]
@@ -47,7 +46,8 @@ TILED = {
 }
 """Runs in tiles: the sample, the side of a tile, and options."""
 
-HOWS = ("bit", "bits", "cut", "empty", "remove", "another")
+ALONE = ("bit", "cut", "empty", "remove")
+HOWS = (*ALONE, "bits", "another")
 """Kinds of damage."""
 
 RESUMES = 6
@@ -86,10 +86,14 @@ class Run:
         return distributed.resume(folder / "o.zarr", device="reference").compute()
 
 
-def damaged(folder, rng):
-    """Damage a file of a folder, and return how and which."""
-    files = sorted(path for path in folder.rglob("*") if path.is_file())
-    path, how = files[rng.integers(len(files))], str(rng.choice(HOWS))
+def files(folder):
+    """Return the files of a folder."""
+    return sorted(path.relative_to(folder) for path in folder.rglob("*") if path.is_file())
+
+
+def damage(folder, name, how, rng):
+    """Damage a file of a folder."""
+    path = folder / name
     data = bytearray(path.read_bytes())
     if how in ("bit", "bits"):
         for _ in range(1 if how == "bit" else 20):
@@ -97,10 +101,10 @@ def damaged(folder, rng):
     elif how == "cut":
         data = data[: rng.integers(len(data))]
     elif how == "another":  # most likely of the same array
-        near = [one for one in files if one != path and one.parent.parent == path.parent.parent] or files
-        data = near[rng.integers(len(near))].read_bytes()
+        others = [one for one in files(folder) if one != name] or [name]
+        near = [one for one in others if one.parent.parent == name.parent.parent] or others
+        data = (folder / near[rng.integers(len(near))]).read_bytes()
     path.unlink() if how == "remove" else path.write_bytes(b"" if how == "empty" else data)
-    return f"{how} {path.relative_to(folder)}"
 
 
 def tried(run, folder):
@@ -153,32 +157,58 @@ def begin(place):
     _runs.extend(Run(name, Path(_place[0], name)) for name in (*TILED, "checkpoint"))
 
 
-def one_try(seed, number):
+@cache
+def each(moments):
+    """Return every file of every run at so many moments with every kind of damage of `ALONE`."""
+    found = []
+    for number, run in enumerate(_runs):
+        for n in range(moments):
+            moment = run.moments[(2 * n + 1) * len(run.moments) // (2 * moments)]
+            found += [(number, moment, name, how) for name in files(moment) for how in ALONE]
+    return found
+
+
+def count(moments):
+    """Return how many tries that are."""
+    return len(each(moments))
+
+
+def one_try(seed, number, moments):
     """Return the run of a try, what was damaged, and how it ended."""
     rng = np.random.default_rng((seed, number))
-    run, folder = _runs[rng.integers(len(_runs))], Path(_place[0], "try")
-    shutil.copytree(run.moments[rng.integers(len(run.moments))], folder)
-    what = damaged(folder, rng)
+    if moments:
+        which, moment, name, how = each(moments)[number]
+        run = _runs[which]
+    else:
+        run = _runs[rng.integers(len(_runs))]
+        moment = run.moments[rng.integers(len(run.moments))]
+        names = files(moment)
+        name, how = names[rng.integers(len(names))], str(rng.choice(HOWS))
+    folder = Path(_place[0], "try")
+    shutil.copytree(moment, folder)
+    damage(folder, name, how, rng)
     end = tried(run, folder)
     shutil.rmtree(folder)
-    return run.name, what, end
+    return run.name, f"{how} {name}", end
 
 
 def main():
     parser = argparse.ArgumentParser(prog="python -m fuzz.stores", description=__doc__.splitlines()[0])
     parser.add_argument("--tries", type=int, default=200)
+    parser.add_argument("--every", type=int, default=0, metavar="N", help="damage every file at N moments of each run")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="the number of the first try")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--record", action="store_true", help=f"write docs/{RECORD.name}")
+    parser.add_argument("--record", action="store_true", help=f"write docs/fuzzing/{RECORD.name}")
     given = parser.parse_args()
     ends, hows, began = Counter(), Counter(), time.monotonic()
-    numbers = range(given.first, given.first + given.tries)
     with (
         tempfile.TemporaryDirectory() as place,
         ProcessPoolExecutor(given.workers, get_context("spawn"), begin, (place,)) as pool,
     ):
-        found = pool.map(one_try, repeat(given.seed), numbers, chunksize=10)
+        tries = pool.submit(count, given.every).result() - given.first if given.every else given.tries
+        numbers = range(given.first, given.first + tries)
+        found = pool.map(one_try, repeat(given.seed), numbers, repeat(given.every), chunksize=10)
         for number, (name, what, end) in zip(numbers, found, strict=True):
             hows[what.split()[0]] += 1
             ends[end if end.islower() else "fault"] += 1
@@ -186,15 +216,16 @@ def main():
                 print(f"try {number}: {name}, {what}: {end}", flush=True)
             if sys.stderr.isatty() and not number % 10:
                 print(f"\r{number} ", end="", file=sys.stderr, flush=True)
-    print(f"{given.tries} tries, seed {given.seed}: " + ", ".join(f"{ends[end]} {end}" for end in sorted(ends)))
+    print(f"{tries} tries, seed {given.seed}: " + ", ".join(f"{ends[end]} {end}" for end in sorted(ends)))
     if given.record:
-        version = ["git", "-C", str(RECORD.parent), "rev-parse", "--short", "HEAD"]
-        found = {
-            **{"seed": given.seed, "tries": given.tries, "seconds": round(time.monotonic() - began, 1)},
-            **{"ends": dict(sorted(ends.items())), "damage": dict(sorted(hows.items()))},
-            "version": subprocess.run(version, capture_output=True, text=True, check=False).stdout.strip(),
+        counts = {
+            **{"tries": tries, "seed": given.seed, "seconds": f"{time.monotonic() - began:.0f}"},
+            "ended with the bytes of an undisturbed run": ends["the bytes"],
+            "ended with a sentence that the run has to begin anew": ends["begins anew"],
+            "ended otherwise, which is a fault": ends["fault"],
+            **{f"tries with the damage *{how}*": hows[how] for how in sorted(hows)},
         }
-        RECORD.write_text(json.dumps(found, indent=1) + "\n")
+        RECORD.write_text("what,how many\n" + "".join(f'"{name}","{n}"\n' for name, n in counts.items()))
     return bool(ends["fault"])
 
 
