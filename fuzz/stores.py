@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Damage what runs keep, go on with it, and check the result.
 
-    python -m fuzz.stores [--tries 200 | --every 1] [--seed 1] [--first 0] [--workers N] [--record]
+    python -m fuzz.stores [--tries 200 | --every 1] [--minutes M] [--seed 1] [--first 0] [--workers N] [--record]
 
 Each try takes a run in tiles, or one with a checkpoint, as it was at a random moment or when it was finished; flips
 bits of one of its files, cuts, empties or removes it, or copies another file over it; and goes on. It passes if the
@@ -195,6 +195,7 @@ def one_try(seed, number, moments):
 def main():
     parser = argparse.ArgumentParser(prog="python -m fuzz.stores", description=__doc__.splitlines()[0])
     parser.add_argument("--tries", type=int, default=200)
+    parser.add_argument("--minutes", type=float, default=np.inf, help="stop after so long, whatever is left to try")
     parser.add_argument("--every", type=int, default=0, metavar="N", help="damage every file at N moments of each run")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="the number of the first try")
@@ -214,8 +215,12 @@ def main():
             ends[end if end.islower() else "fault"] += 1
             if not end.islower():
                 print(f"try {number}: {name}, {what}: {end}", flush=True)
+            if time.monotonic() - began > 60 * given.minutes:
+                pool.shutdown(wait=False, cancel_futures=True)
+                break
             if sys.stderr.isatty() and not number % 10:
                 print(f"\r{number} ", end="", file=sys.stderr, flush=True)
+    tries = ends.total()
     print(f"{tries} tries, seed {given.seed}: " + ", ".join(f"{ends[end]} {end}" for end in sorted(ends)))
     if given.record:
         counts = {

@@ -296,7 +296,10 @@ class Store:
             arrays = dict(self.root.attrs["simdtex"]["arrays"])
         except (KeyError, TypeError, ValueError):
             raise Damaged("zarr.json") from None
-        for (name, description), noted in zip(arrays.items(), self._at("checksums")[:], strict=True):
+        every = self._at("checksums")[:]
+        if len(every) != len(arrays):
+            raise Damaged("checksums/zarr.json")
+        for (name, description), noted in zip(arrays.items(), every, strict=True):
             if self._description(name) != description:
                 raise Damaged(f"{name}/zarr.json")
             for place in np.ndindex(noted.shape):
@@ -434,7 +437,7 @@ class Store:
             about, state = read_state(self._file(name))
         except (Damaged, OSError):
             raise Damaged(f"work/{name}") from None
-        if about.get("file") != name:
+        if about.get("file", name) != name:  # an older format has none
             raise Damaged(f"work/{name}")
         return about, state
 
@@ -466,10 +469,11 @@ class Store:
     def _array(
         self, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: np.dtype[Any], axes: tuple[str, ...]
     ) -> Checked:
-        """Make an array, or write its description again, and return it."""
+        """Make an array, or write its description again, unless this process has it open; return it."""
+        if name in self._arrays:
+            return self._arrays[name]
         fast = zarr.codecs.BloscCodec(cname="lz4", clevel=1, shuffle="shuffle")
         Path(self.where, name, "zarr.json").unlink(missing_ok=True)
-        self._arrays.pop(name, None)
         self.root.create_array(
             name,
             shape=shape,
