@@ -216,7 +216,7 @@ def main():
             if not end.islower():
                 print(f"try {number}: {name}, {what}: {end}", flush=True)
             if time.monotonic() - began > 60 * given.minutes:
-                pool.shutdown(wait=False, cancel_futures=True)
+                pool.shutdown(cancel_futures=True)
                 break
             if sys.stderr.isatty() and not number % 10:
                 print(f"\r{number} ", end="", file=sys.stderr, flush=True)
