@@ -104,6 +104,8 @@ RECORD ?=
 fuzz:
 	$(call install,test,[test])
 	$(PY) -m fuzz --minutes $(MINUTES) --seed $(SEED) $(RECORD)
+	$(PY) -m fuzz.stores --seed $(SEED)
+	$(PY) -m fuzz.checkpoints --seed $(SEED)
 
 # What goes to the package index: built, checked, and tried in an empty environment.
 .PHONY: dist

@@ -136,10 +136,12 @@ def _command(name):
 
 def made(seed, number):
     """Return the try of a number under a seed; the same on every call."""
-    return _Maker(random.Random(f"{seed}-{number}")).make()
+    return Maker(random.Random(f"{seed}-{number}")).make()
 
 
-class _Maker:
+class Maker:
+    """Makes command lines and their files."""
+
     def __init__(self, rng):
         self.rng, self.files, self.kinds = rng, {}, set()
 

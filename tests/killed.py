@@ -53,6 +53,8 @@ JOBS = {
     "pyramid": lambda **how: simdtex.synthesize(COLOUR, (64, 64), method="pyramid", channel_axis=-1, **how),
     "solid": lambda **how: simdtex.synthesize_solid(GREY, (16, 16, 16), **how),
     "fill": lambda **how: simdtex.fill(GREY, HOLE, order=2, levels=1, **how),
+    "extend": lambda **how: simdtex.extend(GREY, right=5, seamless="y", band=3, order=2, **how),
+    "mix": lambda **how: simdtex.mix([GREY, GREY[::-1]], (48, 48), iterations=3, **how),
     "classify": lambda **how: simdtex.classify(GREY, {"a": GREY[:12], "b": GREY[8:]}, exemplars=40, **how),
     "simulate": lambda **how: (
         simdtex.simulate(

@@ -401,7 +401,7 @@ def test_the_store_is_an_array_that_others_read(tmp_path):
     image = zarr.open_group(path, mode="r")["image"]
     assert image.metadata.dimension_names == ("y", "x", "channel")
     assert zarr.open_group(path).attrs["simdtex"]["seed"] == 1
-    assert sorted(zarr.open_group(path).keys()) == ["image"]
+    assert sorted(zarr.open_group(path).keys()) == ["checksums", "image"]
     assert Field._fields == store_module.PLANES
 
 
@@ -415,7 +415,7 @@ def test_further_maps_are_carried_along(tmp_path, several):
     distributed.synthesize(samples, (26, 25), path, tiles=13, maps=maps, **options)
     _, output = simdtex.synthesize(samples, (26, 25), full_output=True, **options)
     store = zarr.open_group(path)
-    assert sorted(store.keys()) == ["height", "image", "normal"]
+    assert sorted(store.keys()) == ["checksums", "height", "image", "normal"]
     for name, one in maps.items():
         assert_same_bits(store[name][...], apply_source_map(output.source, one))
 
@@ -423,7 +423,7 @@ def test_further_maps_are_carried_along(tmp_path, several):
 @pytest.mark.parametrize(
     ("maps", "options", "words"),
     [
-        ({"image": SAMPLE}, {}, "'image' is no name of a map; give a word other than image, source, work"),
+        ({"image": SAMPLE}, {}, "'image' is no name of a map; give a word other than image, source, checksums, work"),
         ({"../a": SAMPLE}, {}, "'../a' is no name of a map"),
         ({"n": SAMPLE[1:]}, {}, "the other map is 25 x 21 pixels .* and the sample 25 x 22: bring it to the"),
         (

@@ -67,6 +67,16 @@ def stopped(tmp_path_factory):
     return store
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """Return a finished store with tiles of 12 x 12 in chunks of 6 x 6."""
+    path = tmp_path_factory.mktemp("store") / "o.zarr"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(layout, "CHUNK", 8)
+        distributed.synthesize(SAMPLE, SHAPE, path, tiles=12, known=KNOWN, source_map=True, **OPTIONS)
+    return path
+
+
 def gone_on(path, sentences):
     """Resume until the output is there, and return it; None if it has to begin anew."""
     for _ in range(5):
@@ -91,6 +101,7 @@ PARTS = [
     ("sweep", "work/tally*/zarr.json", None),
     ("sweep", "zarr.json", None),
     ("sweep", "work/zarr.json", None),
+    ("begin", "work/level0/zarr.json", None),
     ("begin", "work/level1/*/values/c/0/0/0", "level 1 begins again with: simdtex resume"),
     ("begin", "work/given/held0/known/c/1/1", "and nothing makes it again; remove the store and begin anew"),
     ("show", "work/given/values/c/2/1/0", "and nothing makes it again; remove the store and begin anew"),
@@ -118,7 +129,7 @@ def test_damage_is_mended_or_said(tmp_path, stopped, whole, phase, part, words, 
         assert str(where.relative_to(path)) in sentences[0] or "zarr.json" in where.name
     if words is None or "begin anew" not in words:
         assert_same_bits(image.compute(), whole)
-        assert sorted(one.name for one in path.iterdir()) == ["image", "source", "zarr.json"]
+        assert sorted(one.name for one in path.iterdir()) == ["checksums", "image", "source", "zarr.json"]
 
 
 def test_a_flipped_bit_is_damage(tmp_path, stopped, whole):
@@ -128,6 +139,103 @@ def test_a_flipped_bit_is_damage(tmp_path, stopped, whole):
     image = gone_on(path, sentences)
     assert [sentence.split(" of ")[0] for sentence in sentences] == ["work/level0/1/source/c/0/0"]
     assert_same_bits(image.compute(), whole)
+
+
+@pytest.mark.parametrize(
+    ("phase", "part", "other", "words"),
+    [
+        ("sweep", "work/level0/1/values/c/0/0/0", "work/level0/1/values/c/0/0/1", "level 0 begins again with"),
+        ("sweep", "work/level0/0/values/c/0/0/0", "work/level0/1/values/c/0/0/0", "level 0 begins again with"),
+        ("sweep", "work/level0/1/source/c/0/0", "work/level0/0/source/c/0/0", None),  # the present turn writes it
+        ("sweep", "work/tally*/c/0/0", "work/tally*/c/1/0", None),
+        ("sweep", "work/begun0", "work/turn", "level 0 begins again with"),
+        ("sweep", "work/turn", "work/run", "and nothing makes it again"),
+        ("begin", "work/given/held0/known/c/0/0", "work/given/held0/known/c/1/1", "and nothing makes it again"),
+        ("show", "image/c/0/0", "image/c/0/1", None),
+        ("show", "source/c/0/1/0", "source/c/0/2/0", None),
+        ("show", "checksums/c/0/0/1", "checksums/c/0/0/2", None),
+    ],
+    ids=lambda one: one and one.replace("/", "."),
+)
+def test_a_chunk_in_the_place_of_another_one_is_damage(tmp_path, stopped, finished, whole, phase, part, other, words):
+    path, sentences = tmp_path / "o.zarr", []
+    shutil.copytree(stopped(phase, 3, 2 if phase == "sweep" else 1), path)
+    (one,), (two,) = path.glob(part), path.glob(other)
+    assert one.read_bytes() != two.read_bytes()
+    shutil.copyfile(one, two)
+    image = gone_on(path, sentences)
+    if words is None:
+        assert sentences == []
+    else:
+        assert f"{two.relative_to(path)} of {path} is missing or damaged" in sentences[0]
+        assert words in sentences[0]
+    if image is not None:
+        assert_same_bits(image.compute(), whole)
+        assert_same_bits(zarr.open_group(path)["source"][:], zarr.open_group(finished)["source"][:])
+
+
+@pytest.mark.parametrize(
+    ("phase", "part", "old", "new", "words"),
+    [
+        ("sweep", "work/level0/1/values", b'"separator": "/"', b'"separator": "."', "level 0 begins again"),
+        ("begin", "work/given/held0/known", b'"separator": "/"', b'"separator": "."', "nothing makes it again"),
+        ("show", "image", b"26", b"27", None),
+        ("show", "image", b'"separator": "/"', b'"separator": "."', None),
+    ],
+)
+def test_one_flipped_bit_in_the_description_of_an_array(tmp_path, stopped, whole, phase, part, old, new, words):
+    path, sentences = tmp_path / "o.zarr", []
+    shutil.copytree(stopped(phase, 3, 2 if phase == "sweep" else 1), path)
+    where = path / part / "zarr.json"
+    assert old in where.read_bytes()
+    where.write_bytes(where.read_bytes().replace(old, new))
+    image = gone_on(path, sentences)
+    assert (words is None) == (sentences == [])
+    if words:
+        assert f"{part}/zarr.json of " in sentences[0] and words in sentences[0]
+    if image is not None:
+        assert_same_bits(image.compute(), whole)
+
+
+@pytest.mark.parametrize("damage", ["removed", "cut", "another"])
+@pytest.mark.parametrize("part", ["image/c/4/3", "source/c/1/0/0"])
+def test_a_finished_store_is_checked(tmp_path, finished, whole, part, damage):
+    path = tmp_path / "o.zarr"
+    shutil.copytree(finished, path)
+    image = distributed.resume(path)
+    assert image.chunks[0][:2] == (6, 6)
+    assert_same_bits(image.compute(), whole)
+    if damage == "another":
+        shutil.copyfile(path / part.replace("c/1/", "c/2/").replace("c/4/", "c/3/"), path / part)
+    else:
+        DAMAGES[damage](path / part)
+    with pytest.raises(
+        ValueError, match=rf"{part} of .* is missing or damaged, and nothing makes it again; remove the store and begin"
+    ):
+        distributed.resume(path)
+
+
+@pytest.mark.parametrize(
+    ("part", "old", "new"),
+    [
+        ("image/zarr.json", b'"separator": "/"', b'"separator": "."'),
+        ("source/zarr.json", b"26", b"27"),
+        ("zarr.json", b'"arrays"', b'"arrayc"'),
+        ("checksums/zarr.json", b"2,", b"1,"),
+        ("image/zarr.json", b'"attributes": {}', b'"attributes": {"mine": 1}'),
+    ],
+)
+def test_the_description_of_a_finished_store_is_checked(tmp_path, finished, whole, part, old, new):
+    path = tmp_path / "o.zarr"
+    shutil.copytree(finished, path)
+    where = path / part
+    assert old in where.read_bytes()
+    where.write_bytes(where.read_bytes().replace(old, new, 1))
+    if b"mine" in new:
+        assert_same_bits(distributed.resume(path).compute(), whole)
+        return
+    with pytest.raises(ValueError, match=rf"{part} of .* is missing or damaged, and nothing makes it"):
+        distributed.resume(path)
 
 
 def test_the_picture_has_checksums(tmp_path, stopped):
@@ -217,6 +325,6 @@ def test_a_full_disk_is_said_and_the_run_goes_on_later(tmp_path, stopped, whole,
     assert_same_bits(distributed.resume(path, device=REFERENCE).compute(), whole)
     (path / "image" / "zarr.json").unlink()
     with pytest.raises(
-        ValueError, match=r"image/zarr.json of .* is missing or damaged; remove the store and begin anew"
+        ValueError, match=r"image/zarr.json of .* is missing or damaged, and nothing makes it again; remove the store"
     ):
         distributed.resume(path, device=REFERENCE)

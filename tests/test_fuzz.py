@@ -19,12 +19,19 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "memfd_create"), reason="the fuz
 ROOT = Path(__file__).resolve().parent.parent
 
 
-def fuzz(*args, timeout=100):
+def fuzz(*args, module="fuzz", timeout=100):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", "fuzz", *map(str, args)]
+    command = [sys.executable, "-m", module, *map(str, args)]
     return subprocess.run(
         command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=timeout, check=False
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [("stores", "--tries", 30), ("checkpoints", "--damages", 4, "--draws", 1, "fill")])
+def test_damaged_stores_and_checkpoints(words):
+    done = fuzz(*words[1:], module=f"fuzz.{words[0]}", timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_every_command_is_tried():

@@ -2,6 +2,7 @@
 """The Zarr store of an output in tiles: what is made, how far it is, and what a worker needs to go on with it.
 
     image, source    the output and its source map, and further maps by their names, written tile by tile at the end
+    checksums        the checksum of each chunk of those, in the order of the attribute ``arrays`` of ``simdtex``
     work/            removed at the end
         run          the plan (`simdtex.distributed.description`), conditioning data between sites of levels, and maps
         turn         the present turn, and the penalty of each candidate during it
@@ -15,12 +16,16 @@ read in it, so an interrupted turn is completed by its missing tasks. The file `
 in one write.
 
 Every chunk that is read must be there and have its checksum, and the three files have theirs; a chunk is on the disk
-before its task has a row. A level whose state is damaged begins again, from the state of the level above.
+before its task has a row. A file of an array of ``work`` ends with a checksum of its content and its place. A chunk of
+another array has that of Zarr, of its content alone, and ``checksums`` has the checksum of each place. A level whose
+state is damaged begins again, from the state of the level above.
 """
 
 from __future__ import annotations
 
 import asyncio
+import json
+import os
 import re
 import secrets
 import shutil
@@ -29,6 +34,7 @@ from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
+from zlib import crc32
 
 import numpy as np
 import zarr
@@ -52,6 +58,9 @@ FORMAT = 7
 
 TOGETHER = 2**22
 """Numbers of tallies that are read at a time."""
+
+NODES = ("zarr.json", ".zarray", ".zgroup", ".zattrs", ".zmetadata")
+"""Files that Zarr looks for; every other one is a chunk."""
 
 PLANES = ("values", "source", "temperature")
 
@@ -105,12 +114,16 @@ class Work(NamedTuple):
 
 
 class Files(zarr.storage.LocalStore):
-    """The files of a store: what is written is on the disk, and a chunk that is read is there."""
+    """The files of a store: what is written is on the disk, and a chunk that is read is there, and is no other one."""
 
     async def get(self, key: str, prototype: Any = None, byte_range: Any = None) -> Any:
-        """Return the content of a file; None if it is missing, but Damaged if it is that of a chunk."""
+        """Return the content of a file; if it is missing or damaged, None, but Damaged for a chunk."""
         found = await super().get(key, prototype, byte_range)
-        if found is None and "/c/" in key:
+        if found is not None and key.startswith("work/"):
+            found, end = found[:-4], found[-4:]
+            if end.to_bytes() != placed(key, found.as_buffer_like()):
+                found = None
+        if found is None and key.rpartition("/")[2] not in NODES:
             raise Damaged(key)
         return found
 
@@ -118,7 +131,15 @@ class Files(zarr.storage.LocalStore):
         """Write a file; raise Damaged if the store is gone."""
         if key != "zarr.json" and not (self.root / "zarr.json").exists():
             raise Damaged("zarr.json")
-        await asyncio.to_thread(write_durable, self.root / key, value.as_buffer_like())
+        data = value.as_buffer_like()
+        if key.startswith("work/"):
+            data = b"".join((data, placed(key, data)))
+        await asyncio.to_thread(write_durable, self.root / key, data)
+
+    async def set_if_not_exists(self, key: str, value: Any) -> None:
+        """Write a file that does not exist."""
+        if not (self.root / key).exists():
+            await self.set(key, value)
 
 
 class Checked:
@@ -127,6 +148,7 @@ class Checked:
     def __init__(self, array: Any, name: str) -> None:
         self._array, self._name = array, name
         self.shape, self.dtype = array.shape, array.dtype
+        self.chunks, self.counts = array.chunks, array.cdata_shape
 
     def __getitem__(self, where: Any) -> NDArray[Any]:
         try:
@@ -216,7 +238,7 @@ class Store:
             **{"tile": layout.levels[0].side, "confidences": [float(one) for one in conditions.confidences]},
             **{"held": held, "given": given is not None, "channels": channels, "source": source, "command": command},
         }
-        write_state(store._file("run"), about, [described(plan), scattered, maps])
+        store._keep("run", about, [described(plan), scattered, maps])
         store.save(first_turn(layout))
         return store
 
@@ -259,26 +281,27 @@ class Store:
         """Go on to a turn, and return it."""
         state = [list(turn), penalty]
         if turn.phase in ("begin", "whole"):
-            write_state(self._file(f"begun{turn.level}"), {}, state)
-        write_state(self._file("turn"), {}, state)
+            self._keep(f"begun{turn.level}", {}, state)
+        self._keep("turn", {}, state)
         self._remove(f"tally{turn.number - 1}/")
         return turn
 
     def prepare(self, turn: Turn, work: Work, candidates: int) -> None:
-        """Make the arrays that a turn writes to, unless they are there."""
+        """Make the arrays that a turn writes to; of those that are there only the description is written again."""
         level = work.layout.levels[turn.level]
         if turn.phase == "show":
             for name, (after, dtype) in work.outputs.items():
-                if self._lacks(name):
-                    self._pixels(name, level, after, dtype)
+                self._pixels(name, level, after, dtype)
+            count, side = len(work.outputs), -(-level.side // level.chunk)
+            shape = (count, *self._at("image").counts[:2])
+            axes = ("array", "chunk_y", "chunk_x")
+            self._array("checksums", shape, (count, side, side), np.dtype(np.uint32), axes)
         else:
             for name, kind in zip(PLANES, ("uint16", "int32", "uint16"), strict=True):
                 before = (work.layout.channels,) if name == "values" else ()
-                if self._lacks(where := f"work/level{level.number}/{turn.write}/{name}"):
-                    self._planes(where, level, before, np.dtype(kind))
-        if self._lacks(where := f"work/tally{turn.number}"):
-            row = 2 + candidates
-            self._array(where, (level.tasks, row), (1, row), np.dtype(np.int64), ("task", "count"))
+                self._planes(f"work/level{level.number}/{turn.write}/{name}", level, before, np.dtype(kind))
+        row = 2 + candidates
+        self._array(f"work/tally{turn.number}", (level.tasks, row), (1, row), np.dtype(np.int64), ("task", "count"))
 
     def forget(self, level: int, which: int) -> None:
         """Remove a state of a level."""
@@ -296,7 +319,23 @@ class Store:
     def finish(self, work: Work) -> None:
         """Note that the output is complete, and what it is."""
         about = {"version": version("simdtex"), "seed": work.seed, "options": asdict(work.plan.options)}
-        self.root.attrs["simdtex"] = about
+        self.root.attrs["simdtex"] = about | {"arrays": {name: self._description(name) for name in work.outputs}}
+
+    def check(self) -> None:
+        """Raise Damaged if a chunk of a complete output is missing or is another one; its content is not read."""
+        try:
+            arrays = dict(self.root.attrs["simdtex"]["arrays"])
+        except (KeyError, TypeError, ValueError):
+            raise Damaged("zarr.json") from None
+        every = self._at("checksums")[:]
+        if len(every) != len(arrays):
+            raise Damaged("checksums/zarr.json")
+        for (name, description), noted in zip(arrays.items(), every, strict=True):
+            if self._description(name) != description:
+                raise Damaged(f"{name}/zarr.json")
+            for place in np.ndindex(noted.shape):
+                if self._checksum(name, *place) != noted[place]:
+                    raise Damaged(self._chunk(name, *place))
 
     def clean(self) -> None:
         """Remove the working state of a complete output."""
@@ -306,7 +345,7 @@ class Store:
 
     def back(self, part: str) -> str | None:
         """Go back to where a damaged part is made, and return what happens then in words; None if nothing makes it."""
-        if part == "work/run" or part.startswith("work/given/"):
+        if self.finished or part == "work/run" or part.startswith("work/given/"):
             return None
         level = re.match(r"work/level(\d+)/", part)
         if not (level or part == "work/turn"):  # the present turn finds out what is missing
@@ -341,6 +380,9 @@ class Store:
                     continue
                 for name in work.outputs:
                     self._at(name)[spans(tile)]
+                where, found = self._checksums(list(work.outputs), tile)
+                if not np.array_equal(self._at("checksums")[where], found):
+                    return False
         except Damaged:
             return False
         return True
@@ -378,16 +420,57 @@ class Store:
         """Write a tile of the arrays of the output."""
         for name, array in arrays.items():
             self._at(name)[spans(tile)] = array
+        where, found = self._checksums(list(arrays), tile)
+        self._at("checksums")[where] = found
+
+    def _checksums(self, names: list[str], tile: Tile) -> tuple[tuple[slice, ...], NDArray[np.uint32]]:
+        """Return where the checksums of a tile of the output are, and what they are in its chunks."""
+        sides = self._at("image").chunks
+        rows, cols = (
+            slice(one.start // side, -(-one.stop // side)) for one, side in zip(spans(tile), sides, strict=False)
+        )
+        places = [(row, col) for row in range(rows.start, rows.stop) for col in range(cols.start, cols.stop)]
+        found = np.array([[self._checksum(name, *place) for place in places] for name in names], np.uint32)
+        return (slice(None), rows, cols), found.reshape(len(names), rows.stop - rows.start, -1)
+
+    def _checksum(self, name: str, row: int, col: int) -> int:
+        """Return the checksum of a chunk of the output, its last four bytes."""
+        part = self._chunk(name, row, col)
+        try:
+            with open(Path(self.where, part), "rb") as file:
+                file.seek(-4, os.SEEK_END)
+                return int.from_bytes(file.read(), "little")
+        except OSError:
+            raise Damaged(part) from None
+
+    def _description(self, name: str) -> int:
+        """Return a checksum of what the description of an array says of its pixels; a user may change the rest."""
+        try:
+            about = json.loads(Path(self.where, name, "zarr.json").read_bytes())
+            parts = [about[key] for key in ("shape", "data_type", "chunk_grid", "chunk_key_encoding")]
+        except (OSError, ValueError, KeyError, TypeError):
+            raise Damaged(f"{name}/zarr.json") from None
+        return crc32(json.dumps(parts, sort_keys=True).encode())
+
+    def _chunk(self, name: str, row: int, col: int) -> str:
+        return "/".join((name, "c", str(row), str(col), *("0" for _ in self._at(name).shape[2:])))
 
     def _file(self, name: str) -> Path:
         return Path(self.where, "work", name)
 
+    def _keep(self, name: str, about: dict[str, Any], state: Any) -> None:
+        """Write a checked file of ``work``, which has its name in it."""
+        write_state(self._file(name), {"file": name, **about}, state)
+
     def _state(self, name: str) -> tuple[dict[str, Any], Any]:
         """Return the content of a checked file of ``work``."""
         try:
-            return read_state(self._file(name))
+            about, state = read_state(self._file(name))
         except (Damaged, OSError):
             raise Damaged(f"work/{name}") from None
+        if about.get("file", name) != name:  # an older format has none
+            raise Damaged(f"work/{name}")
+        return about, state
 
     def _remove(self, name: str) -> None:
         """Remove arrays of ``work``, whatever is left of them."""
@@ -406,13 +489,6 @@ class Store:
                 raise Damaged(f"{name}/zarr.json") from None
         return self._arrays[name]
 
-    def _lacks(self, name: str) -> bool:
-        try:
-            self._at(name)
-        except Damaged:
-            return True
-        return False
-
     def _planes(self, name: str, level: LevelLayout, before: tuple[int, ...], dtype: np.dtype[Any]) -> Checked:
         shape, chunks = (*before, level.rows, level.cols), (*before, level.chunk, level.chunk)
         return self._array(name, shape, chunks, dtype, (*("channel",) * len(before), "y", "x"))
@@ -424,15 +500,17 @@ class Store:
     def _array(
         self, name: str, shape: tuple[int, ...], chunks: tuple[int, ...], dtype: np.dtype[Any], axes: tuple[str, ...]
     ) -> Checked:
-        """Make an array, and return it."""
+        """Make an array, or write its description again, unless this process has it open; return it."""
+        if name in self._arrays:
+            return self._arrays[name]
         fast = zarr.codecs.BloscCodec(cname="lz4", clevel=1, shuffle="shuffle")
-        shutil.rmtree(Path(self.where, name), ignore_errors=True)
+        Path(self.where, name, "zarr.json").unlink(missing_ok=True)
         self.root.create_array(
             name,
             shape=shape,
             chunks=tuple(max(1, min(pair)) for pair in zip(chunks, shape, strict=True)),
             dtype=dtype,
-            compressors=(fast, zarr.codecs.Crc32cCodec()),
+            compressors=(fast,) if name.startswith("work/") else (fast, zarr.codecs.Crc32cCodec()),
             dimension_names=axes,
         )
         return self._at(name)
@@ -465,6 +543,11 @@ def first_turn(layout: Layout) -> Turn:
 def phase_of(level: LevelLayout) -> str:
     """Return the phase that begins a level: a level of one tile does all its sweeps in one turn."""
     return "whole" if level.count == 1 else "begin"
+
+
+def placed(key: str, data: Any) -> bytes:
+    """Return a checksum of the content of a file and of its place."""
+    return crc32(data, crc32(key.encode())).to_bytes(4, "little")
 
 
 def spans(tile: Tile) -> tuple[slice, slice]:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 TILES = 2048
 """Sites to the side of a tile by default."""
 
-TAKEN = ("image", "source", "work")
+TAKEN = ("image", "source", "checksums", "work")
 """Names in a store that no map has."""
 
 PathLike = str | os.PathLike[str]
@@ -179,7 +179,10 @@ def resume(
 
     check_workers(workers, device)
     with exclusive(store):
-        if not opened.finished:
+        if opened.finished:
+            with _mending(opened):
+                opened.check()
+        else:
             with connected(workers) as client:
                 each = here(opened, device) if client is None else across(client, opened, device, note or warn)
                 with _mending(opened):
@@ -326,8 +329,5 @@ def _libraries() -> None:
 
 def _array(where: str, channel_axis: int | None) -> Any:
     dask: Any = import_module("dask.array")
-    try:
-        image = dask.from_zarr(where, component="image")
-    except Exception:  # Zarr's are of many kinds
-        raise ValueError(f"image/zarr.json of {where} is missing or damaged; remove the store and begin anew") from None
+    image = dask.from_zarr(where, component="image")
     return image if channel_axis is None or image.ndim == 2 else dask.moveaxis(image, -1, channel_axis)
