@@ -42,7 +42,7 @@ class Result:
     def __init__(self, number: int, job: Job, image: NDArray[Any], output: Output, seconds: float) -> None:
         self.number, self.job, self.image, self.seconds = number, job, image, seconds
         self.source, self.temperature = output.source, output.temperature
-        self.device, self.lattice = output.statistics["device"], output.statistics.get("lattice")
+        self.lattice = output.statistics.get("lattice")
         complete = self.source is not None and bool((self.source[..., 0] >= 0).all())  # every pixel has a source
         source: Any = self.source if complete else None
         self.maps = {name: apply_source_map(source, one) for name, one in job.maps.items() if complete}
@@ -81,7 +81,7 @@ class Result:
         """Return the message to the page."""
         return {
             **{"result": self.number, "width": self.job.shape[1], "height": self.job.shape[0]},
-            **{"seconds": self.seconds, "device": self.device, "settings": self.job.message},
+            **{"seconds": self.seconds, "settings": self.job.message},
             **{"picture": self.job.given[0].name},
             **{"note": lattice_sentence(self.lattice), "lattice": self.lattice, "shares": self.job.shares(self.image)},
             **{"layers": ["sample", *self.layers], "files": self.files},

@@ -410,8 +410,8 @@ class Page {
     if (this.results.size === 1 && this.columns.clientWidth > 1000) this.controls.querySelector("details").open = true;
   }
 
-  summary({ width, height, seconds, device, settings, note }) {
-    return `${width} × ${height} in ${seconds.toFixed(2)} s on ${device}, seed ${settings.seed}${note && `. ${note}`}`.replace(/\.?$/, ".");
+  summary({ width, height, seconds, settings, note }) {
+    return `${width} × ${height} in ${seconds.toFixed(2)} s, seed ${settings.seed}${note && `. ${note}`}`.replace(/\.?$/, ".");
   }
 
   on_selected({ result, settings }) {
