@@ -61,8 +61,8 @@ def record():
     wanted = {one["kind"]: (one, own) for one, own in page.got[after:]}
     wanted["picture"][0]["new"] = False
     start = [kept(*wanted[kind]) for kind in ("hello", "picture", "result", "selected")]
-    inside, _ = page.ask("inside", kind="inside", open=True)
-    sweeps = inside["panes"][0]["sweeps"]
+    inside = kept(*page.ask("inside", kind="inside", open=True))
+    sweeps = inside[0]["panes"][0]["sweeps"]
     fine = next(n for n, one in enumerate(sweeps) if one[0] == 0) + 1
     moments = [("null", None)]
     for n, (level, sweep, sets, *_) in enumerate(sweeps):

@@ -8,7 +8,7 @@ from live import Fake, texture
 
 import simdtex
 from simdtex.live.inside import BARS, SET_COLOURS
-from simdtex.live.job import Picture
+from simdtex.live.job import Picture, paint
 
 SAMPLE = texture(24, 28)
 RULES = {"order": 4, "channel_axis": -1, "device": "reference"}
@@ -34,7 +34,8 @@ def test_moments_are_those_of_the_run(page):
     page.result(width=20, height=18)
     (pane,) = inside(page)
     replay = simdtex.replay(SAMPLE, (18, 20), rng=7, **RULES)
-    assert pane == {"result": 1, "sweeps": [list(one) for one in replay.sweeps], "moment": None}
+    assert (pane["result"], pane["moment"]) == (1, None)
+    assert pane["sweeps"] == [list(one) for one in replay.sweeps]
     for layer in ("picture", "temperature", "sets"):
         page.say(kind="view", layer=layer, left=0, top=0, width=20, height=18, step=1)
         for n in (0, len(replay.sweeps) - 1):
@@ -141,5 +142,62 @@ def test_the_lattice_and_its_faults_are_sent():
         assert len(told["lattice"]["vectors"]) == 2 and "faults" in told["layers"]
         page.say(kind="view", layer="faults", left=0, top=0, width=48, height=48, step=1)
         assert page.wait("frame", layer="faults")[0]["rows"] == 48
+    finally:
+        page.session.close(10)
+
+
+HOLE = [{"label": 1, "width": 7, "points": [[12, 10], [16, 12]]}]
+
+
+def test_a_filled_hole_is_looked_into(page):
+    page.result(job="fill", hole=HOLE, options={"order": 4})
+    image, hole = page.latest.image, paint(HOLE, SAMPLE.shape) > 0
+    (pane,) = inside(page)
+    level, sweep, sets, *_ = pane["sweeps"][-1]
+    page.say(kind="view", layer="picture", left=0, top=0, width=28, height=24, step=1)
+    after = len(page.got)
+    page.ask("moments", kind="seek", level=level, sweep=sweep, sets=sets)
+    np.testing.assert_array_equal(frame(page, after, layer="picture")[1][..., :3], image, "the end is the result")
+    after = len(page.got)
+    page.ask("moments", kind="seek", level=pane["sweeps"][0][0], sweep=1, sets=0)
+    seen = frame(page, after, layer="picture")[1][..., :3]
+    np.testing.assert_array_equal(seen[~hole], SAMPLE[~hole])
+    assert (seen[hole] != image[hole]).any(), "the hole has changed since"
+
+    row, col = np.argwhere(hole)[0].tolist()
+    page.ask("moments", kind="seek")
+    found, _ = page.ask("explained", kind="explain", row=row, col=col)
+    taken = next(one for one in found["candidates"] if one["taken"])
+    assert taken["place"] == page.latest.source[row, col].tolist()
+    np.testing.assert_array_equal(taken["pixels"][0], SAMPLE[tuple(taken["place"])])
+    assert found["corner"] == [row, col]
+    around = [
+        ((row + down, col + across), pixel)
+        for (down, across), pixel in zip(found["offsets"], found["pixels"], strict=True)
+        if not hole[row + down, col + across]
+    ]
+    assert len(around) > 2
+    for place, pixel in around:
+        np.testing.assert_array_equal(pixel, SAMPLE[place])
+    assert "value is given" in page.ask("explained", kind="explain", row=0, col=0)[0]["reason"]
+
+
+def test_the_sample_of_a_look_is_that_of_the_run(page):
+    page.result(width=20, height=18, part=[4, 2, 16, 12])
+    told, (small,) = page.ask("inside", kind="inside", open=True)
+    assert (told["panes"][0]["width"], told["panes"][0]["height"]) == (16, 12)
+    part = np.frombuffer(small, np.uint8).reshape(*told["panes"][0]["preview"][::-1], 4)[..., :3]
+    np.testing.assert_array_equal(part, SAMPLE[2:14, 4:20])
+    after = len(page.got)
+    page.say(kind="view", layer="sample", left=0, top=0, width=28, height=24, step=1)
+    np.testing.assert_array_equal(frame(page, after, layer="sample")[1][..., :3], part)
+
+
+def test_several_holes_are_not_looked_into():
+    page = Fake(Picture("t.png", texture(90, 100), -1))
+    try:
+        hole = [{"label": 1, "width": 5, "points": [[x, 12]]} for x in (10, 90)]
+        page.result(job="fill", hole=hole, options={"order": 2})
+        assert "fill one hole" in page.error(kind="inside", open=True)
     finally:
         page.session.close(10)

@@ -23,7 +23,7 @@ def test_recorded_pictures_and_reasons_are_those_of_a_run(recording):
     shape = (recorded.SIDE, recorded.SIDE)
     rules = recorded.OPTIONS | {"rng": recorded.SEED, "device": "reference"}
     replay = simdtex.replay(recorded.sample(), shape, **rules)
-    assert [list(one) for one in replay.sweeps] == found["inside"]["panes"][0]["sweeps"]
+    assert [list(one) for one in replay.sweeps] == found["inside"][0]["panes"][0]["sweeps"]
     for key, moment in found["moments"][1::20]:
         (n, sets), level = json.loads(key), moment[0]
         _, ((begin, size),) = found["frames"][f"picture {key}"]

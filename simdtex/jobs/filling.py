@@ -20,6 +20,8 @@ from simdtex.jobs.inputs import check_mask, check_picture, check_samples
 from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options, few
+from simdtex.methods.mrf.replay import Instant, Replay, Sweep
+from simdtex.model.explanation import Explanation
 from simdtex.model.given import Given
 from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
@@ -172,17 +174,7 @@ def fill(
     >>> bool((filled[~hole] == gravel[~hole]).all())
     True
     """
-    pixels, hole = check_picture(image, channel_axis)
-    hole = hole if mask is None else hole | check_mask(mask, pixels.shape[:2])
-    if not hole.any():
-        raise ValueError("there is nothing to fill; give a mask that is True (white) where the picture is to be made")
-    if hole.all():
-        raise ValueError("nothing of the picture is known; give a mask that is False (black) where it is to be kept")
-    if reach is not None:
-        whole("reach", reach, 1)
-    given = None if sample is None else _check_sample(sample, channel_axis, pixels)
-    chosen = resolve(Options, "fill", options)
-    job = Filling(pixels, hole, given, reach, chosen)
+    job = filling(image, mask, sample=sample, reach=reach, channel_axis=channel_axis, **options)
     return execute("fill", job.run, job.inputs, channel_axis, Call(rng, device, callback, full_output, checkpoint))
 
 
@@ -387,14 +379,8 @@ class Filling:
         self, machine: Machine, seed: int, callback: Callback | None, checkpointing: Checkpointing
     ) -> tuple[NDArray[Any], Output]:
         """Fill one window after the other; the state is the results of finished ones, and the present run's state."""
-        shape, options = self.hole.shape, self.options
-        several = self.sample is not None and len(self.sample.pixels) > 1
-        whole = Whole(self.pixels.copy(), np.zeros(shape), np.full((*shape, 3 if several else 2), -1, np.int32))
-        if self.sample is None:
-            whole.source[:] = np.moveaxis(np.indices(shape), 0, -1)
-        radius = int(neighbourhood_offsets(options.order).max())
-        everything = [Window(slice(0, shape[0]), slice(0, shape[1]), 0)]
-        parts = everything if options.boundary == "torus" else windows(self.hole, radius, options.levels)
+        whole = self.begin()
+        parts = self._windows()
         done, inside = checkpointing.found or ([], None)
         finished = [Made(*made) for made in done]
         for number, window in enumerate(parts):
@@ -419,6 +405,27 @@ class Filling:
         }
         return whole.image, Output(whole.source, whole.temperature, [], statistics)
 
+    def replay(self, machine: Machine, seed: int) -> HoleReplay:
+        """Return the run, to look at any moment of it; raise ValueError if it has several windows."""
+        parts = self._windows()
+        if len(parts) > 1:
+            raise ValueError(f"{len(parts)} holes are filled by runs of their own; fill one hole to look into its run")
+        return HoleReplay(self, parts[0], machine, seed)
+
+    def _windows(self) -> list[Window]:
+        if self.options.boundary == "torus":
+            return [Window(slice(0, self.hole.shape[0]), slice(0, self.hole.shape[1]), 0)]
+        return windows(self.hole, int(neighbourhood_offsets(self.options.order).max()), self.options.levels)
+
+    def begin(self) -> Whole:
+        """Return the picture before any hole is filled."""
+        shape = self.hole.shape
+        several = self.sample is not None and len(self.sample.pixels) > 1
+        whole = Whole(self.pixels.copy(), np.zeros(shape), np.full((*shape, 3 if several else 2), -1, np.int32))
+        if self.sample is None:
+            whole.source[:] = np.moveaxis(np.indices(shape), 0, -1)
+        return whole
+
     def _guide(self, window: Window, around: Around, values: NDArray[Any]) -> Surroundings | None:
         """Return the colours around a window's hole as its guide; None with a sample of its own, or of categories."""
         pictures = around.pictures
@@ -428,6 +435,21 @@ class Filling:
         top, left = around.corner
         corner = (window.rows.start - top, window.cols.start - left)
         return Surroundings(pictures.pixels[0], known, values, ~self.hole[window.rows, window.cols], corner)
+
+    def plan(self, window: Window, around: Around) -> mrf.Plan:
+        """Return the plan of a window's run."""
+        at, options = (window.rows, window.cols), self.options
+        hole, least = self.hole[at], window.levels and options.levels is None
+        known = np.repeat(~hole[..., None], self.pixels.shape[2], -1)
+        values = np.where(known, self.pixels[at], 0).astype(self.pixels.dtype)
+        return mrf.plan(
+            around.pictures,
+            hole.shape,
+            replace(options, overview=LEAST) if least else options,
+            Given(values, known, around.place, suggests=False),
+            self._guide(window, around, values),
+            most=max(window.levels, _fewest_levels(around.pictures)) if window.levels else None,
+        )
 
     def _window(
         self,
@@ -439,22 +461,79 @@ class Filling:
         checkpointing: Checkpointing,
     ) -> Made:
         """Fill one window."""
-        at, options = (window.rows, window.cols), self.options
-        hole, least = self.hole[at], window.levels and options.levels is None
-        known = np.repeat(~hole[..., None], self.pixels.shape[2], -1)
-        values = np.where(known, self.pixels[at], 0).astype(self.pixels.dtype)
-        plan = mrf.plan(
-            around.pictures,
-            hole.shape,
-            replace(options, overview=LEAST) if least else options,
-            Given(values, known, around.place, suggests=False),
-            self._guide(window, around, values),
-            most=max(window.levels, _fewest_levels(around.pictures)) if window.levels else None,
-        )
-        made, output = drive(plan, machine, seed, callback, checkpointing)
+        at = (window.rows, window.cols)
+        hole = self.hole[at]
+        made, output = drive(self.plan(window, around), machine, seed, callback, checkpointing)
         assert output.source is not None and output.temperature is not None
         statistics = output.statistics | {"window": [side for part in at for side in (part.start, part.stop)]}
         return Made(around.corner, made[hole], output.temperature[hole], output.source[hole], statistics)
+
+
+class HoleReplay:
+    """The run that fills one hole, to look at any moment of it, as with `simdtex.methods.mrf.replay.Replay`.
+
+    The arrays of `at` are those of the whole picture, with a coarse level's sites repeated; sites are pixels of the
+    window around the hole, and sources and candidates pixels of the picture or of the sample.
+    """
+
+    def __init__(self, job: Filling, window: Window, machine: Machine, seed: int) -> None:
+        around = _around(job, window)
+        self._replay = Replay(job.plan(window, around), machine, seed)
+        self._at, self._hole, self._corner = (window.rows, window.cols), job.hole, around.corner
+        self._whole = job.begin()
+        self.origin = window.rows.start, window.cols.start
+
+    @property
+    def sweeps(self) -> list[Sweep]:
+        """All sweeps of the run, in order."""
+        return self._replay.sweeps
+
+    def at(self, sweep: int, sets: int | None = None) -> Instant:
+        """Return the picture after so many sets of a sweep; None: after all of it."""
+        now = self._replay.at(sweep, sets)
+        pasted = partial(_pasted, at=self._at, hole=self._hole[self._at], level=now.level)
+        return Instant(
+            now.level,
+            pasted(self._whole.image, now.image),
+            pasted(self._whole.source, _moved(now.source, self._corner)),
+            pasted(self._whole.temperature, now.temperature),
+            pasted(np.zeros(self._hole.shape, np.uint8), now.relaxed),
+        )
+
+    def explain_pixel(self, row: int, col: int, sweep: int = -1, sets: int | None = None) -> Explanation:
+        """Return why a pixel had its value after so many sets of a sweep; raise ValueError if it did not relax."""
+        if not self._hole[row, col]:
+            raise ValueError("this pixel is not in the hole: its value is given")
+        why = self._replay.explain_pixel(row - self.origin[0], col - self.origin[1], sweep, sets)
+        near, found = why.neighbours, why.candidates
+        return replace(
+            why,
+            neighbours=replace(near, source=_moved(near.source, self._corner)),
+            candidates=replace(found, place=_moved(found.place, self._corner)),
+        )
+
+
+def filling(
+    image: ArrayLike,
+    mask: ArrayLike | None = None,
+    *,
+    sample: ArrayLike | None = None,
+    reach: int | None = None,
+    channel_axis: int | None = None,
+    **options: Any,
+) -> Filling:
+    """Return the job of `fill`, which has the same parameters; raise ValueError or TypeError if one is invalid."""
+    pixels, hole = check_picture(image, channel_axis)
+    hole = hole if mask is None else hole | check_mask(mask, pixels.shape[:2])
+    if not hole.any():
+        raise ValueError("there is nothing to fill; give a mask that is True (white) where the picture is to be made")
+    if hole.all():
+        raise ValueError("nothing of the picture is known; give a mask that is False (black) where it is to be kept")
+    if reach is not None:
+        whole("reach", reach, 1)
+    given = None if sample is None else _check_sample(sample, channel_axis, pixels)
+    chosen = resolve(Options, "fill", options)
+    return Filling(pixels, hole, given, reach, chosen)
 
 
 def _has_tones(options: Options, pictures: Pictures) -> bool:
@@ -489,6 +568,14 @@ def _moved(source: NDArray[np.int32], corner: tuple[int, int]) -> NDArray[np.int
     return moved
 
 
+def _pasted(below: NDArray[Any], values: NDArray[Any], at: tuple[slice, slice], hole: Mask, level: int) -> NDArray[Any]:
+    """Return a picture with the values of a level's lattice in the hole of a window."""
+    above = below.copy()
+    fine = values.repeat(2**level, 0).repeat(2**level, 1)[: hole.shape[0], : hole.shape[1]]
+    above[at][hole] = fine[hole]
+    return above
+
+
 def _pasting(
     callback: Callback,
     whole: Whole,
@@ -504,11 +591,7 @@ def _pasting(
     """
 
     def seen(progress: Any) -> Any:
-        def pasted(below: NDArray[Any], values: NDArray[Any]) -> NDArray[Any]:
-            above, step = below.copy(), 2**progress.level
-            fine = values.repeat(step, 0).repeat(step, 1)[: hole.shape[0], : hole.shape[1]]
-            above[at][hole] = fine[hole]
-            return above
+        pasted = partial(_pasted, at=at, hole=hole, level=progress.level)
 
         def source() -> NDArray[np.int32]:
             return pasted(whole.source, _moved(progress.source(), corner))

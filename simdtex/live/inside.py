@@ -54,17 +54,22 @@ class Inside:
         self.moment = self._instant = None
 
     def layers(self, result: dict[str, Callable[[], frames.Layer]]) -> dict[str, Callable[[], frames.Layer]]:
-        """Return the layers of the moment; those of the result if it is shown."""
-        if self._instant is None:
-            return result
+        """Return the layers of the moment, those of the result if it is shown, and the job's sample."""
         now, job = self._instant, self.job
+        sample = {"sample": lambda: frames.picture(job.sample, job.sample)}
+        if now is None:
+            return result | sample
         image = now.image if job.sample.ndim == 3 else now.image[..., 0]
         found = job.layers(lambda: image, lambda: now.source, lambda: now.temperature)
-        return found | {"sets": lambda: frames.overlay(image, now.relaxed, SET_COLOURS, SET_SHARES, job.shape)}
+        return found | sample | {"sets": lambda: frames.overlay(image, now.relaxed, SET_COLOURS, SET_SHARES, job.shape)}
 
     def describe(self) -> dict[str, Any]:
-        """Return the sweeps of the run for the page: level, sweep, sets, sites and mean temperature of each."""
-        return {"sweeps": [list(one) for one in self.sweeps], "moment": self.moment}
+        """Return what the page has to know: the sample's size, and the sweeps of the run.
+
+        Of each sweep its level and number, its sets and sites, and the mean temperature before it.
+        """
+        rows, cols = self.job.sample.shape[:2]
+        return {"width": cols, "height": rows, "sweeps": [list(one) for one in self.sweeps], "moment": self.moment}
 
     def explain(self, row: Any, col: Any) -> dict[str, Any]:
         """Return why a pixel of the output has the value that is shown, as plain numbers."""
@@ -74,7 +79,8 @@ class Inside:
         why = self._replay.explain_pixel(row, col, sweep, sets)
         sample = self.job.sample
         limits = None if sample.dtype == np.uint8 else (float(sample.min()), float(sample.max()))
-        return {"pixel": [row, col], **described(why, partial(to_display, limits=limits))}
+        corner = [2**why.level * n + start for n, start in zip(why.site, self._replay.origin, strict=True)]
+        return {"pixel": [row, col], "corner": corner, **described(why, partial(to_display, limits=limits))}
 
 
 def described(why: Explanation, display: Callable[[Any], Any]) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from simdtex.checkpoint import Checkpointing
 from simdtex.io.decode import NOTHING
 from simdtex.io.image import Metadata, suitable_suffix
 from simdtex.jobs.classification import classify
-from simdtex.jobs.filling import extend, extension, fill
+from simdtex.jobs.filling import HoleReplay, extend, extension, fill, filling
 from simdtex.live import frames
 from simdtex.live.words import controls
 from simdtex.machine import Machine
@@ -135,14 +135,16 @@ class Job:
         made: tuple[Array, Output] = FUNCTIONS[self.kind](self.sample, checkpoint=checkpointing, **keywords)
         return made
 
-    def replay(self, machine: Machine) -> Replay:
+    def replay(self, machine: Machine) -> Replay | HoleReplay:
         """Return the run, to look at any moment of it; raise ValueError if it is not one run of ``mrf``."""
-        if self.method != "mrf" or self.kind == "fill":
-            raise ValueError("only textures and seamless pictures by the method mrf can be looked into")
+        if self.method != "mrf":
+            raise ValueError("only runs of the method mrf can be looked into")
         keywords = {name: value for name, value in self._keywords.items() if name != "method"}
         if self.kind == "synth":
             return replay(self.sample, device=machine, **keywords)
         seed = keywords.pop("rng")
+        if self.kind == "fill":
+            return filling(self.sample, **keywords).replay(machine, seed)
         return Replay(extension(self.sample, **keywords)[0], machine, seed)
 
     def layers(

@@ -329,9 +329,13 @@ class Session:
         kept, self._inside = self._inside, {}
         found = [self.results.find(number) for number in dict.fromkeys([shown, message.get("beside") or shown])]
         self._inside = {one.number: kept.get(one.number) or Inside(one.job, self._machine) for one in found}
-        looked = [{"result": number, **one.describe()} for number, one in self._inside.items()]
+        samples = [frames.thumbnail(frames.picture(one.job.sample, one.job.sample), PREVIEW) for one in found]
+        looked = [
+            {"result": number, "preview": [small.width, small.height], **inside.describe()}
+            for small, (number, inside) in zip(samples, self._inside.items(), strict=True)
+        ]
         self._stale = True
-        self.send({"kind": "inside", "panes": looked}, [])
+        self.send({"kind": "inside", "panes": looked}, [small.pixels for small in samples])
 
     def _on_seek(self, message: Message, buffers: Sequence[Any]) -> None:
         """Show a moment of the results that are looked into, or, without a level, the results."""
@@ -394,7 +398,7 @@ class Session:
         """Send the window of the layer that the page looks at, of a result, the run or the sample."""
         assert self._picture is not None
         name, pixels = self._window.layer, self._picture.pixels
-        if name == "sample" or not layers:
+        if not layers or (name == "sample" and name not in layers):
             name, layer = "sample", frames.picture(pixels, pixels)
         else:
             name = name if name in layers else next(iter(layers))

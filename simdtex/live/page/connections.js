@@ -135,7 +135,7 @@ class Recording {
     const { start, inside, moments, frames, explained, pixels } = this.recorded;
     const frame = () => this.emit(frames[`${this.layer} ${this.at}`] ?? frames[`picture ${this.at}`]);
     if (message.kind === "hello") start.forEach((one) => this.emit(one));
-    else if (message.kind === "inside" && message.open) this.emit([inside, []]);
+    else if (message.kind === "inside" && message.open) this.emit(inside);
     else if (message.kind === "view") {
       this.layer = message.layer;
       frame();

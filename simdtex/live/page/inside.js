@@ -100,8 +100,9 @@ class Inside {
     if (this.element.open && this.body.hidden) this.status.textContent = text;
   }
 
-  on_inside({ panes }) {
+  on_inside({ panes }, buffers) {
     this.panes = panes;
+    this.samples = panes.map(({ preview }, n) => bitmap(buffers[n], ...preview));
     [this.sweeps, this.body.hidden] = [panes[0].sweeps, false];
     this.status.textContent = "";
     this.beside = panes[1]?.result ?? null;
@@ -282,15 +283,14 @@ class Inside {
   }
 
   /** The sample with the candidates, the first by rank the brightest. */
-  marks({ candidates }) {
-    const { small, picture, wholePart } = this.page;
-    const [left, top, width, height] = wholePart;
-    const scale = small.width / picture.width;
+  marks({ candidates, pane }) {
+    const { width, height } = this.panes[pane];
+    const small = this.samples[pane];
     const size = 220 / Math.max(width, height);
     const canvas = make("canvas", { width: width * size, height: height * size, "aria-hidden": "true" });
     const context = canvas.getContext("2d");
-    context.imageSmoothingEnabled = size * scale < 1;
-    context.drawImage(small, left * scale, top * scale, width * scale, height * scale, 0, 0, canvas.width, canvas.height);
+    context.imageSmoothingEnabled = canvas.width < small.width;
+    context.drawImage(small, 0, 0, canvas.width, canvas.height);
     for (const { place, rank, taken } of [...candidates].reverse()) {
       const [x, y] = [(place[1] + 0.5) * size, (place[0] + 0.5) * size];
       for (const [colour, more] of [["#000", 3], [taken ? HOLE : "#fff", 1.5]]) {

@@ -603,6 +603,7 @@ class Page {
   }
 
   get paintable() {
+    if (this.inside.open) return false; // a click explains a pixel
     if (this.job.value === "classify") return PICTURE_LAYERS.includes(this.seen); // which stays as it is during the run
     return !this.watching && ["sample", "picture"].includes(this.seen);
   }

@@ -160,21 +160,20 @@ class View {
   }
 
   /** Mark a pixel and its neighbourhood or, in the sample, its candidates by rank. */
-  mark(context, frame, { pixel, level, offsets, confidence, candidates }) {
+  mark(context, frame, { pixel, corner, level, offsets, confidence, candidates }) {
     const size = 2 ** (level ?? 0);
     if (frame.layer === "sample" || frame.layer === "use") {
-      const [left, top] = frame.layer === "sample" ? this.page.wholePart : [0, 0];
       context.font = `${12 * (window.devicePixelRatio || 1)}px sans-serif`;
       for (const { place, rank, taken } of [...(candidates ?? [])].reverse()) {
-        this.outline(context, left + place[1], top + place[0], 1, 1, taken ? 3 : 1);
-        const at = [(left + place[1] + 1.5 - this.left) * this.unit, (top + place[0] + 1 - this.top) * this.unit];
+        this.outline(context, place[1], place[0], 1, 1, taken ? 3 : 1);
+        const at = [(place[1] + 1.5 - this.left) * this.unit, (place[0] + 1 - this.top) * this.unit];
         [context.lineWidth, context.strokeStyle, context.fillStyle] = [3, "#000", "#fff"];
         context.strokeText(`${rank}`, ...at);
         context.fillText(`${rank}`, ...at);
       }
       return;
     }
-    const [row, col] = pixel.map((one) => Math.floor(one / size) * size);
+    const [row, col] = corner ?? pixel;
     (offsets ?? []).forEach(([down, across], index) => {
       if (!down && !across) return;
       context.globalAlpha = 0.25 + 0.75 * confidence[index];

@@ -91,6 +91,9 @@ class Replay:
     per site and 2 for each channel, `KEPT` bytes at most. `at` and `explain` start from the nearest state before.
     """
 
+    origin = (0, 0)
+    """Where the lattice begins in the output, pixels."""
+
     def __init__(self, plan: Plan, machine: Machine, seed: int, kept: int = KEPT) -> None:
         self._run, self._twin = plan.on(machine, seed), Lattices(plan, Reference(), seed)
         self._sweeps: list[Sweep] = []
