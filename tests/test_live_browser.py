@@ -558,6 +558,22 @@ def test_a_widget_is_not_much_higher_than_its_view(page, wall):
     assert page.script("return document.querySelector('.columns').scrollHeight") < 1300
 
 
+def test_results_and_files_are_beside_the_view_and_a_run_moves_nothing(page, wall):
+    shown(page.driver, width=1280, height=720)
+    drop(page.driver, wall)
+    page.result(1)
+    view = page.one("canvas.view").rect
+    for selector in (".strip button:not(.current button)", ".result [data-file='texture.zip']"):
+        rect = page.script("return arguments[0].getBoundingClientRect().toJSON()", page.all(selector)[-1])
+        assert rect["left"] >= view["x"] + view["width"] and rect["bottom"] <= 720
+    page.script(
+        "window.heights = new Set(); const seen = () => { heights.add(document.querySelector('.result').scrollHeight);"
+        "requestAnimationFrame(seen) }; seen(); page.setPart([0, 0, 40, 40])"
+    )
+    page.result(2)
+    assert len(page.script("return [...heights]")) == 1
+
+
 def test_values_legends_and_levels_say_what_they_are(page, wall, tmp_path):
     page.script("page.auto.checked = false")
     file = tmp_path / "moving.gif"
@@ -653,7 +669,7 @@ def explained(page, pane=0):
 
 
 def at(page):
-    until(lambda: page.script("return !page.inside.waiting && !page.inside.wanted"))
+    until(lambda: page.script("return !page.inside.waiting && !page.inside.late"))
     return page.script("return page.inside.at")
 
 

@@ -24,9 +24,10 @@ class Inside {
     this.page = page;
     this.sweeps = [];
     this.at = null; // [sweep, sets], null for the result
+    this.goal = null; // the moment that was asked for last, as `at`
+    this.waiting = this.late = false; // whether a moment is on its way, and whether the goal is another one
     this.pixel = null; // [row, column]
     this.beside = null; // the number of the result that is shown beside the selected one
-    this.wanted = null; // the last moment that was asked for while another one is on its way
     const range = (label, onchange) => make("input", { type: "range", min: 0, max: 0, value: 0, step: 1, "aria-label": label, oninput: onchange });
     this.sweepRange = range("Sweep", () => this.seek(Number(this.sweepRange.value), null));
     this.setRange = range("Set of sites", () => this.seek(this.at[0], Number(this.setRange.value)));
@@ -87,8 +88,8 @@ class Inside {
     this.stop();
     if (!this.body.hidden) this.page.send({ kind: "inside", open: false });
     this.body.hidden = true;
-    this.at = this.beside = null;
-    this.waiting = false;
+    this.at = this.goal = this.beside = null;
+    this.waiting = this.late = false;
     this.unpick();
     this.page.view.split(false);
     if (this.page.layer === "sets") this.page.showLayer("picture");
@@ -112,7 +113,7 @@ class Inside {
     this.choice.value = this.beside ?? "";
     this.sweepRange.max = this.sweeps.length;
     const [at] = panes.map(({ moment }) => moment);
-    this.at = null;
+    this.goal = at;
     this.show(at);
     if (panes.length > 1 && at) this.seek(...at);
     if (this.pixel) this.explain();
@@ -123,22 +124,25 @@ class Inside {
 
   /** Go to a moment: so many sets of a sweep, null for all; the sweep after the last is the result. */
   seek(sweep, sets) {
-    if (this.waiting) {
-      this.wanted = [sweep, sets];
-      return;
-    }
-    const found = this.sweeps[clamp(sweep, 0, this.sweeps.length)];
-    this.waiting = true;
-    if (!found) this.page.send({ kind: "seek" });
-    else this.page.send({ kind: "seek", level: found[0], sweep: found[1], sets: sets ?? found[2] });
+    const number = clamp(sweep, 0, this.sweeps.length);
+    this.goal = number < this.sweeps.length ? [number, sets ?? this.sweeps[number][2]] : null;
+    if (this.waiting) this.late = true;
+    else this.ask();
+  }
+
+  /** Ask for the goal. */
+  ask() {
+    [this.waiting, this.late] = [true, false];
+    const [number, sets] = this.goal ?? [];
+    const [level, sweep] = this.goal ? this.sweeps[number] : [];
+    this.page.send(this.goal ? { kind: "seek", level, sweep, sets } : { kind: "seek" });
   }
 
   on_moments({ moments }) {
     this.waiting = false;
+    if (!this.late) [this.goal] = moments;
     this.show(moments[0]);
-    const { wanted } = this;
-    this.wanted = null;
-    if (wanted) this.seek(...wanted);
+    if (this.late) this.ask();
     else if (this.pixel) this.explain();
   }
 
@@ -163,7 +167,7 @@ class Inside {
   }
 
   step(by) {
-    const [sweep, sets] = this.at ?? [this.sweeps.length, 0];
+    const [sweep, sets] = this.goal ?? [this.sweeps.length, 0];
     if (this.page.layer === "picture") this.page.showLayer("sets");
     if (sets + by > (this.sweeps[sweep]?.[2] ?? 0)) this.seek(sweep + 1, Math.min(by, this.sweeps[sweep + 1]?.[2] ?? 0));
     else if (sets + by < 0) this.seek(Math.max(0, sweep - 1), sweep ? null : 0);
@@ -171,7 +175,7 @@ class Inside {
   }
 
   stepSweep(by) {
-    this.seek(Math.max(0, (this.at?.[0] ?? this.sweeps.length) + by), null);
+    this.seek(Math.max(0, (this.goal?.[0] ?? this.sweeps.length) + by), null);
   }
 
   play() {

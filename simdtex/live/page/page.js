@@ -151,7 +151,7 @@ class Page {
     this.pending = null;
     if (this.refused) for (const options of Object.values(this.options)) options.values = {};
     this.refused = false;
-    this.downloads.hidden = true;
+    this.offerFiles(false);
     this.doing.textContent = "";
     this.guide = { sample: [], output: [] };
     this.hole = [];
@@ -270,31 +270,29 @@ class Page {
     this.files = bar();
     this.archive = make("p");
     this.command = make("pre", { tabindex: 0, "aria-label": "Command line" });
-    this.downloads = make(
-      "section",
-      { "aria-label": "Download", hidden: true },
-      make("h3", {}, "Download"),
-      this.files,
-      this.archive,
-      this.command,
-      button("Copy the command line", () => this.copy(this.command.textContent)),
-    );
+    this.downloads = make("section", { "aria-label": "Download" }, make("h3", {}, "Download"), this.files);
+    const copying = button("Copy the command line", () => this.copy(this.command.textContent));
+    this.recipe = make("section", { "aria-label": "The same bytes again" }, this.archive, this.command, copying);
     return make(
       "section",
       { "aria-label": "Result", class: "result" },
       make("h2", {}, "Result"),
       shown,
-      this.view.element,
+      make("div", { class: "stage" }, this.view.element, make("div", { class: "kept" }, this.strip, this.downloads)),
       this.legend,
       this.hint,
       this.classes,
-      this.inside.element,
       bar(this.pausing, this.cancelling, this.progress),
       this.doing,
-      this.strip,
+      this.inside.element,
       this.paintSet(),
-      this.downloads,
+      this.recipe,
     );
+  }
+
+  /** Show or hide the files of a result; their place stays, so that nothing moves. */
+  offerFiles(shown) {
+    for (const one of [this.downloads, this.recipe]) one.style.visibility = shown ? "" : "hidden";
   }
 
   showLayer(layer) {
@@ -351,6 +349,8 @@ class Page {
     const found = this.results.get(this.shown);
     const layers = found?.layers ?? (this.running ? this.runLayers : ["sample"]);
     this.offer(this.inside.at ? [...layers, "sets"] : layers);
+    this.fitting.disabled = !found;
+    if (!found && this.running) return; // the controls stay where they are during a run
     this.latticeField.hidden = !found?.lattice;
     const [rows, cols] = found?.lattice?.fitting ?? [found?.height, found?.width];
     this.fitting.hidden = !found || found.settings.job !== "synth" || (rows === found.height && cols === found.width);
@@ -404,7 +404,7 @@ class Page {
     message.button.append(make("span", {}, `Result ${result}, ${width} × ${height}, seed ${settings.seed}`));
     message.item = make("li", {}, message.button);
     this.currentItem.before(message.item);
-    this.strip.scrollLeft = this.strip.scrollWidth;
+    this.strip.scrollTo(this.strip.scrollWidth, this.strip.scrollHeight);
     const gone = dropped.length ? ` Result ${dropped.join(", ")} is no longer kept, to save memory.` : "";
     this.say(`Result ${result} is ready.${gone}`);
     if (this.results.size === 1 && this.columns.clientWidth > 1000) this.controls.querySelector("details").open = true;
@@ -438,7 +438,7 @@ class Page {
     this.shown = result;
     this.mark(result, true);
     const found = this.results.get(result);
-    this.downloads.hidden = !found;
+    this.offerFiles(Boolean(found));
     this.inside.close();
     this.offerLayers();
     this.inside.look();
