@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpoint
-from simdtex.driver import Call, Plan, check_shape, drive, execute, with_channels_last
+from simdtex.driver import Plan, check_shape, drive, execute, with_channels_last
+from simdtex.io.hard_data import HardData
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine, open_machine
@@ -32,7 +33,7 @@ from simdtex.run import Callback, Output
 if TYPE_CHECKING:
     from typing import Unpack
 
-    from simdtex.methods.typed_options import AnyOptions, SolidOptions
+    from simdtex.methods.typed_options import SolidOptions, SynthOptions
 
 GIVEN = ("channel_axis", "mask", "known", "known_source", "guide")
 """The arrays of a synthesis, and their axis, beside sample and shape."""
@@ -46,31 +47,13 @@ METHODS = ("mrf", "multires", "pyramid")
 
 @overload
 def synthesize(
-    sample: ArrayLike,
-    shape: tuple[int, int],
-    *,
-    method: str = ...,
-    mask: Any = ...,
-    known: Any = ...,
-    known_source: ArrayLike | None = ...,
-    guide: tuple[Any, Any] | None = ...,
-    full_output: Literal[True],
-    **options: Unpack[AnyOptions],
+    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[SynthOptions]
 ) -> tuple[NDArray[Any], Output]: ...
 
 
 @overload
 def synthesize(
-    sample: ArrayLike,
-    shape: tuple[int, int],
-    *,
-    method: str = ...,
-    mask: Any = ...,
-    known: Any = ...,
-    known_source: ArrayLike | None = ...,
-    guide: tuple[Any, Any] | None = ...,
-    full_output: Literal[False] = ...,
-    **options: Unpack[AnyOptions],
+    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[False] = ..., **options: Unpack[SynthOptions]
 ) -> NDArray[Any]: ...
 
 
@@ -81,7 +64,7 @@ def synthesize(
     method: str = "mrf",
     channel_axis: int | None = None,
     mask: ArrayLike | Sequence[ArrayLike] | None = None,
-    known: ArrayLike | None = None,
+    known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
     known_source: ArrayLike | None = None,
     guide: tuple[Any, Any] | None = None,
     rng: int | np.random.Generator | None = None,
@@ -180,12 +163,13 @@ def synthesize(
         plan = replace(mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide), remedy=TILED)
     else:
         plan = import_module(f"simdtex.methods.{method}.algorithm").Plan(inputs.pictures.pixels[0], size, chosen)
-    call = Call(rng, device, callback, full_output, checkpoint)
 
     def identity() -> dict[str, Any]:
         return {"method": method, "shape": size, "options": chosen, **inputs.identity()}
 
-    return execute("synthesize", partial(drive, plan), identity, channel_axis, call)
+    return execute(
+        "synthesize", partial(drive, plan), identity, channel_axis, rng, device, callback, full_output, checkpoint
+    )
 
 
 @overload
@@ -270,8 +254,8 @@ def synthesize_solid(
     size = _check_block(shape)
     chosen = resolve(solid.Options, "solid", options)
     run, axis = partial(drive, solid.Plan(pixels, size, chosen)), None if channel_axis is None else -1
-    call = Call(rng, device, callback, full_output, checkpoint)
-    return execute("synthesize_solid", run, lambda: {"shape": size, "options": chosen, "sample": pixels}, axis, call)
+    inputs = {"shape": size, "options": chosen, "sample": pixels}
+    return execute("synthesize_solid", run, lambda: inputs, axis, rng, device, callback, full_output, checkpoint)
 
 
 def explain(

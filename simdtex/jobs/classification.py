@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpoint
-from simdtex.driver import Call, drive, execute
+from simdtex.driver import drive, execute
 from simdtex.jobs.inputs import check_mask, check_picture, is_several
 from simdtex.machine import Machine, open_machine
 from simdtex.methods.classifier.algorithm import Plan
@@ -26,20 +26,14 @@ from simdtex.run import Callback, Output
 if TYPE_CHECKING:
     from typing import Self, Unpack
 
-    from simdtex.methods.typed_options import ClassifierOptions
+    from simdtex.methods.typed_options import ClassifyOptions
 
 Textures = Mapping[str, ArrayLike | Sequence[ArrayLike]]
 
 
 @overload
 def classify(
-    image: ArrayLike,
-    textures: Textures | ArrayLike,
-    *,
-    masks: Mapping[str, Any] | None = ...,
-    validation: Textures | None = ...,
-    full_output: Literal[True],
-    **options: Unpack[ClassifierOptions],
+    image: ArrayLike, textures: Textures | ArrayLike, *, full_output: Literal[True], **options: Unpack[ClassifyOptions]
 ) -> tuple[NDArray[np.uint8], Output]: ...
 
 
@@ -48,10 +42,8 @@ def classify(
     image: ArrayLike,
     textures: Textures | ArrayLike,
     *,
-    masks: Mapping[str, Any] | None = ...,
-    validation: Textures | None = ...,
     full_output: Literal[False] = ...,
-    **options: Unpack[ClassifierOptions],
+    **options: Unpack[ClassifyOptions],
 ) -> NDArray[np.uint8]: ...
 
 
@@ -60,7 +52,7 @@ def classify(
     textures: Textures | ArrayLike,
     *,
     masks: Mapping[str, Any] | None = None,
-    validation: Textures | None = None,
+    validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None = None,
     channel_axis: int | None = None,
     rng: int | np.random.Generator | None = None,
     device: str | Machine | None = None,
@@ -142,8 +134,7 @@ def classify(
             "textures": [[(*one[:2], one.judged) for one in regions] for regions in classes],
         }
 
-    call = Call(rng, device, callback, full_output, checkpoint)
-    return execute("classify", partial(drive, plan), inputs, None, call)
+    return execute("classify", partial(drive, plan), inputs, None, rng, device, callback, full_output, checkpoint)
 
 
 def _sampled(

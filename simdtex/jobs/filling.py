@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from simdtex.checkpoint import Checkpoint, Checkpointing
-from simdtex.driver import Call, drive, execute
+from simdtex.driver import drive, execute
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_mask, check_picture, check_samples
 from simdtex.machine import Machine, memory
@@ -32,7 +32,7 @@ from simdtex.run import Callback, Output
 if TYPE_CHECKING:
     from typing import Unpack
 
-    from simdtex.methods.typed_options import MrfOptions
+    from simdtex.methods.typed_options import ExtendOptions, FillOptions
 
 REACH = 128
 """How far around its window a hole is filled from, at least, pixels."""
@@ -82,25 +82,13 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
 
 @overload
 def fill(
-    image: ArrayLike,
-    mask: ArrayLike | None = ...,
-    *,
-    sample: ArrayLike | None = ...,
-    reach: int | None = ...,
-    full_output: Literal[True],
-    **options: Unpack[MrfOptions],
+    image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[True], **options: Unpack[FillOptions]
 ) -> tuple[NDArray[Any], Output]: ...
 
 
 @overload
 def fill(
-    image: ArrayLike,
-    mask: ArrayLike | None = ...,
-    *,
-    sample: ArrayLike | None = ...,
-    reach: int | None = ...,
-    full_output: Literal[False] = ...,
-    **options: Unpack[MrfOptions],
+    image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[False] = ..., **options: Unpack[FillOptions]
 ) -> NDArray[Any]: ...
 
 
@@ -175,36 +163,18 @@ def fill(
     True
     """
     job = filling(image, mask, sample=sample, reach=reach, channel_axis=channel_axis, **options)
-    return execute("fill", job.run, job.inputs, channel_axis, Call(rng, device, callback, full_output, checkpoint))
+    return execute("fill", job.run, job.inputs, channel_axis, rng, device, callback, full_output, checkpoint)
 
 
 @overload
 def extend(
-    image: ArrayLike,
-    *,
-    top: int = ...,
-    bottom: int = ...,
-    left: int = ...,
-    right: int = ...,
-    seamless: bool | str = ...,
-    band: int | None = ...,
-    full_output: Literal[True],
-    **options: Unpack[MrfOptions],
+    image: ArrayLike, *, full_output: Literal[True], **options: Unpack[ExtendOptions]
 ) -> tuple[NDArray[Any], Output]: ...
 
 
 @overload
 def extend(
-    image: ArrayLike,
-    *,
-    top: int = ...,
-    bottom: int = ...,
-    left: int = ...,
-    right: int = ...,
-    seamless: bool | str = ...,
-    band: int | None = ...,
-    full_output: Literal[False] = ...,
-    **options: Unpack[MrfOptions],
+    image: ArrayLike, *, full_output: Literal[False] = ..., **options: Unpack[ExtendOptions]
 ) -> NDArray[Any]: ...
 
 
@@ -266,8 +236,9 @@ def extend(
     plan, inputs = extension(
         image, channel_axis, top=top, bottom=bottom, left=left, right=right, seamless=seamless, band=band, **options
     )
-    call = Call(rng, device, callback, full_output, checkpoint)
-    return execute("extend", partial(drive, plan), lambda: inputs, channel_axis, call)
+    return execute(
+        "extend", partial(drive, plan), lambda: inputs, channel_axis, rng, device, callback, full_output, checkpoint
+    )
 
 
 def extension(
