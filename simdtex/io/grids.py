@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.atomic import atomic_path, check_target
-from simdtex.io.limits import BYTES, TooLarge, check_file, check_size, max_pixels_or_default
+from simdtex.io.limits import BYTES, check_size, reading
 from simdtex.options import shown
 
 __all__ = ["MISSING", "SUFFIXES", "CartesianGrid", "check_grid", "frame", "kind_of", "read_grid", "write_grid"]
@@ -158,21 +158,9 @@ def read_grid(path: PathLike, *, missing: Iterable[float] = MISSING, max_pixels:
     Without these numbers the origin is 0 and the size of a cell 1. Files of SGeMS hold 32-bit floats, of which the
     shortest decimal number is taken for origin and size. Regions and groups of SGeMS are passed over.
     """
-    name = os.fspath(path)
-    most = max_pixels_or_default(max_pixels)
-    check_file(path, "the grid", most)
-    try:
-        with open(path, "rb") as file:
-            binary = file.read(len(MAGIC)) == MAGIC
-            columns, sides, lies = _sgems(file, most) if binary else _gslib(file, most)
-    except TooLarge as error:
-        raise ValueError(f"{name} {error}") from None
-    except MemoryError:
-        raise ValueError(f"{name} is too large for the memory: crop it first") from None
-    except OSError as error:
-        raise ValueError(f"{name} cannot be read ({error.strerror}): check the path") from None
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
+    with reading(path, "the grid", max_pixels) as most, open(path, "rb") as file:
+        binary = file.read(len(MAGIC)) == MAGIC
+        columns, sides, lies = _sgems(file, most) if binary else _gslib(file, most)
     stands = np.array(tuple(missing), np.float64)
     return CartesianGrid({key: _typed(column, stands).reshape(sides[::-1]) for key, column in columns.items()}, *lies)
 

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io.grids import MISSING, frame
 from simdtex.io.image import cast
-from simdtex.io.limits import BYTES, TooLarge, check_file, max_pixels_or_default, read_npy
+from simdtex.io.limits import BYTES, read_npy, reading
 from simdtex.options import one_of
 
 PathLike = str | os.PathLike[str]
@@ -99,24 +99,16 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
     -----
     About 8 s for a million rows of text.
     """
-    name = os.fspath(path)
-    most = max_pixels_or_default(max_pixels)
     binary = Path(path).suffix.lower() == ".npy"
-    check_file(path, "the hard data", most if binary else -(-most // BYTES))
-    try:
+    with reading(path, "the hard data", max_pixels, each=BYTES if binary else 1) as most:
         if binary:
             with open(path, "rb") as file:
                 return _table(read_npy(file, os.fstat(file.fileno()).st_size, most))
         with open(path, encoding="utf-8-sig") as text:
-            return _parsed(text)
-    except TooLarge as error:
-        raise ValueError(f"{name} {error}") from None
-    except UnicodeDecodeError:
-        raise ValueError(f"{name} is no text in UTF-8: save the table as CSV in UTF-8") from None
-    except OSError as error:
-        raise ValueError(f"{name} cannot be read ({error.strerror}): check the path") from None
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: {error}") from None
+            try:
+                return _parsed(text)
+            except UnicodeDecodeError:
+                raise ValueError("the table is no text in UTF-8: save it as CSV in UTF-8") from None
 
 
 def _parsed(text: Iterable[str]) -> HardData:

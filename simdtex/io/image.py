@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io.atomic import Unbuffered, atomic_path, check_target
 from simdtex.io.decode import NOTHING, Metadata, decode, native
-from simdtex.io.limits import TooLarge, check_file, max_pixels_or_default
+from simdtex.io.limits import TooLarge, max_pixels_or_default, reading
 from simdtex.options import unmasked
 
 __all__ = [
@@ -95,14 +95,9 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
     -----
     The whole file is held in memory together with its pixels.
     """
-    name = os.fspath(path)
-    most = max_pixels_or_default(max_pixels)
-    check_file(name, "the image", most)
-    try:
-        data = Path(name).read_bytes()
-    except OSError as error:
-        raise ValueError(f"{name} cannot be read ({error.strerror}): check the path of the image") from None
-    return read_bytes(name, data, max_pixels=most)
+    with reading(path, "the image", max_pixels):
+        data = Path(path).read_bytes()
+    return read_bytes(os.fspath(path), data, max_pixels=max_pixels)
 
 
 def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None) -> Image:

@@ -22,7 +22,7 @@ from simdtex.io import image
 from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable
 from simdtex.io.decode import native
 from simdtex.io.image import FLOATS, INTEGERS, Format, check_holds
-from simdtex.io.limits import TooLarge, check_array, check_file, max_pixels_or_default, read_npy
+from simdtex.io.limits import check_array, read_npy, reading
 from simdtex.options import unmasked
 
 __all__ = ["check_writable", "is_volume", "read", "write"]
@@ -102,10 +102,8 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Array:
     ValueError
         The file is missing, damaged, no volume, or too large.
     """
-    name, most = os.fspath(path), max_pixels_or_default(max_pixels)
-    check_file(name, "the volume", most)
-    suffix = Path(path).suffix.lower()
-    try:
+    name, suffix = os.fspath(path), Path(path).suffix.lower()
+    with reading(path, "the volume", max_pixels, kind="a volume") as most:
         if suffix == ".nrrd":
             header = nrrd.read_header(name)
             check_array(tuple(int(side) for side in header["sizes"]), 8, most)
@@ -117,12 +115,6 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Array:
             with tifffile.TiffFile(name) as file:
                 check_array((len(file.pages), *file.pages.first.shape), 8, most)
                 values = np.stack([page.asarray() for page in file.pages])
-    except TooLarge as error:
-        raise ValueError(f"{name} {error}") from None
-    except MemoryError:
-        raise
-    except Exception as error:  # each library has errors of its own for a damaged file
-        raise ValueError(f"{name} cannot be read as a volume ({error}): save it again") from None
     if values.ndim not in (3, 4) or values.size == 0 or values.dtype.kind not in "buif":
         raise ValueError(f"{name} has the shape {values.shape} and the type {values.dtype}: give numbers of three axes")
     return native(values[..., None] if values.ndim == 3 else values)
