@@ -335,6 +335,12 @@ def unmasked(name: str, value: Any) -> None:
         )
 
 
+def check_real(name: str, array: NDArray[Any]) -> None:
+    """Raise unless an array holds real numbers."""
+    if array.dtype.kind not in "buif":
+        raise TypeError(f"{name} holds {array.dtype} values; convert it to integers or real floats")
+
+
 def real_array(name: str, value: Any) -> NDArray[Any]:
     """Return the value as an array of finite real numbers; raise if it is none."""
     unmasked(name, value)
@@ -342,8 +348,7 @@ def real_array(name: str, value: Any) -> NDArray[Any]:
         array = np.asarray(value)
     except ValueError:
         raise ValueError(f"{name} is ragged; give rows of equal length") from None
-    if array.dtype.kind not in "buif":
-        raise TypeError(f"{name} holds {array.dtype} values; convert it to integers or real floats")
+    check_real(name, array)
     if not np.isfinite(array).all():
         raise ValueError(f"{name} has values that are NaN or infinite; fill them first")
     return array

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpoint
-from simdtex.driver import Plan, check_shape, drive, execute, with_channels_last
+from simdtex.driver import Plan, check_shape, check_sides, drive, execute, with_channels_last
 from simdtex.io.hard_data import HardData
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_inputs
@@ -251,7 +251,7 @@ def synthesize_solid(
     from simdtex.methods.pyramid import solid
 
     pixels = check_sample(sample, channel_axis)
-    size = _check_block(shape)
+    size: Any = check_sides(shape, ("depth", "rows", "columns"))
     chosen = resolve(solid.Options, "solid", options)
     run, axis = partial(drive, solid.Plan(pixels, size, chosen)), None if channel_axis is None else -1
     inputs = {"shape": size, "options": chosen, "sample": pixels}
@@ -450,16 +450,6 @@ def lcpdf(
     planes = x[None].astype(np.uint16), np.zeros(x.shape, np.int32), _check_temperature(temperature, x.shape)
     field = Field(*map(machine.put, planes))
     return lcpdf_at(machine, field, grey, where, offsets, grid, bandwidth, estimator)
-
-
-def _check_block(shape: Any) -> tuple[int, int, int]:
-    try:
-        depth, rows, cols = shape
-    except (TypeError, ValueError):
-        raise ValueError(f"shape must be three integers (depth, rows, columns), not {shape!r}") from None
-    whole("depth of the block", depth, 1)
-    rows, cols = check_shape((rows, cols))
-    return int(depth), rows, cols
 
 
 def _check_grey(name: str, array: ArrayLike, greys: int) -> NDArray[np.int64]:

@@ -230,7 +230,7 @@ THREE = np.full((*SHAPE, 3), -1)
 BAD = {
     # samples
     "ragged": ({"sample": [[1, 2], [3]]}, ValueError, "the sample is ragged; give rows of equal length"),
-    "text": ({"sample": GREY.astype(str)}, TypeError, "the sample holds <U.* values: convert it"),
+    "text": ({"sample": GREY.astype(str)}, TypeError, "the sample holds <U.* values; convert it"),
     "one axis": ({"sample": GREY[0]}, ValueError, r"1-dimensional: give \(rows, cols\)"),
     "colour": ({"sample": COLOUR}, ValueError, "3-dimensional: give .* or channel_axis=-1"),
     "grey with an axis": ({"channel_axis": 0}, ValueError, "2-dimensional .grey.: give three axes"),

@@ -265,10 +265,10 @@ def output_shape(size: str | None, pixels: Any, *like: Any, axes: int = 2) -> tu
 
     By default those of the first picture of `like`, or twice the sample's.
     """
-    from simdtex.io.image import parse_size, parse_volume_size
+    from simdtex.io.image import parse_sides
 
     if size is not None:
-        return parse_size(size) if axes == 2 else parse_volume_size(size)
+        return parse_sides(size, "WIDTHxHEIGHTxDEPTH" if axes == 3 else "WIDTHxHEIGHT")[::-1]
     for picture in like:
         if hasattr(picture, "shape"):  # a table has none
             return tuple(picture.shape[:axes])

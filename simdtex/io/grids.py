@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.atomic import atomic_path, check_target
 from simdtex.io.limits import BYTES, check_size, reading
-from simdtex.options import shown
+from simdtex.options import check_real, shown
 
 __all__ = ["MISSING", "SUFFIXES", "CartesianGrid", "check_grid", "frame", "kind_of", "read_grid", "write_grid"]
 
@@ -407,8 +407,7 @@ def check_grid(
 
 def _check_values(target: Path, array: np.ma.MaskedArray[Any, Any]) -> None:
     """Raise unless a format holds these values."""
-    if array.dtype.kind not in "buif":
-        raise TypeError(f"the grid holds {array.dtype} values; give real numbers")
+    check_real("the grid", array)
     known = array.compressed()
     wrong = np.isin(known, MISSING) if known.dtype.kind != "b" else np.zeros(known.shape, bool)
     if wrong.any():

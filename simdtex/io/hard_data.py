@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from simdtex.io.grids import MISSING, frame
 from simdtex.io.image import cast
 from simdtex.io.limits import BYTES, read_npy, reading
-from simdtex.options import one_of
+from simdtex.options import check_real, one_of
 
 PathLike = str | os.PathLike[str]
 Floats = NDArray[np.float64]
@@ -212,8 +212,7 @@ def _table(array: Any) -> HardData:
         raise ValueError("the rows of hard data are of unequal length: give x, y and the same values in each") from None
     if numbers.size == 0:
         raise ValueError("the hard data has no rows: give x, y and a value for each datum")
-    if numbers.dtype.kind not in "buif":
-        raise TypeError(f"the hard data holds {numbers.dtype} values: give real numbers")
+    check_real("the hard data", numbers)
     if numbers.ndim != 2 or numbers.shape[1] < 3:
         raise ValueError(f"the hard data has the shape {numbers.shape}: give (data, 3) of x, y, value, or more values")
     found = np.where(np.ma.getmaskarray(numbers), np.nan, numbers.data).astype(np.float64)

@@ -23,7 +23,6 @@ from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable
 from simdtex.io.decode import native
 from simdtex.io.image import FLOATS, INTEGERS, Format, check_holds
 from simdtex.io.limits import check_array, read_npy, reading
-from simdtex.options import unmasked
 
 __all__ = ["check_writable", "is_volume", "read", "write"]
 
@@ -145,14 +144,7 @@ def write(path: PathLike, volume: ArrayLike) -> None:
     y, then z, with the channels as a vector before them, as ParaView, 3D Slicer and Fiji expect. It is not compressed,
     because not every version of ParaView decompresses.
     """
-    unmasked("the volume", volume)
-    values = np.asarray(volume)
-    if values.dtype.kind not in "buif":
-        raise TypeError(f"the volume holds {values.dtype} values: give integers or real floats")
-    if values.ndim not in (3, 4) or values.size == 0:
-        raise ValueError(
-            f"the volume has the shape {values.shape}: give (depth, rows, cols) or (depth, rows, cols, channels)"
-        )
+    values = image.pixels_of("the volume", volume, 3)
     check_writable(path, values.dtype, values.shape[3] if values.ndim == 4 else 1)
     suffix = Path(path).suffix.lower()
     if suffix not in (".npz", ".npy") and values.ndim == 4 and values.shape[3] == 1:
