@@ -309,9 +309,9 @@ def whole(name: str, value: Any, least: int, most: float = MOST) -> None:
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise TypeError(f"{name} must be an integer, not {shown(value)}")
     if value < least:
-        raise ValueError(f"{name} is {number(value)}; give {least} or more")
+        raise ValueError(f"{name} is {shown(value, str)}; give {least} or more")
     if int(value) > most:
-        raise ValueError(f"{name} is {number(value)}; give {most} or fewer")
+        raise ValueError(f"{name} is {shown(value, str)}; give {most} or fewer")
 
 
 def real(
@@ -321,9 +321,11 @@ def real(
     if isinstance(value, bool) or not isinstance(value, Real):
         raise TypeError(f"{name} must be a number, not {shown(value)}")
     if not (_finite(value) or value == most) or value < least or (above and value == least):
-        raise ValueError(f"{name} is {number(value)}; give a number {'above' if above else 'of at least'} {least:g}")
+        raise ValueError(
+            f"{name} is {shown(value, str)}; give a number {'above' if above else 'of at least'} {least:g}"
+        )
     if float(value) > most or (below and value == most):
-        raise ValueError(f"{name} is {number(value)}; give {'a number below' if below else 'at most'} {most:g}")
+        raise ValueError(f"{name} is {shown(value, str)}; give {'a number below' if below else 'at most'} {most:g}")
 
 
 def unmasked(name: str, value: Any) -> None:
@@ -354,20 +356,11 @@ def real_array(name: str, value: Any) -> NDArray[Any]:
     return array
 
 
-def shown(value: Any) -> str:
+def shown(value: Any, form: Callable[[Any], str] = repr) -> str:
     """Return a value in one line, cut if it is long."""
     try:
-        text = " ".join(repr(value).split())
+        text = " ".join(form(value).split())
     except ValueError:  # an integer of thousands of digits
-        text = f"a value of type {type(value).__name__}"
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
-
-
-def number(value: Any) -> str:
-    """Return a number as text, or its kind if it has too many digits."""
-    try:
-        text = str(value)
-    except ValueError:
         return "a number of thousands of digits"
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 

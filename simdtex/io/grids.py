@@ -241,11 +241,16 @@ def _of_title(title: str) -> list[str] | None:
     return list(match.groups()) if match else None
 
 
-def _all_numbers(words: Iterable[Any]) -> bool:
+def number_of(word: Any) -> float | None:
+    """Return the number that a word is, or None."""
     try:
-        return all(isfinite(float(word)) for word in words)
+        return float(word)
     except ValueError:
-        return False
+        return None
+
+
+def _all_numbers(words: Iterable[Any]) -> bool:
+    return all((found := number_of(word)) is not None and isfinite(found) for word in words)
 
 
 def _parsed(file: BinaryIO, count: int, what: str, line: int) -> NDArray[np.float64]:
@@ -260,7 +265,7 @@ def _parsed(file: BinaryIO, count: int, what: str, line: int) -> NDArray[np.floa
             found[at : at + len(words)] = list(map(float, words))
         except ValueError:
             for number, row in enumerate(lines, line):
-                wrong = next((word for word in row.split() if not _is_number(word)), None)
+                wrong = next((word for word in row.split() if number_of(word) is None), None)
                 if wrong is not None:
                     raise ValueError(f"line {number} has {_text(wrong)[:40]!r}, not a number: correct it") from None
         at += len(words)
@@ -272,14 +277,6 @@ def _parsed(file: BinaryIO, count: int, what: str, line: int) -> NDArray[np.floa
             "it ends without the end of a line, as if it were cut short: get it again, or add the end of the line"
         )
     return found
-
-
-def _is_number(word: bytes) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _apart(names: list[str]) -> list[str]:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from simdtex.io.grids import MISSING, frame
+from simdtex.io.grids import MISSING, frame, number_of
 from simdtex.io.image import cast
 from simdtex.io.limits import BYTES, read_npy, reading
 from simdtex.options import check_real, one_of
@@ -129,7 +129,7 @@ def _parsed(text: Iterable[str]) -> HardData:
             f"line {rows[0][0]} has {columns} cell{'s' * (columns != 1)}: give x, y and one value or more, with "
             "commas, semicolons, tabs or blanks between them"
         )
-    if all(cell[:1].isalpha() and _number(cell) is None for cell in rows[0][1][:2]):
+    if all(cell[:1].isalpha() and number_of(cell) is None for cell in rows[0][1][:2]):
         names = rows.pop(0)[1]
         _check_order(names)
     if not rows:
@@ -162,7 +162,7 @@ def _of_rows(rows: Sequence[tuple[int, list[str]]], columns: int, names: Sequenc
     table = np.empty((len(rows), columns))
     for k, (number, cells) in enumerate(rows):
         for column, cell in enumerate(cells):
-            value = np.nan if not cell and column >= axes else _number(cell)
+            value = np.nan if not cell and column >= axes else number_of(cell)
             if value is None:
                 raise ValueError(
                     f"line {number} has {cell[:40]!r} in column {column + 1}, which is no number: write numbers with a "
@@ -181,13 +181,6 @@ def _cells(line: str, number: int, delimiter: str | None) -> list[str]:
     except csv.Error as error:
         raise ValueError(f"line {number} cannot be split into cells ({error}): check its quotation marks") from None
     return [cell.strip() for cell in cells]
-
-
-def _number(cell: str) -> float | None:
-    try:
-        return float(cell)
-    except ValueError:
-        return None
 
 
 def _check_order(header: Sequence[str]) -> None:
