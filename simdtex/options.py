@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
+from importlib.util import find_spec
 from math import isfinite, prod
 from numbers import Integral, Real
 from textwrap import wrap
@@ -326,6 +327,13 @@ def real(
         )
     if float(value) > most or (below and value == most):
         raise ValueError(f"{name} is {shown(value, str)}; give {'a number below' if below else 'at most'} {most:g}")
+
+
+def require(extra: str, *libraries: str) -> None:
+    """Raise unless the libraries are installed, which an extra of the package brings."""
+    for library in libraries:
+        if find_spec(library) is None:
+            raise ValueError(f"{library} is not installed; pip install 'simdtex[{extra}]'")
 
 
 def unmasked(name: str, value: Any) -> None:

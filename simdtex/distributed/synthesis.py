@@ -25,7 +25,7 @@ from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.plan import plan as planned_run
 from simdtex.model.source_map import apply_source_map
-from simdtex.options import resolve
+from simdtex.options import require, resolve
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
@@ -126,7 +126,7 @@ def synthesize(
     inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
     run, seed = _plan(inputs, size, options), as_seed(rng)
     layout, more = planned(run, seed, tiles), _maps(maps or {}, run)
-    _libraries()
+    require("distributed", "zarr", "dask")
     from simdtex.distributed.cluster import check_workers, connected
     from simdtex.distributed.store import Store
 
@@ -268,7 +268,7 @@ def _made(store: PathLike) -> Iterator[str]:
 
 def _opened(path: PathLike) -> Any:
     """Open a store; raise ValueError unless this version can go on with it."""
-    _libraries()
+    require("distributed", "zarr", "dask")
     from simdtex.distributed.store import FORMAT, Store
 
     where = os.path.abspath(path)
@@ -317,14 +317,6 @@ def _mending(store: Any) -> Iterator[None]:
         if again is None:
             raise ValueError(f"{wrong}, and nothing makes it again; remove the store and begin anew") from None
         raise ValueError(f"{wrong}; {again} with: simdtex resume {where}") from None
-
-
-def _libraries() -> None:
-    try:
-        for name in ("zarr", "dask.array"):
-            import_module(name)
-    except ImportError as error:
-        raise ValueError(f"{error.name} is not installed; pip install 'simdtex[distributed]'") from None
 
 
 def _array(where: str, channel_axis: int | None) -> Any:

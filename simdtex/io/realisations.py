@@ -11,7 +11,6 @@ import json
 import os
 import warnings
 from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +19,7 @@ import numpy as np
 from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable, check_target
 from simdtex.io.grids import SUFFIXES, CartesianGrid, write_grid
 from simdtex.io.limits import check_array, reading
+from simdtex.options import require
 
 if TYPE_CHECKING:
     from xarray import DataArray, Dataset
@@ -53,9 +53,7 @@ def check_realisations_path(path: PathLike, *, source: bool = False) -> str:
         raise ValueError(f"{target} names no format of realisations: end its name in one of {', '.join(_NEEDED)}")
     if source and suffix in SUFFIXES:
         raise ValueError(f"{target} is a grid, which holds no source map: end its name in .zarr, .nc or .npz")
-    for library in _NEEDED[suffix]:
-        if find_spec(library) is None:
-            raise ValueError(f"{library} is not installed; pip install 'simdtex[simulate]'")
+    require("simulate", *_NEEDED[suffix])
     if suffix == ".zarr" and target.is_dir():
         if not _own(target):
             raise ValueError(
@@ -158,9 +156,7 @@ def read_netcdf(path: PathLike, *, max_pixels: int | None = None) -> CartesianGr
         The file is missing, damaged, too large, or has no such variable, or a library is not installed.
     """
     name = os.fspath(path)
-    for library in _NEEDED[".nc"]:
-        if find_spec(library) is None:
-            raise ValueError(f"{library} is not installed; pip install 'simdtex[simulate]'")
+    require("simulate", *_NEEDED[".nc"])
     import xarray
 
     with (

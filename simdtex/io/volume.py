@@ -19,7 +19,7 @@ import tifffile
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io import image
-from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable
+from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable, earlier_files
 from simdtex.io.decode import native
 from simdtex.io.image import FLOATS, INTEGERS, Format, check_holds
 from simdtex.io.limits import check_array, read_npy, reading
@@ -54,14 +54,11 @@ def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int
             f"{target} ends in {target.suffix}: end its name in one of {', '.join(sorted(filter(None, _FORMATS)))}, "
             "or give a name without suffix for a folder of PNG slices"
         )
-    if not suffix and os.path.isdir(target):
-        if any(not _SLICE.fullmatch(name) for name in os.listdir(target)):
-            raise ValueError(f"{target} is a folder with other files in it: give a new name for the folder of slices")
-        check_folder_writable(target)
-    else:
+    if suffix:
         image.check_writable(target, suffixes=(suffix,))
-        if not suffix and target.exists():
-            raise ValueError(f"{target} is a file: give another name for the folder of slices, or a suffix")
+    else:
+        earlier_files(target, "the slices", lambda name: bool(_SLICE.fullmatch(name)))
+        check_folder_writable(target)
     other = next(one for one in (".nrrd", ".tif", ".npz") if _FORMATS[one].holds(dtype, channels))
     check_holds(target, _FORMATS, dtype, channels, other)
 
