@@ -240,7 +240,7 @@ BAD = {
     "infinite": ({"sample": at(FLOAT, (2, 3), -np.inf)}, ValueError, "infinite, the first at row 2, column 3"),
     "NaN": ({"sample": FLOAT * np.nan}, ValueError, "a sample has no known pixel; leave it out"),
     "two types": ({"sample": [GREY, FLOAT]}, ValueError,
-                  "sample 1 has 1 channels of float64 and sample 0 1 channels of uint8; give samples of one type"),
+                  "sample 1 has 1 channel of float64 and sample 0 1 channel of uint8; convert them to one type"),
     # masks
     "a mask of numbers": ({"mask": MASK.astype(int)}, TypeError, "mask holds int64 values; give True and False"),
     "a mask of another size": ({"mask": MASK.T}, ValueError, "mask is 10x9 and the picture 9x10 .*; give one size"),

@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.command import DATA, OUTPUTS
-from simdtex.cli.inputs import Material, channels, check_alike, read_material, read_pixels, size
+from simdtex.cli.inputs import Material, channels, planes, read_material, read_pixels, size
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import given, option, report_option
 from simdtex.cli.places import READ, READ_NAMED, WRITE
+from simdtex.model.pictures import check_alike
 
 FITS = (".tif", ".tiff", ".npy")
 
@@ -146,7 +147,7 @@ def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[st
             gone = np.zeros(pixels.shape[:2], bool)
             if channels(pixels) == channels(picture.array) + 1:
                 pixels, gone = split_alpha(pixels)
-            check_alike(Path(file), pixels, picture.paths[0], picture.array)
+            check_alike(file, planes(pixels), str(picture.paths[0]), planes(picture.array))
             pixels = pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:])
             hidden = np.broadcast_to(gone.reshape(*gone.shape, *[1] * (pixels.ndim - 2)), pixels.shape)
             found[name].append(np.ma.MaskedArray(pixels, hidden))

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.ending import note
+from simdtex.model.pictures import check_alike
 
 if TYPE_CHECKING:
     from simdtex.io.grids import Frame
@@ -87,26 +88,19 @@ class Also(NamedTuple):
         return apply_source_map(source, self.maps.array, self.maps.sizes if self.maps.several else self.maps.sizes[0])
 
 
+def planes(pixels: NDArray[Any]) -> NDArray[Any]:
+    """Return a picture (rows, cols) or (rows, cols, channels) as the latter."""
+    return pixels[..., None] if pixels.ndim == 2 else pixels
+
+
 def channels(pixels: NDArray[Any]) -> int:
     """Return the number of channels of a picture (rows, cols) or (rows, cols, channels)."""
-    return 1 if pixels.ndim == 2 else pixels.shape[2]
+    return int(planes(pixels).shape[2])
 
 
 def size(pixels: NDArray[Any]) -> str:
     """Return width x height as text."""
     return f"{pixels.shape[1]}x{pixels.shape[0]}"
-
-
-def kind(pixels: NDArray[Any]) -> str:
-    """Return channels and type as text."""
-    count = channels(pixels)
-    return f"{count} channel{'s' * (count != 1)} of {pixels.dtype}"
-
-
-def check_alike(path: Path, pixels: NDArray[Any], other: Path, like: NDArray[Any]) -> None:
-    """Raise unless two pictures have the same type and as many channels."""
-    if (pixels.dtype, channels(pixels)) != (like.dtype, channels(like)):
-        raise ValueError(f"{path} has {kind(pixels)} and {other} {kind(like)}; convert them to one type")
 
 
 def note_lossy(path: Path, pixels: NDArray[Any]) -> None:
@@ -219,7 +213,7 @@ def read_also(texts: Sequence[str], samples: Material, *, files: bool = True) ->
         paths, out = read_pair("--also", "MAP=OUT", text, samples)
         maps = read_material(paths)
         for path, pixels, of, sample in zip(maps.paths, maps.pixels, samples.paths, samples.pixels, strict=True):
-            check_alike(path, pixels, maps.paths[0], maps.pixels[0])
+            check_alike(str(path), planes(pixels), str(maps.paths[0]), planes(maps.pixels[0]))
             if pixels.shape[:2] != sample.shape[:2]:
                 raise ValueError(
                     f"{path} is {size(pixels)} and {of} {size(sample)}; give --also a map of the sample's size"

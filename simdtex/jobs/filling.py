@@ -25,7 +25,7 @@ from simdtex.model.explanation import Explanation
 from simdtex.model.given import Given
 from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
-from simdtex.model.pictures import Mask, Pictures
+from simdtex.model.pictures import Mask, Pictures, check_alike
 from simdtex.options import resolve, whole, within_32_bits
 from simdtex.run import Callback, Output
 
@@ -502,7 +502,9 @@ def filling(
         raise ValueError("nothing of the picture is known; give a mask that is False (black) where it is to be kept")
     if reach is not None:
         whole("reach", reach, 1)
-    given = None if sample is None else _check_sample(sample, channel_axis, pixels)
+    given = None if sample is None else check_samples(sample, channel_axis)
+    if given:
+        check_alike("the sample", given.pixels[0], "the picture", pixels)
     chosen = resolve(Options, "fill", options)
     return Filling(pixels, hole, given, reach, chosen)
 
@@ -578,14 +580,3 @@ def _pasting(
         )
 
     return seen
-
-
-def _check_sample(sample: Any, channel_axis: int | None, pixels: NDArray[Any]) -> Pictures:
-    pictures = check_samples(sample, channel_axis)
-    one = pictures.pixels[0]
-    if one.dtype != pixels.dtype or one.shape[2] != pixels.shape[2]:
-        raise ValueError(
-            f"the sample has {one.shape[2]} channels of {one.dtype} and the picture {pixels.shape[2]} of "
-            f"{pixels.dtype}; give both one type"
-        )
-    return pictures

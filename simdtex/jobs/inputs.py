@@ -16,7 +16,7 @@ from simdtex.io.image import AXES, as_array, cast, check_sample, pixels_of
 from simdtex.machine import memory
 from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair
-from simdtex.model.pictures import Mask, Pictures, unknown_in
+from simdtex.model.pictures import Mask, Pictures, check_alike, unknown_in
 from simdtex.options import check_real, unmasked
 
 Placing = Callable[..., "np.ma.MaskedArray[Any, Any]"]
@@ -76,9 +76,7 @@ def check_samples(sample: Any, channel_axis: int | None, mask: Any = None, axes:
         raise ValueError(f"the samples have {counts} axes; give samples of one type, grey or colour")
     pixels, unknown = zip(*(check_picture(one, channel_axis, axes) for one in arrays), strict=True)
     for number, picture in enumerate(pixels[1:], 1):
-        if picture.dtype != pixels[0].dtype or picture.shape[-1] != pixels[0].shape[-1]:
-            types = [f"{one.shape[-1]} channels of {one.dtype}" for one in (picture, pixels[0])]
-            raise ValueError(f"sample {number} has {types[0]} and sample 0 {types[1]}; give samples of one type")
+        check_alike(f"sample {number}", picture, "sample 0", pixels[0])
     if mask is None:
         return Pictures(pixels, unknown)
     masks = list(mask) if several and np.iterable(mask) else [mask]
