@@ -126,7 +126,7 @@ def test_known_values_with_nan_are_taken():
         (PIL.Image.fromarray(RGB).quantize(4), r"palette indices, which are no colours; give image\.convert\('RGB'\)"),
         (pandas.DataFrame(GREY).astype("Int64"), "holds object values; convert it"),
         (xarray.DataArray(GREY).to_dataset(name="a"), "no array that NumPy can take: .*Dataset"),
-        ("sample.png", "values: convert it"),
+        ("sample.png", "values; convert it"),
     ],
     ids=["GPU", "gradient", "palette", "nullable", "dataset", "path"],
 )

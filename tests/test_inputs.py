@@ -250,7 +250,7 @@ BAD = {
     # known values
     "data of another number": ({"known": HardData(np.ones((1, 2)), np.ones((1, 2)), ("a", "b"))}, ValueError,
                                "a datum has 2 values and a pixel of the sample 1; give as many"),
-    "known words": ({"known": SOME.astype(str)}, TypeError, "known holds <U.* give integers or real floats"),
+    "known words": ({"known": SOME.astype(str)}, TypeError, "known holds <U.* convert it to integers or real floats"),
     "known ragged": ({"known": [[1, 2], [3]]}, ValueError, "known is ragged; give rows of equal length"),
     "known in colour": ({"known": np.dstack([SOME] * 3)}, ValueError, r"known is 3-dimensional; give \(rows, cols\)"),
     "known grey": ({"sample": COLOUR, "channel_axis": -1, "known": SOME}, ValueError,
@@ -278,7 +278,7 @@ BAD = {
     "no pair": ({"guide": GREY}, TypeError, "guide is no pair; give .guide of the sample, guide of the output"),
     "guides in words": ({"guide": (GREY.astype(str), GREY)}, TypeError, "the guide of the sample holds"),
     "ragged guides": ({"guide": ([[1, 2], [3]], GREY)}, ValueError, "the guide of the sample is ragged"),
-    "an empty guide": ({"guide": (GREY, GREY[:0])}, ValueError, "the guide of the output is 2-dimensional"),
+    "an empty guide": ({"guide": (GREY, GREY[:0])}, ValueError, "the guide of the output has the shape .0, 10."),
     "an infinite guide": ({"guide": (FLOAT + np.inf, SOME)}, ValueError, "guide of the sample has infinite values"),
     "a guide with NaN": ({"guide": (at(FLOAT, (1, 1), np.nan), SOME)}, ValueError, "guide of the sample has NaN; give"),
     "a small guide": ({"guide": (GREY[:5], GREY[:6, :7])}, ValueError,
