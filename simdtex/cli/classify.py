@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.command import DATA, OUTPUTS
-from simdtex.cli.inputs import Material, channels, planes, read_material, read_pixels, size
+from simdtex.cli.inputs import Material, channels, masked, planes, read_material, read_pixels, size, without_alpha
 from simdtex.cli.job import Task, command_line, job
 from simdtex.cli.options import given, option, report_option
 from simdtex.cli.places import READ, READ_NAMED, WRITE
@@ -132,8 +132,6 @@ def classify(
 
 def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[str, list[NDArray[Any]]]:
     """Read the samples of classes, ``NAME=FILE`` or ``NAME=FILE0,FILE1``, masked where they are transparent."""
-    from simdtex.io.image import split_alpha
-
     found: dict[str, list[NDArray[Any]]] = {}
     for text in texts:
         name, equals, files = text.partition("=")
@@ -144,13 +142,9 @@ def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[st
         found[name] = []
         for file in files.split(","):
             pixels = read_pixels(Path(file))[0]
-            gone = np.zeros(pixels.shape[:2], bool)
-            if channels(pixels) == channels(picture.array) + 1:
-                pixels, gone = split_alpha(pixels)
+            pixels, gone = without_alpha(pixels, channels(picture.array))
             check_alike(file, planes(pixels), str(picture.paths[0]), planes(picture.array))
-            pixels = pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:])
-            hidden = np.broadcast_to(gone.reshape(*gone.shape, *[1] * (pixels.ndim - 2)), pixels.shape)
-            found[name].append(np.ma.MaskedArray(pixels, hidden))
+            found[name].append(masked(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]), gone))
     return found
 
 

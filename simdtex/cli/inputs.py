@@ -103,6 +103,19 @@ def size(pixels: NDArray[Any]) -> str:
     return f"{pixels.shape[1]}x{pixels.shape[0]}"
 
 
+def without_alpha(pixels: NDArray[Any], count: int) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return a picture without the alpha that pictures of so many channels lack, and where it is transparent."""
+    from simdtex.io.image import split_alpha
+
+    return split_alpha(pixels) if channels(pixels) == count + 1 else (pixels, np.zeros(pixels.shape[:2], bool))
+
+
+def masked(pixels: NDArray[Any], gone: NDArray[np.bool_]) -> np.ma.MaskedArray[Any, Any]:
+    """Return a picture that is masked in all channels where it is gone."""
+    hidden = gone.reshape(*gone.shape, *[1] * (pixels.ndim - 2))
+    return np.ma.MaskedArray(pixels, np.broadcast_to(hidden, pixels.shape))
+
+
 def note_lossy(path: Path, pixels: NDArray[Any]) -> None:
     """Say so if the format of an output changes pixels that are to stay as they are."""
     from simdtex.io.image import LOSSY, suitable_suffix
@@ -314,19 +327,14 @@ def read_known(path: Path, samples: Material) -> HardData | np.ma.MaskedArray[An
 
     Or, of a volume, a volume. A picture is unknown where it is transparent, if it has alpha and the samples have none.
     """
-    from simdtex.io import grids, image
+    from simdtex.io import grids
     from simdtex.io.hard_data import read_hard_data
 
     if path.suffix.lower() in TABLES or grids.kind_of(path) == "points":
         return read_hard_data(path)
-    (values, lies, metadata), gone = read_pixels(path, samples.deep), None
+    values, lies, metadata = read_pixels(path, samples.deep)
     check_profiles([samples.paths[0], path], [samples.metadata, metadata])
     if values.ndim == 4:
         return np.ma.MaskedArray(values[..., 0] if values.shape[-1] == 1 else values)
-    if lies is None and channels(values) == channels(samples.pixels[0]) + 1:
-        values, gone = image.split_alpha(values)
-    if channels(values) == 1:
-        values = values.reshape(values.shape[:2])
-    if gone is None:
-        return np.ma.MaskedArray(values)
-    return np.ma.MaskedArray(values, np.broadcast_to(gone.reshape(*gone.shape, *[1] * (values.ndim - 2)), values.shape))
+    values, gone = without_alpha(values, channels(values if lies else samples.pixels[0]))  # a grid has no alpha
+    return masked(values.reshape(values.shape[:2]) if channels(values) == 1 else values, gone)
