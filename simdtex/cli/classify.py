@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from simdtex.cli.command import DATA, OUTPUTS
 from simdtex.cli.inputs import Material, channels, masked, planes, read_material, read_pixels, size, without_alpha
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import given, option, report_option
+from simdtex.cli.options import given, option, reads, report_option
 from simdtex.cli.places import READ, READ_NAMED, WRITE
 from simdtex.model.pictures import check_alike
 
@@ -45,12 +45,8 @@ UNLABELLED = 255
     help="Learn the class NAME from this sample; give one for each class, NAME=FILE0,FILE1 for several samples. "
     "Transparent pixels are not used.",
 )
-@option(
-    "--strokes",
-    type=READ,
-    metavar="FILE",
-    group=DATA,
-    help="Learn the classes from strokes with the values 1, 2... in this picture, of the size of PICTURE.",
+@reads(
+    "--strokes", help="Learn the classes from strokes with the values 1, 2... in this picture, of the size of PICTURE."
 )
 @option(
     "--validation",
@@ -60,13 +56,7 @@ UNLABELLED = 255
     group=DATA,
     help="Measure with this picture of a class how much the class varies.",
 )
-@option(
-    "--truth",
-    type=READ,
-    metavar="FILE",
-    group=DATA,
-    help="Compare with these labels; 255 is unknown.",
-)
+@reads("--truth", help="Compare with these labels; 255 is unknown.")
 @option(
     "--confidence",
     type=WRITE,

@@ -162,7 +162,7 @@ def fill(
     >>> bool((filled[~hole] == gravel[~hole]).all())
     True
     """
-    job = filling(image, mask, sample=sample, reach=reach, channel_axis=channel_axis, **options)
+    job = filling(image, mask, sample, reach, channel_axis, options)
     return execute("fill", job.run, job.inputs, channel_axis, rng, device, callback, full_output, checkpoint)
 
 
@@ -233,9 +233,8 @@ def extend(
     >>> simdtex.extend(grass, right=16, bottom=8, rng=1).shape
     (72, 80)
     """
-    plan, inputs = extension(
-        image, channel_axis, top=top, bottom=bottom, left=left, right=right, seamless=seamless, band=band, **options
-    )
+    sides = {"top": top, "bottom": bottom, "left": left, "right": right}
+    plan, inputs = extension(image, channel_axis, sides, seamless, band, options)
     return execute(
         "extend", partial(drive, plan), lambda: inputs, channel_axis, rng, device, callback, full_output, checkpoint
     )
@@ -244,24 +243,21 @@ def extend(
 def extension(
     image: ArrayLike,
     channel_axis: int | None,
-    *,
-    top: int = 0,
-    bottom: int = 0,
-    left: int = 0,
-    right: int = 0,
-    seamless: bool | str = False,
-    band: int | None = None,
-    **options: Any,
+    sides: dict[str, int],
+    seamless: bool | str,
+    band: int | None,
+    options: dict[str, Any],
 ) -> tuple[mrf.Plan, dict[str, Any]]:
     """Return the plan of a run of `extend`, and its input by the names that users give it."""
     pixels = check_sample(image, channel_axis)
     rows, cols = pixels.shape[:2]
-    for name, value in {"top": top, "bottom": bottom, "left": left, "right": right}.items():
+    for name, value in sides.items():
         whole(name, value, 0)
+    top, bottom, left, right = sides.values()
     if seamless not in (True, False, "x", "y"):
         raise ValueError(f'seamless is {seamless!r}; give True, False, "x" or "y"')
     tall, wide = seamless in (True, "y"), seamless in (True, "x")
-    if not (seamless or top or bottom or left or right):
+    if not (seamless or any(sides.values())):
         raise ValueError("there is nothing to add; give top, bottom, left or right, or seamless=True")
     width = min(64, max(8, min(rows, cols) // 8)) if band is None else band
     whole("band", width, 1)
@@ -280,7 +276,6 @@ def extension(
     if "boundary" in options:
         raise ValueError("the boundary of what is extended follows from seamless; leave boundary out")
     chosen = resolve(Options, "extend", {"boundary": "torus" if seamless else "open"} | options)
-    sides = {"top": top, "bottom": bottom, "left": left, "right": right, "seamless": seamless, "band": width}
     place = np.full((*hole.shape, 2), -1, np.int32)
     place[top : top + rows, left : left + cols] = np.moveaxis(np.indices((rows, cols)), 0, -1)
     place[hole] = -1
@@ -290,7 +285,8 @@ def extension(
     if not seamless and _has_tones(chosen, pictures):
         corner = (np.nan if top or bottom else 0, np.nan if left or right else 0)  # rows for rows, columns for columns
         guide = Surroundings(pixels, np.ones((rows, cols), bool), canvas, ~hole, corner)
-    return mrf.plan(pictures, canvas.shape[:2], chosen, given, guide), {"options": chosen, "image": pixels, **sides}
+    inputs = {"options": chosen, "image": pixels, **sides, "seamless": seamless, "band": width}
+    return mrf.plan(pictures, canvas.shape[:2], chosen, given, guide), inputs
 
 
 class Made(NamedTuple):
@@ -486,12 +482,11 @@ class HoleReplay:
 
 def filling(
     image: ArrayLike,
-    mask: ArrayLike | None = None,
-    *,
-    sample: ArrayLike | None = None,
-    reach: int | None = None,
-    channel_axis: int | None = None,
-    **options: Any,
+    mask: ArrayLike | None,
+    sample: ArrayLike | None,
+    reach: int | None,
+    channel_axis: int | None,
+    options: dict[str, Any],
 ) -> Filling:
     """Return the job of `fill`, which has the same parameters; raise ValueError or TypeError if one is invalid."""
     pixels, hole = check_picture(image, channel_axis)
