@@ -7,14 +7,13 @@ import os
 from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from importlib import import_module
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from simdtex.checkpoint import warn
+from simdtex.checkpoint import check_version, warn
 from simdtex.distributed.layout import Layout, Maps, further, planned
 from simdtex.driver import check_shape, drive
 from simdtex.io.atomic import Damaged, NotWritten, atomic_folder, exclusive
@@ -283,17 +282,8 @@ def _opened(path: PathLike) -> Any:
     if not os.path.isdir(os.path.join(where, "work")):
         raise ValueError(f"{where} is no output in tiles; give one that simdtex has begun")
     with _mending(store):
-        about, own = store.about, version("simdtex")
-    if about["format"] != FORMAT:
-        raise ValueError(
-            f"{where} has format {about['format']} and this simdtex reads {FORMAT}; "
-            f"go on with the code of simdtex {about['version']} that began it, or begin anew"
-        )
-    if about["version"] != own:
-        raise ValueError(
-            f"{where} was begun by simdtex {about['version']} and this is {own}, whose results may differ; "
-            "go on with that version, or begin anew"
-        )
+        about = store.about
+    check_version(where, about, FORMAT)
     return store
 
 
