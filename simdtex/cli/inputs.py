@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,13 +66,6 @@ class Material(NamedTuple):
     def known(self) -> bool:
         """Whether nothing is NaN."""
         return all(array.dtype.kind != "f" or not np.isnan(array).any() for array in self.pixels)
-
-
-class Writes(Protocol):
-    """What writes a picture with what its file says of it, and other maps in its arrangement."""
-
-    def write(self, made: NDArray[Any], run: Any, metadata: Metadata | None) -> None:
-        """Write all files, or none."""
 
 
 class Also(NamedTuple):
@@ -238,11 +231,11 @@ def read_also(texts: Sequence[str], samples: Material, *, files: bool = True) ->
 
 
 def write_arranged(
-    output: Path | Writes, others: Sequence[Also], source_map: Path | None, metadata: Metadata | None
+    output: Path | Callable[..., object], others: Sequence[Also], source_map: Path | None, metadata: Metadata | None
 ) -> list[Callable[[Any, Any], object]]:
     """Return functions that write a picture, the other maps in its arrangement, and the source map if it has a file.
 
-    ``metadata`` is written with the picture; `output` is its file, or an object that writes it and others.
+    ``metadata`` is written with the picture; ``output`` is its file, or ``output(made, run, metadata)`` writes it.
     """
     from simdtex.io import image
     from simdtex.model.source_map import save_source_map
@@ -251,11 +244,9 @@ def write_arranged(
         if isinstance(output, Path):
             image.write(output, made, metadata)
         else:
-            output.write(made, run, metadata)
+            output(made, run, metadata)
 
-    writers: list[Callable[[Any, Any], object]] = [write]
-    for one in others:
-        writers.append(partial(_write_map, one))
+    writers: list[Callable[[Any, Any], object]] = [write, *(partial(_write_map, one) for one in others)]
     if source_map:
         writers.append(lambda made, run: save_source_map(source_map, run.source))
     return writers

@@ -46,15 +46,11 @@ def max_pixels_or_default(max_pixels: int | None) -> int:
     return int(text)
 
 
-def check_size(pixels: int, unpacked: int, most: int) -> None:
-    """Raise TooLarge if a file has more pixels than `most`, or unpacks to more bytes than `most` pixels may have."""
-    for count, what, limit in ((pixels, "pixels", most), (unpacked, "bytes", BYTES * most)):
+def check_size(pixels: int, unpacked: int, most: int, each: int = BYTES) -> None:
+    """Raise TooLarge if a file has more pixels than `most`, or unpacks to more than `each` bytes for so many pixels."""
+    for count, what, limit in ((pixels, "pixels", most), (unpacked, "bytes", each * most)):
         if count > limit:
-            raise TooLarge(_beyond(count, what, limit))
-
-
-def _beyond(count: int, what: str, limit: int) -> str:
-    return f"has {count} {what} and no more than {limit} are read: crop it, or set {VARIABLE} higher"
+            raise TooLarge(f"has {count} {what} and no more than {limit} are read: crop it, or set {VARIABLE} higher")
 
 
 def check_array(shape: Iterable[int], itemsize: int, most: int) -> None:
@@ -63,8 +59,8 @@ def check_array(shape: Iterable[int], itemsize: int, most: int) -> None:
     check_size(prod(sides[:2]), prod(sides) * itemsize, most)
 
 
-def check_file(name: str, what: str, largest: int) -> None:
-    """Raise unless a path is a regular file of so many bytes at most; `what` names it, for example ``"the image"``."""
+def size_of_file(name: str, what: str) -> int:
+    """Return the bytes of a file; raise unless it is a regular one; `what` names it, for example ``"the image"``."""
     try:
         found = os.stat(name)
     except FileNotFoundError:
@@ -75,8 +71,7 @@ def check_file(name: str, what: str, largest: int) -> None:
         raise ValueError(f"{name} is a folder: give the path of {what}, which is a file in it")
     if not stat.S_ISREG(found.st_mode):
         raise ValueError(f"{name} is not a regular file: give the path of {what}")
-    if found.st_size > largest:
-        raise ValueError(f"{name} {_beyond(found.st_size, 'bytes', largest)}")
+    return found.st_size
 
 
 @contextmanager
@@ -87,8 +82,9 @@ def reading(path: PathLike, what: str, max_pixels: int | None, *, each: int = BY
     any error is one of a library that finds the file damaged, which is no ``kind`` then.
     """
     name, most = os.fspath(path), max_pixels_or_default(max_pixels)
-    check_file(name, what, most * each)
+    size = size_of_file(name, what)
     try:
+        check_size(0, size, most, each)
         yield most
     except TooLarge as error:
         raise ValueError(f"{name} {error}") from None
