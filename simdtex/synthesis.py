@@ -366,9 +366,8 @@ def replay(
     """
     size = check_shape(shape)
     given = {name: arguments.pop(name) for name in GIVEN if name in arguments}
-    axis = given.get("channel_axis")
     inputs = check_inputs(sample, size, **given)
-    chosen: Any = resolve(mrf.Options, "synth", with_channels_last(arguments, axis))
+    chosen: Any = resolve(mrf.Options, "synth", arguments)
     plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
     return Replay(plan, open_machine(device), as_seed(rng))
 
