@@ -20,8 +20,7 @@ from matplotlib.figure import Figure as Plot
 from numpy.typing import NDArray
 
 from simdtex import __version__
-from simdtex.io.atomic import atomic_folder
-from simdtex.report.folder import earlier_files
+from simdtex.io.atomic import atomic_folder, earlier_files
 from simdtex.report.plots import figure_png
 from simdtex.report.sheet import encoded
 from simdtex.report.tables import Table, warns

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.driver import Call, check_shape, drive, execute, with_channels_last
+from simdtex.checkpoint import Checkpoint
+from simdtex.driver import check_shape, drive, execute, with_channels_last
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, memory
 from simdtex.methods.pyramid import algorithm as pyramid
@@ -27,22 +29,12 @@ from simdtex.run import Callback, Output
 if TYPE_CHECKING:
     from typing import Unpack
 
-    from simdtex.methods.typed_options import PyramidOptions
+    from simdtex.methods.typed_options import MixOptions
 
 
 @overload
 def mix(
-    samples: Sequence[ArrayLike],
-    shape: tuple[int, int],
-    *,
-    palette: int | None = ...,
-    pattern: int | None = ...,
-    average: Sequence[float] | None = ...,
-    low: int | None = ...,
-    high: int | None = ...,
-    split: int | None = ...,
-    full_output: Literal[True],
-    **options: Unpack[PyramidOptions],
+    samples: Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[MixOptions]
 ) -> tuple[NDArray[Any], Output]: ...
 
 
@@ -51,14 +43,8 @@ def mix(
     samples: Sequence[ArrayLike],
     shape: tuple[int, int],
     *,
-    palette: int | None = ...,
-    pattern: int | None = ...,
-    average: Sequence[float] | None = ...,
-    low: int | None = ...,
-    high: int | None = ...,
-    split: int | None = ...,
     full_output: Literal[False] = ...,
-    **options: Unpack[PyramidOptions],
+    **options: Unpack[MixOptions],
 ) -> NDArray[Any]: ...
 
 
@@ -77,7 +63,7 @@ def mix(
     device: str | Machine | None = None,
     callback: Callback | None = None,
     full_output: bool = False,
-    checkpoint: Any = None,
+    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
     """Mix several textures into one, by pyramid matching.
@@ -141,8 +127,17 @@ def mix(
     chosen = resolve(Options, "mix", with_channels_last(options, channel_axis))
     sides = None if low is None or high is None else (low, high, split)
     plan = Mixture(pictures, size, chosen, weights, sides, palette)
-    call = Call(rng, device, callback, full_output, checkpoint)
-    return execute("mix", partial(drive, plan), lambda: dict(vars(plan)), channel_axis, call)
+    return execute(
+        "mix",
+        partial(drive, plan),
+        lambda: dict(vars(plan)),
+        channel_axis,
+        rng,
+        device,
+        callback,
+        full_output,
+        checkpoint,
+    )
 
 
 @dataclass(frozen=True)
