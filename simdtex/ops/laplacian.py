@@ -15,11 +15,6 @@ from numpy.typing import NDArray
 from simdtex.machine.interface import Array, Launcher, Operation
 
 
-def sizes(*numbers: int) -> tuple[np.int32, ...]:
-    """Return numbers as a kernel takes them."""
-    return tuple(np.int32(n) for n in numbers)
-
-
 def half(shape: tuple[int, ...]) -> tuple[int, int]:
     """Return rows and columns of the level above a level of this shape."""
     return -(-shape[0] // 2), -(-shape[1] // 2)
@@ -72,9 +67,9 @@ def _up(machine: Launcher, kernel: str, each: float, band: Array, source: Array,
     rows, cols = source.shape
     fine = machine.empty((band.shape[0], rows, cols), np.int32)
     machine.launch(
-        machine.kernel("laplacian", kernel),
+        kernel,
         (rows * cols, band.shape[0]),
-        *(band, *sizes(*band.shape, torus), source, *sizes(rows, cols), coarse, *sizes(*coarse.shape[1:]), fine),
+        *(band, *band.shape, torus, source, rows, cols, coarse, *coarse.shape[1:], fine),
     )
     return fine
 
@@ -92,9 +87,9 @@ def laplacian_reduce(machine: Launcher | None, fine: Array, torus: bool) -> Arra
     planes, rows, cols = fine.shape
     coarse = machine.empty((planes, *half((rows, cols))), np.int32)
     machine.launch(
-        machine.kernel("laplacian", "laplacian_reduce"),
+        "laplacian_reduce",
         (coarse.shape[1] * coarse.shape[2], planes),
-        *(fine, *sizes(planes, rows, cols, torus), coarse),
+        *(fine, planes, rows, cols, torus, coarse),
     )
     return coarse
 
@@ -106,11 +101,7 @@ def laplacian_band(machine: Launcher | None, fine: Array, coarse: Array, torus: 
     if machine is None:
         return (fine - _expanded(coarse, (rows, cols), (rows, cols), torus)).astype(np.int32)
     band = machine.empty(fine.shape, np.int32)
-    machine.launch(
-        machine.kernel("laplacian", "laplacian_band"),
-        (rows * cols, planes),
-        *(fine, coarse, *sizes(planes, rows, cols, torus), band),
-    )
+    machine.launch("laplacian_band", (rows * cols, planes), fine, coarse, planes, rows, cols, torus, band)
     return band
 
 
