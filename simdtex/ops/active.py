@@ -26,17 +26,6 @@ def survey(machine: Launcher | None, grid: Grid, temperature: Array) -> tuple[in
     return int(count), int(total)
 
 
-@Operation
-def total(machine: Launcher | None, grid: Grid, numbers: Array) -> int:
-    """Return the sum of an (H, W) int32 array over the sites of a grid."""
-    if machine is None:
-        return int(grid.view(numbers).sum(dtype=np.int64))
-    stretches = -(-grid.size // CHUNK)
-    sums = machine.empty((stretches,), np.int32)
-    machine.launch("active_total", (stretches,), grid.struct, numbers, CHUNK, stretches, sums)
-    return int(machine.get(sums).sum(dtype=np.int64))
-
-
 def stretches(starts: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Cut the groups of a list, which begin at ``starts``, into stretches of at most `CHUNK` sites.
 
