@@ -13,9 +13,6 @@ from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import Grid
 
-UNTOUCHED = 1024
-"""t = 1 in 1/1024: no relaxation has touched the site."""
-
 
 class Field(NamedTuple):
     """State of the relaxation.
