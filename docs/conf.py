@@ -51,14 +51,6 @@ autodoc_typehints = "none"  # the docstrings give types, shapes and units
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 
-# The page of the study shows each method's table and all the pictures that benchmarks/study.py has written:
-# name of the result -> table, beginning of the pictures' names.
-STUDIES = {
-    "study": ("mrf.csv", "mrf-"),
-    "study-exact": ("exact.csv", "exact-"),
-    "study-multires": ("multires.csv", "multires-"),
-    "study-pyramid": ("pyramid.csv", "pyramid-"),
-}
 (HERE / "generated").mkdir(exist_ok=True)
 
 # concepts/why.rst plays a recorded session of the live page; a page that is opened as a file cannot load a module.
@@ -68,14 +60,13 @@ STUDIES = {
 )
 (HERE / "generated" / "live" / "live.css").write_text(style(), encoding="utf-8")
 
-for result, (figures, prefix) in STUDIES.items():
-    others = tuple(other for _, other in STUDIES.values() if len(other) > len(prefix))
-    results = [f".. csv-table::\n   :file: ../study/{figures}\n   :header-rows: 1\n"]
-    for picture in sorted((HERE / "study").glob(f"{prefix}*.png")):
-        if not picture.name.startswith(others):
-            caption = picture.stem.removeprefix(prefix)
-            results.append(f".. figure:: /study/{picture.name}\n   :alt: {picture.stem}\n\n   {caption}\n")
-    (HERE / "generated" / f"{result}.txt").write_text("\n".join(results), encoding="utf-8")
+# The page of the study shows each table and all the pictures that benchmarks/study.py has written.
+for study in ("mrf", "exact", "multires", "pyramid"):
+    results = [f".. csv-table::\n   :file: ../study/{study}.csv\n   :header-rows: 1\n"]
+    for picture in sorted((HERE / "study").glob(f"{study}-*.png")):
+        caption = picture.stem.removeprefix(f"{study}-")
+        results.append(f".. figure:: /study/{picture.name}\n   :alt: {picture.stem}\n\n   {caption}\n")
+    (HERE / "generated" / f"study-{study}.txt").write_text("\n".join(results), encoding="utf-8")
 
 # The page of the schedules shows a few columns of what benchmarks/schedules.py has written: heading, form, factor.
 COST = {
