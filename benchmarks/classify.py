@@ -23,17 +23,14 @@ time         512x512 against five samples of 128x128 (by --side), seconds on the
 """
 
 import argparse
-import csv
-import sys
 import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import tables
 from baselines import FEATURES, probabilities
 from mosaics import accuracy, auroc, drawn, grey, own_fit, textures
-from rich.console import Console
-from rich.table import Table
 from skimage import data
 
 import simdtex
@@ -318,16 +315,9 @@ def main():
     for part in parts:
         began = time.perf_counter()
         header, rows = PARTS[part](bench)
-        shown = Table(title=f"{part}, {time.perf_counter() - began:.0f} s")
-        for column in header:
-            shown.add_column(column)
-        for row in rows:
-            shown.add_row(*map(str, row))
-        Console(width=None if sys.stdout.isatty() else 120).print(shown)
+        tables.show(f"{part}, {time.perf_counter() - began:.0f} s", header, rows)
         if options.out:
-            options.out.mkdir(parents=True, exist_ok=True)
-            with open(options.out / f"{part}.csv", "w", newline="", encoding="utf-8") as file:
-                csv.writer(file, lineterminator="\n").writerows([header, *rows])
+            tables.write(options.out / f"{part}.csv", header, rows)
 
 
 if __name__ == "__main__":

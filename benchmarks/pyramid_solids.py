@@ -7,10 +7,9 @@ Writes PNG files, the same bytes every time, and oblique.csv, and prints their n
 quotes. ``--quick`` runs all of it on small sizes.
 """
 
-import csv
-
 import numpy as np
 import samples
+import tables
 from pyramid_figures import COLOURS, main, moved, png, reduced
 from scipy.ndimage import map_coordinates
 from scipy.stats import wasserstein_distance
@@ -131,10 +130,7 @@ def oblique(making):
     figure.legend(
         *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9
     )
-    with open(making.out / "oblique.csv", "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["sample", "slices", *wanted, "mean", "worst slice"])
-        writer.writerows(lines)
+    tables.write(making.out / "oblique.csv", ["sample", "slices", *wanted, "mean", "worst slice"], lines)
     return figure_png(figure)
 
 

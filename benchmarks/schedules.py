@@ -10,11 +10,11 @@ more of them, what oscillates is told from what still settles.
 """
 
 import argparse
-import csv
 import time
 from pathlib import Path
 
 import samples
+from tables import write
 
 import simdtex
 from simdtex.experiments.comparison import FIGURES, compare
@@ -63,11 +63,8 @@ def main():
             figures = {figure: entry.figure(figure) for figure in FIGURES}
             cells = [cell for figure in FIGURES for cell in written(figures[figure])]
             lines.append([name, entry.name, "yes" if entry.independent else "no", *cells])
-    with open(options.table, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        heads = [head for figure in FIGURES for head in (figure.replace("_", " "), f"{figure.replace('_', ' ')} +-")]
-        writer.writerow(["sample", "schedule", "keeps (14)", *heads])
-        writer.writerows(lines)
+    heads = [head for figure in FIGURES for head in (figure.replace("_", " "), f"{figure.replace('_', ' ')} +-")]
+    write(options.table, ["sample", "schedule", "keeps (14)", *heads], lines)
 
 
 def written(spread):
