@@ -17,7 +17,7 @@ import numpy as np
 
 import simdtex
 from simdtex.experiments.ensemble import connectivity
-from simdtex.report.volumes import variogram
+from simdtex.experiments.ensemble.summary import variogram
 
 SHARE = 0.3
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -191,8 +190,6 @@ def _check_report(folder: Path, material: Material, shape: tuple[int, ...], know
         raise ValueError(f"--report requires {LEAST}x{LEAST} pixels or more; give a larger size, or leave it out")
     if any(np.fmax.reduce(np.abs(np.ma.getdata(one), dtype=np.float64), None) > LARGEST for one in given):
         raise ValueError(f"--report requires values up to {LARGEST:g}; give them in a larger unit, or leave it out")
-    if not material.deep and find_spec("gstools") is None:
-        raise ValueError("gstools is not installed; pip install 'simdtex[simulate]', or leave --report out")
     check_folder(folder)
 
 
