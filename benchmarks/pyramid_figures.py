@@ -386,10 +386,10 @@ MADE = {
 }
 
 
-def main(made, about):
+def main(made, about, folder="pyramid"):
     """Make figures by name: functions of a `Making` that return a PNG."""
     parser = argparse.ArgumentParser(description=about)
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "docs" / "pyramid")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "docs" / folder)
     parser.add_argument("--device")
     parser.add_argument("--only", default="", help="figures to make, by name, separated by commas")
     parser.add_argument("--quick", action="store_true", help="small sizes")
