@@ -2,7 +2,6 @@
 """How Sphinx builds the documentation: `make docs`. Nothing is fetched while it builds, or while a page is read."""
 
 import csv
-import json
 import re
 import sys
 from pathlib import Path
@@ -121,23 +120,3 @@ lines = [".. list-table::", "   :header-rows: 1", ""]
 lines += [f"   {'  -' if column else '* -'} {text}" for row in rows for column, text in enumerate(row)]
 notes = [line for line in part.splitlines() if not line.startswith("|")]
 (HERE / "generated" / "comparison.txt").write_text("\n".join([*lines, *notes]) + "\n", encoding="utf-8")
-
-# The page on testing shows the record of `make fuzz RECORD=--record`.
-with open(HERE / "fuzzing.json", encoding="utf-8") as file:
-    fuzzed = json.load(file)
-counts = {
-    "tries": f"{fuzzed['tries']:,}",
-    "seconds": f"{fuzzed['seconds']:,.0f}",
-    "seed": fuzzed["seed"],
-    "ended with exit code 0": f"{fuzzed['codes'].get('0', 0):,}",
-    "ended with exit code 2 and a sentence": f"{fuzzed['codes'].get('2', 0):,}",
-    "ended by Ctrl-C": f"{fuzzed['codes'].get('130', 0):,}",
-    "slowest try, seconds": fuzzed["slowest"],
-    "most memory of a try, MiB": f"{fuzzed['largest'] / 2**20:.0f}",
-    "different faults": len(fuzzed["faults"]),
-}
-rows = [f'"{name}", "{value}"' for name, value in counts.items()]
-rows += [f'"tries with {name}", "{count:,}"' for name, count in fuzzed["kinds"].items() if name != "plain"]
-rows += [f'"fault: {fault["kind"]}", "{fault["tries"]}"' for fault in fuzzed["faults"]]
-body = "\n   ".join([".. csv-table::", ':header: "what", "how many"', "", *rows])
-(HERE / "generated" / "fuzzing.txt").write_text(body + "\n", encoding="utf-8")

@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 
 import simdtex
+from fuzz.record import write_counts
 from simdtex import Checkpoint, distributed
 from simdtex.distributed import layout
 from simdtex.distributed.tasks import forget
@@ -231,7 +232,7 @@ def main():
             "ended otherwise, which is a fault": ends["fault"],
             **{f"tries with the damage *{how}*": hows[how] for how in sorted(hows)},
         }
-        RECORD.write_text("what,how many\n" + "".join(f'"{name}","{n}"\n' for name, n in counts.items()))
+        write_counts(RECORD, counts)
     return bool(ends["fault"])
 
 
