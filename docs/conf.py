@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How Sphinx builds the documentation: `make docs`. Nothing is fetched while it builds, or while a page is read."""
 
-import csv
 import re
 import sys
 from pathlib import Path
@@ -66,49 +65,6 @@ for study in ("mrf", "exact", "multires", "pyramid"):
         caption = picture.stem.removeprefix(f"{study}-")
         results.append(f".. figure:: /study/{picture.name}\n   :alt: {picture.stem}\n\n   {caption}\n")
     (HERE / "generated" / f"study-{study}.txt").write_text("\n".join(results), encoding="utf-8")
-
-# The page of the schedules shows a few columns of what benchmarks/schedules.py has written: heading, form, factor.
-COST = {
-    "keeps (14)": ("keeps (14)", "{}", None),
-    "steps": ("steps", "{:,.0f}", 1),
-    "relaxations per site": ("relaxations per site", "{:.1f}", 1),
-    "seconds": ("seconds, wall", "{:.1f}", 1),
-    "device seconds": ("seconds, device", "{:.1f}", 1),
-    "model seconds": ("MP-1, hours", "{:.1f}", 1 / 3600),
-}
-RESULT = {
-    "oscillation cooling": ("flip back, cooling, %", "{:.2f} ± {:.2f}", 100),
-    "oscillation free": ("flip back, free, %", "{:.2f} ± {:.2f}", 100),
-    "plausibility": ("plausibility", "{:.2f} ± {:.2f}", 1),
-    "coverage": ("coverage", "{:.2f} ± {:.2f}", 1),
-    "histogram distance": ("histogram", "{:.2f} ± {:.2f}", 1),
-    "copying": ("copying", "{:.2f} ± {:.2f}", 1),
-}
-
-
-def cell(row, name, form, factor):
-    if factor is None:
-        return row[name]
-    return form.format(float(row[name]) * factor, float(row[f"{name} +-"]) * factor)
-
-
-def table(caption, rows, columns):
-    header = ", ".join(f'"{heading}"' for heading, *_ in columns.values())
-    lines = [
-        ", ".join(f'"{text}"' for text in (row["schedule"], *(cell(row, name, *c[1:]) for name, c in columns.items())))
-        for row in rows
-    ]
-    return "\n   ".join([f".. csv-table:: {caption}", f':header: "schedule", {header}', "", *lines]) + "\n\n"
-
-
-with open(HERE / "study" / "schedules.csv", encoding="utf-8", newline="") as file:
-    found = list(csv.DictReader(file))
-by_sample = {
-    name: [row for row in found if row["sample"] == name] for name in dict.fromkeys(r["sample"] for r in found)
-}
-tables = [table("What it takes: brick", by_sample["brick"], COST)]
-tables += [table(name.capitalize(), rows, RESULT) for name, rows in by_sample.items()]
-(HERE / "generated" / "schedules.txt").write_text("\n".join(tables), encoding="utf-8")
 
 # The first page shows the comparison of README.md: its table, and the notes below it.
 readme = (HERE.parent / "README.md").read_text(encoding="utf-8")
