@@ -170,11 +170,6 @@ def each(moments):
     return found
 
 
-def count(moments):
-    """Return how many tries that are."""
-    return len(each(moments))
-
-
 def one_try(seed, number, moments):
     """Return the run of a try, what was damaged, and how it ended."""
     rng = np.random.default_rng((seed, number))
@@ -209,7 +204,7 @@ def main():
         tempfile.TemporaryDirectory() as place,
         ProcessPoolExecutor(given.workers, get_context("spawn"), begin, (place,)) as pool,
     ):
-        tries = pool.submit(count, given.every).result() - given.first if given.every else given.tries
+        tries = len(pool.submit(each, given.every).result()) - given.first if given.every else given.tries
         numbers = range(given.first, given.first + tries)
         found = pool.map(one_try, repeat(given.seed), numbers, repeat(given.every), chunksize=10)
         for number, (name, what, end) in zip(numbers, found, strict=True):
