@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from simdtex.experiments.ensemble.arrays import Array, as_ensemble, as_image
+from simdtex.experiments.ensemble.arrays import Array, as_ensemble, as_image, position
 from simdtex.experiments.quality.patches import hashes
 
 WINDOW = 16
@@ -51,7 +51,7 @@ def copies(ensemble: ArrayLike, training: ArrayLike, *, side: int = WINDOW) -> N
     values = np.unique(image)
 
     def hashed(one: Array) -> NDArray[np.uint64]:
-        return hashes(_found(one, values)[..., np.newaxis], side)
+        return hashes(position(one, values)[..., np.newaxis], side)
 
     known, first = np.unique(hashed(image), return_index=True)
     row, col = np.divmod(first, image.shape[1] - side + 1)
@@ -60,15 +60,9 @@ def copies(ensemble: ArrayLike, training: ArrayLike, *, side: int = WINDOW) -> N
 
     def placed(one: Array) -> NDArray[np.int32]:
         plain = (minimum_filter(one, side) == maximum_filter(one, side))[middle]
-        return np.where(plain, np.int32(PLAIN), pixel[_found(hashed(one), known)])
+        return np.where(plain, np.int32(PLAIN), pixel[position(hashed(one), known)])
 
     return np.stack([placed(one) for one in array])
-
-
-def _found(array: Array, values: Array) -> NDArray[np.int64]:
-    """Return the place of every element in a sorted list; -1 where it is not there."""
-    place = np.minimum(np.searchsorted(values, array), len(values) - 1)
-    return np.where(values[place] == array, place, ABSENT).astype(np.int64)
 
 
 def copied(places: NDArray[np.int32]) -> NDArray[np.float64]:
