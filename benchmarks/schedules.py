@@ -4,7 +4,7 @@
     python benchmarks/schedules.py [--out docs/schedules] [--seeds 3] [--size 128] [--free-sweeps 8] [--only brick]
                                    [--device TEXT]
 
-Writes pictures, plots and a table of figures (mean and standard deviation over the seeds) for each sample, and cost.csv
+Writes pictures and a table of figures (mean and standard deviation over the seeds) for each sample, plots and cost.csv
 for the first one, and prints tables. The options are those of ``simdtex synth`` but for the free sweeps: with
 more of them, what oscillates is told from what still settles.
 """
@@ -66,12 +66,11 @@ def main():
         print(f"\n{name}, {time.perf_counter() - began:.0f} s\n")
         for table in tables(found):
             print_table(table, 220)
-        figures = [part for section in sections(found) for part in section.parts if isinstance(part, Figure)]
-        for figure in figures:
-            # temperatures depend on the schedule and the seed, not on the pixels: one plot is every sample's
-            if figure.file in ("pictures.png", "oscillation.png", "temperature.png"):
-                prefix = "" if figure.file == "temperature.png" else f"{name}-"
-                (options.out / f"{prefix}{figure.file}").write_bytes(figure.png)
+        # temperatures depend on the schedule and the seed, not on the pixels: one plot is every sample's
+        plots = ("oscillation.png", "temperature.png") if number == 0 else ()
+        for part in (part for section in sections(found) for part in section.parts if isinstance(part, Figure)):
+            if part.file in ("pictures.png", *plots):
+                (options.out / f"{'' if part.file in plots else f'{name}-'}{part.file}").write_bytes(part.png)
         header = ["schedule", *(heading for heading, *_ in RESULT.values())]
         write(options.out / f"{name}.csv", header, [[entry.name, *cells(entry, RESULT)] for entry in found.entries])
         if number == 0:
@@ -82,7 +81,7 @@ def main():
 def cells(entry, columns):
     """The cells of a schedule in some columns."""
     found = [(entry.figure(name), form, factor) for name, (_, form, factor) in columns.items()]
-    return [form.format(factor * one.mean, factor * (one.deviation or 0)) for one, form, factor in found]
+    return [one and form.format(factor * one.mean, factor * (one.deviation or 0)) for one, form, factor in found]
 
 
 if __name__ == "__main__":
