@@ -7,9 +7,10 @@ Writes PNG files, the same bytes every time, and oblique.csv, and prints their n
 quotes. ``--quick`` runs all of it on small sizes.
 """
 
+import csv
+
 import numpy as np
 import samples
-import tables
 from pyramid_figures import COLOURS, main, moved, png, reduced
 from scipy.ndimage import map_coordinates
 from scipy.stats import wasserstein_distance
@@ -36,8 +37,9 @@ def block(making, sample, side, **options):
 def solid(making):
     """Two blocks as one sees them."""
     sheets = []
-    for sample in isotropic(making).values():
-        volume, _ = block(making, sample, 96)
+    for name, sample in isotropic(making).items():
+        volume, output = block(making, sample, 96)
+        print(f"  {name}, {volume.shape}: mean distance {moved(output.statistics):.3f}")
         sheets.append(view(volume, size=max(96, making.small(192))))
     return png(np.concatenate(sheets))
 
@@ -91,15 +93,17 @@ def apart(found, wanted):
 def solid_options(making):
     """The ways to make a block, and slices of each."""
     sample = isotropic(making)["tissue"]
-    pictures = []
+    wanted, pictures = bands_of(making, sample), []
     ways = [{"solids": solids, "slices": own} for solids in ("average", "turns") for own in ("each", "together")]
     for options in [*ways, {"pyramid": "laplacian"}]:
         volume, output = block(making, sample, 64, **options)
         name = ", ".join(options.values())
         for number, direction in enumerate(("x-y", "y-z", "45° about x")):
             made = plane(volume, direction, len(volume) // 2)
+            w1 = np.mean(list(apart(bands_of(making, made), wanted).values()))
             label = f"{name}: {moved(output.statistics):.3f}" if number == 0 else direction
             pictures.append((label, np.rint(np.clip(made, 0, 255)).astype(np.uint8)))
+            print(f"  {name}, mean distance {moved(output.statistics):.3f}; {direction}: mean W1 {w1:.3f}")
     return png(contact_sheet(pictures, columns=6))
 
 
@@ -127,7 +131,10 @@ def oblique(making):
     figure.legend(
         *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9
     )
-    tables.write(making.out / "oblique.csv", ["sample", "slices", *wanted, "mean", "worst slice"], lines)
+    with open(making.out / "oblique.csv", "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["sample", "slices", *wanted, "mean", "worst slice"])
+        writer.writerows(lines)
     return figure_png(figure)
 
 

@@ -25,7 +25,6 @@ from pathlib import Path
 import numpy as np
 
 import simdtex
-from fuzz.record import write_counts
 from simdtex import Checkpoint, distributed
 from simdtex.distributed import layout
 from simdtex.distributed.tasks import forget
@@ -170,6 +169,11 @@ def each(moments):
     return found
 
 
+def count(moments):
+    """Return how many tries that are."""
+    return len(each(moments))
+
+
 def one_try(seed, number, moments):
     """Return the run of a try, what was damaged, and how it ended."""
     rng = np.random.default_rng((seed, number))
@@ -204,7 +208,7 @@ def main():
         tempfile.TemporaryDirectory() as place,
         ProcessPoolExecutor(given.workers, get_context("spawn"), begin, (place,)) as pool,
     ):
-        tries = len(pool.submit(each, given.every).result()) - given.first if given.every else given.tries
+        tries = pool.submit(count, given.every).result() - given.first if given.every else given.tries
         numbers = range(given.first, given.first + tries)
         found = pool.map(one_try, repeat(given.seed), numbers, repeat(given.every), chunksize=10)
         for number, (name, what, end) in zip(numbers, found, strict=True):
@@ -227,7 +231,7 @@ def main():
             "ended otherwise, which is a fault": ends["fault"],
             **{f"tries with the damage *{how}*": hows[how] for how in sorted(hows)},
         }
-        write_counts(RECORD, counts)
+        RECORD.write_text("what,how many\n" + "".join(f'"{name}","{n}"\n' for name, n in counts.items()))
     return bool(ends["fault"])
 
 

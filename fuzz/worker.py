@@ -108,7 +108,9 @@ class Sandbox:
         self.folder = self.root / "try"
         for name in ("home", "tmp", "beside"):
             (self.root / name).mkdir(parents=True, exist_ok=True)
-        (self.root / "beside" / "secret.raw").write_bytes(bytes(range(216)))  # which a damaged header names
+        from fuzz.corpus import beside
+
+        beside(self.root / "beside")
         self.around = self.listing(("home", "tmp", "beside"))
 
     def listing(self, names):
@@ -126,6 +128,11 @@ class Sandbox:
         self.folder.mkdir()
         for name, data in files.items():
             (self.folder / name).write_bytes(data)
+
+
+def seconds_for(one):
+    """Seconds that a try may take."""
+    return DEMO if "demo" in one.args[:1] else SECONDS
 
 
 def _stamp(path):
@@ -198,7 +205,7 @@ class Worker:
         result.faults += self.left_wrong(one, result)
         if one.interrupt and any(what == "old output changed" for what, _ in result.faults):
             result.faults = self.without_whole(one, result.faults)
-        if seconds > (DEMO if "demo" in one.args[:1] else SECONDS):
+        if seconds > seconds_for(one):
             result.faults.append(("time", one.args[0]))
         if size > MEMORY or "the memory does not suffice" in said:
             result.faults.append(("memory", one.args[0]))

@@ -142,11 +142,10 @@ class Job:
         keywords = {name: value for name, value in self._keywords.items() if name != "method"}
         if self.kind == "synth":
             return replay(self.sample, device=machine, **keywords)
-        seed, axis = keywords.pop("rng"), keywords.pop("channel_axis")
+        seed = keywords.pop("rng")
         if self.kind == "fill":
-            return filling(self.sample, keywords.pop("mask"), None, None, axis, keywords).replay(machine, seed)
-        sides = dict.fromkeys(("top", "bottom", "left", "right"), 0)
-        return Replay(extension(self.sample, axis, sides, keywords.pop("seamless"), None, keywords)[0], machine, seed)
+            return filling(self.sample, **keywords).replay(machine, seed)
+        return Replay(extension(self.sample, **keywords)[0], machine, seed)
 
     def layers(
         self,

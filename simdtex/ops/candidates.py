@@ -127,11 +127,10 @@ def candidates(
     levels, features = structure.threshold.shape
     items = -(-len(sites) // 4)  # one for four siblings; where these are fewer, an item takes several
     machine.launch(
-        "candidates",
+        machine.kernel("candidates", "candidates", FEATURES=features),
         (items,),
-        *(np.uint64(seed), level, levels - 1, match),
+        *(np.uint64(seed), np.int32(level), np.int32(levels - 1), np.int32(match)),
         *(structure.lattice, structure.features, structure.threshold, sampled.lattice),
-        *(sites.start, sites.stop, items, sampled.source, sampled.counts),
-        defines={"FEATURES": features},
+        *(np.int32(sites.start), np.int32(sites.stop), np.int32(items), sampled.source, sampled.counts),
     )
     return sampled

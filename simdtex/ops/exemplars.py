@@ -57,9 +57,8 @@ def exemplars(machine: Launcher | None, features: Array, known: Exemplars) -> Ar
         return np.rint(log32(least + own + np.float32(1)) * np.float32(LOGS)).astype(np.uint16)
     logs = machine.empty((classes, count), np.uint16)
     machine.launch(
-        "exemplars",
+        machine.kernel("exemplars", "exemplars", K=features.shape[0], V=machine.vector),
         (-(-count // machine.vector),),
-        *(features, count, *known, classes, logs),
-        defines={"K": features.shape[0], "V": machine.vector},
+        *(features, np.int32(count), *known, np.int32(classes), logs),
     )
     return logs

@@ -22,10 +22,9 @@ def histogram(machine: Launcher | None, distances: Distances, candidates: Candid
     counts = machine.empty((distances.sites, greys), np.uint32)
     blocks, padded = distances.nearest.shape
     machine.launch(
-        "histogram",
+        machine.kernel("histogram", "histogram", BLOCK=BLOCK),
         (distances.sites,),
-        *(distances.distance, distances.nearest, blocks, distances.sites, padded),
-        *(candidates.pixels, candidates.positions, greys, counts),
-        defines={"BLOCK": BLOCK},
+        *(distances.distance, distances.nearest, np.int32(blocks), np.int32(distances.sites)),
+        *(np.int32(padded), candidates.pixels, candidates.positions, np.int32(greys), counts),
     )
     return counts

@@ -65,7 +65,8 @@ def write_ensemble(
     Raises
     ------
     ValueError
-        The folder cannot be written, the arrays do not suit each other, or a datum lies outside.
+        The folder cannot be written, the arrays do not suit each other, a datum lies outside, or GSTools is not
+        installed.
 
     Notes
     -----
