@@ -20,8 +20,6 @@ from simdtex.jobs.inputs import check_mask, check_picture, check_samples
 from simdtex.machine import Machine, memory
 from simdtex.methods import mrf
 from simdtex.methods.mrf.options import Options, few
-from simdtex.methods.mrf.replay import Instant, Replay, Sweep
-from simdtex.model.explanation import Explanation
 from simdtex.model.given import Given
 from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
@@ -380,13 +378,13 @@ class Filling:
     ) -> tuple[NDArray[Any], Output]:
         """Fill one window after the other; the state is the results of finished ones, and the present run's state."""
         whole = self.begin()
-        parts = self._windows()
+        parts = self.windows()
         done, inside = checkpointing.found or ([], None)
         finished = [Made(*made) for made in done]
         for number, window in enumerate(parts):
             at = (window.rows, window.cols)
             if number == len(finished):
-                around = _around(self, window)
+                around = self.around(window)
                 seen = callback and _pasting(callback, whole, at, self.hole[at], around.corner, number, len(parts))
                 now = Checkpointing(inside, lambda info, tree: checkpointing.offer(info, lambda: (finished, tree())))
                 finished.append(self._window(machine, window, around, seed, seen, now))
@@ -395,7 +393,7 @@ class Filling:
             found = finished[number]
             hole = self.hole[at]
             whole.image[at][hole], whole.temperature[at][hole] = found.values, found.temperature
-            whole.source[at][hole] = _moved(found.source, found.corner)
+            whole.source[at][hole] = shifted(found.source, found.corner)
         runs = [found.statistics for found in finished]
         seconds = [run["device_seconds"] for run in runs]
         statistics = {
@@ -405,14 +403,8 @@ class Filling:
         }
         return whole.image, Output(whole.source, whole.temperature, [], statistics)
 
-    def replay(self, machine: Machine, seed: int) -> HoleReplay:
-        """Return the run, to look at any moment of it; raise ValueError if it has several windows."""
-        parts = self._windows()
-        if len(parts) > 1:
-            raise ValueError(f"{len(parts)} holes are filled by runs of their own; fill one hole to look into its run")
-        return HoleReplay(self, parts[0], machine, seed)
-
-    def _windows(self) -> list[Window]:
+    def windows(self) -> list[Window]:
+        """Return the windows that are filled, one after the other."""
         if self.options.boundary == "torus":
             return [Window(slice(0, self.hole.shape[0]), slice(0, self.hole.shape[1]), 0)]
         return windows(self.hole, int(neighbourhood_offsets(self.options.order).max()), self.options.levels)
@@ -425,6 +417,20 @@ class Filling:
         if self.sample is None:
             whole.source[:] = np.moveaxis(np.indices(shape), 0, -1)
         return whole
+
+    def around(self, window: Window) -> Around:
+        """Return the sample of a window: its surroundings, or the job's own."""
+        if self.sample is not None:
+            return Around(self.sample, (0, 0), None)
+        hole, (rows, cols) = self.hole[window.rows, window.cols], self.hole.shape
+        lines, columns = (np.flatnonzero(hole.any(axis)) for axis in (1, 0))
+        sides = lines[-1] - lines[0] + 1, columns[-1] - columns[0] + 1
+        reach = self.reach or max(REACH, 2 * max(sides))
+        top, left = max(0, window.rows.start - reach), max(0, window.cols.start - reach)
+        near = (slice(top, min(rows, window.rows.stop + reach)), slice(left, min(cols, window.cols.stop + reach)))
+        inside = np.indices(hole.shape) + np.array([window.rows.start - top, window.cols.start - left])[:, None, None]
+        place = np.moveaxis(inside, 0, -1).astype(np.int32)
+        return Around(Pictures((self.pixels[near],), unknown=(self.hole[near],)), (top, left), place)
 
     def _guide(self, window: Window, around: Around, values: NDArray[Any]) -> Surroundings | None:
         """Return the colours around a window's hole as its guide; None with a sample of its own, or of categories."""
@@ -469,50 +475,6 @@ class Filling:
         return Made(around.corner, made[hole], output.temperature[hole], output.source[hole], statistics)
 
 
-class HoleReplay:
-    """The run that fills one hole, to look at any moment of it, as with `simdtex.methods.mrf.replay.Replay`.
-
-    The arrays of `at` are those of the whole picture, with a coarse level's sites repeated; sites are pixels of the
-    window around the hole, and sources and candidates pixels of the picture or of the sample.
-    """
-
-    def __init__(self, job: Filling, window: Window, machine: Machine, seed: int) -> None:
-        around = _around(job, window)
-        self._replay = Replay(job.plan(window, around), machine, seed)
-        self._at, self._hole, self._corner = (window.rows, window.cols), job.hole, around.corner
-        self._whole = job.begin()
-        self.origin = window.rows.start, window.cols.start
-
-    @property
-    def sweeps(self) -> list[Sweep]:
-        """All sweeps of the run, in order."""
-        return self._replay.sweeps
-
-    def at(self, sweep: int, sets: int | None = None) -> Instant:
-        """Return the picture after so many sets of a sweep; None: after all of it."""
-        now = self._replay.at(sweep, sets)
-        pasted = partial(_pasted, at=self._at, hole=self._hole[self._at], level=now.level)
-        return Instant(
-            now.level,
-            pasted(self._whole.image, now.image),
-            pasted(self._whole.source, _moved(now.source, self._corner)),
-            pasted(self._whole.temperature, now.temperature),
-            pasted(np.zeros(self._hole.shape, np.uint8), now.relaxed),
-        )
-
-    def explain_pixel(self, row: int, col: int, sweep: int = -1, sets: int | None = None) -> Explanation:
-        """Return why a pixel had its value after so many sets of a sweep; raise ValueError if it did not relax."""
-        if not self._hole[row, col]:
-            raise ValueError("this pixel is not in the hole: its value is given")
-        why = self._replay.explain_pixel(row - self.origin[0], col - self.origin[1], sweep, sets)
-        near, found = why.neighbours, why.candidates
-        return replace(
-            why,
-            neighbours=replace(near, source=_moved(near.source, self._corner)),
-            candidates=replace(found, place=_moved(found.place, self._corner)),
-        )
-
-
 def filling(
     image: ArrayLike,
     mask: ArrayLike | None = None,
@@ -546,29 +508,14 @@ def _fewest_levels(pictures: Pictures) -> int:
     return 1 + max(0, ceil(log2(prod(pictures.pixels[0].shape[:2]) / MANY) / 2))
 
 
-def _around(job: Filling, window: Window) -> Around:
-    """Return the sample of a window: its surroundings, or that of the job."""
-    if job.sample is not None:
-        return Around(job.sample, (0, 0), None)
-    hole, (rows, cols) = job.hole[window.rows, window.cols], job.hole.shape
-    lines, columns = (np.flatnonzero(hole.any(axis)) for axis in (1, 0))
-    sides = lines[-1] - lines[0] + 1, columns[-1] - columns[0] + 1
-    reach = job.reach or max(REACH, 2 * max(sides))
-    top, left = max(0, window.rows.start - reach), max(0, window.cols.start - reach)
-    near = (slice(top, min(rows, window.rows.stop + reach)), slice(left, min(cols, window.cols.stop + reach)))
-    inside = np.indices(hole.shape) + np.array([window.rows.start - top, window.cols.start - left])[:, None, None]
-    place = np.moveaxis(inside, 0, -1).astype(np.int32)
-    return Around(Pictures((job.pixels[near],), unknown=(job.hole[near],)), (top, left), place)
-
-
-def _moved(source: NDArray[np.int32], corner: tuple[int, int]) -> NDArray[np.int32]:
+def shifted(source: NDArray[np.int32], corner: tuple[int, int]) -> NDArray[np.int32]:
     """Return sources (..., 2 or 3) that count from a corner in pixels of the whole; -1 stays -1."""
-    moved = source.copy()
-    moved[..., :2] += np.where(source[..., :1] < 0, 0, np.array(corner, np.int32))
-    return moved
+    found = source.copy()
+    found[..., :2] += np.where(source[..., :1] < 0, 0, np.array(corner, np.int32))
+    return found
 
 
-def _pasted(below: NDArray[Any], values: NDArray[Any], at: tuple[slice, slice], hole: Mask, level: int) -> NDArray[Any]:
+def paste(below: NDArray[Any], values: NDArray[Any], at: tuple[slice, slice], hole: Mask, level: int) -> NDArray[Any]:
     """Return a picture with the values of a level's lattice in the hole of a window."""
     above = below.copy()
     fine = values.repeat(2**level, 0).repeat(2**level, 1)[: hole.shape[0], : hole.shape[1]]
@@ -591,10 +538,10 @@ def _pasting(
     """
 
     def seen(progress: Any) -> Any:
-        pasted = partial(_pasted, at=at, hole=hole, level=progress.level)
+        pasted = partial(paste, at=at, hole=hole, level=progress.level)
 
         def source() -> NDArray[np.int32]:
-            return pasted(whole.source, _moved(progress.source(), corner))
+            return pasted(whole.source, shifted(progress.source(), corner))
 
         return callback(
             replace(

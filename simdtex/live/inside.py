@@ -31,7 +31,7 @@ class Inside:
     """
 
     def __init__(self, job: Job, machine: Machine) -> None:
-        self.job = job
+        self.job, self.sample = job, frames.picture(job.sample, job.sample)
         self._replay = job.replay(machine)
         self.sweeps = self._replay.sweeps
         self.moment: tuple[int, int] | None = None  # a sweep, and sets of it; None for the result
@@ -56,7 +56,7 @@ class Inside:
     def layers(self, result: dict[str, Callable[[], frames.Layer]]) -> dict[str, Callable[[], frames.Layer]]:
         """Return the layers of the moment, those of the result if it is shown, and the job's sample."""
         now, job = self._instant, self.job
-        sample = {"sample": lambda: frames.picture(job.sample, job.sample)}
+        sample = {"sample": lambda: self.sample}
         if now is None:
             return result | sample
         image = now.image if job.sample.ndim == 3 else now.image[..., 0]
@@ -68,7 +68,7 @@ class Inside:
 
         Of each sweep its level and number, its sets and sites, and the mean temperature before it.
         """
-        rows, cols = self.job.sample.shape[:2]
+        rows, cols = self.sample.shape
         return {"width": cols, "height": rows, "sweeps": [list(one) for one in self.sweeps], "moment": self.moment}
 
     def explain(self, row: Any, col: Any) -> dict[str, Any]:

@@ -18,7 +18,8 @@ from simdtex.checkpoint import Checkpointing
 from simdtex.io.decode import NOTHING
 from simdtex.io.image import Metadata, suitable_suffix
 from simdtex.jobs.classification import classify
-from simdtex.jobs.filling import HoleReplay, extend, extension, fill, filling
+from simdtex.jobs.filling import extend, extension, fill, filling
+from simdtex.jobs.hole_replay import HoleReplay
 from simdtex.live import frames
 from simdtex.live.words import controls
 from simdtex.machine import Machine
@@ -144,7 +145,7 @@ class Job:
             return replay(self.sample, device=machine, **keywords)
         seed = keywords.pop("rng")
         if self.kind == "fill":
-            return filling(self.sample, **keywords).replay(machine, seed)
+            return HoleReplay(filling(self.sample, **keywords), machine, seed)
         return Replay(extension(self.sample, **keywords)[0], machine, seed)
 
     def layers(

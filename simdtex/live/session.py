@@ -329,7 +329,7 @@ class Session:
         kept, self._inside = self._inside, {}
         found = [self.results.find(number) for number in dict.fromkeys([shown, message.get("beside") or shown])]
         self._inside = {one.number: kept.get(one.number) or Inside(one.job, self._machine) for one in found}
-        samples = [frames.thumbnail(frames.picture(one.job.sample, one.job.sample), PREVIEW) for one in found]
+        samples = [frames.thumbnail(one.sample, PREVIEW) for one in self._inside.values()]
         looked = [
             {"result": number, "preview": [small.width, small.height], **inside.describe()}
             for small, (number, inside) in zip(samples, self._inside.items(), strict=True)

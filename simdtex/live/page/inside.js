@@ -170,12 +170,12 @@ class Inside {
     const [sweep, sets] = this.goal ?? [this.sweeps.length, 0];
     if (this.page.layer === "picture") this.page.showLayer("sets");
     if (sets + by > (this.sweeps[sweep]?.[2] ?? 0)) this.seek(sweep + 1, Math.min(by, this.sweeps[sweep + 1]?.[2] ?? 0));
-    else if (sets + by < 0) this.seek(Math.max(0, sweep - 1), sweep ? null : 0);
+    else if (sets + by < 0) this.seek(sweep - 1, sweep ? null : 0);
     else this.seek(sweep, sets + by);
   }
 
   stepSweep(by) {
-    this.seek(Math.max(0, (this.goal?.[0] ?? this.sweeps.length) + by), null);
+    this.seek((this.goal?.[0] ?? this.sweeps.length) + by, null);
   }
 
   play() {
