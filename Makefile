@@ -51,11 +51,12 @@ demo:
 	@$(VENV)/bin/simdtex demo
 
 # JOBS=0 runs the tests one after another in this process, as one wants in a debugger.
+# The tests start some hundred processes, each of which would compile the package where no bytecode is kept.
 JOBS ?= auto
 test:
 	$(call install,test,[test])
 	$(device)
-	@$(PY) -m pytest --numprocesses $(JOBS) --maxprocesses 4 --dist worksteal
+	@PYTHONDONTWRITEBYTECODE= $(PY) -m pytest --numprocesses $(JOBS) --maxprocesses 4 --dist worksteal
 
 slow:
 	$(call install,slow,[slow])
