@@ -97,6 +97,18 @@ def test_no_more_space_at_any_byte(tmp_path, name):
     assert everything(tmp_path).keys() == before.keys() and everything(tmp_path) != before
 
 
+def test_files_hold_no_time(tmp_path):
+    written = []
+    for number in range(2):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        for name, write in WRITERS.items():
+            write(folder / name, 1)
+        written.append(everything(folder))
+        time.sleep(2.1 * (number == 0))  # the times in a ZIP archive are even
+    assert [name for name in written[0] if written[0][name] != written[1][name]] == []
+
+
 FAULTS = ["open", "fsync", "replace", "rename", "mkdir"]
 
 

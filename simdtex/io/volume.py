@@ -7,6 +7,7 @@ picture with row 0 at the top. x is the column, y the row, z the depth.
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import warnings
@@ -178,9 +179,15 @@ def _encode(path: Path, suffix: str, values: Array) -> None:
     elif suffix == ".nrrd":
         # without the fields of a space: VTK would read the sizes of a vector volume wrongly after them
         header = {"encoding": "raw", "kinds": ["vector"] * (values.ndim - 3) + ["domain"] * 3}
-        with warnings.catch_warnings(), path.open("wb") as file:
+        written = io.BytesIO()
+        with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)  # pynrrd asks for the time in an old way
-            nrrd.write(file, values, header, index_order="C")
+            nrrd.write(written, values, header, index_order="C")
+        # without the line of pynrrd that holds the time: the same volume is the same file
+        before, _, after = written.getvalue().partition(b"# on ")
+        with path.open("wb") as file:
+            file.write(before)
+            file.write(after[after.index(b"\n") + 1 :])
     elif suffix:
         image.write_tiff(path, values)
     else:
