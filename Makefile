@@ -98,7 +98,7 @@ mutants:
 	set -f; OCL_ICD_VENDORS=/nonexistent $(PY) -m mutmut run --max-children 1 $(MUTANTS)
 	$(PY) -m mutmut results
 
-# MINUTES=1 SEED=7 give others; RECORD=--record writes docs/fuzzing.json, which docs/testing.rst shows.
+# MINUTES=1 SEED=7 give others; RECORD=--record writes docs/fuzzing/*.csv, which docs/testing.rst shows.
 MINUTES ?= 10
 SEED ?= 1
 RECORD ?=

@@ -23,17 +23,16 @@ time         512x512 against five samples of 128x128 (by --side), seconds on the
 """
 
 import argparse
-import csv
-import sys
 import time
+import timeit
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import tables
 from baselines import FEATURES, probabilities
 from mosaics import accuracy, auroc, drawn, grey, own_fit, textures
-from rich.console import Console
-from rich.table import Table
 from skimage import data
 
 import simdtex
@@ -272,16 +271,12 @@ def measure_time(bench):
     rows += [[one["name"], one["calls"], f"{one['seconds']:.3f} s"] for one in kernels]
     side, size = bench.side // 4, bench.side * 3 // 16
     picture, samples = large(side, size)
-    took = []
-    for device in (simdtex.open_machine("reference"), machine):
-        once = []
-        for _ in range(3):
-            began = time.perf_counter()
-            simdtex.classify(picture, samples, rng=1, device=device)
-            once.append(time.perf_counter() - began)
-        took.append(min(once))
-    rows.append([f"{side}x{side}, five samples of {size}x{size}", "", f"{took[1]:.3f} s"])
-    rows.append(["the same by the reference", "", f"{took[0]:.3f} s, {took[0] / took[1]:.0f} times"])
+    plain, fast = (
+        min(timeit.repeat(partial(simdtex.classify, picture, samples, rng=1, device=device), number=1, repeat=3))
+        for device in (simdtex.open_machine("reference"), machine)
+    )
+    rows.append([f"{side}x{side}, five samples of {size}x{size}", "", f"{fast:.3f} s"])
+    rows.append(["the same by the reference", "", f"{plain:.3f} s, {plain / fast:.0f} times"])
     return ["what", "launches", "time"], rows
 
 
@@ -318,16 +313,9 @@ def main():
     for part in parts:
         began = time.perf_counter()
         header, rows = PARTS[part](bench)
-        shown = Table(title=f"{part}, {time.perf_counter() - began:.0f} s")
-        for column in header:
-            shown.add_column(column)
-        for row in rows:
-            shown.add_row(*map(str, row))
-        Console(width=None if sys.stdout.isatty() else 120).print(shown)
+        tables.show(f"{part}, {time.perf_counter() - began:.0f} s", header, rows)
         if options.out:
-            options.out.mkdir(parents=True, exist_ok=True)
-            with open(options.out / f"{part}.csv", "w", newline="", encoding="utf-8") as file:
-                csv.writer(file, lineterminator="\n").writerows([header, *rows])
+            tables.write(options.out / f"{part}.csv", header, rows)
 
 
 if __name__ == "__main__":

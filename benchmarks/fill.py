@@ -18,7 +18,6 @@ step    the same between two pixels of the hole: below 1 the filling is blurred.
 """
 
 import argparse
-import csv
 import sys
 import time
 from contextlib import suppress
@@ -28,9 +27,8 @@ from pathlib import Path
 import numpy as np
 import over_folder
 import samples
+import tables
 from numpy.lib.stride_tricks import sliding_window_view
-from rich.console import Console
-from rich.table import Table
 from scipy.ndimage import gaussian_filter
 from skimage import draw
 from skimage.restoration import inpaint_biharmonic
@@ -171,10 +169,7 @@ def report(results, path, figures=FIGURES):
     labels = list(dict.fromkeys(label for _, _, label, _, _ in results))
     names = list(dict.fromkeys(name for name, *_ in results))
     shapes = list(dict.fromkeys(shape for _, shape, *_ in results))
-    table = Table()
     header = ["picture", "filling", *figures]
-    for column in header:
-        table.add_column(column, justify="right" if column in figures else "left", no_wrap=True)
     lines = []
     groups = [(name, lambda r, name=name: r[0] == name) for name in names]
     groups += [(f"all, {shape}", lambda r, shape=shape: r[1] == shape) for shape in shapes if len(shapes) > 1]
@@ -184,11 +179,9 @@ def report(results, path, figures=FIGURES):
             those = [r[4] for r in results if of(r) and r[2] == label]
             values = [[one[figure] for one in those if figure in one] for figure in figures]
             lines.append([title, label, *(f"{np.mean(each):.2f}" if each else "" for each in values)])
-            table.add_row(*lines[-1], end_section=label == labels[-1])
-    Console(width=None if sys.stdout.isatty() else 120).print(table)
+    tables.show("Means over seeds and holes", header, lines)
     if path:
-        with open(path, "w", newline="", encoding="utf-8") as file:
-            csv.writer(file, lineterminator="\n").writerows([header, *lines])
+        tables.write(path, header, lines)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,8 @@ Prints the best and the median of the runs after the first, and the most memory 
 
 import argparse
 import resource
-import time
+import timeit
+from functools import partial
 from statistics import median
 
 import numpy as np
@@ -26,27 +27,23 @@ def main():
     parser.add_argument("--device")
     parser.add_argument("--fill", action="store_true", help="only fill a hole of 64x64 in a picture of 1024x1024")
     options = parser.parse_args()
-    machine, shape = simdtex.open_machine(options.device), (options.size, options.size)
-    sample = data.gravel()[: options.side, : options.side]
+    given = {"rng": 1, "device": simdtex.open_machine(options.device)}
     if options.fill:
         picture, hole = np.tile(data.gravel(), (2, 2)), np.zeros((1024, 1024), bool)
         hole[480:544, 480:544] = True
-        seconds = []
-        for _ in range(1 + options.runs):
-            began = time.perf_counter()
-            simdtex.fill(picture, hole, rng=1, device=machine)
-            seconds.append(time.perf_counter() - began)
-        print(f"fill 64x64 of 1024x1024: best {min(seconds[1:]):.3f} s, median {median(seconds[1:]):.3f} s")
-        return
-    for search in options.search:
-        seconds = []
-        for _ in range(1 + options.runs):
-            began = time.perf_counter()
-            simdtex.synthesize(sample, shape, rng=1, device=machine, search=search)
-            seconds.append(time.perf_counter() - began)
-        best, usual = min(seconds[1:]), median(seconds[1:])
+        jobs = {"fill 64x64 of 1024x1024": partial(simdtex.fill, picture, hole, **given)}
+    else:
+        sample, shape = data.gravel()[: options.side, : options.side], (options.size, options.size)
+        jobs = {
+            f"{search:8} {options.side} -> {options.size}": partial(
+                simdtex.synthesize, sample, shape, search=search, **given
+            )
+            for search in options.search
+        }
+    for name, job in jobs.items():
+        seconds = timeit.repeat(job, number=1, repeat=1 + options.runs)[1:]
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        print(f"{search:8} {options.side} -> {options.size}: best {best:.3f} s, median {usual:.3f} s, {memory:.0f} MiB")
+        print(f"{name}: best {min(seconds):.3f} s, median {median(seconds):.3f} s, {memory:.0f} MiB")
 
 
 if __name__ == "__main__":

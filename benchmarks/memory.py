@@ -75,9 +75,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--device")
     parser.add_argument("--only", default="", help="beginnings of the names of jobs, separated by commas")
-    parser.add_argument("--types", default="uint8,float64")
     parser.add_argument("--quick", action="store_true", help="small sizes")
-    parser.add_argument("--sides", default="", help="two sides, as 512,1024")
     options = parser.parse_args()
     for name, (kind, chosen) in CASES.items():
         if options.only and not name.startswith(tuple(options.only.split(","))):
@@ -86,9 +84,7 @@ def main():
         sides = (24, 48) if kind == "solid" else (128, 256)
         if not options.quick:
             sides = (48, 112) if kind == "solid" else (512, 1536)
-        if options.sides:
-            sides = tuple(int(side) for side in options.sides.split(","))
-        for dtype in options.types.split(","):
+        for dtype in ("uint8", "float64"):
             for channels in (1, 3):
                 runs = [measured(kind, sides[0], s, channels, dtype, options.device, chosen) for s in sides]
                 more = sides[1] ** axes - sides[0] ** axes

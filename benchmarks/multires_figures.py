@@ -1,23 +1,20 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every figure of the page on multiresolution sampling.
 
-    python benchmarks/multires_figures.py [--out docs/multires] [--device TEXT]
+    python benchmarks/multires_figures.py [--out docs/multires] [--device TEXT] [--only filters,edges] [--quick]
 
 Writes PNG files, the same bytes every time, and prints their names.
 """
 
-import argparse
-from functools import partial
 from itertools import pairwise, product
 from math import inf
-from pathlib import Path
 
 import numpy as np
 import samples
 from figures import enlarged
 from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.patches import Patch, Polygon, Rectangle
-from pyramid_figures import png
+from pyramid_figures import main, png
 
 import simdtex
 from simdtex.experiments.quality import seam
@@ -33,37 +30,9 @@ from simdtex.report.sheet import contact_sheet
 ALPHAS = {0: (0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, inf), 1: (0.1, 0.2, 0.3, 0.4, 0.6, 1, 1.5)}
 OWN, SIMILAR, FAILS, CANDIDATE = "#0072B2", "#8CC9A8", "#E07B4F", "#E69F00"
 SIBLING, OTHER, UNSEEN, THIRD = "#A9D3EE", "#F8E3B5", "#ECECEA", "#CFE8DA"
+SAMPLES = samples.grey() | samples.colour()
 PERIODS = (8, 16, 32)  # of the grids whose lines show
 CELL = 160  # side of an output that is shown level by level, pixels; 1.25 tiles
-
-
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path(__file__).parent.parent / "docs" / "multires")
-    parser.add_argument("--device")
-    options = parser.parse_args()
-    machine = simdtex.open_machine(options.device)
-    print(f"device: {machine.name}")
-    options.out.mkdir(parents=True, exist_ok=True)
-    collection = samples.grey() | samples.colour()
-    gravel = collection["gravel"]
-    made = {
-        "pyramid": partial(pyramids, machine, gravel),
-        "filters": partial(responses, machine, gravel),
-        "parents": parents,
-        "tiles": tiles,
-        "candidates": partial(candidates, machine, gravel),
-        "sources": partial(sources, machine, gravel),
-        "beta-0": partial(series, machine, gravel, 0),
-        "beta-1": partial(series, machine, gravel, 1),
-        "parity": partial(parities, machine, gravel),
-        "edges": partial(edges, {name: collection[name] for name in ("brick", "gravel", "tissue", "wood")}),
-        "seams": partial(seams, machine, {name: collection[name] for name in ("gravel", "brick", "tissue")}),
-    }
-    for name, figure in made.items():
-        path = options.out / f"{name}.png"
-        path.write_bytes(figure())
-        print(f"{path}  {path.stat().st_size / 1000:.0f} kB", flush=True)
 
 
 # ---------------------------------------------------------------- the first phase
@@ -161,7 +130,7 @@ def join(axes, low, high, **look):
     axes.plot([x, p], [y, q], zorder=4, **({"color": INK, "linewidth": 1.1} | look))
 
 
-def parents():
+def parents(making):
     """A pixel with its parent structure, and the scan of the nodes for it."""
     figure = new_figure(9.2, 5.9)
     left, right = figure.subplots(1, 2)
@@ -214,7 +183,7 @@ def parents():
     return figure_png(figure)
 
 
-def tiles():
+def tiles(making):
     """Parents in a row of an output of 12 pixels, its sample having 5."""
     shapes = [(1, 5), (1, 3), (1, 2), (1, 1)]
     figure = new_figure(8.4, 2.7)
@@ -318,7 +287,7 @@ def mended(sample):
     return sample.reshape(-1, *sample.shape[2:])[mend(planes)]
 
 
-def edges(collection):
+def edges(machine, collection):
     """Samples laid beside themselves, as they are and mended."""
     pictures = [
         (f"{name}, keep: seam {seam(one):.2f}", np.tile(one, (2, 2, 1)[: one.ndim])) for name, one in collection.items()
@@ -363,5 +332,32 @@ def parities(machine, gravel):
     return png(contact_sheet(pictures, columns=4))
 
 
+def of(figure, *names):
+    """A figure of samples by name, on the machine."""
+
+    def made(making):
+        return figure(making.machine, {name: making.crop(SAMPLES[name]) for name in names})
+
+    return made
+
+
+def of_gravel(figure, *more):
+    return of(lambda machine, chosen: figure(machine, *chosen.values(), *more), "gravel")
+
+
+MADE = {
+    "pyramid": of_gravel(pyramids),
+    "filters": of_gravel(responses),
+    "parents": parents,
+    "tiles": tiles,
+    "candidates": of_gravel(candidates),
+    "sources": of_gravel(sources),
+    "beta-0": of_gravel(series, 0),
+    "beta-1": of_gravel(series, 1),
+    "parity": of_gravel(parities),
+    "edges": of(edges, "brick", "gravel", "tissue", "wood"),
+    "seams": of(seams, "gravel", "brick", "tissue"),
+}
+
 if __name__ == "__main__":
-    main()
+    main(MADE, __doc__.splitlines()[0], "multires")

@@ -2,7 +2,6 @@
 """A method over a folder of samples, before and after a change; `study.py --samples` runs it."""
 
 import ast
-import csv
 import time
 from dataclasses import fields
 from math import log
@@ -10,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import tables
 from figures import further
 
 import simdtex
@@ -147,22 +147,16 @@ def study(known, out, options, *, seeds=1, before=None, machine=None):
         first_seeds += cells[: 1 + len(settings)]
         results += own
     sheet(out / "sheets.png", first_seeds, 1 + len(settings))
-    write_table(out / "figures.csv", results)
+    rows = [
+        [*one[:3], *(f"{one.figures[figure]:.4f}" if figure in one.figures else "" for figure in FIGURES)]
+        for one in results
+    ]
+    tables.write(out / "figures.csv", ["sample", "setting", "seed", *FIGURES], rows)
     for setting in settings:
         print(f"\n{setting:20}{'mean':>8}{'worst':>8}")
         for figure, (mean, worst, name, seed) in summary([r for r in results if r.setting == setting]).items():
             print(f"{figure:20}{mean:8.3f}{worst:8.3f}  {name}{f', seed {seed}' if seeds > 1 else ''}")
     return results
-
-
-def write_table(path, results):
-    """Write a line for each picture, empty where it lacks a figure."""
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["sample", "setting", "seed", *FIGURES])
-        for one in results:
-            values = [f"{one.figures[figure]:.4f}" if figure in one.figures else "" for figure in FIGURES]
-            writer.writerow([one.sample, one.setting, one.seed, *values])
 
 
 def main(options, own):

@@ -7,10 +7,9 @@ Writes PNG files, the same bytes every time, and oblique.csv, and prints their n
 quotes. ``--quick`` runs all of it on small sizes.
 """
 
-import csv
-
 import numpy as np
 import samples
+import tables
 from pyramid_figures import COLOURS, main, moved, png, reduced
 from scipy.ndimage import map_coordinates
 from scipy.stats import wasserstein_distance
@@ -37,9 +36,8 @@ def block(making, sample, side, **options):
 def solid(making):
     """Two blocks as one sees them."""
     sheets = []
-    for name, sample in isotropic(making).items():
-        volume, output = block(making, sample, 96)
-        print(f"  {name}, {volume.shape}: mean distance {moved(output.statistics):.3f}")
+    for sample in isotropic(making).values():
+        volume, _ = block(making, sample, 96)
         sheets.append(view(volume, size=max(96, making.small(192))))
     return png(np.concatenate(sheets))
 
@@ -93,17 +91,15 @@ def apart(found, wanted):
 def solid_options(making):
     """The ways to make a block, and slices of each."""
     sample = isotropic(making)["tissue"]
-    wanted, pictures = bands_of(making, sample), []
+    pictures = []
     ways = [{"solids": solids, "slices": own} for solids in ("average", "turns") for own in ("each", "together")]
     for options in [*ways, {"pyramid": "laplacian"}]:
         volume, output = block(making, sample, 64, **options)
         name = ", ".join(options.values())
         for number, direction in enumerate(("x-y", "y-z", "45° about x")):
             made = plane(volume, direction, len(volume) // 2)
-            w1 = np.mean(list(apart(bands_of(making, made), wanted).values()))
             label = f"{name}: {moved(output.statistics):.3f}" if number == 0 else direction
             pictures.append((label, np.rint(np.clip(made, 0, 255)).astype(np.uint8)))
-            print(f"  {name}, mean distance {moved(output.statistics):.3f}; {direction}: mean W1 {w1:.3f}")
     return png(contact_sheet(pictures, columns=6))
 
 
@@ -131,10 +127,7 @@ def oblique(making):
     figure.legend(
         *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=9
     )
-    with open(making.out / "oblique.csv", "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["sample", "slices", *wanted, "mean", "worst slice"])
-        writer.writerows(lines)
+    tables.write(making.out / "oblique.csv", ["sample", "slices", *wanted, "mean", "worst slice"], lines)
     return figure_png(figure)
 
 

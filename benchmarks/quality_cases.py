@@ -7,10 +7,10 @@ The sample is 128 x 128 pixels of the gravel of scikit-image, the pictures are 2
 """
 
 import argparse
-import csv
 from pathlib import Path
 
 import numpy as np
+import tables
 from figures import further
 from scipy.ndimage import gaussian_filter
 from skimage import data
@@ -63,8 +63,7 @@ def main():
         found = vars(simdtex.quality.measure(sample, picture, source)) | further(sample, picture)
         table.append([name, *("" if found[figure] is None else f"{found[figure]:.2f}" for figure in FIGURES)])
         print(*table[-1], sep="  ", flush=True)
-    with open(options.out, "w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows([["picture", *FIGURES.values()], *table])
+    tables.write(options.out, ["picture", *FIGURES.values()], table)
 
 
 if __name__ == "__main__":

@@ -20,20 +20,15 @@ every figure.
 """
 
 import argparse
-import csv
-import time
-from dataclasses import asdict
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import over_folder
 import samples
-from figures import further
+import tables
 from pyramid_figures import png
 
 import simdtex
-from simdtex.experiments.quality import measure
 from simdtex.report.sheet import contact_sheet
 
 MRF = {
@@ -73,7 +68,6 @@ EXACT = {
     "preset=paper, icm": {"preset": "paper", "relaxation": "icm", "pixel": "source"},
     "preset=paper, bandwidth=0.15": {"preset": "paper", "bandwidth": 0.15},
 }
-IN_COLOUR = ("default", "coherence=0", "coherence=1", "balance=0", "structure=0", "order=8", "relaxation=gibbs")
 MULTIRES = {
     "alpha=0": {"alpha": 0.0},
     "alpha=0.05": {"alpha": 0.05},
@@ -112,6 +106,9 @@ PYRAMID = {
     "edges=wrap": {"edges": "wrap"},
     "color=channels": {"color": "channels"},
 }
+IN_COLOUR = ("default", "coherence=0", "coherence=1", "balance=0", "structure=0", "order=8", "relaxation=gibbs")
+"""Those of the exact search that are tried on samples in colour too."""
+
 UNSEEN = {  # not on the sheets, where they look like others
     "orientations=2",
     "orientations=8",
@@ -123,8 +120,8 @@ UNSEEN = {  # not on the sheets, where they look like others
     "levels=5",
     "edges=wrap",
 }
-FIGURES = ("plausibility", "coverage", "copying", "histogram_distance", "seam")
 OF_MRF = ("plausibility", "coverage", "copying", "repeats", "salt", "contrast", "seam")
+OF_OTHERS = ("plausibility", "coverage", "copying", "histogram_distance", "seam", "repetition")
 
 
 def repetition(sample, made):
@@ -135,67 +132,25 @@ def repetition(sample, made):
     return np.mean([(centred * displaced).mean() for displaced in ways]) / (centred**2).mean()
 
 
-class Study(NamedTuple):
-    """The settings of a method, those that colour or grey samples leave out, and what the files are called."""
-
-    settings: dict
-    skipped: dict
-    figures: tuple
-    seeds: int
-    table: str
-    prefix: str
+STUDIES = {"mrf": MRF, "exact": EXACT, "multires": MULTIRES, "pyramid": PYRAMID}
+"""The settings of each study by its name, which its files have too."""
 
 
-STUDIES = {
-    "mrf": Study(
-        settings=MRF,
-        skipped={"colour": [], "grey": []},
-        figures=OF_MRF,
-        seeds=3,
-        table="mrf.csv",
-        prefix="mrf-",
-    ),
-    "exact": Study(
-        settings=EXACT,
-        skipped={"colour": [setting for setting in EXACT if setting not in IN_COLOUR], "grey": []},
-        figures=OF_MRF,
-        seeds=1,
-        table="exact.csv",
-        prefix="exact-",
-    ),
-    "multires": Study(
-        settings=MULTIRES,
-        skipped={"colour": [], "grey": []},
-        figures=(*FIGURES, "repetition"),
-        seeds=3,
-        table="multires.csv",
-        prefix="multires-",
-    ),
-    "pyramid": Study(
-        settings=PYRAMID,
-        skipped={"colour": [], "grey": ["color=channels"]},
-        figures=(*FIGURES, "repetition"),
-        seeds=3,
-        table="pyramid.csv",
-        prefix="pyramid-",
-    ),
-}
-
-
-def tried(method):
-    """The settings to try in turn: label, options, seeds (None: as many as asked for)."""
-    if method in ("multires", "pyramid"):
+def tried(study, in_colour):
+    """The settings to try in turn on samples with or without colours: label, options, seeds (None: as asked for)."""
+    if study in ("multires", "pyramid"):
         yield "mrf", {"method": "mrf", "search": "exact"}, 1
-    if method == "pyramid":
+    if study == "pyramid":
         yield "multires", {"method": "multires"}, 1
-    own = own_options(method)
-    for label, given in STUDIES[method].settings.items():
-        yield label, own | given, None
+    for label, given in STUDIES[study].items():
+        left_out = (study == "exact" and label not in IN_COLOUR) if in_colour else "color" in given
+        if not left_out:
+            yield label, own_options(study) | given, None
 
 
-def own_options(method):
+def own_options(study):
     """What a study passes on to name its method."""
-    return {"method": "mrf", "search": "exact"} if method == "exact" else {"method": method}
+    return {"method": "mrf", "search": "exact"} if study == "exact" else {"method": study}
 
 
 def main():
@@ -221,51 +176,28 @@ def main():
     if options.before is not None or options.after:
         parser.error("--before and --after are for --samples; leave them out, or give a folder of samples")
     options.out = options.out or Path(__file__).parent.parent / "docs" / "study"
-    study = STUDIES[options.method]
+    study = options.method
+    wanted = OF_MRF if study in ("mrf", "exact") else OF_OTHERS
     machine = simdtex.open_machine(options.device)
     print(f"device: {machine.name}")
     options.out.mkdir(parents=True, exist_ok=True)
-    known = {**samples.grey(), **samples.colour()}
-    chosen = options.only.split(",") if options.only else list(known)
     rows = []
-    for name in chosen:
-        sample = known[name]
+    for name, sample in samples.chosen(None, options.only).items():
         if options.quick:
             sample = sample[: len(sample) // 2, : len(sample) // 2]
-        in_colour = sample.ndim == 3
         pictures = [(name, sample)]
-        for label, given, fixed in tried(options.method):
-            setting = label
-            if label in study.skipped["colour" if in_colour else "grey"]:
-                continue
-            figures, seconds = [], []
-            for seed in range(1, (fixed or options.seeds or study.seeds) + 1):
-                began = time.perf_counter()
-                made = simdtex.synthesize(
-                    sample,
-                    (2 * sample.shape[0], 2 * sample.shape[1]),
-                    channel_axis=-1 if in_colour else None,
-                    rng=seed,
-                    device=machine,
-                    **given,
-                )
-                seconds.append(time.perf_counter() - began)
-                found = {
-                    **asdict(measure(sample, made)),
-                    **further(sample, made),
-                    "repetition": repetition(sample, made),
-                }
-                figures.append([found[figure] for figure in study.figures])
-            mean = np.mean(figures, 0)
-            rows.append([name, setting, *(f"{value:.2f}" for value in mean)])
-            print(f"{name:8}{setting:32}", *rows[-1][2:], f"{np.mean(seconds):.1f} s", flush=True)
+        for label, given, fixed in tried(study, sample.ndim == 3):
+            seeds = range(1, (fixed or options.seeds or (1 if study == "exact" else 3)) + 1)
+            runs = [over_folder.made(sample, name, label, seed, given, machine) for seed in seeds]
+            found = [run.figures | {"repetition": repetition(sample, run.picture)} for run in runs]
+            mean = [np.mean([figures[figure] for figures in found]) for figure in (*wanted, "seconds")]
+            rows.append([name, label, *(f"{value:.2f}" for value in mean[:-1])])
+            print(f"{name:8}{label:32}", *rows[-1][2:], f"{mean[-1]:.1f} s", flush=True)
             if label not in UNSEEN:
-                pictures.append((setting, made))
-        (options.out / f"{study.prefix}{name}.png").write_bytes(png(contact_sheet(pictures, columns=4)))
-    with open(options.out / study.table, "w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["sample", "setting", *(figure.replace("_", " ") for figure in study.figures)])
-        writer.writerows(rows)
+                pictures.append((label, runs[-1].picture))
+        (options.out / f"{study}-{name}.png").write_bytes(png(contact_sheet(pictures, columns=4)))
+    header = ["sample", "setting", *(figure.replace("_", " ") for figure in wanted)]
+    tables.write(options.out / f"{study}.csv", header, rows)
 
 
 if __name__ == "__main__":

@@ -50,11 +50,7 @@ WAYS = ("whole", "here", "workers")
 
 
 def sample(name: str) -> np.ndarray:
-    """A picture of scikit-image, or of a file: 128 pixels to the side of it."""
-    if "." in name:
-        from skimage import io
-
-        return io.imread(name)[:128, :128, :3]
+    """A picture of scikit-image: 128 pixels to the side of it."""
     return getattr(data, name)()[:128, :128]
 
 
@@ -187,7 +183,7 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=2048, help="sides of the output, pixels")
     parser.add_argument("--tiles", type=int, default=1024, help="sides of a tile")
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--sample", default="brick", help="of skimage.data, or a file")
+    parser.add_argument("--sample", default="brick", help="of skimage.data")
     parser.add_argument("--device")
     parser.add_argument("--only", choices=WAYS, action="append", help="only this way; may be repeated")
     parser.add_argument("--folder", help="where the stores are")

@@ -1,27 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Simulation in three dimensions: time, proportions, variograms and connectivity of channels in a volume.
 
-    python benchmarks/volumes.py [--size 100x100x30] [--data 0,200] [--number 2] [--order 12] [--out DIR]
-                                 [--device TEXT]
+    python benchmarks/volumes.py [--size 100x100x30] [--data 0,200] [--number 2] [--order 12] [--device TEXT]
 
 The training image and the truth that data are read off are two draws of one model: sinuous channels of elliptic cross
 section, along x, at random depths. Prints a line for each number of data: seconds of a realisation, the share of
 channels in it and in the training image, the data that it misses, and the mean absolute differences, from the training
 image, of the indicator variograms along z, y and x and of the connectivity functions (lags up to a third of a side).
-The line *truth* is what another draw of the model has. ``--out`` writes a sheet for each: the training image and the
-realisations in the middle slices across z, y and x.
+The line *truth* is what another draw of the model has.
 """
 
 import argparse
 import time
-from pathlib import Path
 
 import numpy as np
 
 import simdtex
 from simdtex.experiments.ensemble import connectivity
-from simdtex.io.image import write
-from simdtex.report.volumes import variogram
+from simdtex.experiments.ensemble.summary import variogram
 
 SHARE = 0.3
 
@@ -53,28 +49,12 @@ def figures(volume, training):
     return np.mean(apart), np.nanmean(abs(found - wanted))
 
 
-def slices(volumes):
-    """The middle slices across z, y and x of several volumes, side by side, each in a row."""
-    lines = []
-    for volume in volumes:
-        layers, rows, cols = volume.shape
-        cut = [volume[layers // 2], volume[:, rows // 2], volume[:, :, cols // 2].T]
-        line = np.full((max(part.shape[0] for part in cut), sum(part.shape[1] + 4 for part in cut)), 128, np.uint8)
-        left = 0
-        for part in cut:
-            line[: part.shape[0], left : left + part.shape[1]] = 255 * part
-            left += part.shape[1] + 4
-        lines.append(np.pad(line, ((0, 4), (0, 0)), constant_values=128))
-    return np.kron(np.concatenate(lines), np.ones((2, 2), np.uint8))
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--size", default="100x100x30", help="columns x rows x layers")
     parser.add_argument("--data", default="0,200", help="numbers of data")
     parser.add_argument("--number", type=int, default=2, help="realisations of each")
     parser.add_argument("--order", type=int, default=12)
-    parser.add_argument("--out", type=Path)
     parser.add_argument("--device")
     options = parser.parse_args()
     shape = tuple(int(side) for side in options.size.split("x"))[::-1]
@@ -83,26 +63,21 @@ def main():
     print(f"device: {machine.name}; {options.size}, order {options.order}")
     print("  data    time  share  wanted  misses  variograms  connectivity")
     for count in map(int, options.data.split(",")):
-        known = np.ma.masked_all(shape, np.uint8)
-        known.flat[np.random.default_rng(3).choice(known.size, count, replace=False)] = 0
-        known = np.ma.MaskedArray(truth, known.mask)
-        made = []
+        hidden = np.ones(shape, bool)
+        hidden.flat[np.random.default_rng(3).choice(hidden.size, count, replace=False)] = False
+        known = np.ma.MaskedArray(truth, hidden)
         for number in range(options.number):
             began = time.perf_counter()
             given = {"known": known} if count else {"shape": shape}
-            one = simdtex.simulate(
+            made = simdtex.simulate(
                 training, 1, first=number, categorical=True, rng=1, order=options.order, device=options.device, **given
-            )
-            made.append(one.values[0])
+            ).values[0]
             seconds = time.perf_counter() - began
-            missed = int((made[-1] != truth)[~known.mask].sum()) if count else 0
-            told = "  ".join(f"{value:10.4f}" for value in figures(made[-1], training))
-            print(f"{count:6}  {seconds:5.1f}s  {made[-1].mean():.3f}   {training.mean():.3f}  {missed:6}  {told}")
+            missed = int((made != truth)[~hidden].sum())
+            told = "  ".join(f"{value:10.4f}" for value in figures(made, training))
+            print(f"{count:6}  {seconds:5.1f}s  {made.mean():.3f}   {training.mean():.3f}  {missed:6}  {told}")
         told = "  ".join(f"{value:10.4f}" for value in figures(truth, training))
         print(f" truth          {truth.mean():.3f}   {training.mean():.3f}          {told}")
-        if options.out:
-            options.out.mkdir(parents=True, exist_ok=True)
-            write(options.out / f"volume-{count}.png", slices([training, *made]))
 
 
 if __name__ == "__main__":

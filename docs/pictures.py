@@ -22,7 +22,7 @@ import simdtex
 from simdtex.io.image import write
 from simdtex.model.colours import source_colours, temperature_colours
 from simdtex.model.source_map import apply_source_map
-from simdtex.report.sheet import contact_sheet
+from simdtex.report.sheet import contact_sheet, magnified
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "benchmarks"))
@@ -37,11 +37,6 @@ def gravel(side=128):
 
 def brick(side=128):
     return data.brick()[:side, :side]
-
-
-def larger(picture, times):
-    """Every pixel as a square of times x times."""
-    return np.repeat(np.repeat(picture, times, axis=0), times, axis=1)
 
 
 def mosaic(side=120, period=20):
@@ -92,7 +87,7 @@ def finish():
     wood = data.coffee()[266:362, 486:582]
     found = [simdtex.synthesize(wood, SHAPE, channel_axis=-1, finish=value, rng=2) for value in (0, 1.5, 4)]
     labels = ("finish 0", "finish 1.5, the default", "finish 4")
-    return [(label, larger(picture[110:196, 30:116], 3)) for label, picture in zip(labels, found, strict=True)]
+    return [(label, magnified(picture[110:196, 30:116], 3)) for label, picture in zip(labels, found, strict=True)]
 
 
 def tile():

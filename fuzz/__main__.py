@@ -12,13 +12,11 @@ import argparse
 import itertools
 import json
 import os
-import subprocess
 import sys
 import time
 from pathlib import Path
 
-HERE = Path(__file__).resolve().parent
-RECORD = HERE.parent / "docs" / "fuzzing.json"
+RECORD = Path(__file__).resolve().parent.parent / "docs" / "fuzzing" / "lines.csv"
 
 
 def replay(path, device):
@@ -45,14 +43,14 @@ def main():
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--device", default="reference", help="the device of tries that name none")
     parser.add_argument("--out", type=Path, default=Path("build/fuzz"), metavar="DIR")
-    parser.add_argument("--record", action="store_true", help="write docs/fuzzing.json")
+    parser.add_argument("--record", action="store_true", help="write docs/fuzzing/lines.csv")
     parser.add_argument("--replay", type=Path, metavar="FILE", help="run the try of a file, and say what is wrong")
     options = parser.parse_args()
     if options.replay:
         return replay(options.replay, options.device)
     from fuzz import pool
     from fuzz.lines import made
-    from fuzz.record import Record
+    from fuzz.record import Record, write_counts
 
     record = Record(options.seed, options.out)
     end = time.monotonic() + 60 * options.minutes
@@ -69,16 +67,15 @@ def main():
             print(f"\r{record.tries} tries, {len(record.first)} faults ", end="", file=sys.stderr, flush=True)
 
     pool.run(questions(), options.workers, took, options.device)
-    text, found = record.text(), record.results()
-    print(text)
+    found = record.results()
+    print("\n".join(f"{what}: {number}" for what, number in found.items() if what != "faults"))
+    for fault in found["faults"]:
+        print(f"{fault['tries']:6} {fault['kind']}: {fault['text']}")
+        print(f"       python -m fuzz --replay {fault['file']}")
     options.out.mkdir(parents=True, exist_ok=True)
-    (options.out / "fuzz.txt").write_text(text + "\n")
     (options.out / "fuzz.json").write_text(json.dumps(found, indent=1) + "\n")
     if options.record:
-        found["version"] = subprocess.run(
-            ["git", "-C", str(HERE), "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=False
-        ).stdout.strip()
-        RECORD.write_text(json.dumps(found, indent=1) + "\n")
+        write_counts(RECORD, record.counts())
     return bool(record.faults)
 
 

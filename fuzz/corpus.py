@@ -5,7 +5,6 @@ import gzip
 import io
 import struct
 import zlib
-from pathlib import Path
 
 import numpy as np
 
@@ -269,8 +268,3 @@ def mutated(rng, data, others):
                 at = rng.choice(digits)
                 data[at : at + 1] = rng.choice(WORDS)
     return bytes(data)
-
-
-def beside(folder):
-    """What lies beside the folder of a try and is none of its business."""
-    (Path(folder) / "secret.raw").write_bytes(bytes(range(216)))

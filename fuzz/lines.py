@@ -129,11 +129,6 @@ def everything():
     return [data for files in seeds().values() for data in files.values() if len(data) < 10**5]
 
 
-@cache
-def _command(name):
-    return load(name)
-
-
 def made(seed, number):
     """Return the try of a number under a seed; the same on every call."""
     return Maker(random.Random(f"{seed}-{number}")).make()
@@ -150,7 +145,7 @@ class Maker:
         name = rng.choices(list(COMMANDS), list(COMMANDS.values()))[0]
         if name in ("", "nothing"):
             return Try([word for word in (name, *rng.choices(TEXT, k=rng.randrange(3))) if word], kind="no command")
-        args = [name, *self.line(_command(name), name)]
+        args = [name, *self.line(load(name), name)]
         if rng.random() < 0.03:
             args.insert(rng.randrange(len(args) + 1), rng.choice((*TEXT, "--help", "-o", "--nothing", "-q", "--size")))
             self.kinds.add("odd words")
@@ -158,7 +153,7 @@ class Maker:
         if interrupt:
             self.kinds.add("interrupted")
         old = self.old_outputs(args) if rng.random() < 0.1 else []
-        if interrupt and old and "--seed" not in args and any(one.name == "seed" for one in _command(name).params):
+        if interrupt and old and "--seed" not in args and any(one.name == "seed" for one in load(name).params):
             args += ["--seed", "1"]  # so that new outputs can be compared with right ones
         return Try(args, self.files, ", ".join(sorted(self.kinds)) or "plain", old, interrupt)
 

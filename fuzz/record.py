@@ -42,12 +42,10 @@ class Record:
 
     def results(self):
         """Return all counts and faults for JSON."""
-        seconds = time.monotonic() - self.began
         return {
             "seed": self.seed,
-            "seconds": round(seconds, 1),
+            "seconds": round(time.monotonic() - self.began, 1),
             "tries": self.tries,
-            "rate": round(self.tries / seconds, 1),
             "slowest": round(self.slowest, 2),
             "largest": self.largest,
             "codes": dict(sorted(self.codes.items())),
@@ -60,18 +58,20 @@ class Record:
             ],
         }
 
-    def text(self):
-        """Return the same as text."""
-        found = self.results()
-        lines = [
-            f"{found['tries']} tries in {found['seconds']:.0f} s, {found['rate']:.0f} a second, seed {self.seed}",
-            f"exit codes: {found['codes']}",
-            f"slowest {found['slowest']} s, most memory {found['largest'] / 2**20:.0f} MiB",
-            f"commands: {found['commands']}",
-            f"kinds: {found['kinds']}",
-            f"{len(found['faults'])} different faults in {found['faulty']} tries",
-        ]
-        for fault in found["faults"]:
-            lines.append(f"{fault['tries']:6} {fault['kind']}: {fault['text']}")
-            lines.append(f"       python -m fuzz --replay {fault['file']}")
-        return "\n".join(lines)
+    def counts(self):
+        """Return what docs/testing.rst tells of a run."""
+        return {
+            **{"tries": f"{self.tries:,}", "seconds": f"{time.monotonic() - self.began:,.0f}", "seed": self.seed},
+            "ended with exit code 0": f"{self.codes['0']:,}",
+            "ended with exit code 2 and a sentence": f"{self.codes['2']:,}",
+            "ended by Ctrl-C": f"{self.codes['130']:,}",
+            "slowest try, seconds": f"{self.slowest:.2f}",
+            "most memory of a try, MiB": f"{self.largest / 2**20:.0f}",
+            "different faults": len(self.faults),
+            **{f"tries with {kind}": f"{count:,}" for kind, count in self.kinds.most_common() if kind != "plain"},
+        }
+
+
+def write_counts(path, counts):
+    """Write a record that docs/testing.rst shows: what was counted, and how many."""
+    path.write_text("what,how many\n" + "".join(f'"{what}","{number}"\n' for what, number in counts.items()))

@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 
 import simdtex
+from fuzz.record import write_counts
 from simdtex import Checkpoint, distributed
 from simdtex.distributed import layout
 from simdtex.distributed.tasks import forget
@@ -169,11 +170,6 @@ def each(moments):
     return found
 
 
-def count(moments):
-    """Return how many tries that are."""
-    return len(each(moments))
-
-
 def one_try(seed, number, moments):
     """Return the run of a try, what was damaged, and how it ended."""
     rng = np.random.default_rng((seed, number))
@@ -208,7 +204,7 @@ def main():
         tempfile.TemporaryDirectory() as place,
         ProcessPoolExecutor(given.workers, get_context("spawn"), begin, (place,)) as pool,
     ):
-        tries = pool.submit(count, given.every).result() - given.first if given.every else given.tries
+        tries = len(pool.submit(each, given.every).result()) - given.first if given.every else given.tries
         numbers = range(given.first, given.first + tries)
         found = pool.map(one_try, repeat(given.seed), numbers, repeat(given.every), chunksize=10)
         for number, (name, what, end) in zip(numbers, found, strict=True):
@@ -231,7 +227,7 @@ def main():
             "ended otherwise, which is a fault": ends["fault"],
             **{f"tries with the damage *{how}*": hows[how] for how in sorted(hows)},
         }
-        RECORD.write_text("what,how many\n" + "".join(f'"{name}","{n}"\n' for name, n in counts.items()))
+        write_counts(RECORD, counts)
     return bool(ends["fault"])
 
 

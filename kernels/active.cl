@@ -25,23 +25,6 @@ __kernel void active_survey(const Lattice g, __global const ushort *restrict tem
     found[stretches + n] = sum;
 }
 
-// The sum over each stretch of the lattice.
-//
-// numbers (H, W); sums (stretches,)  out
-// One work-item per stretch.
-__kernel void active_total(const Lattice g, __global const int *restrict numbers, const int chunk, const int stretches,
-                           __global int *restrict sums)
-{
-    const int n = get_global_id(0);
-    if (n >= stretches)
-        return;
-    const int end = min(g.rows * g.cols, (n + 1) * chunk);
-    int sum = 0;
-    for (int at = n * chunk; at < end; ++at)
-        sum += numbers[SITE(g, at / g.cols, at % g.cols)];
-    sums[n] = sum;
-}
-
 // How many sites of each stretch of a list are active.
 //
 // sites  (S,)                 pixel indices

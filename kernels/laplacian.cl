@@ -62,21 +62,6 @@ __kernel void laplacian_band(__global const int *restrict fine, __global const i
     band[pixel] = fine[pixel] - expanded(g, half_rows, half_cols, rows, cols, torus, s / cols, s % cols);
 }
 
-// G_i = L_i + 2up(G_{i+1}) of the output, rows x cols, where pixel s of L_i is pixel source[s] of the sample's band,
-// tile_rows x tile_cols. The output's level i + 1 is coarse_rows x coarse_cols.
-__kernel void laplacian_collapse(__global const int *restrict band, const int planes, const int tile_rows,
-                                 const int tile_cols, const int torus, __global const int *restrict source,
-                                 const int rows, const int cols, __global const int *restrict coarse,
-                                 const int coarse_rows, const int coarse_cols, __global int *restrict fine)
-{
-    const int s = get_global_id(0), plane = get_global_id(1);
-    if (s >= rows * cols || plane >= planes)
-        return;
-    __global const int *g = coarse + plane * coarse_rows * coarse_cols;
-    const int up = expanded(g, coarse_rows, coarse_cols, tile_rows, tile_cols, torus, s / cols, s % cols);
-    fine[plane * rows * cols + s] = band[plane * tile_rows * tile_cols + source[s]] + up;
-}
-
 // Pixel (i, j) of L_i of the output where pieces of the sample that meet fade into each other: (1, 2, 1) / 4 in each
 // direction of what the neighbours, and the pixel itself, were copied from would go on with here.
 inline int joined(__global const int *restrict band, const int tile_rows, const int tile_cols, const int torus,
@@ -95,18 +80,19 @@ inline int joined(__global const int *restrict band, const int tile_rows, const 
     return (sum + 8) >> 4;
 }
 
-// As `laplacian_collapse`, where pieces fade into each other.
-__kernel void laplacian_blend(__global const int *restrict band, const int planes, const int tile_rows,
-                              const int tile_cols, const int torus, __global const int *restrict source,
-                              const int rows, const int cols, __global const int *restrict coarse,
-                              const int coarse_rows, const int coarse_cols, __global int *restrict fine)
+// G_i = L_i + 2up(G_{i+1}) of the output, rows x cols, where pixel s of L_i is pixel source[s] of the sample's band,
+// tile_rows x tile_cols; with `blend` pieces fade into each other. The output's level i + 1 is coarse_rows x coarse_cols.
+__kernel void laplacian_collapse(__global const int *restrict band, const int planes, const int tile_rows,
+                                 const int tile_cols, const int torus, __global const int *restrict source,
+                                 const int rows, const int cols, __global const int *restrict coarse,
+                                 const int coarse_rows, const int coarse_cols, const int blend, __global int *restrict fine)
 {
     const int s = get_global_id(0), plane = get_global_id(1);
     if (s >= rows * cols || plane >= planes)
         return;
     const int i = s / cols, j = s % cols;
     __global const int *g = coarse + plane * coarse_rows * coarse_cols;
-    __global const int *own = band + plane * tile_rows * tile_cols;
-    fine[plane * rows * cols + s] = joined(own, tile_rows, tile_cols, torus, source, rows, cols, i, j) +
-                                    expanded(g, coarse_rows, coarse_cols, tile_rows, tile_cols, torus, i, j);
+    __global const int *l = band + plane * tile_rows * tile_cols;
+    const int own = blend ? joined(l, tile_rows, tile_cols, torus, source, rows, cols, i, j) : l[source[s]];
+    fine[plane * rows * cols + s] = own + expanded(g, coarse_rows, coarse_cols, tile_rows, tile_cols, torus, i, j);
 }

@@ -30,10 +30,8 @@
 #define MANY 512      // candidates that are weighed one by one before the scan takes over
 #define BUCKETS 8     // of confidence
 #if V == 1
-typedef int ivec;
 #define BITS(x) as_int(x)
 #else
-typedef JOIN(int, V) ivec;
 #define BITS(x) JOIN(as_int, V)(x)
 #endif
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma OPENCL FP_CONTRACT OFF
+#define C channels // any number of them
 #include "common/confidence.h"
 #include "common/lattice.h"
 
@@ -30,18 +31,11 @@ __kernel void neighbourhood(__global const int *restrict sites, const int S, con
     const int2 o = k < N ? offsets[k] : (int2)(0, 0);
     const int r = s >= S ? -1 : k < N ? neighbour(g, i, j, o.x, o.y) : site;
     const float u = r < 0 || k == N ? 0.0f : (float)(1024 - temperature[r]) * 0x1p-10f;
-#ifdef OWN
-    const float certain = weighed_as(u, r < 0 ? 0 : source[r], hard);
-    const float guide = r < 0 ? 0.0f : k < N ? 1.0f : centre;
+    const float certain = WEIGHED_AS(u, r < 0 ? 0 : source[r], hard), guide = r < 0 ? 0.0f : k < N ? 1.0f : centre;
     for (int c = 0; c < channels; ++c) {
         const ushort x = r < 0 ? 0 : values[c * plane + r];
-        const float uc = confidence_of(c < made, x, certain, guide);
-        confidence[(k * channels + c) * P + s] = uc;
+        const float uc = CONFIDENCE_OF(c < made, x, certain, guide);
+        confidence[(k * CONFIDENCES + CONFIDENT(c)) * P + s] = uc;
         weighted[(k * channels + c) * P + s] = (float)x * uc;
     }
-#else
-    confidence[k * P + s] = u;
-    for (int c = 0; c < channels; ++c)
-        weighted[(k * channels + c) * P + s] = r < 0 ? 0.0f : (float)values[c * plane + r] * u;
-#endif
 }

@@ -54,19 +54,12 @@
 #endif
 
 // Confidence and weighted value of each channel at pixel r, the k-th of those that are looked at; -1: nobody.
-#ifdef OWN
 #define GATHER(k, r, certain, guide)                                                                                   \
     for (int c = 0; c < C; ++c) {                                                                                      \
         const ushort x = r < 0 ? 0 : values[c * g.area + r];                                                           \
-        u[(k) * C + c] = confidence_of(c < MADE, x, certain, guide);                                                   \
-        xu[(k) * C + c] = (float)x * u[(k) * C + c];                                                                   \
+        u[(k) * CONFIDENCES + CONFIDENT(c)] = CONFIDENCE_OF(c < MADE, x, certain, guide);                              \
+        xu[(k) * C + c] = (float)x * u[(k) * CONFIDENCES + CONFIDENT(c)];                                              \
     }
-#else
-#define GATHER(k, r, certain, guide)                                                                                   \
-    u[k] = certain;                                                                                                    \
-    for (int c = 0; c < C; ++c)                                                                                        \
-        xu[(k) * C + c] = r < 0 ? 0.0f : (float)values[c * g.area + r] * u[k];
-#endif
 
 // strip       (C, size)  the sample's pixels of this level, row by row: candidates that follow one another side by side
 // strip_reach (N,)       pixel offset of each neighbour there
@@ -93,11 +86,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
     for (int k = 0; k < neighbours; ++k) {
         const int r = neighbour(g.lattice, i, j, offsets[k].x, offsets[k].y);
         const int t = r < 0 ? UNTOUCHED : temperature[r];
-#ifdef OWN
-        const float certain = weighed_as((float)(1024 - t) * 0x1p-10f, r < 0 ? 0 : source[r], g.hard);
-#else
-        const float certain = (float)(1024 - t) * 0x1p-10f;
-#endif
+        const float certain = WEIGHED_AS((float)(1024 - t) * 0x1p-10f, r < 0 ? 0 : source[r], g.hard);
         GATHER(k, r, certain, r < 0 ? 0.0f : 1.0f);
         sum += r < 0 ? 0 : t;
         members += r < 0 ? 0 : 1;
@@ -194,19 +183,12 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
 //   3. `chance` positions at random, and one where there would be none at all.
 //
 // Lane n of a cell gets what is known at pixel r.
-#ifdef OWN
 #define PUT(cell, n, r, certain, guide)                                                                                \
     for (int c = 0; c < C; ++c) {                                                                                      \
         const ushort x = values[c * g.area + r];                                                                       \
-        U(cell, c, n) = confidence_of(c < MADE, x, certain, guide);                                                    \
+        U(cell, c, n) = CONFIDENCE_OF(c < MADE, x, certain, guide);                                                    \
         XU(cell, c, n) = (float)x * U(cell, c, n);                                                                     \
     }
-#else
-#define PUT(cell, n, r, certain, guide)                                                                                \
-    U(cell, 0, n) = certain;                                                                                           \
-    for (int c = 0; c < C; ++c)                                                                                        \
-        XU(cell, c, n) = (float)values[c * g.area + r] * certain;
-#endif
 
 // disc    (CELLS, 16)  1 on the neighbourhood, 0 elsewhere
 // at      (count,)     place of each candidate in `levels`
@@ -259,21 +241,17 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
                 const int cell = a * CHUNKS + k, from = max(row[a], 0) + (j - RADIUS + 16 * k) * h.spacing;
                 const float16 in = row[a] < 0 ? (float16)0.0f : vload16(cell, disc);
                 const float16 t = spread(temperature + from, h.spacing);
+                float16 certain = (1024.0f - t) * 0x1p-10f * in;
 #ifdef OWN
-                const float16 heavy = select((float16)1.0f, (float16)g.hard, spread_int(source + from, h.spacing) < 0);
-                const float16 certain = (1024.0f - t) * 0x1p-10f * in * heavy;
+                certain *= select((float16)1.0f, (float16)g.hard, spread_int(source + from, h.spacing) < 0);
                 const float16 guide = in + (row[a] < 0 ? 0.0f : g.centre) * middle(a, k);
+#endif
                 for (int c = 0; c < C; ++c) {
                     const float16 x = spread(values + c * g.area + from, h.spacing);
-                    u[cell * C + c] = select(c < MADE ? certain : guide, (float16)0.0f, x == (float)UNKNOWN);
-                    xu[cell * C + c] = x * u[cell * C + c];
+                    const float16 uc = CONFIDENCES_OF(c < MADE, x, certain, guide);
+                    u[cell * CONFIDENCES + CONFIDENT(c)] = uc;
+                    xu[cell * C + c] = x * uc;
                 }
-#else
-                const float16 certain = (1024.0f - t) * 0x1p-10f * in;
-                u[cell] = certain;
-                for (int c = 0; c < C; ++c)
-                    xu[cell * C + c] = spread(values + c * g.area + from, h.spacing) * certain;
-#endif
                 heat += t * in;
                 inside += in;
             }
@@ -297,11 +275,7 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
             const int t = temperature[r], cell = a * CHUNKS + b / 16, n = b % 16;
             sum += t;
             ++members;
-#ifdef OWN
-            const float ur = weighed_as((float)(1024 - t) * 0x1p-10f, source[r], g.hard);
-#else
-            const float ur = (float)(1024 - t) * 0x1p-10f;
-#endif
+            const float ur = WEIGHED_AS((float)(1024 - t) * 0x1p-10f, source[r], g.hard);
             PUT(cell, n, r, ur, 1.0f);
         }
         if (G)

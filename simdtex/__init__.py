@@ -7,90 +7,64 @@ TYPE_CHECKING = False  # as type checkers know it by this name, without what imp
 if TYPE_CHECKING:
     from typing import Any
 
-    from simdtex.checkpoint import Checkpoint
-    from simdtex.experiments import quality
-    from simdtex.io.grids import read_grid, write_grid
-    from simdtex.io.hard_data import place_hard_data, read_hard_data
-    from simdtex.jobs.classification import TextureClassifier, classify
-    from simdtex.jobs.estimation import estimate
-    from simdtex.jobs.filling import extend, fill
-    from simdtex.jobs.simulation import simulate
-    from simdtex.live.widget import Live
-    from simdtex.machine import open_machine
-    from simdtex.machine.devices import DeviceError, devices
-    from simdtex.methods.pyramid.mixtures import mix
-    from simdtex.run import Output, Progress
-    from simdtex.synthesis import explain, lcpdf, replay, synthesize, synthesize_solid
+    from simdtex.checkpoint import Checkpoint as Checkpoint
+    from simdtex.experiments import quality as quality
+    from simdtex.io.grids import read_grid as read_grid
+    from simdtex.io.grids import write_grid as write_grid
+    from simdtex.io.hard_data import place_hard_data as place_hard_data
+    from simdtex.io.hard_data import read_hard_data as read_hard_data
+    from simdtex.jobs.classification import TextureClassifier as TextureClassifier
+    from simdtex.jobs.classification import classify as classify
+    from simdtex.jobs.estimation import estimate as estimate
+    from simdtex.jobs.filling import extend as extend
+    from simdtex.jobs.filling import fill as fill
+    from simdtex.jobs.simulation import simulate as simulate
+    from simdtex.live.widget import Live as Live
+    from simdtex.machine import open_machine as open_machine
+    from simdtex.machine.devices import DeviceError as DeviceError
+    from simdtex.machine.devices import devices as devices
+    from simdtex.methods.pyramid.mixtures import mix as mix
+    from simdtex.run import Output as Output
+    from simdtex.run import Progress as Progress
+    from simdtex.synthesis import explain as explain
+    from simdtex.synthesis import lcpdf as lcpdf
+    from simdtex.synthesis import replay as replay
+    from simdtex.synthesis import synthesize as synthesize
+    from simdtex.synthesis import synthesize_solid as synthesize_solid
 
     __version__: str
 
-__all__ = [
-    "Checkpoint",
-    "DeviceError",
-    "Live",
-    "Output",
-    "Progress",
-    "TextureClassifier",
-    "classify",
-    "devices",
-    "estimate",
-    "explain",
-    "extend",
-    "fill",
-    "lcpdf",
-    "mix",
-    "open_machine",
-    "place_hard_data",
-    "quality",
-    "read_grid",
-    "read_hard_data",
-    "replay",
-    "simulate",
-    "synthesize",
-    "synthesize_solid",
-    "write_grid",
-]
-
-_HOMES = {
-    "Checkpoint": "simdtex.checkpoint",
-    "DeviceError": "simdtex.machine.devices",
-    "Live": "simdtex.live.widget",
-    "Output": "simdtex.run",
-    "Progress": "simdtex.run",
-    "TextureClassifier": "simdtex.jobs.classification",
-    "classify": "simdtex.jobs.classification",
-    "devices": "simdtex.machine.devices",
-    "estimate": "simdtex.jobs.estimation",
-    "explain": "simdtex.synthesis",
-    "extend": "simdtex.jobs.filling",
-    "fill": "simdtex.jobs.filling",
-    "lcpdf": "simdtex.synthesis",
-    "mix": "simdtex.methods.pyramid.mixtures",
-    "open_machine": "simdtex.machine",
-    "place_hard_data": "simdtex.io.hard_data",
-    "read_grid": "simdtex.io.grids",
-    "read_hard_data": "simdtex.io.hard_data",
-    "replay": "simdtex.synthesis",
-    "simulate": "simdtex.jobs.simulation",
-    "synthesize": "simdtex.synthesis",
-    "synthesize_solid": "simdtex.synthesis",
-    "write_grid": "simdtex.io.grids",
+_NAMES = {
+    "simdtex.checkpoint": ("Checkpoint",),
+    "simdtex.experiments": ("quality",),
+    "simdtex.io.grids": ("read_grid", "write_grid"),
+    "simdtex.io.hard_data": ("place_hard_data", "read_hard_data"),
+    "simdtex.jobs.classification": ("TextureClassifier", "classify"),
+    "simdtex.jobs.estimation": ("estimate",),
+    "simdtex.jobs.filling": ("extend", "fill"),
+    "simdtex.jobs.simulation": ("simulate",),
+    "simdtex.live.widget": ("Live",),
+    "simdtex.machine": ("open_machine",),
+    "simdtex.machine.devices": ("DeviceError", "devices"),
+    "simdtex.methods.pyramid.mixtures": ("mix",),
+    "simdtex.run": ("Output", "Progress"),
+    "simdtex.synthesis": ("explain", "lcpdf", "replay", "synthesize", "synthesize_solid"),
 }
-"""Where the public names live; each is loaded when it is asked for first, so that the command line starts at once."""
+"""The public names by their modules; each is loaded when it is asked for first: the command line starts at once."""
 
-_MODULES = {"quality": "simdtex.experiments.quality"}
-"""The public names that are modules themselves."""
+__all__ = sorted(name for names in _NAMES.values() for name in names)
 
 
 def __getattr__(name: str) -> Any:
+    home = next((home for home, names in _NAMES.items() if name in names), None)
     if name == "__version__":
         from importlib.metadata import version
 
         found: Any = version("simdtex")
-    elif name in _HOMES or name in _MODULES:
+    elif home:
         from importlib import import_module
 
-        found = getattr(import_module(_HOMES[name]), name) if name in _HOMES else import_module(_MODULES[name])
+        found = import_module(f"{home}.{name}") if name == "quality" else getattr(import_module(home), name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = found  # the next time it is found without this function

@@ -164,12 +164,7 @@ class Checkpoint:
 
     def _compare(self, about: dict[str, Any], now: dict[str, Any], seed: int | None) -> None:
         """Raise if the file is of another run; the sentence says how they differ."""
-        here, before = version("simdtex"), about["inputs"]
-        if about["version"] != here:
-            raise ValueError(
-                f"the checkpoint {self.path} is of simdtex {about['version']} and this is {here}, "
-                f"whose results may differ; resume with {about['version']}, or give a new file"
-            )
+        before = about["inputs"]
         for name in {**before, **now}:
             old, new = before.get(name), now.get(name)
             if old == new:
@@ -241,7 +236,7 @@ def opened(
 def read(path: Path) -> tuple[dict[str, Any], Any]:
     """Return the description of the run in a checkpoint, and its state.
 
-    Raises ValueError if the file is no checkpoint, is damaged, or of another format.
+    Raises ValueError if the file is no checkpoint, is damaged, or of another format or version.
     """
     try:
         about, tree = read_state(path)
@@ -249,12 +244,18 @@ def read(path: Path) -> tuple[dict[str, Any], Any]:
         raise ValueError(f"{path} is no checkpoint, or is damaged; remove it, and run the command again") from None
     except OSError as error:
         raise ValueError(f"{path} cannot be read ({error.strerror}); give another file") from None
-    if about.get("format") != FORMAT:
-        raise ValueError(
-            f"the checkpoint {path} is of format {about.get('format')} and this simdtex reads {FORMAT}; "
-            f"resume with the code of simdtex {about.get('version')} that wrote it, or give a new file"
-        )
+    check_version(f"the checkpoint {path}", about, FORMAT)
     return about, tree
+
+
+def check_version(name: str, about: dict[str, Any], known: int) -> None:
+    """Raise unless a state of this description is of a known format and of this version."""
+    wrote, own = about.get("version"), version("simdtex")
+    wrong = f"format {about.get('format')} and this simdtex reads {known}" if about.get("format") != known else ""
+    if not wrong and wrote != own:
+        wrong = f"simdtex {wrote} and this is {own}, whose results may differ"
+    if wrong:
+        raise ValueError(f"{name} is of {wrong}; go on with the code of simdtex {wrote} that wrote it, or begin anew")
 
 
 def write_state(path: Path, about: dict[str, Any], tree: Any) -> None:

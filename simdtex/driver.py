@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from math import inf
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,42 +127,31 @@ def _saved(run: Run, state: Any, observer: Observer) -> Tree:
     return {"state": run.save(state), "observer": observer.save()}
 
 
-class Call(NamedTuple):
-    """The arguments that all public functions share, see `simdtex.synthesize`."""
-
-    rng: int | np.random.Generator | None
-    device: str | Machine | None
-    callback: Callback | None
-    full_output: bool
-    checkpoint: str | os.PathLike[str] | Checkpoint | Checkpointing | None
-
-
-Result = NDArray[Any] | tuple[NDArray[Any], Output]
-"""What a public function returns: the picture or, with ``full_output=True``, the picture and the rest."""
-
-
 def execute(
     name: str,
     run: Callable[[Machine, int, Callback | None, Checkpointing], tuple[NDArray[Any], Output]],
     inputs: Callable[[], dict[str, Any]],
     channel_axis: int | None,
-    call: Call,
-) -> Result:
+    rng: int | np.random.Generator | None,
+    device: str | Machine | None,
+    callback: Callback | None,
+    full_output: bool,
+    checkpoint: str | os.PathLike[str] | Checkpoint | Checkpointing | None,
+) -> NDArray[Any] | tuple[NDArray[Any], Output]:
     """Run a validated call on a device: what every public function does once its input is validated.
 
     ``name`` is the public function; ``run`` is `drive` with its plan, or a function that drives several plans in turn;
     ``inputs()`` returns all that determines the result but the seed, by the names that users give it; and
-    ``channel_axis`` is that of the returned picture. A `Checkpointing` in place of the call's checkpoint keeps
-    states in memory.
+    ``channel_axis`` is that of the returned picture. The others are the arguments that all public functions share; a
+    `Checkpointing` as ``checkpoint`` keeps states in memory.
     """
-    machine = open_machine(call.device)
+    machine = open_machine(device)
     machine.profile()  # forget what was before
-    callback = seeing(call.callback, channel_axis)
-    with opened(call.checkpoint, name, call.rng, inputs, machine.name) as (seed, checkpointing):
-        image, output = run(machine, seed, callback, checkpointing)
+    with opened(checkpoint, name, rng, inputs, machine.name) as (seed, checkpointing):
+        image, output = run(machine, seed, seeing(callback, channel_axis), checkpointing)
     output.statistics.update(machine.profile() or {})
     picture = restored(image, channel_axis)
-    if not call.full_output:
+    if not full_output:
         return picture
     stages = [replace(stage, image=restored(stage.image, channel_axis)) for stage in output.stages]
     return picture, replace(output, stages=stages, made=image)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
+from importlib.util import find_spec
 from math import isfinite, prod
 from numbers import Integral, Real
 from textwrap import wrap
@@ -309,9 +310,9 @@ def whole(name: str, value: Any, least: int, most: float = MOST) -> None:
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise TypeError(f"{name} must be an integer, not {shown(value)}")
     if value < least:
-        raise ValueError(f"{name} is {number(value)}; give {least} or more")
+        raise ValueError(f"{name} is {shown(value, str)}; give {least} or more")
     if int(value) > most:
-        raise ValueError(f"{name} is {number(value)}; give {most} or fewer")
+        raise ValueError(f"{name} is {shown(value, str)}; give {most} or fewer")
 
 
 def real(
@@ -321,9 +322,18 @@ def real(
     if isinstance(value, bool) or not isinstance(value, Real):
         raise TypeError(f"{name} must be a number, not {shown(value)}")
     if not (_finite(value) or value == most) or value < least or (above and value == least):
-        raise ValueError(f"{name} is {number(value)}; give a number {'above' if above else 'of at least'} {least:g}")
+        raise ValueError(
+            f"{name} is {shown(value, str)}; give a number {'above' if above else 'of at least'} {least:g}"
+        )
     if float(value) > most or (below and value == most):
-        raise ValueError(f"{name} is {number(value)}; give {'a number below' if below else 'at most'} {most:g}")
+        raise ValueError(f"{name} is {shown(value, str)}; give {'a number below' if below else 'at most'} {most:g}")
+
+
+def require(extra: str, *libraries: str) -> None:
+    """Raise unless the libraries are installed, which an extra of the package brings."""
+    for library in libraries:
+        if find_spec(library) is None:
+            raise ValueError(f"{library} is not installed; pip install 'simdtex[{extra}]'")
 
 
 def unmasked(name: str, value: Any) -> None:
@@ -335,6 +345,12 @@ def unmasked(name: str, value: Any) -> None:
         )
 
 
+def check_real(name: str, array: NDArray[Any]) -> None:
+    """Raise unless an array holds real numbers."""
+    if array.dtype.kind not in "buif":
+        raise TypeError(f"{name} holds {array.dtype} values; convert it to integers or real floats")
+
+
 def real_array(name: str, value: Any) -> NDArray[Any]:
     """Return the value as an array of finite real numbers; raise if it is none."""
     unmasked(name, value)
@@ -342,27 +358,17 @@ def real_array(name: str, value: Any) -> NDArray[Any]:
         array = np.asarray(value)
     except ValueError:
         raise ValueError(f"{name} is ragged; give rows of equal length") from None
-    if array.dtype.kind not in "buif":
-        raise TypeError(f"{name} holds {array.dtype} values; convert it to integers or real floats")
+    check_real(name, array)
     if not np.isfinite(array).all():
         raise ValueError(f"{name} has values that are NaN or infinite; fill them first")
     return array
 
 
-def shown(value: Any) -> str:
+def shown(value: Any, form: Callable[[Any], str] = repr) -> str:
     """Return a value in one line, cut if it is long."""
     try:
-        text = " ".join(repr(value).split())
+        text = " ".join(form(value).split())
     except ValueError:  # an integer of thousands of digits
-        text = f"a value of type {type(value).__name__}"
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
-
-
-def number(value: Any) -> str:
-    """Return a number as text, or its kind if it has too many digits."""
-    try:
-        text = str(value)
-    except ValueError:
         return "a number of thousands of digits"
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 

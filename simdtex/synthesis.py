@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpoint
-from simdtex.driver import Call, Plan, check_shape, drive, execute, with_channels_last
+from simdtex.driver import Plan, check_shape, check_sides, drive, execute, with_channels_last
+from simdtex.io.hard_data import HardData
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_inputs
 from simdtex.machine import Machine, open_machine
@@ -32,7 +33,7 @@ from simdtex.run import Callback, Output
 if TYPE_CHECKING:
     from typing import Unpack
 
-    from simdtex.methods.typed_options import AnyOptions, SolidOptions
+    from simdtex.methods.typed_options import SolidOptions, SynthOptions
 
 GIVEN = ("channel_axis", "mask", "known", "known_source", "guide")
 """The arrays of a synthesis, and their axis, beside sample and shape."""
@@ -46,31 +47,13 @@ METHODS = ("mrf", "multires", "pyramid")
 
 @overload
 def synthesize(
-    sample: ArrayLike,
-    shape: tuple[int, int],
-    *,
-    method: str = ...,
-    mask: Any = ...,
-    known: Any = ...,
-    known_source: ArrayLike | None = ...,
-    guide: tuple[Any, Any] | None = ...,
-    full_output: Literal[True],
-    **options: Unpack[AnyOptions],
+    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[SynthOptions]
 ) -> tuple[NDArray[Any], Output]: ...
 
 
 @overload
 def synthesize(
-    sample: ArrayLike,
-    shape: tuple[int, int],
-    *,
-    method: str = ...,
-    mask: Any = ...,
-    known: Any = ...,
-    known_source: ArrayLike | None = ...,
-    guide: tuple[Any, Any] | None = ...,
-    full_output: Literal[False] = ...,
-    **options: Unpack[AnyOptions],
+    sample: ArrayLike, shape: tuple[int, int], *, full_output: Literal[False] = ..., **options: Unpack[SynthOptions]
 ) -> NDArray[Any]: ...
 
 
@@ -81,7 +64,7 @@ def synthesize(
     method: str = "mrf",
     channel_axis: int | None = None,
     mask: ArrayLike | Sequence[ArrayLike] | None = None,
-    known: ArrayLike | None = None,
+    known: ArrayLike | HardData | str | os.PathLike[str] | None = None,
     known_source: ArrayLike | None = None,
     guide: tuple[Any, Any] | None = None,
     rng: int | np.random.Generator | None = None,
@@ -180,12 +163,13 @@ def synthesize(
         plan = replace(mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide), remedy=TILED)
     else:
         plan = import_module(f"simdtex.methods.{method}.algorithm").Plan(inputs.pictures.pixels[0], size, chosen)
-    call = Call(rng, device, callback, full_output, checkpoint)
 
     def identity() -> dict[str, Any]:
         return {"method": method, "shape": size, "options": chosen, **inputs.identity()}
 
-    return execute("synthesize", partial(drive, plan), identity, channel_axis, call)
+    return execute(
+        "synthesize", partial(drive, plan), identity, channel_axis, rng, device, callback, full_output, checkpoint
+    )
 
 
 @overload
@@ -267,11 +251,11 @@ def synthesize_solid(
     from simdtex.methods.pyramid import solid
 
     pixels = check_sample(sample, channel_axis)
-    size = _check_block(shape)
+    size: Any = check_sides(shape, ("depth", "rows", "columns"))
     chosen = resolve(solid.Options, "solid", options)
     run, axis = partial(drive, solid.Plan(pixels, size, chosen)), None if channel_axis is None else -1
-    call = Call(rng, device, callback, full_output, checkpoint)
-    return execute("synthesize_solid", run, lambda: {"shape": size, "options": chosen, "sample": pixels}, axis, call)
+    inputs = {"shape": size, "options": chosen, "sample": pixels}
+    return execute("synthesize_solid", run, lambda: inputs, axis, rng, device, callback, full_output, checkpoint)
 
 
 def explain(
@@ -382,9 +366,8 @@ def replay(
     """
     size = check_shape(shape)
     given = {name: arguments.pop(name) for name in GIVEN if name in arguments}
-    axis = given.get("channel_axis")
     inputs = check_inputs(sample, size, **given)
-    chosen: Any = resolve(mrf.Options, "synth", with_channels_last(arguments, axis))
+    chosen: Any = resolve(mrf.Options, "synth", arguments)
     plan = mrf.plan(inputs.pictures, size, chosen, inputs.given, inputs.guide)
     return Replay(plan, open_machine(device), as_seed(rng))
 
@@ -466,16 +449,6 @@ def lcpdf(
     planes = x[None].astype(np.uint16), np.zeros(x.shape, np.int32), _check_temperature(temperature, x.shape)
     field = Field(*map(machine.put, planes))
     return lcpdf_at(machine, field, grey, where, offsets, grid, bandwidth, estimator)
-
-
-def _check_block(shape: Any) -> tuple[int, int, int]:
-    try:
-        depth, rows, cols = shape
-    except (TypeError, ValueError):
-        raise ValueError(f"shape must be three integers (depth, rows, columns), not {shape!r}") from None
-    whole("depth of the block", depth, 1)
-    rows, cols = check_shape((rows, cols))
-    return int(depth), rows, cols
 
 
 def _check_grey(name: str, array: ArrayLike, greys: int) -> NDArray[np.int64]:

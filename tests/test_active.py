@@ -30,15 +30,6 @@ def test_a_survey_counts_sites_and_heat(machine, case):
     assert active.survey(REFERENCE, grid, t) == active.survey(machine, grid, machine.put(t)) == expected
 
 
-@given(case=temperatures())
-@settings(max_examples=20)
-def test_a_total_is_a_sum_over_sites(machine, case):
-    grid, t = case
-    numbers = t.astype(np.int32) * 70 - 999
-    expected = int(numbers[:: grid.spacing, :: grid.spacing].sum())
-    assert active.total(REFERENCE, grid, numbers) == active.total(machine, grid, machine.put(numbers)) == expected
-
-
 @given(case=temperatures(), groups=st.integers(1, 9), chunk=st.sampled_from([1, 3, 256]))
 @settings(max_examples=40)
 def test_the_active_sites_of_a_list_stay_in_order_group_by_group(machine, case, groups, chunk):

@@ -142,7 +142,7 @@ def build(machine):
 
     def run(name, *arrays):
         out = machine.empty(arrays[0].shape, np.float32)
-        machine.launch(cl.Kernel(program, name), out.shape, *map(machine.put, arrays), out, local=(1,))
+        machine.enqueue(cl.Kernel(program, name), out.shape, *map(machine.put, arrays), out, local=(1,))
         return machine.get(out)
 
     return run

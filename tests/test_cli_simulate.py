@@ -186,7 +186,6 @@ def test_what_a_grid_cannot_hold_is_told_before_the_run(folder, case, monkeypatc
 
 
 def test_a_report_of_data_on_the_ground(folder):
-    pytest.importorskip("gstools")
     args = ("--known", "wells.eas", "--several", "most", "--size", "14x12", "--categorical", "--report", "report")
     assert (made(folder, "ti.gslib", *args).values[0, 4, 3] == 3).all()
     assert "wells.eas" in (folder / "report" / "index.html").read_text(encoding="utf-8")
@@ -228,7 +227,6 @@ def test_an_existing_file_is_replaced(folder):
 
 
 def test_a_report_is_a_page_and_numbers(folder):
-    pytest.importorskip("gstools")
     args = ("--known", "facies.csv", "--size", "14x12", "--categorical", "--report", "report")
     made(folder, "facies.png", "-n", 2, *args)
     page = (folder / "report" / "index.html").read_text(encoding="utf-8")

@@ -1,6 +1,5 @@
 """What an ensemble of realisations is judged by, on cases whose answers are known."""
 
-import builtins
 import hashlib
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from scipy.ndimage import binary_dilation, binary_erosion
 from scipy.special import kl_div
 
 from simdtex.experiments import ensemble
-from simdtex.experiments.ensemble.summary import MARGIN, _variogram
+from simdtex.experiments.ensemble.summary import MARGIN, variogram
 
 
 def noise(seed, shape=(6, 40, 50), values=2):
@@ -28,17 +27,11 @@ def test_categories_are_those_of_the_training_image_unless_they_are_named():
     assert ensemble.categories_of(image > 2).tolist() == [False, True]
 
 
-def test_without_gstools_one_sentence_says_so(monkeypatch):
-    real = builtins.__import__
-
-    def missing(name, *args, **kwargs):
-        if name == "gstools":
-            raise ImportError(name)
-        return real(name, *args, **kwargs)
-
-    monkeypatch.setattr(builtins, "__import__", missing)
-    with pytest.raises(ValueError, match=r"gstools is not installed; pip install 'simdtex\[simulate\]'"):
-        _variogram(np.zeros((5, 5)), 0, 2)
+def test_the_variogram_of_stripes():
+    """Pixels on both sides of the border of a stripe differ by 2, so half the square is 2."""
+    stripes = np.tile(np.arange(12) // 3 % 2 * 2.0, (5, 1))
+    np.testing.assert_allclose(variogram(stripes, 1, 3), [0, 2 * 3 / 11, 2 * 6 / 10, 2])
+    np.testing.assert_array_equal(variogram(stripes > 0, 0, 2), 0)
 
 
 def test_connectivity_of_two_bars():
@@ -183,8 +176,8 @@ def test_summary_puts_everything_together():
     np.testing.assert_allclose(found.shares[:, -1], [1 - training.mean(), training.mean()])
     np.testing.assert_allclose(found.shares[1, :-1], images.mean(axis=(1, 2)))
     assert found.variograms.shape == found.connectivity.shape == (2, 2, 5, 25)
-    np.testing.assert_array_equal(found.variograms[1, 0, 2], _variogram(images[2] == 0, 1, 24))
-    np.testing.assert_array_equal(found.variograms[0, 1, -1], _variogram(training == 1, 0, 24))
+    np.testing.assert_array_equal(found.variograms[1, 0, 2], variogram(images[2] == 0, 1, 24))
+    np.testing.assert_array_equal(found.variograms[0, 1, -1], variogram(training == 1, 0, 24))
     np.testing.assert_array_equal(found.connectivity[:, 1, 3], ensemble.connectivity(images[3], 1, 24).function)
     assert found.components[0, 1] == ensemble.connectivity(images[1], 0, 1).components
     assert found.dead_ends[1, -1] == 1e4 * len(ensemble.dead_ends(training, 1)) / 48**2

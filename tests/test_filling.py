@@ -474,7 +474,7 @@ BAD_FILL = {
     "another size": ({"mask": MIDDLE[:-1]}, ValueError, "mask is 15x20 and the picture 16x20 .*; give one size"),
     "no reach": ({"reach": 0}, ValueError, "reach is 0; give 1 or more"),
     "a sample of another type": (
-        {"sample": FLOAT}, ValueError, "sample has 1 channels of float32 and the picture 1 of uint8; give both one"),
+        {"sample": FLOAT}, ValueError, "sample has 1 channel of float32 and the picture 1 channel of uint8; convert"),
     "a sample with colour": ({"sample": texture(SHAPE, 3)}, ValueError, "the sample is 3-dimensional"),
     "a sample of nothing": (
         {"image": FLOAT, "sample": np.full(SHAPE, np.nan, np.float32)}, ValueError, "no known pixel"),

@@ -124,9 +124,9 @@ def test_known_values_with_nan_are_taken():
         (OnGpu(GREY), r"the sample is no array that NumPy can take: can.t convert cuda:0 .*Use Tensor\.cpu\(\)"),
         (Tracked(GREY), r"the sample is no array that NumPy can take: .*Use tensor\.detach"),
         (PIL.Image.fromarray(RGB).quantize(4), r"palette indices, which are no colours; give image\.convert\('RGB'\)"),
-        (pandas.DataFrame(GREY).astype("Int64"), "holds object values: convert it"),
+        (pandas.DataFrame(GREY).astype("Int64"), "holds object values; convert it"),
         (xarray.DataArray(GREY).to_dataset(name="a"), "no array that NumPy can take: .*Dataset"),
-        ("sample.png", "values: convert it"),
+        ("sample.png", "values; convert it"),
     ],
     ids=["GPU", "gradient", "palette", "nullable", "dataset", "path"],
 )

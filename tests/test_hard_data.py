@@ -93,7 +93,7 @@ def test_files_that_are_no_tables(tmp_path):
         (np.zeros((0, 3)), "has no rows"),
         (np.zeros((4, 2)), r"shape \(4, 2\): give"),
         (np.zeros(3), r"shape \(3,\): give"),
-        (np.array([["1", "2", "3"]]), "<U1 values: give real numbers"),
+        (np.array([["1", "2", "3"]]), "<U1 values; convert it to integers or real floats"),
         (np.zeros((2, 3), complex), "complex128 values"),
     ):
         np.save(tmp_path / "a.npy", array)
@@ -348,7 +348,7 @@ def test_arguments_that_are_wrong():
             place_hard_data(rows, (2, 2))
     with pytest.raises(ValueError, match="has no rows"):
         place_hard_data(HardData(np.zeros((0, 2)), np.zeros((0, 1)), ("a",)), (2, 2))
-    with pytest.raises(TypeError, match="object values: give real numbers"):
+    with pytest.raises(TypeError, match="object values; convert it to integers or real floats"):
         place_hard_data([[0, 0, None]], (2, 2))
     with pytest.raises(ValueError, match="row 0 and row 2 of the hard data"):
         place_hard_data([[0, 0, 1], [0, 1, 1], [0, 0, 2]], (2, 2))

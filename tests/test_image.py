@@ -328,7 +328,7 @@ def test_split_alpha(dtype, alpha, transparent, colours):
 )
 def test_what_is_no_picture_is_refused(check, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(TypeError, match="complex128 values: give integers or real floats"):
+    with pytest.raises(TypeError, match="complex128 values; convert it to integers or real floats"):
         check(np.zeros((2, 2, 4), complex))
     with pytest.raises(ValueError, match="has the shape"):
         check(np.zeros(4))

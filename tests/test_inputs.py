@@ -230,7 +230,7 @@ THREE = np.full((*SHAPE, 3), -1)
 BAD = {
     # samples
     "ragged": ({"sample": [[1, 2], [3]]}, ValueError, "the sample is ragged; give rows of equal length"),
-    "text": ({"sample": GREY.astype(str)}, TypeError, "the sample holds <U.* values: convert it"),
+    "text": ({"sample": GREY.astype(str)}, TypeError, "the sample holds <U.* values; convert it"),
     "one axis": ({"sample": GREY[0]}, ValueError, r"1-dimensional: give \(rows, cols\)"),
     "colour": ({"sample": COLOUR}, ValueError, "3-dimensional: give .* or channel_axis=-1"),
     "grey with an axis": ({"channel_axis": 0}, ValueError, "2-dimensional .grey.: give three axes"),
@@ -240,7 +240,7 @@ BAD = {
     "infinite": ({"sample": at(FLOAT, (2, 3), -np.inf)}, ValueError, "infinite, the first at row 2, column 3"),
     "NaN": ({"sample": FLOAT * np.nan}, ValueError, "a sample has no known pixel; leave it out"),
     "two types": ({"sample": [GREY, FLOAT]}, ValueError,
-                  "sample 1 has 1 channels of float64 and sample 0 1 channels of uint8; give samples of one type"),
+                  "sample 1 has 1 channel of float64 and sample 0 1 channel of uint8; convert them to one type"),
     # masks
     "a mask of numbers": ({"mask": MASK.astype(int)}, TypeError, "mask holds int64 values; give True and False"),
     "a mask of another size": ({"mask": MASK.T}, ValueError, "mask is 10x9 and the picture 9x10 .*; give one size"),
@@ -250,7 +250,7 @@ BAD = {
     # known values
     "data of another number": ({"known": HardData(np.ones((1, 2)), np.ones((1, 2)), ("a", "b"))}, ValueError,
                                "a datum has 2 values and a pixel of the sample 1; give as many"),
-    "known words": ({"known": SOME.astype(str)}, TypeError, "known holds <U.* give integers or real floats"),
+    "known words": ({"known": SOME.astype(str)}, TypeError, "known holds <U.* convert it to integers or real floats"),
     "known ragged": ({"known": [[1, 2], [3]]}, ValueError, "known is ragged; give rows of equal length"),
     "known in colour": ({"known": np.dstack([SOME] * 3)}, ValueError, r"known is 3-dimensional; give \(rows, cols\)"),
     "known grey": ({"sample": COLOUR, "channel_axis": -1, "known": SOME}, ValueError,
@@ -278,7 +278,7 @@ BAD = {
     "no pair": ({"guide": GREY}, TypeError, "guide is no pair; give .guide of the sample, guide of the output"),
     "guides in words": ({"guide": (GREY.astype(str), GREY)}, TypeError, "the guide of the sample holds"),
     "ragged guides": ({"guide": ([[1, 2], [3]], GREY)}, ValueError, "the guide of the sample is ragged"),
-    "an empty guide": ({"guide": (GREY, GREY[:0])}, ValueError, "the guide of the output is 2-dimensional"),
+    "an empty guide": ({"guide": (GREY, GREY[:0])}, ValueError, "the guide of the output has the shape .0, 10."),
     "an infinite guide": ({"guide": (FLOAT + np.inf, SOME)}, ValueError, "guide of the sample has infinite values"),
     "a guide with NaN": ({"guide": (at(FLOAT, (1, 1), np.nan), SOME)}, ValueError, "guide of the sample has NaN; give"),
     "a small guide": ({"guide": (GREY[:5], GREY[:6, :7])}, ValueError,

@@ -44,7 +44,7 @@ def test_a_struct_is_the_same_on_the_host_and_on_a_device(machine, kind, dtype):
     )
     kernel = cl.Kernel(cl.Program(machine.context, source).build(["-I", str(kernel_folder())]), "look")
     out = machine.put(np.zeros(1 + len(fields(dtype)), np.int32))
-    machine.launch(kernel, (1,), np.zeros((), dtype)[()], out)
+    machine.enqueue(kernel, (1,), np.zeros((), dtype)[()], out)
     told = machine.get(out).tolist()
     assert told == [dtype.itemsize, *fields(dtype).values()]
 

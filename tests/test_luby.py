@@ -101,7 +101,7 @@ def test_equal_priorities_are_decided_in_the_same_way_on_a_device(machine):
     for _ in range(63):
         following = machine.empty((7, 9), np.uint8)
         arguments = (grid.flat.struct, offsets, np.int32(offsets.shape[0]), priority, state, following)
-        machine.launch(machine.kernel("luby", "luby_round"), (63,), *arguments)
+        machine.launch("luby_round", (63,), *arguments)
         state = following
     assert_same_bits(machine.get(state) == IN, greedy(grid, 2, np.ones((7, 9), bool), few.tolist()))
 

@@ -167,7 +167,7 @@ def test_an_empty_step_is_a_part():
 
 
 def test_a_site_always_cools():
-    assert [prepared(xi=xi).level(0).xi for xi in (-1e-9, -0.001, -0.0024, -1.5)] == [-1, -1, -2, -1536]
+    assert [prepared(xi=xi).level(0).relaxation.xi for xi in (-1e-9, -0.001, -0.0024, -1.5)] == [-1, -1, -2, -1536]
 
 
 def test_a_window_of_a_level():

@@ -185,7 +185,7 @@ def test_folders_that_cannot_be_written(tmp_path):
         (tmp_path / "file", "is a file"),
         (tmp_path / "file" / "r", "file"),
         (tmp_path / "none" / "r", "does not exist"),
-        (tmp_path / ("x" * 300), "cannot be used"),
+        (tmp_path / ("x" * 300), "cannot be written"),
     ):
         with pytest.raises(ValueError, match=words):
             check_folder(folder)

@@ -145,7 +145,7 @@ def test_known_answers_on_a_device(machine, program):
         out = machine.empty((4,), np.uint32)
         packed = cl.cltypes.make_uint2(*numbers(key))
         counters = machine.put(np.array(numbers(counter), np.uint32))
-        machine.launch(cl.Kernel(program, "raw"), (1,), counters, packed, out, local=(1,))
+        machine.enqueue(cl.Kernel(program, "raw"), (1,), counters, packed, out, local=(1,))
         assert machine.get(out).tolist() == numbers(answer)
 
 
@@ -156,6 +156,6 @@ def test_draws_on_a_device_are_the_references(machine, program, n):
     seed, level, sweep, attempt = 2**63 + 12345, 5, 17, 3
     out = machine.empty((1000,), np.uint64)
     scalars = (np.uint64(seed), *map(np.uint32, (level, sweep, random.DRAW, attempt)), np.uint64(n))
-    machine.launch(cl.Kernel(program, "draws"), out.shape, *scalars, out, local=(8,))
+    machine.enqueue(cl.Kernel(program, "draws"), out.shape, *scalars, out, local=(8,))
     lo, hi, *_ = random.draw4(seed, level, sweep, np.arange(1000), random.DRAW, attempt)
     assert_same_bits(machine.get(out), random.below(lo, hi, n))

@@ -414,7 +414,7 @@ BAD = {
     "no sum": (NAMED | {"probabilities": THIRDS * 2}, ValueError, "row 0, column 0 are 0.6.*add up to 1"),
     "below 0": (NAMED | {"probabilities": THIRDS * [[[-1]], [[2]], [[2]]]}, ValueError, "of 0 or more that add up"),
     "no table": (NAMED | {"probabilities": "nowhere.csv"}, ValueError, "nowhere.csv does not exist"),
-    "words": ({"rotation": np.full(SHAPE, "a")}, TypeError, "rotation holds .* give real numbers"),
+    "words": ({"rotation": np.full(SHAPE, "a")}, TypeError, "rotation holds .* convert it to integers or real floats"),
     "scale": ({"scale": np.full(SHAPE, 3.0)}, ValueError, "scale has 3 to 3; give factors of 0.5 to 2"),
     "infinite": ({"rotation": np.full(SHAPE, np.inf)}, ValueError, "rotation has infinite values"),
     "no such image": ({"image_map": np.ones(SHAPE)}, ValueError, "image_map has 1 and there is 1 training image;"),

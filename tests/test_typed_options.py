@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from importlib import import_module
+from inspect import Parameter, signature
 from pathlib import Path
 
 import click
@@ -10,6 +11,7 @@ from click.testing import CliRunner
 
 import simdtex
 from simdtex.cli.job import Task, job
+from simdtex.methods.typed_options import Common
 from simdtex.options import (
     Choice,
     Number,
@@ -25,6 +27,8 @@ from simdtex.options import (
 )
 
 FILE = Path(simdtex.__file__).with_name("methods") / "typed_options.py"
+SHARED = {*Common.__annotations__, "full_output"}
+
 TABLES = {
     "MrfOptions": ("mrf", "Common"),
     "MultiresOptions": ("multires", "Common"),
@@ -42,13 +46,15 @@ HEAD = '''# SPDX-License-Identifier: BSD-3-Clause
 
 from __future__ import annotations
 
-from os import PathLike
-from typing import TypedDict
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from simdtex.checkpoint import Checkpoint
+from simdtex.io.hard_data import HardData
 from simdtex.machine import Machine
 from simdtex.run import Callback
 from simdtex.schedules import Schedule
@@ -61,13 +67,16 @@ class Common(TypedDict, total=False):
     rng: int | np.random.Generator | None
     device: str | Machine | None
     callback: Callback | None
-    checkpoint: str | PathLike[str] | Checkpoint | None
+    checkpoint: str | os.PathLike[str] | Checkpoint | None
 '''
-ANY = '''
-
-class AnyOptions(MrfOptions, MultiresOptions, PyramidOptions, total=False):
-    """The options of all methods."""
-'''
+FUNCTIONS = {
+    "SynthOptions": (simdtex.synthesize, "MrfOptions, MultiresOptions, PyramidOptions"),
+    "FillOptions": (simdtex.fill, "MrfOptions"),
+    "ExtendOptions": (simdtex.extend, "MrfOptions"),
+    "MixOptions": (simdtex.mix, "PyramidOptions"),
+    "ClassifyOptions": (simdtex.classify, "ClassifierOptions"),
+}
+"""The functions that have further arguments, which are given by name, and the options that they take."""
 
 
 def type_of(one):
@@ -91,7 +100,15 @@ def typed():
         lines += [f"\nclass {name}({base}, total=False):", f'    """The options of the method ``{method}``."""', ""]
         lines += ["    preset: str"] if has_presets(found) and not known else []
         lines += [f"    {option}: {type_of(one)}" for option, one in found.items() if option not in known] + [""]
-    return "\n".join(lines) + ANY
+    for name, (function, bases) in FUNCTIONS.items():
+        own = [one for one in signature(function).parameters.values() if one.kind is Parameter.KEYWORD_ONLY]
+        lines += [
+            f"\nclass {name}({bases}, total=False):",
+            f'    """The options of `simdtex.{function.__name__}`."""',
+            "",
+        ]
+        lines += [f"    {one.name}: {one.annotation}" for one in own if one.name not in SHARED] + [""]
+    return "\n".join(lines)
 
 
 def test_the_types_follow_from_the_tables():

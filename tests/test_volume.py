@@ -106,7 +106,7 @@ def test_places_that_cannot_be_written(tmp_path, monkeypatch):
         (tmp_path / "none" / "a.tif", "the folder .* does not exist"),
         (tmp_path / "a.vti", r"ends in \.vti: .* \.tiff, or give a name without suffix"),
         (tmp_path / "file", "is a file"),
-        (tmp_path / "full", "other files in it"),
+        (tmp_path / "full", "holds other files"),
         (tmp_path / "file" / "a", "the folder .* does not exist"),
         (tmp_path / ("a" * 300), "cannot be written"),
     ]:

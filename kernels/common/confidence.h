@@ -11,24 +11,18 @@
 #define UNKNOWN 0xffff // the grey level of what nobody knows
 #define MADE (C - G)
 
+// The confidence of a site of confidence u: hard data, which are from nowhere in the sample, count more. The confidence of
+// a value x: u of channels that are made, `guide` of others.
 #ifdef OWN
 #define CONFIDENCES C
 #define CONFIDENT(c) (c)
+#define WEIGHED_AS(u, source, hard) ((source) < 0 ? (u) * (hard) : (u))
+#define CONFIDENCE_OF(made, x, u, guide) ((x) == UNKNOWN ? 0.0f : (made) ? (u) : (guide))
 #else
 #define CONFIDENCES 1
 #define CONFIDENT(c) 0
+#define WEIGHED_AS(u, source, hard) (u)
+#define CONFIDENCE_OF(made, x, u, guide) (u)
 #endif
-
-// The confidence of a site of confidence u: hard data, which are from nowhere in the sample, count more.
-inline float weighed_as(const float u, const int source, const float hard)
-{
-    return source < 0 ? u * hard : u;
-}
-
-// The confidence of a value: `u` of channels that are made, `guide` of others.
-inline float confidence_of(const bool made, const ushort x, const float u, const float guide)
-{
-    return x == UNKNOWN ? 0.0f : made ? u : guide;
-}
 
 #endif

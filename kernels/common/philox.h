@@ -22,19 +22,6 @@ inline uint4 philox(const uint4 counter, const uint2 key)
     return (uint4)(a, b, c, d);
 }
 
-// The same for 8 counters, the n-th word of each in the n-th vector: two vector products a round.
-inline void philox8(ulong8 *x, ulong8 *y, ulong8 *z, ulong8 *w, uint2 key)
-{
-    for (int round = 0; round < 10; ++round) {
-        const ulong8 even = 0xD2511F53ul * *x, odd = 0xCD9E8D57ul * *z;
-        *x = (odd >> 32) ^ *y ^ key.x;
-        *z = (even >> 32) ^ *w ^ key.y;
-        *y = odd & 0xFFFFFFFFul;
-        *w = even & 0xFFFFFFFFul;
-        key += (uint2)(0x9E3779B9u, 0xBB67AE85u);
-    }
-}
-
 // What a draw is for; the same numbers stand in simdtex/random.py.
 #define PURPOSE_START 1u
 #define PURPOSE_DRAW 2u

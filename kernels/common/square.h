@@ -91,7 +91,11 @@ inline float16 spread(__global const ushort *p, const int spacing)
     return convert_float16(spacing == 1 ? vload16(0, p) : (ushort16)(vload16(0, p).even, vload16(1, p).even));
 }
 
-#ifdef OWN
+#ifndef OWN
+#define CONFIDENCES_OF(made, x, u, guide) (u)
+#else
+#define CONFIDENCES_OF(made, x, u, guide) select((made) ? (u) : (guide), (float16)0.0f, (x) == (float)UNKNOWN)
+
 // The same of whole numbers.
 inline int16 spread_int(__global const int *p, const int spacing)
 {

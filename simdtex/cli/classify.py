@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.command import DATA, OUTPUTS
-from simdtex.cli.inputs import Material, channels, check_alike, read_material, read_pixels, size
+from simdtex.cli.inputs import Material, channels, masked, planes, read_material, read_pixels, size, without_alpha
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import given, option, report_option
+from simdtex.cli.options import given, option, reads, report_option
 from simdtex.cli.places import READ, READ_NAMED, WRITE
+from simdtex.model.pictures import check_alike
 
 FITS = (".tif", ".tiff", ".npy")
 
@@ -44,12 +45,8 @@ UNLABELLED = 255
     help="Learn the class NAME from this sample; give one for each class, NAME=FILE0,FILE1 for several samples. "
     "Transparent pixels are not used.",
 )
-@option(
-    "--strokes",
-    type=READ,
-    metavar="FILE",
-    group=DATA,
-    help="Learn the classes from strokes with the values 1, 2... in this picture, of the size of PICTURE.",
+@reads(
+    "--strokes", help="Learn the classes from strokes with the values 1, 2... in this picture, of the size of PICTURE."
 )
 @option(
     "--validation",
@@ -59,13 +56,7 @@ UNLABELLED = 255
     group=DATA,
     help="Measure with this picture of a class how much the class varies.",
 )
-@option(
-    "--truth",
-    type=READ,
-    metavar="FILE",
-    group=DATA,
-    help="Compare with these labels; 255 is unknown.",
-)
+@reads("--truth", help="Compare with these labels; 255 is unknown.")
 @option(
     "--confidence",
     type=WRITE,
@@ -131,8 +122,6 @@ def classify(
 
 def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[str, list[NDArray[Any]]]:
     """Read the samples of classes, ``NAME=FILE`` or ``NAME=FILE0,FILE1``, masked where they are transparent."""
-    from simdtex.io.image import split_alpha
-
     found: dict[str, list[NDArray[Any]]] = {}
     for text in texts:
         name, equals, files = text.partition("=")
@@ -143,13 +132,9 @@ def _read_samples(flag: str, texts: Sequence[str], picture: Material) -> dict[st
         found[name] = []
         for file in files.split(","):
             pixels = read_pixels(Path(file))[0]
-            gone = np.zeros(pixels.shape[:2], bool)
-            if channels(pixels) == channels(picture.array) + 1:
-                pixels, gone = split_alpha(pixels)
-            check_alike(Path(file), pixels, picture.paths[0], picture.array)
-            pixels = pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:])
-            hidden = np.broadcast_to(gone.reshape(*gone.shape, *[1] * (pixels.ndim - 2)), pixels.shape)
-            found[name].append(np.ma.MaskedArray(pixels, hidden))
+            pixels, gone = without_alpha(pixels, channels(picture.array))
+            check_alike(file, planes(pixels), str(picture.paths[0]), planes(picture.array))
+            found[name].append(masked(pixels.reshape(*pixels.shape[:2], *picture.array.shape[2:]), gone))
     return found
 
 

@@ -91,7 +91,7 @@ def extend(
     else:
         image.check_writable(output, pixels.dtype, channels(pixels))
         note_lossy(output, pixels)
-    writers = write_arranged(folder or output, others, source_map, whole.metadata)
+    writers = write_arranged(folder.write if folder else output, others, source_map, whole.metadata)
     if report:
         from simdtex.report.page import check_folder
         from simdtex.report.synthesis import write_synthesis

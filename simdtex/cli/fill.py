@@ -16,6 +16,7 @@ from simdtex.cli.inputs import (
     check_profiles,
     check_source_map,
     note_lossy,
+    planes,
     read_also,
     read_material,
     write_arranged,
@@ -23,6 +24,7 @@ from simdtex.cli.inputs import (
 from simdtex.cli.job import Task, job
 from simdtex.cli.options import ALSO, SOURCE_MAP, given
 from simdtex.cli.places import READ, WRITE
+from simdtex.model.pictures import unknown_in
 
 
 @job(
@@ -103,6 +105,4 @@ def _hole(pixels: NDArray[Any], mask: Path | None) -> tuple[NDArray[Any], NDArra
         hole = read_mask(mask, pixels.shape)
     else:
         pixels, hole = split_alpha(pixels)
-    if pixels.dtype.kind == "f":
-        hole = hole | np.isnan(pixels).reshape(*hole.shape, -1).any(-1)
-    return pixels, hole
+    return pixels, hole | unknown_in(planes(pixels))

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from simdtex.cli.inputs import Material, channels, read_known, read_masks, read_pair, read_pixels
+from simdtex.cli.inputs import Material, channels, planes, read_known, read_masks, read_pair, read_pixels, without_alpha
+from simdtex.model.pictures import unknown_in
 
 
 def read_data(samples: Material, options: dict[str, Any]) -> dict[str, Any]:
@@ -44,7 +45,8 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tupl
     paths, out = read_pair("--guide", "SAMPLE-GUIDE=OUTPUT-GUIDE", text, samples)
     own = [read_pixels(path)[0] for path in paths]
     wanted, lies, _ = read_pixels(out)
-    wanted, free = _free(wanted, channels(wanted if lies else own[0]))  # a grid has no alpha
+    wanted, free = without_alpha(wanted, channels(wanted if lies else own[0]))  # a grid has no alpha
+    free = free | unknown_in(planes(wanted))
     are_few = few([one.reshape(*one.shape[:2], -1) for one in own])
     colours = all(one.dtype == np.uint8 and channels(one) == channels(wanted) > 1 for one in (*own, wanted))
     if labels is not False and colours and (labels or are_few):
@@ -64,18 +66,6 @@ def read_guides(text: str, samples: Material, labels: bool | None) -> tuple[tupl
         wanted = wanted.astype(np.float64)
         wanted[free] = np.nan
     return (own if samples.several else own[0], wanted), labels
-
-
-def _free(pixels: NDArray[Any], count: int) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Return the guide of the output without the alpha that those of the samples lack, and where it is open."""
-    from simdtex.io.image import split_alpha
-
-    free = np.zeros(pixels.shape[:2], bool)
-    if channels(pixels) == count + 1:
-        pixels, free = split_alpha(pixels)
-    if pixels.dtype.kind == "f":
-        free = free | np.isnan(pixels).reshape(*free.shape, -1).any(-1)
-    return pixels, free
 
 
 def _numbers(pixels: NDArray[Any], known: NDArray[Any]) -> NDArray[Any]:

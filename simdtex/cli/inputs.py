@@ -6,12 +6,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.cli.ending import note
+from simdtex.model.pictures import check_alike
 
 if TYPE_CHECKING:
     from simdtex.io.grids import Frame
@@ -67,13 +68,6 @@ class Material(NamedTuple):
         return all(array.dtype.kind != "f" or not np.isnan(array).any() for array in self.pixels)
 
 
-class Writes(Protocol):
-    """What writes a picture with what its file says of it, and other maps in its arrangement."""
-
-    def write(self, made: NDArray[Any], run: Any, metadata: Metadata | None) -> None:
-        """Write all files, or none."""
-
-
 class Also(NamedTuple):
     """A map of the material, one for each sample, and the file that its arrangement goes to."""
 
@@ -87,9 +81,14 @@ class Also(NamedTuple):
         return apply_source_map(source, self.maps.array, self.maps.sizes if self.maps.several else self.maps.sizes[0])
 
 
+def planes(pixels: NDArray[Any]) -> NDArray[Any]:
+    """Return a picture (rows, cols) or (rows, cols, channels) as the latter."""
+    return pixels[..., None] if pixels.ndim == 2 else pixels
+
+
 def channels(pixels: NDArray[Any]) -> int:
     """Return the number of channels of a picture (rows, cols) or (rows, cols, channels)."""
-    return 1 if pixels.ndim == 2 else pixels.shape[2]
+    return int(planes(pixels).shape[2])
 
 
 def size(pixels: NDArray[Any]) -> str:
@@ -97,16 +96,17 @@ def size(pixels: NDArray[Any]) -> str:
     return f"{pixels.shape[1]}x{pixels.shape[0]}"
 
 
-def kind(pixels: NDArray[Any]) -> str:
-    """Return channels and type as text."""
-    count = channels(pixels)
-    return f"{count} channel{'s' * (count != 1)} of {pixels.dtype}"
+def without_alpha(pixels: NDArray[Any], count: int) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return a picture without the alpha that pictures of so many channels lack, and where it is transparent."""
+    from simdtex.io.image import split_alpha
+
+    return split_alpha(pixels) if channels(pixels) == count + 1 else (pixels, np.zeros(pixels.shape[:2], bool))
 
 
-def check_alike(path: Path, pixels: NDArray[Any], other: Path, like: NDArray[Any]) -> None:
-    """Raise unless two pictures have the same type and as many channels."""
-    if (pixels.dtype, channels(pixels)) != (like.dtype, channels(like)):
-        raise ValueError(f"{path} has {kind(pixels)} and {other} {kind(like)}; convert them to one type")
+def masked(pixels: NDArray[Any], gone: NDArray[np.bool_]) -> np.ma.MaskedArray[Any, Any]:
+    """Return a picture that is masked in all channels where it is gone."""
+    hidden = gone.reshape(*gone.shape, *[1] * (pixels.ndim - 2))
+    return np.ma.MaskedArray(pixels, np.broadcast_to(hidden, pixels.shape))
 
 
 def note_lossy(path: Path, pixels: NDArray[Any]) -> None:
@@ -219,7 +219,7 @@ def read_also(texts: Sequence[str], samples: Material, *, files: bool = True) ->
         paths, out = read_pair("--also", "MAP=OUT", text, samples)
         maps = read_material(paths)
         for path, pixels, of, sample in zip(maps.paths, maps.pixels, samples.paths, samples.pixels, strict=True):
-            check_alike(path, pixels, maps.paths[0], maps.pixels[0])
+            check_alike(str(path), planes(pixels), str(maps.paths[0]), planes(maps.pixels[0]))
             if pixels.shape[:2] != sample.shape[:2]:
                 raise ValueError(
                     f"{path} is {size(pixels)} and {of} {size(sample)}; give --also a map of the sample's size"
@@ -231,11 +231,11 @@ def read_also(texts: Sequence[str], samples: Material, *, files: bool = True) ->
 
 
 def write_arranged(
-    output: Path | Writes, others: Sequence[Also], source_map: Path | None, metadata: Metadata | None
+    output: Path | Callable[..., object], others: Sequence[Also], source_map: Path | None, metadata: Metadata | None
 ) -> list[Callable[[Any, Any], object]]:
     """Return functions that write a picture, the other maps in its arrangement, and the source map if it has a file.
 
-    ``metadata`` is written with the picture; `output` is its file, or an object that writes it and others.
+    ``metadata`` is written with the picture; ``output`` is its file, or ``output(made, run, metadata)`` writes it.
     """
     from simdtex.io import image
     from simdtex.model.source_map import save_source_map
@@ -244,11 +244,9 @@ def write_arranged(
         if isinstance(output, Path):
             image.write(output, made, metadata)
         else:
-            output.write(made, run, metadata)
+            output(made, run, metadata)
 
-    writers: list[Callable[[Any, Any], object]] = [write]
-    for one in others:
-        writers.append(partial(_write_map, one))
+    writers: list[Callable[[Any, Any], object]] = [write, *(partial(_write_map, one) for one in others)]
     if source_map:
         writers.append(lambda made, run: save_source_map(source_map, run.source))
     return writers
@@ -265,10 +263,10 @@ def output_shape(size: str | None, pixels: Any, *like: Any, axes: int = 2) -> tu
 
     By default those of the first picture of `like`, or twice the sample's.
     """
-    from simdtex.io.image import parse_size, parse_volume_size
+    from simdtex.io.image import parse_sides
 
     if size is not None:
-        return parse_size(size) if axes == 2 else parse_volume_size(size)
+        return parse_sides(size, "WIDTHxHEIGHTxDEPTH" if axes == 3 else "WIDTHxHEIGHT")[::-1]
     for picture in like:
         if hasattr(picture, "shape"):  # a table has none
             return tuple(picture.shape[:axes])
@@ -320,19 +318,14 @@ def read_known(path: Path, samples: Material) -> HardData | np.ma.MaskedArray[An
 
     Or, of a volume, a volume. A picture is unknown where it is transparent, if it has alpha and the samples have none.
     """
-    from simdtex.io import grids, image
+    from simdtex.io import grids
     from simdtex.io.hard_data import read_hard_data
 
     if path.suffix.lower() in TABLES or grids.kind_of(path) == "points":
         return read_hard_data(path)
-    (values, lies, metadata), gone = read_pixels(path, samples.deep), None
+    values, lies, metadata = read_pixels(path, samples.deep)
     check_profiles([samples.paths[0], path], [samples.metadata, metadata])
     if values.ndim == 4:
         return np.ma.MaskedArray(values[..., 0] if values.shape[-1] == 1 else values)
-    if lies is None and channels(values) == channels(samples.pixels[0]) + 1:
-        values, gone = image.split_alpha(values)
-    if channels(values) == 1:
-        values = values.reshape(values.shape[:2])
-    if gone is None:
-        return np.ma.MaskedArray(values)
-    return np.ma.MaskedArray(values, np.broadcast_to(gone.reshape(*gone.shape, *[1] * (values.ndim - 2)), values.shape))
+    values, gone = without_alpha(values, channels(values if lies else samples.pixels[0]))  # a grid has no alpha
+    return masked(values.reshape(values.shape[:2]) if channels(values) == 1 else values, gone)

@@ -118,7 +118,7 @@ def _checkpoint(path: Path | None) -> Checkpoint | None:
     from simdtex.checkpoint import Checkpoint
 
     context = click.get_current_context()
-    options, arguments = given_words(context, without=("checkpoint",))
+    options, arguments = given_words(context)
     line = {"name": context.command.name, "options": options, "arguments": arguments, "folder": os.getcwd()}
     context.meta[RESUME] = path
     kept = Checkpoint(path, command=line, note=note)
@@ -129,18 +129,18 @@ def _checkpoint(path: Path | None) -> Checkpoint | None:
 def command_line() -> str:
     """Return the command line of the running command, so that a reader can give it again."""
     context = click.get_current_context()
-    options, arguments = given_words(context, without=("checkpoint",))
+    options, arguments = given_words(context)
     words = shlex.join(["simdtex", str(context.command.name), *arguments, *options])
     return os.fsencode(words).decode(errors="backslashreplace")  # the name of a file may be no text
 
 
-def given_words(context: click.Context, without: tuple[str, ...] = ()) -> tuple[list[str], list[str]]:
-    """Return the options that were given to a command, with their values, and the arguments; some options left out."""
+def given_words(context: click.Context) -> tuple[list[str], list[str]]:
+    """Return the options that were given to a command, but ``--checkpoint``, with their values, and the arguments."""
     options: list[str] = []
     arguments: list[str] = []
     for parameter in context.command.params:
         name = parameter.name or ""
-        if context.get_parameter_source(name) is not ParameterSource.COMMANDLINE or name in without:
+        if context.get_parameter_source(name) is not ParameterSource.COMMANDLINE or name == "checkpoint":
             continue
         given = context.params[name]
         for value in given if isinstance(given, tuple) else [given]:

@@ -31,7 +31,7 @@ class Folder:
 
     def read(self, lead: Material) -> None:
         """Read the other maps, and check that all can be written; `lead` is the first, which is read already."""
-        from simdtex.report.folder import earlier_files
+        from simdtex.io.atomic import earlier_files
 
         self.sample = lead.pixels[0]
         self.name = _written(self.lead, self.sample)

@@ -68,6 +68,7 @@ class Option(click.Option):
 
 
 option = functools.partial(click.option, cls=Option)
+reads = functools.partial(option, type=READ, metavar="FILE", group=DATA)
 
 
 def job_options(job: str) -> Callable[[Command], Command]:
@@ -169,20 +170,14 @@ CHECKPOINT = option(
 )
 
 
-SAMPLE_MASK = option(
+SAMPLE_MASK = reads(
     "--sample-mask",
-    group=DATA,
     multiple=True,
-    type=READ,
-    metavar="FILE",
     method="mrf",
     help="Take pixels only from the white parts of this mask, of the sample's size; give one for each sample.",
 )
-KNOWN = option(
+KNOWN = reads(
     "--known",
-    group=DATA,
-    type=READ,
-    metavar="FILE",
     method="mrf",
     help="Keep these conditioning data: a table of x, y and values (.csv, .tsv, .txt, .dat), a point set of "
     "Geo-EAS, or a picture or a grid whose unknown pixels are transparent or NaN.",

@@ -5,18 +5,28 @@ from __future__ import annotations
 
 import json
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
 
-from simdtex.cli.command import DATA, DEVICE_GROUP, OUTPUTS
+from simdtex.cli.command import DEVICE_GROUP, OUTPUTS
 from simdtex.cli.guides import read_data
 from simdtex.cli.inputs import MAPS, Material, output_shape, read_map, read_material
 from simdtex.cli.job import Task, command_line, job
-from simdtex.cli.options import GUIDE, KNOWN, SAMPLE_MASK, given, numbers, option, places, report_option, size_option
+from simdtex.cli.options import (
+    GUIDE,
+    KNOWN,
+    SAMPLE_MASK,
+    given,
+    numbers,
+    option,
+    places,
+    reads,
+    report_option,
+    size_option,
+)
 from simdtex.cli.places import EITHER, READ
 
 
@@ -49,41 +59,26 @@ from simdtex.cli.places import EITHER, READ
 @KNOWN
 @SAMPLE_MASK
 @GUIDE
-@option(
+@reads(
     "--region",
-    type=READ,
-    metavar="FILE",
-    group=DATA,
     help="Make only cells in the white parts of this picture, or above 0 in this grid, of the size of a realisation.",
 )
-@option(
+@reads(
     "--probabilities",
-    type=READ,
-    metavar="FILE",
-    group=DATA,
     help="Follow these probabilities of the categories, in ascending order of category: a table of x, y and one "
     "column for each, or a .npy, .tif or grid with one channel for each; unknown ones are NaN.",
 )
-@option(
+@reads(
     "--image-map",
-    type=READ,
-    metavar="FILE",
-    group=DATA,
     help="Take each cell from the TRAINING_IMAGE of this number, counted from 0; a file with a channel for each gives "
     "their weights.",
 )
-@option(
+@reads(
     "--rotation",
-    type=READ,
-    metavar="FILE",
-    group=DATA,
     help="Draw each cell from TRAINING_IMAGE turned by this many degrees from x to y, in eighths of a turn.",
 )
-@option(
+@reads(
     "--scale",
-    type=READ,
-    metavar="FILE",
-    group=DATA,
     help="Draw each cell from TRAINING_IMAGE enlarged by this factor, 0.5 to 2, in powers of the square root of 2.",
 )
 @option(
@@ -191,8 +186,6 @@ def _check_report(folder: Path, material: Material, shape: tuple[int, ...], know
         raise ValueError(f"--report requires {LEAST}x{LEAST} pixels or more; give a larger size, or leave it out")
     if any(np.fmax.reduce(np.abs(np.ma.getdata(one), dtype=np.float64), None) > LARGEST for one in given):
         raise ValueError(f"--report requires values up to {LARGEST:g}; give them in a larger unit, or leave it out")
-    if not material.deep and find_spec("gstools") is None:
-        raise ValueError("gstools is not installed; pip install 'simdtex[simulate]', or leave --report out")
     check_folder(folder)
 
 

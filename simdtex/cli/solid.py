@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import re
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import numpy as np
 
 from simdtex.cli.command import OUTPUTS
 from simdtex.cli.inputs import channels, last_iteration, read_material
+from simdtex.cli.inputs import size as size_of
 from simdtex.cli.job import Task, job
 from simdtex.cli.options import given, option
 from simdtex.cli.places import EITHER, READ, WRITE
@@ -62,9 +62,9 @@ def solid(sample: Path, outputs: tuple[Path, ...], size: str | None, picture: Pa
     from simdtex.report.solid import view
     from simdtex.synthesis import synthesize_solid
 
-    shape = (SIDE, SIDE, SIDE) if size is None else block_shape(size)
+    shape: Any = image.parse_sides(str(SIDE) if size is None else size, "DEPTHxHEIGHTxWIDTH")
     material = read_material([sample])
-    pixels, (rows, cols) = material.pixels[0], material.sizes[0]
+    pixels = material.pixels[0]
     writers: list[Any] = []
     for output in outputs:
         volume.check_writable(output, pixels.dtype, channels(pixels))
@@ -74,21 +74,9 @@ def solid(sample: Path, outputs: tuple[Path, ...], size: str | None, picture: Pa
         writers.append(lambda block, run: view(np.asarray(block), picture))
     return Task(
         partial(synthesize_solid, pixels, shape, channel_axis=material.channel_axis, **given(options)),
-        lambda block: f"{'x'.join(map(str, shape))} from {cols}x{rows}",
+        lambda block: f"{'x'.join(map(str, shape))} from {size_of(pixels)}",
         ", ".join(str(path) for path in (*outputs, picture) if path),
         writers,
         material.limits,
         lambda statistics: click.echo(last_iteration(statistics)),
     )
-
-
-def block_shape(text: str) -> tuple[int, int, int]:
-    """Return the depth, rows and columns of ``--size``."""
-    match = re.fullmatch(r"\s*([0-9]{1,8})(?:\s*[xX\u00d7]\s*([0-9]{1,8})\s*[xX\u00d7]\s*([0-9]{1,8}))?\s*", text)
-    sides = [int(side or match[1]) for side in match.groups()] if match else [0]
-    if 0 in sides:
-        raise ValueError(
-            f"size {text!r} is not DEPTHxHEIGHTxWIDTH: give slices x rows x columns of 1 or more, such as 64x128x128, "
-            "or one number for a cube"
-        )
-    return sides[0], sides[1], sides[2]

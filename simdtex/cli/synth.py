@@ -123,7 +123,7 @@ def synth(
     if known is not None:
         note_lossy(output, pixels)
     like = material.metadata and material.metadata._replace(exif=None)  # a new picture was taken by no camera
-    writers = write_arranged(folder or output, others, source_map, like)
+    writers = write_arranged(folder.write if folder else output, others, source_map, like)
     if report:
         from simdtex.report.synthesis import write_synthesis
 

@@ -17,7 +17,7 @@ from simdtex.distributed.tasks import do
 from simdtex.distributed.tiling import Execute
 from simdtex.machine import Machine
 from simdtex.machine.devices import DeviceError
-from simdtex.options import whole
+from simdtex.options import require, whole
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -127,11 +127,10 @@ def connected(workers: int | str | Client | None) -> Iterator[Client | None]:
     if workers is None or not isinstance(workers, (int, str)):
         yield workers
         return
-    try:
-        distributed: Any = import_module("distributed")
-        from simdtex.distributed.cores import Cores
-    except ImportError:
-        raise ValueError("distributed is not installed; pip install 'simdtex[distributed]'") from None
+    require("distributed", "distributed")
+    distributed: Any = import_module("distributed")
+    from simdtex.distributed.cores import Cores
+
     if isinstance(workers, str):
         getLogger("distributed.client").setLevel(CRITICAL)  # what ends a run is said in one sentence
         try:

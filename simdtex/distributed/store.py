@@ -239,7 +239,7 @@ class Store:
             **{"held": held, "given": given is not None, "channels": channels, "source": source, "command": command},
         }
         store._keep("run", about, [described(plan), scattered, maps])
-        store.save(first_turn(layout))
+        store.save(Turn(1, phase_of(layout.levels[-1]), len(layout.levels) - 1))
         return store
 
     @property
@@ -533,11 +533,6 @@ class Stored(Conditions):
     def scattered(self, number: int) -> Data | None:
         """Return the conditioning data between the sites of a level; None if there are none."""
         return self._work.scattered.get(str(number))
-
-
-def first_turn(layout: Layout) -> Turn:
-    """Return the turn that begins the coarsest level."""
-    return Turn(1, phase_of(layout.levels[-1]), len(layout.levels) - 1)
 
 
 def phase_of(level: LevelLayout) -> str:

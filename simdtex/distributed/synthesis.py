@@ -7,14 +7,13 @@ import os
 from collections.abc import Callable, Sequence
 from contextlib import contextmanager
 from importlib import import_module
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from simdtex.checkpoint import warn
+from simdtex.checkpoint import check_version, warn
 from simdtex.distributed.layout import Layout, Maps, further, planned
 from simdtex.driver import check_shape, drive
 from simdtex.io.atomic import Damaged, NotWritten, atomic_folder, exclusive
@@ -25,7 +24,7 @@ from simdtex.methods.mrf import Options
 from simdtex.methods.mrf.plan import Plan
 from simdtex.methods.mrf.plan import plan as planned_run
 from simdtex.model.source_map import apply_source_map
-from simdtex.options import resolve
+from simdtex.options import require, resolve
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
 
@@ -126,7 +125,7 @@ def synthesize(
     inputs = check_inputs(sample, size, channel_axis, mask, known, known_source, guide)
     run, seed = _plan(inputs, size, options), as_seed(rng)
     layout, more = planned(run, seed, tiles), _maps(maps or {}, run)
-    _libraries()
+    require("distributed", "zarr", "dask")
     from simdtex.distributed.cluster import check_workers, connected
     from simdtex.distributed.store import Store
 
@@ -268,7 +267,7 @@ def _made(store: PathLike) -> Iterator[str]:
 
 def _opened(path: PathLike) -> Any:
     """Open a store; raise ValueError unless this version can go on with it."""
-    _libraries()
+    require("distributed", "zarr", "dask")
     from simdtex.distributed.store import FORMAT, Store
 
     where = os.path.abspath(path)
@@ -283,17 +282,8 @@ def _opened(path: PathLike) -> Any:
     if not os.path.isdir(os.path.join(where, "work")):
         raise ValueError(f"{where} is no output in tiles; give one that simdtex has begun")
     with _mending(store):
-        about, own = store.about, version("simdtex")
-    if about["format"] != FORMAT:
-        raise ValueError(
-            f"{where} has format {about['format']} and this simdtex reads {FORMAT}; "
-            f"go on with the code of simdtex {about['version']} that began it, or begin anew"
-        )
-    if about["version"] != own:
-        raise ValueError(
-            f"{where} was begun by simdtex {about['version']} and this is {own}, whose results may differ; "
-            "go on with that version, or begin anew"
-        )
+        about = store.about
+    check_version(where, about, FORMAT)
     return store
 
 
@@ -317,14 +307,6 @@ def _mending(store: Any) -> Iterator[None]:
         if again is None:
             raise ValueError(f"{wrong}, and nothing makes it again; remove the store and begin anew") from None
         raise ValueError(f"{wrong}; {again} with: simdtex resume {where}") from None
-
-
-def _libraries() -> None:
-    try:
-        for name in ("zarr", "dask.array"):
-            import_module(name)
-    except ImportError as error:
-        raise ValueError(f"{error.name} is not installed; pip install 'simdtex[distributed]'") from None
 
 
 def _array(where: str, channel_axis: int | None) -> Any:

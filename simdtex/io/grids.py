@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.atomic import atomic_path, check_target
-from simdtex.io.limits import BYTES, TooLarge, check_file, check_size, max_pixels_or_default
-from simdtex.options import shown
+from simdtex.io.limits import BYTES, check_size, reading
+from simdtex.options import check_real, shown
 
 __all__ = ["MISSING", "SUFFIXES", "CartesianGrid", "check_grid", "frame", "kind_of", "read_grid", "write_grid"]
 
@@ -158,21 +158,9 @@ def read_grid(path: PathLike, *, missing: Iterable[float] = MISSING, max_pixels:
     Without these numbers the origin is 0 and the size of a cell 1. Files of SGeMS hold 32-bit floats, of which the
     shortest decimal number is taken for origin and size. Regions and groups of SGeMS are passed over.
     """
-    name = os.fspath(path)
-    most = max_pixels_or_default(max_pixels)
-    check_file(path, "the grid", most)
-    try:
-        with open(path, "rb") as file:
-            binary = file.read(len(MAGIC)) == MAGIC
-            columns, sides, lies = _sgems(file, most) if binary else _gslib(file, most)
-    except TooLarge as error:
-        raise ValueError(f"{name} {error}") from None
-    except MemoryError:
-        raise ValueError(f"{name} is too large for the memory: crop it first") from None
-    except OSError as error:
-        raise ValueError(f"{name} cannot be read ({error.strerror}): check the path") from None
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
+    with reading(path, "the grid", max_pixels) as most, open(path, "rb") as file:
+        binary = file.read(len(MAGIC)) == MAGIC
+        columns, sides, lies = _sgems(file, most) if binary else _gslib(file, most)
     stands = np.array(tuple(missing), np.float64)
     return CartesianGrid({key: _typed(column, stands).reshape(sides[::-1]) for key, column in columns.items()}, *lies)
 
@@ -253,11 +241,16 @@ def _of_title(title: str) -> list[str] | None:
     return list(match.groups()) if match else None
 
 
-def _all_numbers(words: Iterable[Any]) -> bool:
+def number_of(word: Any) -> float | None:
+    """Return the number that a word is, or None."""
     try:
-        return all(isfinite(float(word)) for word in words)
+        return float(word)
     except ValueError:
-        return False
+        return None
+
+
+def _all_numbers(words: Iterable[Any]) -> bool:
+    return all((found := number_of(word)) is not None and isfinite(found) for word in words)
 
 
 def _parsed(file: BinaryIO, count: int, what: str, line: int) -> NDArray[np.float64]:
@@ -272,7 +265,7 @@ def _parsed(file: BinaryIO, count: int, what: str, line: int) -> NDArray[np.floa
             found[at : at + len(words)] = list(map(float, words))
         except ValueError:
             for number, row in enumerate(lines, line):
-                wrong = next((word for word in row.split() if not _is_number(word)), None)
+                wrong = next((word for word in row.split() if number_of(word) is None), None)
                 if wrong is not None:
                     raise ValueError(f"line {number} has {_text(wrong)[:40]!r}, not a number: correct it") from None
         at += len(words)
@@ -284,14 +277,6 @@ def _parsed(file: BinaryIO, count: int, what: str, line: int) -> NDArray[np.floa
             "it ends without the end of a line, as if it were cut short: get it again, or add the end of the line"
         )
     return found
-
-
-def _is_number(word: bytes) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
 
 
 def _apart(names: list[str]) -> list[str]:
@@ -419,8 +404,7 @@ def check_grid(
 
 def _check_values(target: Path, array: np.ma.MaskedArray[Any, Any]) -> None:
     """Raise unless a format holds these values."""
-    if array.dtype.kind not in "buif":
-        raise TypeError(f"the grid holds {array.dtype} values; give real numbers")
+    check_real("the grid", array)
     known = array.compressed()
     wrong = np.isin(known, MISSING) if known.dtype.kind != "b" else np.zeros(known.shape, bool)
     if wrong.any():

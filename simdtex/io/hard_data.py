@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from simdtex.io.grids import MISSING, frame
+from simdtex.io.grids import MISSING, frame, number_of
 from simdtex.io.image import cast
-from simdtex.io.limits import BYTES, TooLarge, check_file, max_pixels_or_default, read_npy
-from simdtex.options import one_of
+from simdtex.io.limits import BYTES, read_npy, reading
+from simdtex.options import check_real, one_of
 
 PathLike = str | os.PathLike[str]
 Floats = NDArray[np.float64]
@@ -99,24 +99,16 @@ def read_hard_data(path: PathLike, *, max_pixels: int | None = None) -> HardData
     -----
     About 8 s for a million rows of text.
     """
-    name = os.fspath(path)
-    most = max_pixels_or_default(max_pixels)
     binary = Path(path).suffix.lower() == ".npy"
-    check_file(path, "the hard data", most if binary else -(-most // BYTES))
-    try:
+    with reading(path, "the hard data", max_pixels, each=BYTES if binary else 1) as most:
         if binary:
             with open(path, "rb") as file:
                 return _table(read_npy(file, os.fstat(file.fileno()).st_size, most))
         with open(path, encoding="utf-8-sig") as text:
-            return _parsed(text)
-    except TooLarge as error:
-        raise ValueError(f"{name} {error}") from None
-    except UnicodeDecodeError:
-        raise ValueError(f"{name} is no text in UTF-8: save the table as CSV in UTF-8") from None
-    except OSError as error:
-        raise ValueError(f"{name} cannot be read ({error.strerror}): check the path") from None
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: {error}") from None
+            try:
+                return _parsed(text)
+            except UnicodeDecodeError:
+                raise ValueError("the table is no text in UTF-8: save it as CSV in UTF-8") from None
 
 
 def _parsed(text: Iterable[str]) -> HardData:
@@ -137,7 +129,7 @@ def _parsed(text: Iterable[str]) -> HardData:
             f"line {rows[0][0]} has {columns} cell{'s' * (columns != 1)}: give x, y and one value or more, with "
             "commas, semicolons, tabs or blanks between them"
         )
-    if all(cell[:1].isalpha() and _number(cell) is None for cell in rows[0][1][:2]):
+    if all(cell[:1].isalpha() and number_of(cell) is None for cell in rows[0][1][:2]):
         names = rows.pop(0)[1]
         _check_order(names)
     if not rows:
@@ -170,7 +162,7 @@ def _of_rows(rows: Sequence[tuple[int, list[str]]], columns: int, names: Sequenc
     table = np.empty((len(rows), columns))
     for k, (number, cells) in enumerate(rows):
         for column, cell in enumerate(cells):
-            value = np.nan if not cell and column >= axes else _number(cell)
+            value = np.nan if not cell and column >= axes else number_of(cell)
             if value is None:
                 raise ValueError(
                     f"line {number} has {cell[:40]!r} in column {column + 1}, which is no number: write numbers with a "
@@ -189,13 +181,6 @@ def _cells(line: str, number: int, delimiter: str | None) -> list[str]:
     except csv.Error as error:
         raise ValueError(f"line {number} cannot be split into cells ({error}): check its quotation marks") from None
     return [cell.strip() for cell in cells]
-
-
-def _number(cell: str) -> float | None:
-    try:
-        return float(cell)
-    except ValueError:
-        return None
 
 
 def _check_order(header: Sequence[str]) -> None:
@@ -220,8 +205,7 @@ def _table(array: Any) -> HardData:
         raise ValueError("the rows of hard data are of unequal length: give x, y and the same values in each") from None
     if numbers.size == 0:
         raise ValueError("the hard data has no rows: give x, y and a value for each datum")
-    if numbers.dtype.kind not in "buif":
-        raise TypeError(f"the hard data holds {numbers.dtype} values: give real numbers")
+    check_real("the hard data", numbers)
     if numbers.ndim != 2 or numbers.shape[1] < 3:
         raise ValueError(f"the hard data has the shape {numbers.shape}: give (data, 3) of x, y, value, or more values")
     found = np.where(np.ma.getmaskarray(numbers), np.nan, numbers.data).astype(np.float64)

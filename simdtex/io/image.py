@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io.atomic import Unbuffered, atomic_path, check_target
 from simdtex.io.decode import NOTHING, Metadata, decode, native
-from simdtex.io.limits import TooLarge, check_file, max_pixels_or_default
-from simdtex.options import unmasked
+from simdtex.io.limits import TooLarge, max_pixels_or_default, reading
+from simdtex.options import check_real, unmasked
 
 __all__ = [
     "Image",
@@ -95,14 +95,9 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Image:
     -----
     The whole file is held in memory together with its pixels.
     """
-    name = os.fspath(path)
-    most = max_pixels_or_default(max_pixels)
-    check_file(name, "the image", most)
-    try:
-        data = Path(name).read_bytes()
-    except OSError as error:
-        raise ValueError(f"{name} cannot be read ({error.strerror}): check the path of the image") from None
-    return read_bytes(name, data, max_pixels=most)
+    with reading(path, "the image", max_pixels):
+        data = Path(path).read_bytes()
+    return read_bytes(os.fspath(path), data, max_pixels=max_pixels)
 
 
 def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None) -> Image:
@@ -126,7 +121,7 @@ def read_bytes(name: str, data: bytes, *, max_pixels: int | None = None) -> Imag
             "or TIFF"
         ) from None
     try:
-        pixels = native(_picture(found))
+        pixels = native(pixels_of("the picture", found))
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: {error}") from None
     return Image(pixels, -1 if pixels.ndim == 3 else None, metadata)
@@ -160,7 +155,7 @@ def split_alpha(pixels: ArrayLike) -> tuple[Array, NDArray[np.bool_]]:
     >>> colour.shape, hole.tolist()
     ((1, 2, 3), [[False, True]])
     """
-    values = _picture(pixels)
+    values = pixels_of("the picture", pixels)
     if values.ndim == 2 or values.shape[2] not in (2, 4):
         return values, np.zeros(values.shape[:2], dtype=bool)
     return values[..., 0] if values.shape[2] == 2 else values[..., :3], ~(values[..., -1] >= _half(values.dtype))
@@ -271,8 +266,7 @@ def check_sample(array: Any, channel_axis: int | None, *, unknown: bool = False,
     if not unknown:
         unmasked("the sample", pixels)
     pixels = np.asarray(pixels)
-    if pixels.dtype.kind not in "buif":
-        raise TypeError(f"the sample holds {pixels.dtype} values: convert it to integers or real floats")
+    check_real("the sample", pixels)
     if channel_axis is None and pixels.ndim != axes:
         hint = ", or channel_axis=-1 if its last axis holds the channels" * (pixels.ndim == axes + 1)
         raise ValueError(f"the sample is {pixels.ndim}-dimensional: give {AXES[axes]}{hint}")
@@ -301,35 +295,30 @@ def check_sample(array: Any, channel_axis: int | None, *, unknown: bool = False,
     return native(planes)
 
 
-def parse_volume_size(text: str) -> tuple[int, ...]:
-    """Return layers, rows and columns of WIDTHxHEIGHTxDEPTH, as ``100x80x30`` for 100 columns, 80 rows, 30 layers."""
-    sides = re.fullmatch(r"\s*([0-9]{1,8})\s*[xX\u00d7]\s*([0-9]{1,8})\s*[xX\u00d7]\s*([0-9]{1,8})\s*", text)
-    if not sides or "0" in sides.groups():
-        raise ValueError(f"size {text!r} is not WIDTHxHEIGHTxDEPTH: give columns x rows x layers, as 100x80x30")
-    return tuple(int(side) for side in sides.groups()[::-1])
-
-
 def parse_size(text: str) -> tuple[int, int]:
     """Return rows and columns of WIDTHxHEIGHT, as ``640x480`` for 640 columns and 480 rows, or of a square's side."""
-    match = re.fullmatch(r"\s*([0-9]{1,8})(?:\s*[xX\u00d7]\s*([0-9]{1,8}))?\s*", text)
-    sides = [int(side) for side in match.groups() if side is not None] if match else []
-    if not sides or 0 in sides:
-        raise ValueError(
-            f"size {text!r} is not WIDTHxHEIGHT: give columns x rows of 1 or more, as 640x480, or "
-            "one number for a square"
-        )
-    return sides[-1], sides[0]
+    width, height = parse_sides(text, "WIDTHxHEIGHT")
+    return height, width
 
 
-def _picture(values: Any) -> Array:
-    """Return a picture's values as an array, after checking their type and axes."""
-    unmasked("the picture", values)
-    pixels = np.asarray(values)
-    if pixels.dtype.kind not in "buif":
-        raise TypeError(f"the picture holds {pixels.dtype} values: give integers or real floats")
-    if pixels.ndim not in (2, 3) or pixels.size == 0:
-        raise ValueError(f"the picture has the shape {pixels.shape}: give (rows, cols) or (rows, cols, channels)")
-    return pixels
+def parse_sides(text: str, form: str) -> tuple[int, ...]:
+    """Return the sides that a text names in the order of a form such as WIDTHxHEIGHT; one number is that of all."""
+    sides, words = form.split("x"), re.split(r"\s*[xX\u00d7]\s*", text.strip())
+    if len(words) not in (1, len(sides)) or not all(re.fullmatch("[0-9]{1,8}", word) and int(word) for word in words):
+        example = "x".join(("640", "480", "100")[: len(sides)])
+        raise ValueError(f"size {text!r} is not {form}; give numbers of 1 or more, as {example}, or one for all sides")
+    return tuple(int(word) for word in (words * len(sides))[: len(sides)])
+
+
+def pixels_of(name: str, values: Any, axes: int = 2) -> Array:
+    """Return a picture's values as an array, after checking their type and axes; with 3 ``axes`` a volume's."""
+    pixels = as_array(name, values)
+    unmasked(name, pixels)
+    check_real(name, pixels)
+    if pixels.ndim not in (axes, axes + 1) or pixels.size == 0:
+        more = AXES[axes].replace(")", ", channels)")
+        raise ValueError(f"{name} has the shape {pixels.shape}; give {AXES[axes]} or {more}")
+    return np.asarray(pixels)
 
 
 class Format(NamedTuple):
@@ -445,7 +434,7 @@ def write(path: PathLike, array: ArrayLike, metadata: Metadata | None = None) ->
     ValueError
         The path cannot be written, or its format cannot hold such pixels; the message names one that can.
     """
-    pixels = _picture(array)
+    pixels = pixels_of("the picture", array)
     channels = 1 if pixels.ndim == 2 else pixels.shape[2]
     check_writable(path, pixels.dtype, channels)
     suffix = Path(path).suffix.lower()

@@ -6,7 +6,8 @@ from __future__ import annotations
 import os
 import stat
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from math import prod
 from tokenize import TokenError
 from typing import IO, Any
@@ -45,9 +46,9 @@ def max_pixels_or_default(max_pixels: int | None) -> int:
     return int(text)
 
 
-def check_size(pixels: int, unpacked: int, most: int) -> None:
-    """Raise TooLarge if a file has more pixels than `most`, or unpacks to more bytes than `most` pixels may have."""
-    for count, what, limit in ((pixels, "pixels", most), (unpacked, "bytes", BYTES * most)):
+def check_size(pixels: int, unpacked: int, most: int, each: int = BYTES) -> None:
+    """Raise TooLarge if a file has more pixels than `most`, or unpacks to more than `each` bytes for so many pixels."""
+    for count, what, limit in ((pixels, "pixels", most), (unpacked, "bytes", each * most)):
         if count > limit:
             raise TooLarge(f"has {count} {what} and no more than {limit} are read: crop it, or set {VARIABLE} higher")
 
@@ -58,9 +59,8 @@ def check_array(shape: Iterable[int], itemsize: int, most: int) -> None:
     check_size(prod(sides[:2]), prod(sides) * itemsize, most)
 
 
-def check_file(path: PathLike, what: str, most: int) -> None:
-    """Raise unless a path is a regular file of an allowed size; `what` names it, for example ``"the image"``."""
-    name = os.fspath(path)
+def size_of_file(name: str, what: str) -> int:
+    """Return the bytes of a file; raise unless it is a regular one; `what` names it, for example ``"the image"``."""
     try:
         found = os.stat(name)
     except FileNotFoundError:
@@ -71,10 +71,33 @@ def check_file(path: PathLike, what: str, most: int) -> None:
         raise ValueError(f"{name} is a folder: give the path of {what}, which is a file in it")
     if not stat.S_ISREG(found.st_mode):
         raise ValueError(f"{name} is not a regular file: give the path of {what}")
+    return found.st_size
+
+
+@contextmanager
+def reading(path: PathLike, what: str, max_pixels: int | None, *, each: int = BYTES, kind: str = "") -> Iterator[int]:
+    """Check a file and yield how many pixels may be read; errors of the block name the file and a remedy.
+
+    ``what`` names it, for example ``"the image"``; it may have ``each`` bytes for every allowed pixel. With ``kind``
+    any error is one of a library that finds the file damaged, which is no ``kind`` then.
+    """
+    name, most = os.fspath(path), max_pixels_or_default(max_pixels)
+    size = size_of_file(name, what)
     try:
-        check_size(0, found.st_size, most)
+        check_size(0, size, most, each)
+        yield most
     except TooLarge as error:
         raise ValueError(f"{name} {error}") from None
+    except MemoryError:
+        raise ValueError(f"{name} is too large for the memory: crop it first") from None
+    except Exception as error:
+        if kind:
+            raise ValueError(f"{name} cannot be read as {kind} ({error}): save it again") from None
+        if isinstance(error, OSError):
+            raise ValueError(f"{name} cannot be read ({error.strerror}): check the path of {what}") from None
+        if isinstance(error, (TypeError, ValueError)):
+            raise ValueError(f"{name}: {error}") from None
+        raise
 
 
 def read_npy(file: IO[bytes], length: int, most: int) -> NDArray[Any]:

@@ -11,7 +11,6 @@ import json
 import os
 import warnings
 from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +18,8 @@ import numpy as np
 
 from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable, check_target
 from simdtex.io.grids import SUFFIXES, CartesianGrid, write_grid
-from simdtex.io.limits import TooLarge, check_array, check_file, max_pixels_or_default
+from simdtex.io.limits import check_array, reading
+from simdtex.options import require
 
 if TYPE_CHECKING:
     from xarray import DataArray, Dataset
@@ -53,9 +53,7 @@ def check_realisations_path(path: PathLike, *, source: bool = False) -> str:
         raise ValueError(f"{target} names no format of realisations: end its name in one of {', '.join(_NEEDED)}")
     if source and suffix in SUFFIXES:
         raise ValueError(f"{target} is a grid, which holds no source map: end its name in .zarr, .nc or .npz")
-    for library in _NEEDED[suffix]:
-        if find_spec(library) is None:
-            raise ValueError(f"{library} is not installed; pip install 'simdtex[simulate]'")
+    require("simulate", *_NEEDED[suffix])
     if suffix == ".zarr" and target.is_dir():
         if not _own(target):
             raise ValueError(
@@ -157,24 +155,19 @@ def read_netcdf(path: PathLike, *, max_pixels: int | None = None) -> CartesianGr
     ValueError
         The file is missing, damaged, too large, or has no such variable, or a library is not installed.
     """
-    name, most = os.fspath(path), max_pixels_or_default(max_pixels)
-    check_file(name, "the grid", most)
-    for library in _NEEDED[".nc"]:
-        if find_spec(library) is None:
-            raise ValueError(f"{library} is not installed; pip install 'simdtex[simulate]'")
+    name = os.fspath(path)
+    require("simulate", *_NEEDED[".nc"])
     import xarray
 
-    try:
-        with xarray.open_dataset(name, engine="h5netcdf") as data:
-            found = [one for one in data.data_vars.values() if set(one.dims) in ({"x", "y"}, {"x", "y", "z"})]
-            found = [one for one in found if set(one.dims) == set(found[0].dims)]
-            for one in found:
-                check_array(one.shape, one.dtype.itemsize, most)
-            arrays = [one.transpose(..., "y", "x").load() for one in found]
-    except TooLarge as error:
-        raise ValueError(f"{name} {error}") from None
-    except Exception as error:  # each library has errors of its own for a damaged file
-        raise ValueError(f"{name} cannot be read as NetCDF ({error}): save it again") from None
+    with (
+        reading(name, "the grid", max_pixels, kind="NetCDF") as most,
+        xarray.open_dataset(name, engine="h5netcdf") as data,
+    ):
+        found = [one for one in data.data_vars.values() if set(one.dims) in ({"x", "y"}, {"x", "y", "z"})]
+        found = [one for one in found if set(one.dims) == set(found[0].dims)]
+        for one in found:
+            check_array(one.shape, one.dtype.itemsize, most)
+        arrays = [one.transpose(..., "y", "x").load() for one in found]
     if not arrays:
         raise ValueError(f"{name} has no variable with the axes y and x, or z, y and x: rename its dimensions")
     origin, cell = zip(*(_axis(arrays[0], axis) for axis in "xyz"), strict=True)

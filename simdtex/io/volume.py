@@ -20,11 +20,10 @@ import tifffile
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from simdtex.io import image
-from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable
+from simdtex.io.atomic import atomic_folder, atomic_path, check_folder_writable, earlier_files
 from simdtex.io.decode import native
 from simdtex.io.image import FLOATS, INTEGERS, Format, check_holds
-from simdtex.io.limits import TooLarge, check_array, check_file, max_pixels_or_default, read_npy
-from simdtex.options import unmasked
+from simdtex.io.limits import check_array, read_npy, reading
 
 __all__ = ["check_writable", "is_volume", "read", "write"]
 
@@ -56,14 +55,11 @@ def check_writable(path: PathLike, dtype: DTypeLike | None = None, channels: int
             f"{target} ends in {target.suffix}: end its name in one of {', '.join(sorted(filter(None, _FORMATS)))}, "
             "or give a name without suffix for a folder of PNG slices"
         )
-    if not suffix and os.path.isdir(target):
-        if any(not _SLICE.fullmatch(name) for name in os.listdir(target)):
-            raise ValueError(f"{target} is a folder with other files in it: give a new name for the folder of slices")
-        check_folder_writable(target)
-    else:
+    if suffix:
         image.check_writable(target, suffixes=(suffix,))
-        if not suffix and target.exists():
-            raise ValueError(f"{target} is a file: give another name for the folder of slices, or a suffix")
+    else:
+        earlier_files(target, "the slices", lambda name: bool(_SLICE.fullmatch(name)))
+        check_folder_writable(target)
     other = next(one for one in (".nrrd", ".tif", ".npz") if _FORMATS[one].holds(dtype, channels))
     check_holds(target, _FORMATS, dtype, channels, other)
 
@@ -103,10 +99,8 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Array:
     ValueError
         The file is missing, damaged, no volume, or too large.
     """
-    name, most = os.fspath(path), max_pixels_or_default(max_pixels)
-    check_file(name, "the volume", most)
-    suffix = Path(path).suffix.lower()
-    try:
+    name, suffix = os.fspath(path), Path(path).suffix.lower()
+    with reading(path, "the volume", max_pixels, kind="a volume") as most:
         if suffix == ".nrrd":
             header = nrrd.read_header(name)
             check_array(tuple(int(side) for side in header["sizes"]), 8, most)
@@ -118,12 +112,6 @@ def read(path: PathLike, *, max_pixels: int | None = None) -> Array:
             with tifffile.TiffFile(name) as file:
                 check_array((len(file.pages), *file.pages.first.shape), 8, most)
                 values = np.stack([page.asarray() for page in file.pages])
-    except TooLarge as error:
-        raise ValueError(f"{name} {error}") from None
-    except MemoryError:
-        raise
-    except Exception as error:  # each library has errors of its own for a damaged file
-        raise ValueError(f"{name} cannot be read as a volume ({error}): save it again") from None
     if values.ndim not in (3, 4) or values.size == 0 or values.dtype.kind not in "buif":
         raise ValueError(f"{name} has the shape {values.shape} and the type {values.dtype}: give numbers of three axes")
     return native(values[..., None] if values.ndim == 3 else values)
@@ -154,14 +142,7 @@ def write(path: PathLike, volume: ArrayLike) -> None:
     y, then z, with the channels as a vector before them, as ParaView, 3D Slicer and Fiji expect. It is not compressed,
     because not every version of ParaView decompresses.
     """
-    unmasked("the volume", volume)
-    values = np.asarray(volume)
-    if values.dtype.kind not in "buif":
-        raise TypeError(f"the volume holds {values.dtype} values: give integers or real floats")
-    if values.ndim not in (3, 4) or values.size == 0:
-        raise ValueError(
-            f"the volume has the shape {values.shape}: give (depth, rows, cols) or (depth, rows, cols, channels)"
-        )
+    values = image.pixels_of("the volume", volume, 3)
     check_writable(path, values.dtype, values.shape[3] if values.ndim == 4 else 1)
     suffix = Path(path).suffix.lower()
     if suffix not in (".npz", ".npy") and values.ndim == 4 and values.shape[3] == 1:

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.checkpoint import Checkpoint
-from simdtex.driver import Call, drive, execute
+from simdtex.driver import drive, execute
 from simdtex.jobs.inputs import check_mask, check_picture, is_several
 from simdtex.machine import Machine, open_machine
 from simdtex.methods.classifier.algorithm import Plan
 from simdtex.methods.classifier.model import BANDS, CLASSES, LEAST, Model, Region, learn
 from simdtex.methods.classifier.options import Options
-from simdtex.model.pictures import Mask, completed
+from simdtex.model.pictures import Mask, check_alike, completed
 from simdtex.options import real_array, resolve
 from simdtex.random import as_seed
 from simdtex.run import Callback, Output
@@ -26,20 +26,14 @@ from simdtex.run import Callback, Output
 if TYPE_CHECKING:
     from typing import Self, Unpack
 
-    from simdtex.methods.typed_options import ClassifierOptions
+    from simdtex.methods.typed_options import ClassifyOptions
 
 Textures = Mapping[str, ArrayLike | Sequence[ArrayLike]]
 
 
 @overload
 def classify(
-    image: ArrayLike,
-    textures: Textures | ArrayLike,
-    *,
-    masks: Mapping[str, Any] | None = ...,
-    validation: Textures | None = ...,
-    full_output: Literal[True],
-    **options: Unpack[ClassifierOptions],
+    image: ArrayLike, textures: Textures | ArrayLike, *, full_output: Literal[True], **options: Unpack[ClassifyOptions]
 ) -> tuple[NDArray[np.uint8], Output]: ...
 
 
@@ -48,10 +42,8 @@ def classify(
     image: ArrayLike,
     textures: Textures | ArrayLike,
     *,
-    masks: Mapping[str, Any] | None = ...,
-    validation: Textures | None = ...,
     full_output: Literal[False] = ...,
-    **options: Unpack[ClassifierOptions],
+    **options: Unpack[ClassifyOptions],
 ) -> NDArray[np.uint8]: ...
 
 
@@ -60,7 +52,7 @@ def classify(
     textures: Textures | ArrayLike,
     *,
     masks: Mapping[str, Any] | None = None,
-    validation: Textures | None = None,
+    validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None = None,
     channel_axis: int | None = None,
     rng: int | np.random.Generator | None = None,
     device: str | Machine | None = None,
@@ -142,8 +134,7 @@ def classify(
             "textures": [[(*one[:2], one.judged) for one in regions] for regions in classes],
         }
 
-    call = Call(rng, device, callback, full_output, checkpoint)
-    return execute("classify", partial(drive, plan), inputs, None, call)
+    return execute("classify", partial(drive, plan), inputs, None, rng, device, callback, full_output, checkpoint)
 
 
 def _sampled(
@@ -181,9 +172,7 @@ def _region(name: str, sample: Any, mask: Any, like: NDArray[Any], channel_axis:
         sites: Mask = ~unknown if mask is None else check_mask(mask, pixels.shape[:2]) & ~unknown
     except (ValueError, TypeError) as error:
         raise type(error)(f"class {name!r}: {error}") from None
-    if (pixels.dtype, pixels.shape[-1]) != (like.dtype, like.shape[-1]):
-        kinds = [f"{one.shape[-1]} bands of {one.dtype}" for one in (pixels, like)]
-        raise ValueError(f"class {name!r} has {kinds[0]} and the picture {kinds[1]}; convert them to one type")
+    check_alike(f"class {name!r}", pixels, "the picture", like)
     if unknown.all():
         raise ValueError(f"class {name!r} has a sample without a known pixel; leave it out")
     return Region(completed(pixels, unknown), sites)
@@ -296,8 +285,8 @@ class TextureClassifier:
         if len(images) != len(painted):
             raise ValueError(f"there are {len(images)} pictures and {len(painted)} of labels; give one for each")
         shown = [check_picture(one, self.channel_axis) for one in images]
-        for pixels, _ in shown:
-            _check_like(pixels, shown[0][0])
+        for number, (pixels, _) in enumerate(shown):
+            check_alike(f"picture {number}", pixels, "picture 0", shown[0][0])
         found = _painted([(*one, marked) for one, marked in zip(shown, painted, strict=True)])
         self.classes_ = np.array(list(found))
         self.n_features_in_ = shown[0][0].shape[-1]
@@ -329,13 +318,7 @@ class TextureClassifier:
         if not hasattr(self, "_model"):
             raise ValueError("the classifier is not trained; call fit first")
         pixels, unknown = check_picture(image, self.channel_axis)
-        _check_like(pixels, self._like)
+        check_alike("the picture", pixels, "that of training", self._like)
         plan = Plan(completed(pixels, unknown), unknown, self._model, self._names, self._chosen)
         labels, output = drive(plan, self._machine, self._seed)
         return labels[..., 0], output
-
-
-def _check_like(pixels: NDArray[Any], like: NDArray[Any]) -> None:
-    if (pixels.dtype, pixels.shape[-1]) != (like.dtype, like.shape[-1]):
-        kinds = [f"{one.shape[-1]} bands of {one.dtype}" for one in (pixels, like)]
-        raise ValueError(f"the pictures have {kinds[0]} and {kinds[1]}; convert them to one type")

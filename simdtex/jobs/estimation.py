@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from simdtex.driver import check_shape
 from simdtex.io.hard_data import HardData, place_hard_data
 from simdtex.jobs.inputs import as_known, check_known, check_samples
-from simdtex.jobs.simulation import digests, grid_axes, require_xarray
+from simdtex.jobs.simulation import digests, grid_axes
 from simdtex.machine import memory, open_machine
 from simdtex.methods import mrf
 from simdtex.methods.mrf.density import Data, given_data
 from simdtex.model.sample import Sample
-from simdtex.options import real, whole
+from simdtex.options import real, require, whole
 
 if TYPE_CHECKING:
     import xarray
@@ -96,7 +96,9 @@ def estimate(
     >>> found.probability.sel(category=1)[2].values.round(2).tolist()
     [0.0, 1.0, 0.0, 0.0, 0.0, 0.88]
     """
-    xr = require_xarray()
+    require("simulate", "xarray")
+    import xarray as xr
+
     whole("nearest", nearest, 0, MOST)
     real("bandwidth", bandwidth, 0, above=True)
     pictures = mrf.Options(categorical=categorical).of(check_samples(training, None, mask))

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage
 
 from simdtex.checkpoint import Checkpoint, Checkpointing
-from simdtex.driver import Call, drive, execute
+from simdtex.driver import drive, execute
 from simdtex.io.image import check_sample
 from simdtex.jobs.inputs import check_mask, check_picture, check_samples
 from simdtex.machine import Machine, memory
@@ -23,14 +23,14 @@ from simdtex.methods.mrf.options import Options, few
 from simdtex.model.given import Given
 from simdtex.model.guide import Surroundings
 from simdtex.model.lattice import neighbourhood_offsets
-from simdtex.model.pictures import Mask, Pictures
+from simdtex.model.pictures import Mask, Pictures, check_alike
 from simdtex.options import resolve, whole, within_32_bits
 from simdtex.run import Callback, Output
 
 if TYPE_CHECKING:
     from typing import Unpack
 
-    from simdtex.methods.typed_options import MrfOptions
+    from simdtex.methods.typed_options import ExtendOptions, FillOptions
 
 REACH = 128
 """How far around its window a hole is filled from, at least, pixels."""
@@ -80,25 +80,13 @@ def windows(hole: Mask, radius: int, levels: int | None) -> list[Window]:
 
 @overload
 def fill(
-    image: ArrayLike,
-    mask: ArrayLike | None = ...,
-    *,
-    sample: ArrayLike | None = ...,
-    reach: int | None = ...,
-    full_output: Literal[True],
-    **options: Unpack[MrfOptions],
+    image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[True], **options: Unpack[FillOptions]
 ) -> tuple[NDArray[Any], Output]: ...
 
 
 @overload
 def fill(
-    image: ArrayLike,
-    mask: ArrayLike | None = ...,
-    *,
-    sample: ArrayLike | None = ...,
-    reach: int | None = ...,
-    full_output: Literal[False] = ...,
-    **options: Unpack[MrfOptions],
+    image: ArrayLike, mask: ArrayLike | None = ..., *, full_output: Literal[False] = ..., **options: Unpack[FillOptions]
 ) -> NDArray[Any]: ...
 
 
@@ -172,37 +160,19 @@ def fill(
     >>> bool((filled[~hole] == gravel[~hole]).all())
     True
     """
-    job = filling(image, mask, sample=sample, reach=reach, channel_axis=channel_axis, **options)
-    return execute("fill", job.run, job.inputs, channel_axis, Call(rng, device, callback, full_output, checkpoint))
+    job = filling(image, mask, sample, reach, channel_axis, options)
+    return execute("fill", job.run, job.inputs, channel_axis, rng, device, callback, full_output, checkpoint)
 
 
 @overload
 def extend(
-    image: ArrayLike,
-    *,
-    top: int = ...,
-    bottom: int = ...,
-    left: int = ...,
-    right: int = ...,
-    seamless: bool | str = ...,
-    band: int | None = ...,
-    full_output: Literal[True],
-    **options: Unpack[MrfOptions],
+    image: ArrayLike, *, full_output: Literal[True], **options: Unpack[ExtendOptions]
 ) -> tuple[NDArray[Any], Output]: ...
 
 
 @overload
 def extend(
-    image: ArrayLike,
-    *,
-    top: int = ...,
-    bottom: int = ...,
-    left: int = ...,
-    right: int = ...,
-    seamless: bool | str = ...,
-    band: int | None = ...,
-    full_output: Literal[False] = ...,
-    **options: Unpack[MrfOptions],
+    image: ArrayLike, *, full_output: Literal[False] = ..., **options: Unpack[ExtendOptions]
 ) -> NDArray[Any]: ...
 
 
@@ -261,34 +231,31 @@ def extend(
     >>> simdtex.extend(grass, right=16, bottom=8, rng=1).shape
     (72, 80)
     """
-    plan, inputs = extension(
-        image, channel_axis, top=top, bottom=bottom, left=left, right=right, seamless=seamless, band=band, **options
+    sides = {"top": top, "bottom": bottom, "left": left, "right": right}
+    plan, inputs = extension(image, channel_axis, sides, seamless, band, options)
+    return execute(
+        "extend", partial(drive, plan), lambda: inputs, channel_axis, rng, device, callback, full_output, checkpoint
     )
-    call = Call(rng, device, callback, full_output, checkpoint)
-    return execute("extend", partial(drive, plan), lambda: inputs, channel_axis, call)
 
 
 def extension(
     image: ArrayLike,
     channel_axis: int | None,
-    *,
-    top: int = 0,
-    bottom: int = 0,
-    left: int = 0,
-    right: int = 0,
-    seamless: bool | str = False,
-    band: int | None = None,
-    **options: Any,
+    sides: dict[str, int],
+    seamless: bool | str,
+    band: int | None,
+    options: dict[str, Any],
 ) -> tuple[mrf.Plan, dict[str, Any]]:
     """Return the plan of a run of `extend`, and its input by the names that users give it."""
     pixels = check_sample(image, channel_axis)
     rows, cols = pixels.shape[:2]
-    for name, value in {"top": top, "bottom": bottom, "left": left, "right": right}.items():
+    for name, value in sides.items():
         whole(name, value, 0)
+    top, bottom, left, right = sides.values()
     if seamless not in (True, False, "x", "y"):
         raise ValueError(f'seamless is {seamless!r}; give True, False, "x" or "y"')
     tall, wide = seamless in (True, "y"), seamless in (True, "x")
-    if not (seamless or top or bottom or left or right):
+    if not (seamless or any(sides.values())):
         raise ValueError("there is nothing to add; give top, bottom, left or right, or seamless=True")
     width = min(64, max(8, min(rows, cols) // 8)) if band is None else band
     whole("band", width, 1)
@@ -307,7 +274,6 @@ def extension(
     if "boundary" in options:
         raise ValueError("the boundary of what is extended follows from seamless; leave boundary out")
     chosen = resolve(Options, "extend", {"boundary": "torus" if seamless else "open"} | options)
-    sides = {"top": top, "bottom": bottom, "left": left, "right": right, "seamless": seamless, "band": width}
     place = np.full((*hole.shape, 2), -1, np.int32)
     place[top : top + rows, left : left + cols] = np.moveaxis(np.indices((rows, cols)), 0, -1)
     place[hole] = -1
@@ -317,7 +283,8 @@ def extension(
     if not seamless and _has_tones(chosen, pictures):
         corner = (np.nan if top or bottom else 0, np.nan if left or right else 0)  # rows for rows, columns for columns
         guide = Surroundings(pixels, np.ones((rows, cols), bool), canvas, ~hole, corner)
-    return mrf.plan(pictures, canvas.shape[:2], chosen, given, guide), {"options": chosen, "image": pixels, **sides}
+    inputs = {"options": chosen, "image": pixels, **sides, "seamless": seamless, "band": width}
+    return mrf.plan(pictures, canvas.shape[:2], chosen, given, guide), inputs
 
 
 class Made(NamedTuple):
@@ -477,12 +444,11 @@ class Filling:
 
 def filling(
     image: ArrayLike,
-    mask: ArrayLike | None = None,
-    *,
-    sample: ArrayLike | None = None,
-    reach: int | None = None,
-    channel_axis: int | None = None,
-    **options: Any,
+    mask: ArrayLike | None,
+    sample: ArrayLike | None,
+    reach: int | None,
+    channel_axis: int | None,
+    options: dict[str, Any],
 ) -> Filling:
     """Return the job of `fill`, which has the same parameters; raise ValueError or TypeError if one is invalid."""
     pixels, hole = check_picture(image, channel_axis)
@@ -493,7 +459,9 @@ def filling(
         raise ValueError("nothing of the picture is known; give a mask that is False (black) where it is to be kept")
     if reach is not None:
         whole("reach", reach, 1)
-    given = None if sample is None else _check_sample(sample, channel_axis, pixels)
+    given = None if sample is None else check_samples(sample, channel_axis)
+    if given:
+        check_alike("the sample", given.pixels[0], "the picture", pixels)
     chosen = resolve(Options, "fill", options)
     return Filling(pixels, hole, given, reach, chosen)
 
@@ -554,14 +522,3 @@ def _pasting(
         )
 
     return seen
-
-
-def _check_sample(sample: Any, channel_axis: int | None, pixels: NDArray[Any]) -> Pictures:
-    pictures = check_samples(sample, channel_axis)
-    one = pictures.pixels[0]
-    if one.dtype != pixels.dtype or one.shape[2] != pixels.shape[2]:
-        raise ValueError(
-            f"the sample has {one.shape[2]} channels of {one.dtype} and the picture {pixels.shape[2]} of "
-            f"{pixels.dtype}; give both one type"
-        )
-    return pictures

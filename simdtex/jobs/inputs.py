@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from simdtex.io.hard_data import HardData, place_hard_data, read_hard_data
-from simdtex.io.image import AXES, as_array, cast, check_sample
+from simdtex.io.image import AXES, as_array, cast, check_sample, pixels_of
 from simdtex.machine import memory
 from simdtex.model.given import Given
 from simdtex.model.guide import GuidePair
-from simdtex.model.pictures import Mask, Pictures, unknown_in
-from simdtex.options import unmasked
+from simdtex.model.pictures import Mask, Pictures, check_alike, unknown_in
+from simdtex.options import check_real, unmasked
 
 Placing = Callable[..., "np.ma.MaskedArray[Any, Any]"]
 """`place_hard_data`, or what places a table where it lies on the ground."""
@@ -76,9 +76,7 @@ def check_samples(sample: Any, channel_axis: int | None, mask: Any = None, axes:
         raise ValueError(f"the samples have {counts} axes; give samples of one type, grey or colour")
     pixels, unknown = zip(*(check_picture(one, channel_axis, axes) for one in arrays), strict=True)
     for number, picture in enumerate(pixels[1:], 1):
-        if picture.dtype != pixels[0].dtype or picture.shape[-1] != pixels[0].shape[-1]:
-            types = [f"{one.shape[-1]} channels of {one.dtype}" for one in (picture, pixels[0])]
-            raise ValueError(f"sample {number} has {types[0]} and sample 0 {types[1]}; give samples of one type")
+        check_alike(f"sample {number}", picture, "sample 0", pixels[0])
     if mask is None:
         return Pictures(pixels, unknown)
     masks = list(mask) if several and np.iterable(mask) else [mask]
@@ -145,8 +143,7 @@ def check_known(
         array = place(known, shape, dtype).reshape(*shape, variables)
     else:
         axes = len(shape) + (channel_axis is not None)
-        if known.dtype.kind not in "buif":
-            raise TypeError(f"known holds {known.dtype} values; give integers or real floats")
+        check_real("known", known)
         if known.ndim != axes:
             raise ValueError(
                 f"known is {known.ndim}-dimensional; give "
@@ -221,12 +218,7 @@ def check_guide(guide: Any, shape: tuple[int, ...], pictures: Pictures) -> Guide
 
 
 def _guide(name: str, array: Any, axes: int) -> NDArray[Any]:
-    found = _unmasked(name, array)
-    if found.dtype.kind not in "buif":
-        raise TypeError(f"{name} holds {found.dtype} values; give integers or real floats")
-    if found.ndim not in (axes, axes + 1) or not found.size:
-        more = AXES[axes].replace(")", ", channels)")
-        raise ValueError(f"{name} is {found.ndim}-dimensional; give {AXES[axes]} or {more}")
+    found = pixels_of(name, array, axes)
     if found.dtype.kind == "f" and np.isinf(found).any():
         raise ValueError(f"{name} has infinite values; give numbers")
     found = found.astype(np.uint8) if found.dtype == np.bool_ else found

@@ -18,6 +18,7 @@ from simdtex.jobs.inputs import Inputs, Placing, check_mask
 from simdtex.model.given import Given
 from simdtex.model.pictures import Pictures
 from simdtex.model.turned import HALVES, Turned, turned
+from simdtex.options import check_real
 
 ONE = 1e-3
 """How far the sum of probabilities may be from 1; they are divided by it."""
@@ -157,8 +158,7 @@ def missing_value(pixels: Sequence[NDArray[Any]]) -> Any:
 def _numbers(name: str, values: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
     """Return a map as floats, NaN where it is masked."""
     array = as_array(name, values)
-    if array.dtype.kind not in "buif":
-        raise TypeError(f"{name} holds {array.dtype} values; give real numbers")
+    check_real(name, array)
     if array.shape != shape:
         sides = ["x".join(map(str, one)) for one in (array.shape, shape)]
         raise ValueError(f"{name} is {sides[0]} and has to be {sides[1]}, as the output; give one size")

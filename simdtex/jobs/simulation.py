@@ -28,7 +28,7 @@ from simdtex.methods import mrf
 from simdtex.model.given import Given
 from simdtex.model.pictures import Pictures
 from simdtex.model.soft import Soft
-from simdtex.options import resolve, whole, within_32_bits
+from simdtex.options import require, resolve, whole, within_32_bits
 from simdtex.run import Callback, Simulating
 
 if TYPE_CHECKING:
@@ -171,7 +171,9 @@ def simulate(
     >>> dict(found.sizes)
     {'realisation': 2, 'y': 32, 'x': 40}
     """
-    xr = require_xarray()
+    require("simulate", "xarray")
+    import xarray as xr
+
     whole("n", n, 1)
     whole("first", first, 0)
     if jobs is not None:
@@ -339,12 +341,3 @@ def _attributes(seed: int, options: mrf.Options, device: str, inputs: Inputs) ->
     if inputs.pictures.usable:
         found["mask"] = digest(*inputs.pictures.usable)
     return found
-
-
-def require_xarray() -> Any:
-    """Return the module xarray; raise if it is not installed."""
-    try:
-        import xarray
-    except ModuleNotFoundError:
-        raise ValueError("xarray is not installed; pip install 'simdtex[simulate]'") from None
-    return xarray

@@ -143,10 +143,12 @@ class Job:
         keywords = {name: value for name, value in self._keywords.items() if name != "method"}
         if self.kind == "synth":
             return replay(self.sample, device=machine, **keywords)
-        seed = keywords.pop("rng")
+        seed, axis = keywords.pop("rng"), keywords.pop("channel_axis")
         if self.kind == "fill":
-            return HoleReplay(filling(self.sample, **keywords), machine, seed)
-        return Replay(extension(self.sample, **keywords)[0], machine, seed)
+            job = filling(self.sample, keywords.pop("mask"), None, None, axis, keywords)
+            return HoleReplay(job, machine, seed)
+        sides = dict.fromkeys(("top", "bottom", "left", "right"), 0)
+        return Replay(extension(self.sample, axis, sides, keywords.pop("seamless"), None, keywords)[0], machine, seed)
 
     def layers(
         self,

@@ -357,7 +357,7 @@ class Session:
 
     def _on_download(self, message: Message, buffers: Sequence[Any]) -> None:
         result, name = self.results.find(message.get("result")), str(message.get("name"))
-        self.send({"kind": "file", "name": name, "result": result.number}, [result.file(name)])
+        self.send({"kind": "file", "name": name}, [result.file(name)])
 
     def _send_picture(self, *, new: bool) -> None:
         assert self._picture is not None
@@ -451,8 +451,7 @@ class Session:
         levels = Levels(key if restarts else None, options, self._levels)
         first = "labels" if job.kind == "classify" else "picture"
         layers = [first, "sample", *(["arrangement", "use", "temperature"] if job.method == "mrf" else [])]
-        size = {"width": job.shape[1], "height": job.shape[0]}
-        self._begun = {"kind": "begun", **size, "from": levels.level, "layers": layers}
+        self._begun = {"kind": "begun", "from": levels.level, "layers": layers}
         self._levels, self._selected, self._stale, self._job, self._inside = levels, None, True, job, {}
         self.send(self._begun, [])
         return levels

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from math import prod
 from pathlib import Path
@@ -30,6 +30,9 @@ OUT_OF_MEMORY = (
     cl.status_code.OUT_OF_HOST_MEMORY,
     cl.status_code.INVALID_BUFFER_SIZE,
 )
+
+NONE: Mapping[str, int | str] = {}
+"""No -D constants."""
 
 SMALL_GROUP = 4
 """Work-group size on a CPU for kernels with much work in each item: few sites still occupy all cores."""
@@ -272,9 +275,9 @@ class OpenCL:
         fit = min(self.scratch // per_site, int(4e9) // (2 * padded * neighbours * channels))
         return max(1, fit // self.vector) * self.vector
 
-    def kernel(self, file: str, function: str, /, **defines: int | str) -> Any:
-        """Return a kernel of ``kernels/FILE.cl``, compiled once for these -D constants."""
-        options = " ".join(f"-D {key}={value}" for key, value in sorted(defines.items()))
+    def kernel(self, function: str, defines: Mapping[str, int | str] = NONE) -> Any:
+        """Return a kernel, compiled once for these -D constants; its file is the first word of its name."""
+        file, options = function.partition("_")[0], " ".join(f"-D {key}={defines[key]}" for key in sorted(defines))
         files = TOGETHER if file in TOGETHER and not defines else (file,)
         key = (files, function, options)
         if key not in self._kernels:
@@ -285,23 +288,47 @@ class OpenCL:
             self._kernels[key] = cl.Kernel(self._programs[files, options], function)
         return self._kernels[key]
 
-    def launch(self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None) -> None:
-        """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels check the range."""
+    def launch(
+        self,
+        function: str,
+        size: tuple[int, ...],
+        *args: Any,
+        local: tuple[int, ...] | None = None,
+        defines: Mapping[str, int | str] = NONE,
+    ) -> None:
+        """Enqueue a kernel over a range of work-items, rounded up to whole work-groups: kernels check the range.
+
+        ``function`` and ``defines`` are as of `kernel`; ``args`` are arrays of the device, scalars and structs of
+        NumPy, and integers of Python, which become 32 bits.
+        """
+        self.enqueue(self.kernel(function, defines), size, *args, local=local)
+
+    def enqueue(self, kernel: Any, size: tuple[int, ...], *args: Any, local: tuple[int, ...] | None = None) -> None:
+        """Enqueue a kernel that is compiled already, as `launch` does."""
         local = local if local and not self._forced else (self._group,) + (1,) * (len(size) - 1)
         size = tuple(-(-n // group) * group for n, group in zip(size, local, strict=True))
-        data = [a.data if type(a) is DeviceArray else a for a in args]
-        self.log.add(kernel(self.queue, size, local, *data), kernel)
+        self.log.add(kernel(self.queue, size, local, *map(_argument, args)), kernel)
 
-    def launch_groups(self, kernel: Any, groups: NDArray[np.int64], *args: Any) -> None:
+    def launch_groups(
+        self, function: str, groups: NDArray[np.int64], *args: Any, defines: Mapping[str, int | str]
+    ) -> None:
         """Enqueue a kernel for one range of work-items after another, from ``groups[g, 0]`` up to ``groups[g, 1]``.
 
         The kernel's second argument is the end of the range. The other arguments are set once, so that a launch takes a
         few microseconds.
         """
-        kernel.set_args(*(a.data if type(a) is DeviceArray else a for a in args))
+        kernel = self.kernel(function, defines)
+        kernel.set_args(*map(_argument, args))
         group = self._group if self._forced or self.kind == "gpu" else SMALL_GROUP
         for begin, end in groups.tolist():
             kernel.set_arg(1, np.int32(end))
             for first in range(begin, end, LONGEST):
                 size = -(-min(end - first, LONGEST) // group) * group
                 self.log.add(cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (group,), (first,)), kernel)
+
+
+def _argument(value: Any) -> Any:
+    """Return an argument of a kernel as pyopencl takes it."""
+    if type(value) is DeviceArray:
+        return value.data
+    return np.int32(value) if isinstance(value, int) else value

@@ -6,13 +6,15 @@
 
 from __future__ import annotations
 
-from os import PathLike
-from typing import TypedDict
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from simdtex.checkpoint import Checkpoint
+from simdtex.io.hard_data import HardData
 from simdtex.machine import Machine
 from simdtex.run import Callback
 from simdtex.schedules import Schedule
@@ -25,7 +27,7 @@ class Common(TypedDict, total=False):
     rng: int | np.random.Generator | None
     device: str | Machine | None
     callback: Callback | None
-    checkpoint: str | PathLike[str] | Checkpoint | None
+    checkpoint: str | os.PathLike[str] | Checkpoint | None
 
 
 class MrfOptions(Common, total=False):
@@ -114,5 +116,47 @@ class ClassifierOptions(Common, total=False):
     window: float
 
 
-class AnyOptions(MrfOptions, MultiresOptions, PyramidOptions, total=False):
-    """The options of all methods."""
+class SynthOptions(MrfOptions, MultiresOptions, PyramidOptions, total=False):
+    """The options of `simdtex.synthesize`."""
+
+    method: str
+    mask: ArrayLike | Sequence[ArrayLike] | None
+    known: ArrayLike | HardData | str | os.PathLike[str] | None
+    known_source: ArrayLike | None
+    guide: tuple[Any, Any] | None
+
+
+class FillOptions(MrfOptions, total=False):
+    """The options of `simdtex.fill`."""
+
+    sample: ArrayLike | None
+    reach: int | None
+
+
+class ExtendOptions(MrfOptions, total=False):
+    """The options of `simdtex.extend`."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+    seamless: bool | str
+    band: int | None
+
+
+class MixOptions(PyramidOptions, total=False):
+    """The options of `simdtex.mix`."""
+
+    palette: int | None
+    pattern: int | None
+    average: Sequence[float] | None
+    low: int | None
+    high: int | None
+    split: int | None
+
+
+class ClassifyOptions(ClassifierOptions, total=False):
+    """The options of `simdtex.classify`."""
+
+    masks: Mapping[str, Any] | None
+    validation: Mapping[str, ArrayLike | Sequence[ArrayLike]] | None

@@ -83,6 +83,18 @@ class Pictures:
         return sum(1 if those is None or len(those) < 3 else len(those) for those in found)
 
 
+def kind(picture: NDArray[Any]) -> str:
+    """Return the channels and the type of a picture ([layers,] rows, cols, C) as text."""
+    count = picture.shape[-1]
+    return f"{count} channel{'s' * (count != 1)} of {picture.dtype}"
+
+
+def check_alike(name: str, picture: NDArray[Any], other: str, like: NDArray[Any]) -> None:
+    """Raise unless two pictures with a channel axis have the same type and as many channels."""
+    if (picture.dtype, picture.shape[-1]) != (like.dtype, like.shape[-1]):
+        raise ValueError(f"{name} has {kind(picture)} and {other} {kind(like)}; convert them to one type")
+
+
 def unknown_in(picture: NDArray[Any]) -> Mask:
     """Return where a picture ([layers,] rows, cols, C) is NaN in any channel."""
     if picture.dtype.kind != "f":

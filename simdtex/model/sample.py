@@ -73,8 +73,8 @@ class Candidates(NamedTuple):
 
     ``pixels`` (C, rows * cols) float32 working grey levels, margin and all; ``positions`` (n rounded up to
     blocks,) int32 pixel index of each p, row by row; ``size`` n; ``reach`` (N,) int32 pixel offset of each
-    neighbour; ``index_of`` (rows * cols,) int32 place of a pixel in ``positions`` or -1; ``rows``, ``cols`` of the
-    sample with its margin; ``guides`` the last channels that are guides.
+    neighbour; ``index_of`` (rows * cols,) int32 place of a pixel in ``positions`` or -1; ``guides`` the last
+    channels that are guides.
     """
 
     pixels: Any
@@ -82,9 +82,12 @@ class Candidates(NamedTuple):
     size: int
     reach: Any
     index_of: Any
-    rows: int
-    cols: int
     guides: int = 0
+
+    @property
+    def plane(self) -> int:
+        """Pixels of the sample with its margin."""
+        return int(self.index_of.size)
 
     @property
     def made(self) -> int:
@@ -391,8 +394,6 @@ class Sample:
             positions.size,
             machine.put(np.pad(places.reach, (0, bool(len(self.guides))))),  # a guide's site itself
             machine.put(index_of),
-            self.rows,
-            self.cols,
             len(self.guides),
         )
 

@@ -21,28 +21,9 @@ def survey(machine: Launcher | None, grid: Grid, temperature: Array) -> tuple[in
         return int((t > 0).sum()), int(t.sum(dtype=np.int64))
     stretches = -(-grid.size // CHUNK)
     both = machine.empty((2, stretches), np.int32)
-    machine.launch(
-        machine.kernel("active", "active_survey"),
-        (stretches,),
-        *(grid.struct, temperature, np.int32(CHUNK), np.int32(stretches), both),
-    )
+    machine.launch("active_survey", (stretches,), grid.struct, temperature, CHUNK, stretches, both)
     count, total = machine.get(both).sum(1, dtype=np.int64)
     return int(count), int(total)
-
-
-@Operation
-def total(machine: Launcher | None, grid: Grid, numbers: Array) -> int:
-    """Return the sum of an (H, W) int32 array over the sites of a grid."""
-    if machine is None:
-        return int(grid.view(numbers).sum(dtype=np.int64))
-    stretches = -(-grid.size // CHUNK)
-    sums = machine.empty((stretches,), np.int32)
-    machine.launch(
-        machine.kernel("active", "active_total"),
-        (stretches,),
-        *(grid.struct, numbers, np.int32(CHUNK), np.int32(stretches), sums),
-    )
-    return int(machine.get(sums).sum(dtype=np.int64))
 
 
 def stretches(starts: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
@@ -71,18 +52,14 @@ def among(
         return sites[active], np.concatenate([[0], np.cumsum(active)])[starts[firsts]]
     stretches = starts.size - 1
     counts = machine.empty((stretches,), np.int32)
-    machine.launch(
-        machine.kernel("active", "active_count"),
-        (stretches,),
-        *(sites, starts, np.int32(stretches), temperature, counts),
-    )
+    machine.launch("active_count", (stretches,), sites, starts, stretches, temperature, counts)
     before = np.concatenate([[0], np.cumsum(machine.get(counts), dtype=np.int64)])
     if before[-1] < sites.size:
         kept = machine.empty((int(before[-1]),), np.int32)
         machine.launch(
-            machine.kernel("active", "active_keep"),
+            "active_keep",
             (stretches,),
-            *(sites, starts, np.int32(stretches), temperature, machine.put(before[:-1].astype(np.int32)), kept),
+            *(sites, starts, stretches, temperature, machine.put(before[:-1].astype(np.int32)), kept),
         )
         sites = kept
     return sites, before[firsts]

@@ -127,10 +127,11 @@ def candidates(
     levels, features = structure.threshold.shape
     items = -(-len(sites) // 4)  # one for four siblings; where these are fewer, an item takes several
     machine.launch(
-        machine.kernel("candidates", "candidates", FEATURES=features),
+        "candidates",
         (items,),
-        *(np.uint64(seed), np.int32(level), np.int32(levels - 1), np.int32(match)),
+        *(np.uint64(seed), level, levels - 1, match),
         *(structure.lattice, structure.features, structure.threshold, sampled.lattice),
-        *(np.int32(sites.start), np.int32(sites.stop), np.int32(items), sampled.source, sampled.counts),
+        *(sites.start, sites.stop, items, sampled.source, sampled.counts),
+        defines={"FEATURES": features},
     )
     return sampled

@@ -21,9 +21,10 @@ def charge(
         return distances._replace(distance=costs.added(distances.distance, numbers, sites, candidates))
     blocks, padded = distances.nearest.shape
     machine.launch(
-        machine.kernel("charge", "charge", BLOCK=BLOCK, **costs.defines),
+        "charge",
         (distances.sites, blocks),
-        *(sites, np.int32(distances.sites), np.int32(padded), np.int32(candidates.size), np.int32(blocks)),
+        *(sites, distances.sites, padded, candidates.size, blocks),
         *(*costs.arguments(machine, candidates), distances.distance, distances.nearest),
+        defines={"BLOCK": BLOCK} | costs.defines,
     )
     return distances

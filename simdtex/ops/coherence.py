@@ -48,11 +48,11 @@ def coherence(
         d = distances.distance
         return distances._replace(distance=np.where(coherent, d * factor, d))
     machine.launch(
-        machine.kernel("coherence", "coherence", BLOCK=BLOCK),
+        "coherence",
         (sites.size,),
-        *(sites, np.int32(sites.size), np.int32(distances.distance.shape[1])),
-        *(field.source, field.temperature, offsets, np.int32(offsets.shape[0]), grid.struct),
-        *(candidates.reach, candidates.index_of, np.int32(candidates.index_of.size), factor),
+        *(sites, sites.size, distances.distance.shape[1], field.source, field.temperature),
+        *(offsets, offsets.shape[0], grid.struct, candidates.reach, candidates.index_of, candidates.plane, factor),
         *(distances.distance, distances.nearest),
+        defines={"BLOCK": BLOCK},
     )
     return distances

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 from math import prod
 
-import numpy as np
-
 from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.ops.lcpdf import Relaxed
 from simdtex.ops.neighbourhood import Field
@@ -22,9 +20,9 @@ def commit(machine: Launcher | None, field: Field, sites: Array, relaxed: Relaxe
         field.temperature.ravel()[sites] = cooled
         return field
     machine.launch(
-        machine.kernel("commit", "commit"),
+        "commit",
         (sites.size,),
-        *(sites, np.int32(sites.size), np.int32(channels), np.int32(prod(field.values.shape[1:]))),
+        *(sites, sites.size, channels, prod(field.values.shape[1:])),
         *(relaxed.values, relaxed.choice, cooled, *field),
     )
     return field

@@ -112,9 +112,9 @@ class Costs(NamedTuple):
         listed = max(phased.candidates.shape[1], kinds.candidates.shape[1])  # both are as long, where there are both
         area = max(prod(phased.sites.shape[1:]), prod(kinds.sites.shape[1:]))
         return (
-            *(self.penalty, phased.candidates, np.int32(listed), phased.sites, np.int32(area)),
+            *(self.penalty, phased.candidates, listed, phased.sites, area),
             *(phased.certain, phased.free, scattered.begin, scattered.reach, scattered.values, scattered.certain),
-            *(candidates.pixels, np.int32(candidates.rows * candidates.cols), candidates.positions),
+            *(candidates.pixels, candidates.plane, candidates.positions),
             *kinds,
         )
 

@@ -57,8 +57,9 @@ def exemplars(machine: Launcher | None, features: Array, known: Exemplars) -> Ar
         return np.rint(log32(least + own + np.float32(1)) * np.float32(LOGS)).astype(np.uint16)
     logs = machine.empty((classes, count), np.uint16)
     machine.launch(
-        machine.kernel("exemplars", "exemplars", K=features.shape[0], V=machine.vector),
+        "exemplars",
         (-(-count // machine.vector),),
-        *(features, np.int32(count), *known, np.int32(classes), logs),
+        *(features, count, *known, classes, logs),
+        defines={"K": features.shape[0], "V": machine.vector},
     )
     return logs

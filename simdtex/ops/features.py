@@ -37,10 +37,9 @@ def features(machine: Launcher | None, levels: Array, sites: Array, offsets: Arr
         return np.rint(z.reshape(bands * count, -1).astype(np.float32) * gain)
     found = machine.empty((bands * count, sites.size), np.float32)
     machine.launch(
-        machine.kernel("features", "features_contrast" if contrast else "features_raw"),
+        "features_contrast" if contrast else "features_raw",
         (sites.size,),
-        *(levels, np.int32(bands), np.int32(rows), np.int32(cols)),
-        *(sites, np.int32(sites.size), offsets, np.int32(count), found),
+        *(levels, bands, rows, cols, sites, sites.size, offsets, count, found),
     )
     return found
 

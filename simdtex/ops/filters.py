@@ -69,9 +69,8 @@ def filters(machine: Launcher | None, picture: Array, band: Array, taps: Array, 
         return np.stack(found, -1).reshape(rows * cols, -1).astype(np.int32)
     features = machine.empty((rows * cols, planes * (1 + count)), np.int32)
     machine.launch(
-        machine.kernel("filters", "filters"),
+        "filters",
         (rows * cols, planes * (1 + count)),
-        *(picture, band, np.int32(planes), np.int32(rows), np.int32(cols), np.int32(torus)),
-        *(taps, np.int32(count), np.int32(side), features),
+        *(picture, band, planes, rows, cols, torus, taps, count, side, features),
     )
     return features

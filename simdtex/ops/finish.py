@@ -52,14 +52,15 @@ def finish(
     first, count = rows.start * grid.cols, len(rows) * grid.cols
     if machine is None:
         return _finished(field, given, grid, sample, offsets, weights, grid.sites()[first : first + count])
-    out, i = machine.empty((sample.shown, count), np.int16), np.int32
+    out = machine.empty((sample.shown, count), np.int16)
     machine.launch(
-        machine.kernel("finish", "finish", C=sample.shown),
+        "finish",
         (count,),
-        *(grid.struct, i(first), i(count), field.source, machine.constant(offsets), machine.constant(weights)),
-        *(i(len(offsets)), planes, i(planes.shape[1]), i(sample.cols), i(sample.margin)),
-        *(i(sample.height), i(sample.width), machine.put(sample.inside.view(np.uint8)), given, field.values),
-        *(i(prod(field.source.shape)), i(sample.fine), out),
+        *(grid.struct, first, count, field.source, machine.constant(offsets), machine.constant(weights)),
+        *(len(offsets), planes, planes.shape[1], sample.cols, sample.margin),
+        *(sample.height, sample.width, machine.put(sample.inside.view(np.uint8)), given, field.values),
+        *(prod(field.source.shape), sample.fine, out),
+        defines={"C": sample.shown},
     )
     found: NDArray[np.int16] = machine.get(out)
     return found

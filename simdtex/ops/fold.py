@@ -27,11 +27,7 @@ def fold(machine: Launcher | None, picture: Array) -> Array:
     if machine is None:
         return np.ascontiguousarray(picture[:, row[:, None], col])
     coarse = machine.empty((planes, row.size, col.size), np.int32)
-    machine.launch(
-        machine.kernel("fold", "fold"),
-        (row.size * col.size, planes),
-        *(picture, np.int32(planes), np.int32(rows), np.int32(cols), coarse),
-    )
+    machine.launch("fold", (row.size * col.size, planes), picture, planes, rows, cols, coarse)
     return coarse
 
 
@@ -44,9 +40,5 @@ def unfold(machine: Launcher | None, coarse: Array, shape: tuple[int, ...]) -> A
         spread[:, folded(rows)[:, None], folded(cols)] = coarse
         return spread
     picture = machine.empty((planes, rows, cols), np.int32)
-    machine.launch(
-        machine.kernel("fold", "fold_back"),
-        (rows * cols, planes),
-        *(coarse, np.int32(planes), np.int32(rows), np.int32(cols), picture),
-    )
+    machine.launch("fold_back", (rows * cols, planes), coarse, planes, rows, cols, picture)
     return picture

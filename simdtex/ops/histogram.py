@@ -22,9 +22,10 @@ def histogram(machine: Launcher | None, distances: Distances, candidates: Candid
     counts = machine.empty((distances.sites, greys), np.uint32)
     blocks, padded = distances.nearest.shape
     machine.launch(
-        machine.kernel("histogram", "histogram", BLOCK=BLOCK),
+        "histogram",
         (distances.sites,),
-        *(distances.distance, distances.nearest, np.int32(blocks), np.int32(distances.sites)),
-        *(np.int32(padded), candidates.pixels, candidates.positions, np.int32(greys), counts),
+        *(distances.distance, distances.nearest, blocks, distances.sites, padded),
+        *(candidates.pixels, candidates.positions, greys, counts),
+        defines={"BLOCK": BLOCK},
     )
     return counts

@@ -38,7 +38,7 @@ def heat_bath_chances(temperatures: Sequence[float], neighbours: int) -> NDArray
 
 
 def _model(offsets: Array, grid: Grid, chances: Array, seed: int) -> tuple[Any, ...]:
-    return offsets, np.int32(offsets.shape[0]), grid.struct, chances, np.uint64(seed)
+    return offsets, offsets.shape[0], grid.struct, chances, np.uint64(seed)
 
 
 @Operation
@@ -67,9 +67,9 @@ def ising_relax(
         return (bits < chances[temperature, there.sum(0), up]).astype(np.uint8)
     relaxed = machine.empty((chains, sites.size), np.uint8)
     machine.launch(
-        machine.kernel("ising", "ising_relax"),
+        "ising_relax",
         (sites.size, seeds, temperatures),
-        *(sites, np.int32(sites.size), spins, np.int32(prod(spins.shape[1:])), np.int32(seeds)),
+        *(sites, sites.size, spins, prod(spins.shape[1:]), seeds),
         *(*_model(offsets, grid, chances, seed), np.uint32(turn), relaxed),
     )
     return relaxed
@@ -83,9 +83,7 @@ def ising_commit(machine: Launcher | None, spins: Array, sites: Array, relaxed: 
         spins.reshape(chains, -1)[:, sites] = relaxed
         return spins
     machine.launch(
-        machine.kernel("ising", "ising_commit"),
-        (sites.size, chains, 1),
-        *(sites, np.int32(sites.size), relaxed, np.int32(prod(spins.shape[1:])), np.int32(chains), spins),
+        "ising_commit", (sites.size, chains, 1), sites, sites.size, relaxed, prod(spins.shape[1:]), chains, spins
     )
     return spins
 
@@ -107,9 +105,9 @@ def ising_sequence(
     temperatures = chances.shape[0]
     seeds = spins.shape[0] // temperatures
     machine.launch(
-        machine.kernel("ising", "ising_sequence"),
+        "ising_sequence",
         (seeds, temperatures),
-        *(queue, np.int32(queue.shape[0]), spins, np.int32(prod(spins.shape[1:])), np.int32(seeds)),
+        *(queue, queue.shape[0], spins, prod(spins.shape[1:]), seeds),
         *_model(offsets, grid, chances, seed),
     )
     return spins

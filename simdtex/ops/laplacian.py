@@ -15,11 +15,6 @@ from numpy.typing import NDArray
 from simdtex.machine.interface import Array, Launcher, Operation
 
 
-def sizes(*numbers: int) -> tuple[np.int32, ...]:
-    """Return numbers as a kernel takes them."""
-    return tuple(np.int32(n) for n in numbers)
-
-
 def half(shape: tuple[int, ...]) -> tuple[int, int]:
     """Return rows and columns of the level above a level of this shape."""
     return -(-shape[0] // 2), -(-shape[1] // 2)
@@ -68,17 +63,6 @@ def shifted(n: int, by: int, torus: bool) -> tuple[NDArray[np.intp], NDArray[np.
     return (near % n, np.full(n, by)) if torus else (np.clip(near, 0, n - 1), np.clip(near, 0, n - 1) - own)
 
 
-def _up(machine: Launcher, kernel: str, each: float, band: Array, source: Array, coarse: Array, torus: bool) -> Array:
-    rows, cols = source.shape
-    fine = machine.empty((band.shape[0], rows, cols), np.int32)
-    machine.launch(
-        machine.kernel("laplacian", kernel),
-        (rows * cols, band.shape[0]),
-        *(band, *sizes(*band.shape, torus), source, *sizes(rows, cols), coarse, *sizes(*coarse.shape[1:]), fine),
-    )
-    return fine
-
-
 @Operation
 def laplacian_reduce(machine: Launcher | None, fine: Array, torus: bool) -> Array:
     """Return G_{i+1} of G_i, equation (6). Cost: 25 multiply-adds a pixel of it."""
@@ -92,9 +76,9 @@ def laplacian_reduce(machine: Launcher | None, fine: Array, torus: bool) -> Arra
     planes, rows, cols = fine.shape
     coarse = machine.empty((planes, *half((rows, cols))), np.int32)
     machine.launch(
-        machine.kernel("laplacian", "laplacian_reduce"),
+        "laplacian_reduce",
         (coarse.shape[1] * coarse.shape[2], planes),
-        *(fine, *sizes(planes, rows, cols, torus), coarse),
+        *(fine, planes, rows, cols, torus, coarse),
     )
     return coarse
 
@@ -106,35 +90,29 @@ def laplacian_band(machine: Launcher | None, fine: Array, coarse: Array, torus: 
     if machine is None:
         return (fine - _expanded(coarse, (rows, cols), (rows, cols), torus)).astype(np.int32)
     band = machine.empty(fine.shape, np.int32)
-    machine.launch(
-        machine.kernel("laplacian", "laplacian_band"),
-        (rows * cols, planes),
-        *(fine, coarse, *sizes(planes, rows, cols, torus), band),
-    )
+    machine.launch("laplacian_band", (rows * cols, planes), fine, coarse, planes, rows, cols, torus, band)
     return band
 
 
 @Operation
-def laplacian_collapse(machine: Launcher | None, band: Array, source: Array, coarse: Array, torus: bool) -> Array:
+def laplacian_collapse(
+    machine: Launcher | None, band: Array, source: Array, coarse: Array, torus: bool, blend: bool = False
+) -> Array:
     """Return G_i of L_i and G_{i+1}.
 
-    ``source`` (rows, cols) int32 are the pixels of ``band`` that make up L_i, which may be of another size.
+    ``source`` (rows, cols) int32 are the pixels of ``band`` that make up L_i, which may be of another size. With
+    ``blend`` there are no hard seams: where neighbours are not neighbours in the band, a pixel of L_i is the mean, by
+    (1, 2, 1) / 4 in each direction, of the pixels of the band at which each neighbour's piece would go on; elsewhere it
+    is the band's own pixel, to the bit.
     """
     if machine is None:
-        taken = band.reshape(len(band), -1)[:, source]
-        return (taken + _expanded(coarse, source.shape, band.shape[1:], torus)).astype(np.int32)
-    return _up(machine, "laplacian_collapse", 25 / 4, band, source, coarse, torus)
-
-
-@Operation
-def laplacian_blend(machine: Launcher | None, band: Array, source: Array, coarse: Array, torus: bool) -> Array:
-    """Return G_i as `laplacian_collapse` does, without hard seams.
-
-    Where neighbours are not neighbours in the band, a pixel of L_i is the mean, by (1, 2, 1) / 4 in each direction, of
-    the pixels of the band at which each neighbour's piece would go on; elsewhere it is the band's own pixel, to the
-    bit.
-    """
-    if machine is None:
-        joined = _joined(band, source, torus)
-        return (joined + _expanded(coarse, source.shape, band.shape[1:], torus)).astype(np.int32)
-    return _up(machine, "laplacian_blend", 25 / 4 + 9, band, source, coarse, torus)
+        own = _joined(band, source, torus) if blend else band.reshape(len(band), -1)[:, source]
+        return (own + _expanded(coarse, source.shape, band.shape[1:], torus)).astype(np.int32)
+    planes, (rows, cols) = band.shape[0], source.shape
+    fine = machine.empty((planes, rows, cols), np.int32)
+    machine.launch(
+        "laplacian_collapse",
+        (rows * cols, planes),
+        *(band, *band.shape, torus, source, rows, cols, coarse, *coarse.shape[1:], blend, fine),
+    )
+    return fine

@@ -121,12 +121,13 @@ def distance(machine: Launcher | None, near: Neighbourhoods, candidates: Candida
     nearest = machine.empty((blocks, padded), np.float32)
     own = {"OWN": 1} if len(near.confidence.shape) > 2 else {}
     machine.launch(
-        machine.kernel("lcpdf", "lcpdf_distance", **_defines(machine, candidates), **own),
+        "lcpdf_distance",
         (padded // machine.vector, blocks),
-        *(near.confidence, near.weighted, np.int32(terms), np.int32(padded)),
-        *(candidates.pixels, _plane(candidates), candidates.positions, np.int32(candidates.size)),
-        *(candidates.reach, np.int32(blocks), distance, nearest),
+        *(near.confidence, near.weighted, terms, padded),
+        *(candidates.pixels, candidates.plane, candidates.positions, candidates.size),
+        *(candidates.reach, blocks, distance, nearest),
         local=machine.tile,
+        defines=_defines(machine, candidates) | own,
     )
     return Distances(distance, nearest, near.sites)
 
@@ -228,12 +229,13 @@ def take(
     if choice.draws:
         window = choice.window
         own = (sites, grid.struct, np.uint64(key.seed), np.uint32(key.level), np.uint32(key.turn))
-        own += (machine.constant(window.noise), np.int32(window.radius if choice.density else -1), np.int32(window.top))
+        own += (machine.constant(window.noise), window.radius if choice.density else -1, window.top)
     machine.launch(
-        machine.kernel("lcpdf", "lcpdf_draw" if choice.draws else "lcpdf_least", **_defines(machine, candidates)),
+        "lcpdf_draw" if choice.draws else "lcpdf_least",
         (distances.sites,),
         *_weighing(distances, choice.window),
-        *(candidates.pixels, _plane(candidates), candidates.positions, *own, *out),
+        *(candidates.pixels, candidates.plane, candidates.positions, *own, *out),
+        defines=_defines(machine, candidates),
     )
     return out
 
@@ -264,11 +266,12 @@ def density(machine: Launcher | None, distances: Distances, candidates: Candidat
         return found
     mass, table = machine.empty(shape, np.uint64), machine.empty(shape, np.float32)
     machine.launch(
-        machine.kernel("lcpdf", "lcpdf_density", **_defines(machine, candidates)),
+        "lcpdf_density",
         (distances.sites,),
         *_weighing(distances, win),
         *(candidates.pixels, candidates.positions, machine.constant(win.gauss)),
-        *(np.int32(win.radius), np.int32(win.top + 1), mass, table),
+        *(win.radius, win.top + 1, mass, table),
+        defines=_defines(machine, candidates),
     )
     return table
 
@@ -278,12 +281,8 @@ def _defines(machine: Launcher, candidates: Candidates) -> dict[str, int]:
     return shape | ({"G": candidates.guides} if candidates.guides else {})
 
 
-def _plane(candidates: Candidates) -> np.int32:
-    return np.int32(candidates.rows * candidates.cols)
-
-
 def _weighing(distances: Distances, win: Window) -> list[Any]:
     """Return the arguments that every kernel on distances begins with."""
     blocks, padded = distances.nearest.shape
-    shape = [np.int32(blocks), np.int32(distances.sites), np.int32(padded)]
+    shape = [blocks, distances.sites, padded]
     return [distances.distance, distances.nearest, *shape, win.scale]

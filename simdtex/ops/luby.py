@@ -40,16 +40,14 @@ def luby(
     priority = machine.empty((sites,), np.uint32)
     state, following = (machine.empty(grid.shape, np.uint8) for _ in range(2))
     machine.launch(
-        machine.kernel("luby", "luby_priority"),
+        "luby_priority",
         (sites,),
-        *(np.int32(sites), np.uint64(seed), np.uint32(level), np.uint32(count), active, priority, state),
+        *(sites, np.uint64(seed), np.uint32(level), np.uint32(count), active, priority, state),
     )
     while True:
         for _ in range(ROUNDS):
             machine.launch(
-                machine.kernel("luby", "luby_round"),
-                (sites,),
-                *(grid.flat.struct, offsets, np.int32(offsets.shape[0]), priority, state, following),
+                "luby_round", (sites,), grid.flat.struct, offsets, offsets.shape[0], priority, state, following
             )
             state, following = following, state
         host = machine.get(state)

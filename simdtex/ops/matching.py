@@ -61,11 +61,7 @@ def match_ranks(machine: Launcher | None, order: Array, targets: Array) -> Array
         np.put_along_axis(matched, order, targets[:, rank].repeat(each, 0), 1)
         return matched
     values = machine.empty(order.shape, np.int32)
-    machine.launch(
-        machine.kernel("matching", "matching_ranks"),
-        (n, segments),
-        *(order, np.int32(segments), np.int32(n), targets, np.int32(each), np.int32(m), values),
-    )
+    machine.launch("matching_ranks", (n, segments), order, segments, n, targets, each, m, values)
     return values
 
 
@@ -86,15 +82,13 @@ def match_lookup(machine: Launcher | None, values: Array, tables: Array) -> Arra
     ranges, spans = machine.empty((segments, runs, 2), np.int32), machine.empty((segments, 2), np.int32)
     counts, cdf = machine.empty((segments, runs, bins), np.uint32), machine.empty((segments, bins + 1), np.uint32)
     result = machine.empty(values.shape, np.int32)
-    s, r, b = np.int32(segments), np.int32(runs), np.int32(bins)
     size, group = (segments * runs,), local(machine)
-    machine.launch(machine.kernel("matching", "matching_range"), size, values, *shape, ranges, local=group)
-    machine.launch(machine.kernel("matching", "matching_span"), (segments,), ranges, s, r, spans)
-    machine.launch(machine.kernel("matching", "matching_count"), size, values, *shape, spans, b, counts, local=group)
-    machine.launch(machine.kernel("matching", "matching_total"), (bins, segments), counts, s, r, b, cdf)
-    machine.launch(machine.kernel("matching", "matching_cdf"), (segments,), s, b, cdf)
-    arguments = (values, s, np.int32(n), spans, b, cdf, tables, np.int32(each), result)
-    machine.launch(machine.kernel("matching", "matching_lookup"), (n, segments), *arguments)
+    machine.launch("matching_range", size, values, *shape, ranges, local=group)
+    machine.launch("matching_span", (segments,), ranges, segments, runs, spans)
+    machine.launch("matching_count", size, values, *shape, spans, bins, counts, local=group)
+    machine.launch("matching_total", (bins, segments), counts, segments, runs, bins, cdf)
+    machine.launch("matching_cdf", (segments,), segments, bins, cdf)
+    machine.launch("matching_lookup", (n, segments), values, segments, n, spans, bins, cdf, tables, each, result)
     return result
 
 
@@ -123,16 +117,13 @@ def distance(machine: Launcher | None, before: Array, after: Array) -> Array:
     segments, n = before.shape
     runs, shape = _runs(machine, segments, n)
     sums, totals = machine.empty((segments, runs), np.int64), machine.empty((segments,), np.int64)
-    size = (segments * runs,)
-    kernel = machine.kernel("matching", "matching_distance")
-    machine.launch(kernel, size, before, after, *shape, sums, local=local(machine))
-    summing = (sums, np.int32(segments), np.int32(runs), totals)
-    machine.launch(machine.kernel("matching", "matching_sum"), (segments,), *summing)
+    machine.launch("matching_distance", (segments * runs,), before, after, *shape, sums, local=local(machine))
+    machine.launch("matching_sum", (segments,), sums, segments, runs, totals)
     return totals
 
 
-def _runs(machine: Launcher, segments: int, n: int, table: int = 0) -> tuple[int, NDArray[np.int32]]:
+def _runs(machine: Launcher, segments: int, n: int, table: int = 0) -> tuple[int, tuple[int, ...]]:
     """Return the runs of a segment, no shorter than the table of each, and their shape as kernels take it."""
     length = min(n, max(run_length(machine, segments, n), table))
     runs = -(-n // length)
-    return runs, np.array([segments, n, runs, length], np.int32)
+    return runs, (segments, n, runs, length)

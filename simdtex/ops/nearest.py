@@ -117,7 +117,6 @@ def nearest(
         choice = candidates.positions[distances.distance.argmin(0)]
         return Relaxed(choice, candidates.pixels[:, choice].astype(np.uint16))
     count, neighbours, channels = sites.size, offsets.shape[0], field.values.shape[0]
-    plane = np.int32(candidates.rows * candidates.cols)
     check = CHECK if neighbours % CHECK == 0 else 2
     defines = {"V": machine.vector, "C": channels, "STEP": machine.step, "CHECK": check} | costs.defines
     more = costs.arguments(machine, candidates)
@@ -129,13 +128,13 @@ def nearest(
     features = machine.empty((count, FEATURES), f)
     axes = leaves.axes if leaves else machine.constant(np.zeros((neighbours * channels, FEATURES), f))
     machine.launch(
-        machine.kernel("nearest", "nearest_begin", **defines),
+        "nearest_begin",
         (count,),
-        *(sites, i(count), i(neighbours), *field, i(prod(field.values.shape[1:])), offsets, grid.struct),
-        *(candidates.index_of, plane),
-        *(candidates.pixels, candidates.positions, candidates.reach, strip.reach),
+        *(sites, count, neighbours, *field, prod(field.values.shape[1:]), offsets, grid.struct, candidates.index_of),
+        *(candidates.plane, candidates.pixels, candidates.positions, candidates.reach, strip.reach),
         *(machine.constant(_spread(strip.offsets)), discount, *more, axes, f(leaves.middle if leaves else 0)),
         *(near, listed, used, features, least, where, certain),
+        defines=defines,
     )
     split = machine.split(count, -(-strip.cols // (machine.vector * machine.step)) * strip.rows)
     row = split if leaves else 0  # the leaves' results come first
@@ -143,27 +142,30 @@ def nearest(
     found, at, work, wanted = (machine.empty((parts, count), t) for t in (f, i, np.uint64, i))
     if leaves:
         machine.launch(
-            machine.kernel("nearest", "nearest_leaves", **defines),
+            "nearest_leaves",
             (count * split,),
-            *(sites, i(count), i(neighbours), near, features, least, where, certain),
-            *(leaves.box, leaves.rows, leaves.order, i(leaves.number), f(leaves.blur)),
-            *(candidates.pixels, plane, candidates.positions, candidates.reach, *more),
-            *(i(split), found, at, work, wanted),
+            *(sites, count, neighbours, near, features, least, where, certain),
+            *(leaves.box, leaves.rows, leaves.order, leaves.number, f(leaves.blur)),
+            *(candidates.pixels, candidates.plane, candidates.positions, candidates.reach, *more, split),
+            *(found, at, work, wanted),
+            defines=defines,
         )
     shape = (strip.first, strip.pitch, strip.rows, strip.cols, strip.high, strip.thick)
     machine.launch(
-        machine.kernel("nearest", "nearest_scan", **defines),
+        "nearest_scan",
         (count * split,),
-        *(sites, i(count), i(neighbours), listed, used, near, least, where),
-        *(strip.pixels, i(strip.pixels.shape[1]), *(i(n) for n in shape), strip.reach, *more),
-        *(slack(neighbours * channels + WAVES), i(split), i(leaves is None), wanted, i(row), found, at, work),
+        *(sites, count, neighbours, listed, used, near, least, where),
+        *(strip.pixels, strip.pixels.shape[1], *shape, strip.reach, *more),
+        *(slack(neighbours * channels + WAVES), split, leaves is None, wanted, row, found, at, work),
+        defines=defines,
     )
     tally = machine.fma_counters(count, 2 * count * candidates.size * neighbours * channels)
     out = Relaxed(machine.empty((count,), np.int32), machine.empty((channels, count), np.uint16))
     machine.launch(
-        machine.kernel("nearest", "nearest_end", **defines),
+        "nearest_end",
         (count,),
-        *(i(count), least, where, i(parts), found, at),
-        *(work, candidates.pixels, plane, candidates.positions, tally, *out),
+        *(count, least, where, parts, found, at, work),
+        *(candidates.pixels, candidates.plane, candidates.positions, tally, *out),
+        defines=defines,
     )
     return out

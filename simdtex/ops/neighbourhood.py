@@ -13,9 +13,6 @@ from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.model.guide import UNKNOWN
 from simdtex.model.lattice import Grid
 
-UNTOUCHED = 1024
-"""t = 1 in 1/1024: no relaxation has touched the site."""
-
 
 class Field(NamedTuple):
     """State of the relaxation.
@@ -98,10 +95,11 @@ def neighbourhood(
     confidence = machine.empty((terms, channels, padded) if confidences.own else (terms, padded), np.float32)
     weighted = machine.empty((terms, channels, padded), np.float32)
     machine.launch(
-        machine.kernel("neighbourhood", "neighbourhood", **({"OWN": 1} if confidences.own else {})),
+        "neighbourhood",
         (padded, terms),
-        *(sites, np.int32(count), np.int32(padded), field.values, field.temperature, field.source, confidences.hard),
-        *(np.int32(channels), np.int32(channels - confidences.guides), np.int32(prod(field.values.shape[1:])), offsets),
-        *(np.int32(neighbours), np.int32(terms), confidences.centre, grid.struct, confidence, weighted),
+        *(sites, count, padded, field.values, field.temperature, field.source, confidences.hard),
+        *(channels, channels - confidences.guides, prod(field.values.shape[1:]), offsets),
+        *(neighbours, terms, confidences.centre, grid.struct, confidence, weighted),
+        defines={"OWN": 1} if confidences.own else {},
     )
     return Neighbourhoods(confidence, weighted, count)

@@ -19,9 +19,5 @@ def noise(machine: Launcher | None, planes: int, n: int, seed: int, level: int) 
         draws = [random.draw4(seed, level, turn, np.arange(n), random.NOISE) for turn in range(-(-planes // 4))]
         return np.concatenate(draws)[:planes].view(np.int32)
     values = machine.empty((planes, n), np.int32)
-    machine.launch(
-        machine.kernel("noise", "noise"),
-        (-(-n // 8), -(-planes // 4)),
-        *(np.uint64(seed), np.int32(level), np.int32(planes), np.int32(n), values),
-    )
+    machine.launch("noise", (n, -(-planes // 4)), np.uint64(seed), level, planes, n, values)
     return values

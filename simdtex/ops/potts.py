@@ -24,10 +24,5 @@ def potts(machine: Launcher | None, sites: Array, evidence: Array, votes: Array,
         energy = energy + ((np.int32(weight) * votes.reshape(classes, -1)[:, sites].astype(np.int32)) >> 4)
         labels.reshape(-1)[sites] = energy.argmax(0)
         return labels
-    machine.launch(
-        machine.kernel("potts", "potts"),
-        (sites.size,),
-        *(sites, np.int32(sites.size), evidence, votes, np.int32(classes), np.int32(labels.size), np.int32(weight)),
-        labels,
-    )
+    machine.launch("potts", (sites.size,), sites, sites.size, evidence, votes, classes, labels.size, weight, labels)
     return labels

@@ -45,14 +45,13 @@ def ranking(machine: Launcher | None, values: Array, first: Array, targets: Arra
     most = min(segments, max(1, SCRATCH // max(n, COUNTERS // 2)))
     pairs, counts = machine.empty((2, most, n, 2), np.uint32), machine.empty((most, COUNTERS), np.uint32)
     matched, moved = machine.empty((segments, n), np.int32), machine.empty((segments,), np.int64)
-    kernel = machine.kernel("ranking", "ranking")
     for begin in range(0, segments, most):
         pieces = min(most, segments - begin)
         machine.launch(
-            kernel,
+            "ranking",
             (pieces,),
-            *(values, np.int32(begin), first, np.int32(pieces), np.int32(n)),
-            *(targets, np.int32(each), np.int32(m), pairs, counts, matched, moved),
+            *(values, begin, first, pieces, n),
+            *(targets, each, m, pairs, counts, matched, moved),
             local=local(machine),
         )
     return matched, moved

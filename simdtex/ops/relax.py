@@ -214,10 +214,9 @@ def relax_apart(
     made = len(field.values) - relaxation.confidences.guides
     relaxed = Relaxed(machine.empty((sites.size,), np.int32), machine.empty((made, sites.size), np.uint16))
     cooled = machine.empty((sites.size,), np.uint16)
-    noise = machine.constant(relaxation.choice.window.noise)
-    name, defines, arguments = _fused(machine, sites, field, weighed, noise, relaxation, turn)
-    kernel = machine.kernel("relax", name, **defines, APART=1)
-    machine.launch(kernel, (sites.size,), *arguments, relaxed.values, relaxed.choice, cooled)
+    name, defines, arguments = _fused(machine, sites, field, weighed, relaxation, turn)
+    defines["APART"] = 1
+    machine.launch(name, (sites.size,), *arguments, relaxed.values, relaxed.choice, cooled, defines=defines)
     return relaxed, cooled
 
 
@@ -246,20 +245,14 @@ def relax(
                 field = commit.reference(field, here, relaxed, cooled)
         return field
     if relaxation.fused:
-        noise = machine.constant(relaxation.choice.window.noise)
-        name, defines, arguments = _fused(machine, sites, field, weighed, noise, relaxation, turn)
-        machine.launch_groups(machine.kernel("relax", name, **defines), steps, *arguments, *_written(field))
+        name, defines, arguments = _fused(machine, sites, field, weighed, relaxation, turn)
+        machine.launch_groups(name, steps, *arguments, *field, defines=defines)
         return field
     for begin, end in steps.tolist():
         here = machine.part(sites, begin, end)
         relaxed, cooled = _staged(machine, here, field, relaxation, turn)
         field = commit(machine, field, here, relaxed, cooled)
     return field
-
-
-def _written(field: Field) -> tuple[Array, Array, Array]:
-    """Return the arrays of a field in the order of a kernel's results."""
-    return field.values, field.source, field.temperature
 
 
 def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxation, turn: int) -> tuple[Relaxed, Array]:
@@ -283,20 +276,20 @@ def _staged(machine: Launcher, sites: Array, field: Field, relaxation: Relaxatio
 
 
 def _fused(
-    machine: Launcher, sites: Array, field: Field, weighed: Array, noise: Array, relaxation: Relaxation, turn: int
+    machine: Launcher, sites: Array, field: Field, weighed: Array, relaxation: Relaxation, turn: int
 ) -> tuple[str, dict[str, int], list[Any]]:
     """Return the kernel of a relaxation, its -D constants, and its arguments but for its results."""
     grid, offsets, proposal, choice = relaxation.grid, relaxation.offsets, relaxation.proposal, relaxation.choice
     candidates, window, confidences = proposal.candidates, choice.window, relaxation.confidences
     level: dict[str, Any] = {
         **{"seed": relaxation.seed, "level": relaxation.level, "area": prod(field.source.shape)},
-        **{"neighbours": offsets.shape[0], "pixels": candidates.index_of.size, "candidates": candidates.size},
+        **{"neighbours": offsets.shape[0], "pixels": candidates.plane, "candidates": candidates.size},
         **{"discount": relaxation.discount, "scale": window.scale, "top": window.top, "draws": choice.draws},
         **{"radius": window.radius if choice.density else -1, "xi": relaxation.xi, "novelty": relaxation.novelty},
         **{"centre": confidences.centre, "hard": confidences.hard},
     }
     common = (offsets, candidates.reach, candidates.index_of, candidates.positions)
-    key = np.uint32(turn)
+    noise, key = machine.constant(window.noise), np.uint32(turn)
     defines = {"C": len(field.values), "V": machine.vector} | ({"TILES": 1} if grid.tile else {})
     defines |= confidences.defines | relaxation.costs.defines
     costs = relaxation.costs.arguments(machine, candidates)
@@ -314,5 +307,5 @@ def _fused(
         defines |= {"CUBE": 1} if grid.layers > 1 else {}
         defines |= {"RADIUS": square.disc.shape[0] // 2, "SLOTS": -(-proposal.slots // 64) * 64}
         name, own = "relax_list", [square.disc, square.at, square.levels, *costs, noise, weighed, key]
-    arguments = [sites, np.int32(sites.size), *field, constants(grid, **level), *common, *own]
+    arguments = [sites, sites.size, *field, constants(grid, **level), *common, *own]
     return name, defines, arguments

@@ -21,9 +21,6 @@ def snapshot(machine: Launcher | None, picture: Array, height: int) -> Array:
     *planes, rows, width = picture.shape
     plane, count = height * width, prod(planes)
     stacked = picture if rows == 2 * height else machine.empty((*planes, 2 * height, width), picture.dtype)
-    machine.launch(
-        machine.kernel("snapshot", "snapshot", T=TYPES[picture.dtype.name]),
-        (plane * count,),
-        *(picture, np.int32(plane), np.int32(count), np.int32(rows * width), stacked),
-    )
+    kind = {"T": TYPES[picture.dtype.name]}
+    machine.launch("snapshot", (plane * count,), picture, plane, count, rows * width, stacked, defines=kind)
     return stacked

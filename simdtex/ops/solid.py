@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Operation
 from simdtex.ops.fold import folded
-from simdtex.ops.laplacian import sizes
 
 MOST_ITEMS = 2**21
 """Work-items of a launch, about: so that none is long on a slow device."""
@@ -50,19 +49,19 @@ def _expanded(coarse: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[np.i
     return (g + (1 << bits - 1)) >> bits
 
 
-def _parts(slices: int, pixels: int) -> Iterator[tuple[np.int32, tuple[int, int]]]:
+def _parts(slices: int, pixels: int) -> Iterator[tuple[int, tuple[int, int]]]:
     """Yield the first slice of each launch, and its work-items: pixels of a slice, and slices."""
     step = max(1, MOST_ITEMS // pixels)
     for first in range(0, slices, step):
-        yield np.int32(first), (pixels, min(step, slices - first))
+        yield first, (pixels, min(step, slices - first))
 
 
 def _launch_expanded(machine: Launcher, sign: int, known: Array, coarse: Array) -> Array:
     result, odd = machine.empty(known.shape, np.int32), any(n % 2 for n in known.shape)
-    kernel = machine.kernel("solid", "solid_folded" if odd else "solid_expanded")
+    kernel = "solid_folded" if odd else "solid_expanded"
     depth, rows, cols = known.shape if odd else coarse.shape
     for first, size in _parts(depth, rows * cols):
-        machine.launch(kernel, size, known, coarse, first, *sizes(*known.shape, sign), result)
+        machine.launch(kernel, size, known, coarse, first, *known.shape, sign, result)
     return result
 
 
@@ -79,8 +78,7 @@ def solid_reduce(machine: Launcher | None, fine: Array) -> Array:
     depth, rows, cols = above(fine.shape)
     coarse = machine.empty((depth, rows, cols), np.int32)
     for first, size in _parts(depth, rows * cols):
-        arguments = (fine, first, *sizes(*fine.shape), coarse)
-        machine.launch(machine.kernel("solid", "solid_reduce"), size, *arguments)
+        machine.launch("solid_reduce", size, fine, first, *fine.shape, coarse)
     return coarse
 
 
@@ -112,8 +110,7 @@ def solid_turn(machine: Launcher | None, block: Array, axes: Sequence[int]) -> A
     depth, rows, cols = (block.shape[axis] for axis in axes)
     turned = machine.empty((depth, rows, cols), np.int32)
     for first, size in _parts(depth, rows * cols):
-        arguments = (block, first, *sizes(depth, rows, cols, *(steps[axis] for axis in axes)), turned)
-        machine.launch(machine.kernel("solid", "solid_turn"), size, *arguments)
+        machine.launch("solid_turn", size, block, first, depth, rows, cols, *(steps[axis] for axis in axes), turned)
     return turned
 
 
@@ -128,5 +125,5 @@ def solid_mean(machine: Launcher | None, blocks: Sequence[Array]) -> Array:
         return np.asarray((2 * np.sum(blocks, axis=0, dtype=np.int64) + k) // (2 * k), np.int32)
     mean = machine.empty(blocks[0].shape, np.int32)
     four = [*blocks, *[blocks[0]] * (MOST_BLOCKS - k)]
-    machine.launch(machine.kernel("solid", "solid_mean", COUNT=k), (mean.size,), *four, np.int32(mean.size), mean)
+    machine.launch("solid_mean", (mean.size,), *four, mean.size, mean, defines={"COUNT": k})
     return mean

@@ -45,19 +45,15 @@ def sort(machine: Launcher | None, values: Array, first: Array) -> Array:
     length = run_length(machine, most, n)
     runs = -(-n // length)
     counts, totals = machine.empty((most, runs, DIGITS), np.uint32), machine.empty((most, DIGITS), np.uint32)
-    group, last = local(machine), 24
-    read, count, scan, scatter = (
-        machine.kernel("sort", f"sort_{name}") for name in ("read", "count", "scan", "scatter")
-    )
+    group = local(machine)
     for begin in range(0, segments, most):
-        pieces, at = min(most, segments - begin), np.int32(begin)
-        shape, size = np.array([pieces, n, runs, length], np.int32), (pieces * runs,)
-        machine.launch(read, size, values, at, first, *shape, pairs, local=group)
-        for bits in range(0, 32, 8):
-            shift = np.int32(bits)
-            machine.launch(count, size, pairs, *shape, shift, counts, local=group)
-            machine.launch(scan, (pieces * DIGITS,), np.int32(pieces), np.int32(runs), counts, totals)
-            moving = (pairs, *shape, shift, counts, totals, moved, np.int32(bits == last), order, at)
-            machine.launch(scatter, size, *moving, local=group)
+        pieces = min(most, segments - begin)
+        shape, size = (pieces, n, runs, length), (pieces * runs,)
+        machine.launch("sort_read", size, values, begin, first, *shape, pairs, local=group)
+        for shift in range(0, 32, 8):
+            machine.launch("sort_count", size, pairs, *shape, shift, counts, local=group)
+            machine.launch("sort_scan", (pieces * DIGITS,), pieces, runs, counts, totals)
+            moving = (pairs, *shape, shift, counts, totals, moved, shift == 24, order, begin)
+            machine.launch("sort_scatter", size, *moving, local=group)
             pairs, moved = moved, pairs
     return order

@@ -22,9 +22,9 @@ def start(machine: Launcher | None, pixels: Array, positions: Array, grid: Grid,
     values = machine.empty((channels, *shape), np.uint16)
     field = Field(values, machine.empty(shape, np.int32), machine.empty(shape, np.uint16))
     machine.launch(
-        machine.kernel("start", "start"),
+        "start",
         (grid.plane,),
-        *(np.uint64(seed), pixels, np.int32(plane), np.int32(channels), positions),
-        *(np.int32(positions.size), grid.struct, *field),
+        *(np.uint64(seed), pixels, plane, channels, positions),
+        *(positions.size, grid.struct, *field),
     )
     return field

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from simdtex.machine.interface import Array, Launcher, Operation
-from simdtex.ops.laplacian import sizes, within
+from simdtex.ops.laplacian import within
 
 PADDED = 2**24
 """Most float32 values that are laid out at a time, fewer where the machine's scratch memory is smaller."""
@@ -75,24 +75,22 @@ def steerable_split(machine: Launcher | None, picture: Array, taps: Array, torus
     v, unit = machine.vector, ROWS.get(count, 1)
     across = _up(cols, v)
     pitch = _up(across + (side - 1) // step, v)
-    pad = machine.kernel("steerable", "steerable_pad", V=v, SPREAD=1, APART=step)
-    split = machine.kernel("steerable", "steerable_split", V=v, APART=step, BANDS=count, ROWS=unit)
     padded = None
     for first, together, first_row, some in _pieces(machine, planes, rows, step * step * pitch, side, unit):
         height = step * (_up(some, unit) - 1) + side
         if padded is None:  # the first piece is the largest
             padded = machine.empty(together * height * step * pitch, np.float32)
         machine.launch(
-            pad,
+            "steerable_pad",
             (height * step * pitch // v, together),
-            *(picture, *sizes(*size, torus, side // 2, 1, planes, first, step * first_row, together, height, pitch)),
-            padded,
+            *(picture, *size, torus, side // 2, 1, planes, first, step * first_row, together, height, pitch, padded),
+            defines={"V": v, "SPREAD": 1, "APART": step},
         )
         machine.launch(
-            split,
+            "steerable_split",
             (_up(some, unit) // unit * across // v, together),
-            *(padded, *sizes(together, height, pitch), taps, *sizes(side, planes, rows, cols)),
-            *(*sizes(first, first_row, some), bands),
+            *(padded, together, height, pitch, taps, side, planes, rows, cols, first, first_row, some, bands),
+            defines={"V": v, "APART": step, "BANDS": count, "ROWS": unit},
         )
     return bands
 
@@ -123,7 +121,6 @@ def steerable_join(
     across = _up(cols, v)
     side = max(taps.shape[1] for _, taps, _ in terms)
     pitch = _up(across + side - 1, v)
-    join = machine.kernel("steerable", "steerable_join", V=v, ROWS=ROWS[1])
     most = max(bands.shape[0] for bands, _, _ in terms)
     padded = total = None
     for first, together, first_row, some in _pieces(machine, planes, rows, most * pitch, side, unit):
@@ -136,16 +133,16 @@ def steerable_join(
             # Every other row is zeros, but if the rows repeat after an odd number even ones meet odd ones.
             skip = 1 if rows == 1 or (torus and rows % 2) else step
             machine.launch(
-                machine.kernel("steerable", "steerable_pad", V=v, SPREAD=step, APART=1),
+                "steerable_pad",
                 (height * pitch // v, count * together),
-                *(bands, *sizes(rows, cols, torus, own // 2, count, planes, first, first_row)),
-                *(*sizes(together, height, pitch), padded),
+                *(bands, rows, cols, torus, own // 2, count, planes, first, first_row, together, height, pitch, padded),
+                defines={"V": v, "SPREAD": step, "APART": 1},
             )
             machine.launch(
-                join,
+                "steerable_join",
                 (_up(some, ROWS[1] * skip) // ROWS[1] * across // v, together),
-                *(padded, *sizes(together, height, pitch), taps, *sizes(count, own, skip)),
-                *sizes(number == 0, number == len(terms) - 1),
-                *(total, *sizes(rows, cols, first, first_row, some), picture),
+                *(padded, together, height, pitch, taps, count, own, skip),
+                *(number == 0, number == len(terms) - 1, total, rows, cols, first, first_row, some, picture),
+                defines={"V": v, "ROWS": ROWS[1]},
             )
     return picture

@@ -20,9 +20,9 @@ def temperature(machine: Launcher | None, sites: Array, field: Field, offsets: A
         return (np.maximum(0, xi + t.sum(0)) // members).astype(np.uint16)
     cooled = machine.empty((sites.size,), np.uint16)
     machine.launch(
-        machine.kernel("temperature", "temperature"),
+        "temperature",
         (sites.size,),
-        *(sites, np.int32(sites.size), field.temperature, offsets, np.int32(offsets.shape[0])),
-        *(grid.struct, np.int32(xi), cooled),
+        *(sites, sites.size, field.temperature, offsets, offsets.shape[0]),
+        *(grid.struct, xi, cooled),
     )
     return cooled

@@ -59,11 +59,7 @@ def use(machine: Launcher | None, field: Field, grid: Grid, candidates: Candidat
         return np.bincount(number[number >= 0], minlength=candidates.size).astype(np.int32)
     counts = machine.put(np.zeros(candidates.size, np.int32))
     sites = grid.size
-    machine.launch(
-        machine.kernel("use", "use"),
-        (sites,),
-        *(grid.struct, np.int32(sites), field.source, field.temperature, candidates.index_of, counts),
-    )
+    machine.launch("use", (sites,), grid.struct, sites, field.source, field.temperature, candidates.index_of, counts)
     found: NDArray[np.int32] = machine.get(counts)
     return found
 

@@ -42,14 +42,13 @@ def window(machine: Launcher | None, labels: Array, owner: Array, taps: Array, v
         return here
     counted = machine.empty((planes, rows, cols + 2 * reach), np.uint32)
     along, sums = (machine.empty((planes, rows, cols), np.uint32) for _ in range(2))
-    defines: dict[str, int | str] = {"COUNT": 1} if values is None else {}
-    size, width = (np.int32(rows), np.int32(cols)), np.int32(reach)
+    defines = {"COUNT": 1} if values is None else {}
     machine.launch(
-        machine.kernel("window", "window_counted", **defines),
+        "window_counted",
         (cols + 2 * reach, planes * rows),
-        *(labels, *size, owner, np.int32(planes), labels if values is None else values, width, counted),
+        *(labels, rows, cols, owner, planes, labels if values is None else values, reach, counted),
+        defines=defines,
     )
     for name, before, after in (("window_rows", counted, along), ("window_cols", along, sums)):
-        kernel = machine.kernel("window", name, **defines)
-        machine.launch(kernel, (cols, planes * rows), *(before, *size, np.int32(planes), taps, width, after))
+        machine.launch(name, (cols, planes * rows), before, rows, cols, planes, taps, reach, after, defines=defines)
     return sums

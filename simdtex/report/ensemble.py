@@ -65,8 +65,7 @@ def write_ensemble(
     Raises
     ------
     ValueError
-        The folder cannot be written, the arrays do not suit each other, a datum lies outside, or GSTools is not
-        installed.
+        The folder cannot be written, the arrays do not suit each other, or a datum lies outside.
 
     Notes
     -----

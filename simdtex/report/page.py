@@ -20,8 +20,7 @@ from matplotlib.figure import Figure as Plot
 from numpy.typing import NDArray
 
 from simdtex import __version__
-from simdtex.io.atomic import atomic_folder
-from simdtex.report.folder import earlier_files
+from simdtex.io.atomic import atomic_folder, earlier_files
 from simdtex.report.plots import figure_png
 from simdtex.report.sheet import encoded
 from simdtex.report.tables import Table, warns
@@ -90,7 +89,7 @@ def write_report(
     lead: str,
     sections: Sequence[Section],
     results: Mapping[str, Any],
-    command: str | None = None,
+    command: str = "",
 ) -> None:
     """Write ``index.html``, every figure's PNG and ``results.json``, all of them or none.
 
@@ -104,8 +103,7 @@ def write_report(
     figures = [part for section in sections for part in section.parts if isinstance(part, Figure)]
     files = {figure.file: figure.png for figure in figures}
     files[PAGE] = _page(title=title, lead=lead, sections=sections, version=__version__).encode()
-    about = {"files": sorted([*files, RESULTS]), "version": __version__}
-    about |= {} if command is None else {"command": command}
+    about = {"files": sorted([*files, RESULTS]), "version": __version__, "command": command}
     numbers = json.dumps(_plain({**results, **about}), indent=1, sort_keys=True, allow_nan=False)
     with atomic_folder(folder) as temporary:
         for name, content in {**files, RESULTS: f"{numbers}\n".encode()}.items():

@@ -8,9 +8,9 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from simdtex.io.atomic import earlier_files
 from simdtex.io.image import to_display, write
 from simdtex.model.colours import temperature_colours
-from simdtex.report.folder import earlier_files
 from simdtex.run import Progress
 
 _FILE = re.compile(r"((temperature|candidates)-)?(level\d+(-sweep\d+)?|iteration\d+)\.png")

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure as Plot
 from numpy.typing import NDArray
 
 from simdtex.experiments.ensemble import connectivity
+from simdtex.experiments.ensemble.summary import variogram
 from simdtex.io.image import to_display
 from simdtex.report.page import Figure, Section, write_report
 from simdtex.report.plots import legend, new_figure, tidy
@@ -105,13 +106,6 @@ def write_volumes(
     size = " x ".join(str(side) for side in ensemble.shape[:0:-1])
     lead = f"{len(ensemble)} realisations of {size} voxels, and a training image of {training.shape[::-1]}."
     write_report(folder, "Realisations of a volume", lead, sections, results, command)
-
-
-def variogram(field: NDArray[Any], axis: int, most: int) -> NDArray[np.float64]:
-    """Return half the mean squared difference at the lags 0 to ``most`` along an axis of a volume."""
-    along = np.moveaxis(np.asarray(field, np.float64), axis, 0)
-    n = len(along)
-    return np.array([((along[lag:] - along[: n - lag]) ** 2).mean() / 2 for lag in range(most + 1)])
 
 
 def _lagged(file: str, tables: list[NDArray[np.float64]], caption: str) -> Figure:

@@ -51,11 +51,16 @@ def as_index(array: Array, categories: ArrayLike, name: str) -> tuple[NDArray[np
     if len(np.unique(values)) < len(values):
         raise ValueError("a category is named twice: name each once")
     order = np.argsort(values)
-    found = order[np.minimum(np.searchsorted(values, array, sorter=order), len(values) - 1)]
-    other = values[found] != array
-    if other.any():
-        raise ValueError(f"the {name} holds {array[other][0]}, which is no category: name it among the categories")
-    return found, len(values)
+    found = position(array, values[order])
+    if (found < 0).any():
+        raise ValueError(f"the {name} holds {array[found < 0][0]}, which is no category: name it among the categories")
+    return order[found], len(values)
+
+
+def position(array: Array, values: Array) -> NDArray[np.intp]:
+    """Return the place of every element in a sorted list; -1 where it is not there."""
+    found = np.minimum(np.searchsorted(values, array), len(values) - 1)
+    return np.where(values[found] == array, found, -1)
 
 
 def categories_of(training: ArrayLike, categories: Sequence[int] | None = None) -> Array:

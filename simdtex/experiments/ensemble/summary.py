@@ -106,8 +106,7 @@ def summary(
     Raises
     ------
     ValueError
-        The arrays have other shapes, a value is no category or beyond 1e100, a datum lies outside, or GSTools is not
-        installed.
+        The arrays have other shapes, a value is no category or beyond 1e100, or a datum lies outside.
 
     Notes
     -----
@@ -134,7 +133,7 @@ def summary(
         left_open = array.std(axis=0, ddof=int(number > 1), dtype=np.float64)
         fields = [images]
         misses = np.sqrt(((at_data - points[:, 2]) ** 2).mean(axis=1)) if len(points) else np.zeros(number)
-    variograms = np.array([[[_variogram(one, axis, lag) for one in row] for row in fields] for axis in (0, 1)])
+    variograms = np.array([[[variogram(one, axis, lag) for one in row] for row in fields] for axis in (0, 1)])
     found = [[connectivity(one, k, lag) for one in images] for k in known]
     functions = np.array([one.function for row in found for one in row]).reshape(len(known), number + 1, 2, lag + 1)
 
@@ -159,13 +158,11 @@ def summary(
     )
 
 
-def _variogram(field: Array, axis: int, max_lag: int) -> Floats:
-    """Return the experimental variogram along an axis, for lags of 0 to `max_lag`."""
-    try:
-        from gstools import vario_estimate_axis  # late: it takes a second and is an extra
-    except ImportError:
-        raise ValueError("gstools is not installed; pip install 'simdtex[simulate]'") from None
-    return np.asarray(vario_estimate_axis(field.astype(np.float64), axis)[: max_lag + 1], dtype=np.float64)
+def variogram(field: Array, axis: int, most: int) -> Floats:
+    """Return half the mean squared difference at the lags 0 to ``most`` along an axis: Matheron's estimator."""
+    along = np.moveaxis(np.asarray(field, np.float64), axis, 0)
+    n = len(along)
+    return np.array([((along[lag:] - along[: n - lag]) ** 2).mean() / 2 for lag in range(most + 1)])
 
 
 def _ends_per_area(image: Array, category: int) -> float:

@@ -6,8 +6,7 @@ from __future__ import annotations
 from math import gcd
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import wasserstein_distance
 
 from simdtex.experiments.quality.patches import (
@@ -19,6 +18,7 @@ from simdtex.experiments.quality.patches import (
     count,
     deviation,
     halved,
+    hashes,
     in_deviations,
     nearest,
 )
@@ -102,22 +102,13 @@ def copying(sample: ArrayLike, output: ArrayLike) -> float:
 
     Notes
     -----
-    Patches are compared by hashes of 64 bits: of n different patches of the output and m of the sample, n m / 2**64 on
-    average are wrongly taken as equal.
+    Patches are compared by their `simdtex.experiments.quality.patches.hashes`.
     """
     first, second = as_pair(sample, output, COPIED_PATCH)
     numbers = np.unique(np.concatenate([first.ravel(), second.ravel()]), return_inverse=True)[1]
     known = numbers[: first.size].reshape(first.shape)
     made = numbers[first.size :].reshape(second.shape)
-    return float(np.isin(_hashes(made), _hashes(known)).mean())
-
-
-def _hashes(numbers: Array) -> NDArray[np.uint64]:
-    """Return a hash of each patch: the sum of its numbers, each times an odd random weight, modulo 2**64."""
-    weights = np.random.default_rng(0).integers(1, 2**64, (COPIED_PATCH, COPIED_PATCH, numbers.shape[2]), np.uint64) | 1
-    patches = sliding_window_view(numbers.astype(np.uint64), (COPIED_PATCH, COPIED_PATCH), (0, 1))
-    found: NDArray[np.uint64] = np.einsum("rckij,ijk->rc", patches, weights)
-    return found
+    return float(np.isin(hashes(made, COPIED_PATCH), hashes(known, COPIED_PATCH)).mean())
 
 
 def histogram_distance(sample: ArrayLike, output: ArrayLike) -> float:

@@ -144,6 +144,19 @@ def count(planes: Planes, side: int) -> int:
     return int((rows - side + 1) * (cols - side + 1))
 
 
+def hashes(numbers: NDArray[np.integer], side: int) -> NDArray[np.uint64]:
+    """Return a hash of each patch of whole numbers (rows, cols, channels), (rows - side + 1, cols - side + 1).
+
+    It is the sum of its numbers modulo 2**64, each times an odd random weight of its row, one of its column and one of
+    its channel. Of n different patches and m others, about n m / 2**64 have the same hash by chance.
+    """
+    weights = np.random.default_rng(0).integers(1, 2**64, (3, max(side, numbers.shape[2])), np.uint64) | 1
+    found: NDArray[np.uint64] = numbers.astype(np.uint64) @ weights[2, : numbers.shape[2]]
+    for axis in (0, 1):
+        found = sliding_window_view(found, side, axis) @ weights[axis, :side]
+    return found
+
+
 def _places(planes: Planes, indices: Indices, side: int) -> tuple[Indices, Indices]:
     """Return rows and columns of the first pixels of patches."""
     return np.divmod(indices, planes.shape[1] - side + 1)

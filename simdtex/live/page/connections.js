@@ -112,10 +112,6 @@ class Recording {
     this.onmessage = this.onstate = () => {};
   }
 
-  get key() {
-    return null;
-  }
-
   async open() {
     const packed = Uint8Array.from(atob(this.text), (one) => one.charCodeAt(0));
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));

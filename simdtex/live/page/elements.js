@@ -42,10 +42,25 @@ const clamp = (value, least, most) => Math.max(least, Math.min(most, value));
 
 /** RGBA bytes as something that a canvas draws. */
 function bitmap(bytes, width, height) {
-  const canvas = make("canvas", { width, height });
+  const canvas = make("canvas", { width, height, "aria-hidden": "true" });
   const data = new ImageData(new Uint8ClampedArray(bytes.buffer, bytes.byteOffset, 4 * width * height), width, height);
   canvas.getContext("2d").putImageData(data, 0, 0);
   return canvas;
+}
+
+/** Draw a circle. */
+function ring(context, x, y, radius, colour, width) {
+  [context.strokeStyle, context.lineWidth] = [colour, width];
+  context.beginPath();
+  context.arc(x, y, radius, 0, 7);
+  context.stroke();
+}
+
+/** Draw a text in white with a black rim. */
+function lettered(context, text, x, y) {
+  [context.lineWidth, context.strokeStyle, context.fillStyle] = [3, "#000", "#fff"];
+  context.strokeText(`${text}`, x, y);
+  context.fillText(`${text}`, x, y);
 }
 
 /** Follow a pointer that is pressed until it is released. */

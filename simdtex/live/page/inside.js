@@ -297,16 +297,9 @@ class Inside {
     context.drawImage(small, 0, 0, canvas.width, canvas.height);
     for (const { place, rank, taken } of [...candidates].reverse()) {
       const [x, y] = [(place[1] + 0.5) * size, (place[0] + 0.5) * size];
-      for (const [colour, more] of [["#000", 3], [taken ? HOLE : "#fff", 1.5]]) {
-        [context.strokeStyle, context.lineWidth] = [colour, more];
-        context.beginPath();
-        context.arc(x, y, taken ? 7 : 5, 0, 7);
-        context.stroke();
-      }
+      for (const [colour, wide] of [["#000", 3], [taken ? HOLE : "#fff", 1.5]]) ring(context, x, y, taken ? 7 : 5, colour, wide);
       context.font = "bold 11px sans-serif";
-      [context.strokeStyle, context.lineWidth, context.fillStyle] = ["#000", 3, "#fff"];
-      context.strokeText(`${rank}`, x + 7, y - 3);
-      context.fillText(`${rank}`, x + 7, y - 3);
+      lettered(context, rank, x + 7, y - 3);
     }
     return make("figure", {}, canvas, make("figcaption", {}, "Candidates in the sample, by rank; the ring in colour is taken."));
   }
@@ -375,7 +368,7 @@ class Tour {
   async start() {
     const { page } = this;
     if (!page.results.size) {
-      if (!page.picture) page.example("brick");
+      if (!page.picture) page.give({ name: "brick", maps: new Map() });
       await page.next("result");
     }
     if (page.shown === null) page.send({ kind: "select", result: Math.max(...page.results.keys()) });

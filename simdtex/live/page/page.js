@@ -125,9 +125,22 @@ class Page {
       await this.restoreView(bytes);
       return;
     }
-    if (kind === "open") this.pending = { name, bytes, maps: new Map() };
-    else this.given?.maps.set(stem(name), { name, bytes });
-    this.send({ kind, name }, [bytes]);
+    if (kind === "open") this.give({ name, bytes, maps: new Map() });
+    else this.giveMap({ name, bytes });
+  }
+
+  /** Give a picture, an example if it has no bytes, and its maps, which are kept in case the server is started anew. */
+  give(given) {
+    const { name, bytes, maps } = given;
+    this.pending = given;
+    if (bytes) this.send({ kind: "open", name }, [bytes]);
+    else this.send({ kind: "example", name });
+    for (const map of maps.values()) this.giveMap(map);
+  }
+
+  giveMap({ name, bytes }) {
+    this.given?.maps.set(stem(name), { name, bytes });
+    this.send({ kind: "map", name }, [bytes]);
   }
 
   on_picture(message, [bytes]) {
@@ -242,7 +255,12 @@ class Page {
     this.view = new View(this);
     this.inside = new Inside(this);
     this.layerChoice = choice(Object.entries(LAYERS), () => this.showLayer(this.layerChoice.value));
-    this.tiling = checkbox({ onchange: () => this.tile() });
+    this.tiling = checkbox({
+      onchange: () => {
+        this.tiled = this.tiling.checked;
+        this.view.fit();
+      },
+    });
     this.zoomOutput = make("output", { "aria-label": "Zoom" }, "100 %");
     const zoom = [
       button("−", () => this.view.zoom(-1), { "aria-label": "Zoom out" }),
@@ -301,11 +319,6 @@ class Page {
     this.view.ask();
   }
 
-  tile() {
-    this.tiled = this.tiling.checked;
-    this.view.fit();
-  }
-
   /** Show what the run began from while a key is held, then the layer again. */
   before(held) {
     if (held === Boolean(this.held)) return;
@@ -347,22 +360,18 @@ class Page {
   /** Offer the layers of what is shown. */
   offerLayers() {
     const found = this.results.get(this.shown);
-    const layers = found?.layers ?? (this.running ? this.runLayers : ["sample"]);
-    this.offer(this.inside.at ? [...layers, "sets"] : layers);
+    const layers = [...(found?.layers ?? (this.running ? this.runLayers : ["sample"]))];
+    if (this.inside.at) layers.push("sets");
+    const text = (name) => LAYERS[name] ?? name.replace(/^map /, "Map: ");
+    this.layerChoice.replaceChildren(...choices(layers.map((name) => [name, text(name)])));
+    if (!layers.includes(this.layer)) this.showLayer(made(layers));
+    this.layerChoice.value = this.layer;
     this.fitting.disabled = !found;
     if (!found && this.running) return; // the controls stay where they are during a run
     this.latticeField.hidden = !found?.lattice;
     const [rows, cols] = found?.lattice?.fitting ?? [found?.height, found?.width];
     this.fitting.hidden = !found || found.settings.job !== "synth" || (rows === found.height && cols === found.width);
     this.fitting.textContent = `Use ${cols} × ${rows}, which fits`;
-  }
-
-  /** Offer these layers. */
-  offer(layers) {
-    const text = (name) => LAYERS[name] ?? name.replace(/^map /, "Map: ");
-    this.layerChoice.replaceChildren(...choices(layers.map((name) => [name, text(name)])));
-    if (!layers.includes(this.layer)) this.showLayer(made(layers));
-    this.layerChoice.value = this.layer;
   }
 
   on_begun(message) {
@@ -398,9 +407,7 @@ class Page {
       this.results.get(number).item.remove();
       this.results.delete(number);
     }
-    const small = bitmap(bytes, ...message.thumbnail);
-    small.setAttribute("aria-hidden", "true");
-    message.button = button(small, () => this.send({ kind: "select", result }), { title: `From ${picture}` });
+    message.button = button(bitmap(bytes, ...message.thumbnail), () => this.send({ kind: "select", result }), { title: `From ${picture}` });
     message.button.append(make("span", {}, `Result ${result}, ${width} × ${height}, seed ${settings.seed}`));
     message.item = make("li", {}, message.button);
     this.currentItem.before(message.item);
@@ -408,10 +415,6 @@ class Page {
     const gone = dropped.length ? ` Result ${dropped.join(", ")} is no longer kept, to save memory.` : "";
     this.say(`Result ${result} is ready.${gone}`);
     if (this.results.size === 1 && this.columns.clientWidth > 1000) this.controls.querySelector("details").open = true;
-  }
-
-  summary({ width, height, seconds, settings, note }) {
-    return `${width} × ${height} in ${seconds.toFixed(2)} s, seed ${settings.seed}${note && `. ${note}`}`.replace(/\.?$/, ".");
   }
 
   on_selected({ result, settings }) {
@@ -424,8 +427,10 @@ class Page {
       return;
     }
     if (!settings && found.settings.job === "fill") this.hole = [];
-    this.doing.textContent = this.summary(found);
-    this.view.canvas.setAttribute("aria-label", `Result ${result}: ${this.summary(found)} Arrow keys move, plus and minus zoom, 0 fits.`);
+    const { width, height, seconds, note } = found;
+    const size = `${width} × ${height} in ${seconds.toFixed(2)} s, seed ${found.settings.seed}`;
+    this.doing.textContent = (note ? `${size}. ${note}` : size).replace(/\.?$/, ".");
+    this.view.canvas.setAttribute("aria-label", `Result ${result}: ${this.doing.textContent} Arrow keys move, plus and minus zoom, 0 fits.`);
     this.command.textContent = found.command;
     const download = (name) => button(name, () => this.send({ kind: "download", result, name }), { "data-file": name });
     this.files.replaceChildren(...found.files.map(download));
@@ -505,14 +510,11 @@ class Page {
     }
     const read = (text) => Uint8Array.from(atob(text), (one) => one.charCodeAt(0));
     const { given, runs, moment } = saved;
-    this.pending = { name: given.name, bytes: given.bytes && read(given.bytes), maps: new Map() };
     [this.again] = runs;
-    if (given.bytes) this.send({ kind: "open", name: given.name }, [this.pending.bytes]);
-    else this.send({ kind: "example", name: given.name });
+    this.give({ name: given.name, bytes: given.bytes && read(given.bytes), maps: new Map() });
     await this.next("picture");
     for (const { name, bytes: map } of given.maps) {
-      this.given.maps.set(stem(name), { name, bytes: read(map) });
-      this.send({ kind: "map", name }, [read(map)]);
+      this.giveMap({ name, bytes: read(map) });
       await this.next("maps");
     }
     const numbers = [];
@@ -781,14 +783,9 @@ class Page {
       this.tool.replaceChildren(...choices([["", "Nothing"], ["hole", "Hole"], ...labels, ["0", "Eraser"]]));
       this.method.replaceChildren(...choices(Object.entries(message.methods)));
       this.scale.style.background = `linear-gradient(to right, ${message.scale.map((colour) => `rgb(${colour})`)})`;
-      const picture = (size, bytes) => {
-        const small = bitmap(bytes, ...size);
-        small.setAttribute("aria-hidden", "true");
-        return small;
-      };
       const shown = ([name, size], index) => {
-        const found = button(name, () => this.example(name));
-        found.prepend(picture(size, buffers[index]));
+        const found = button(name, () => this.give({ name, maps: new Map() }));
+        found.prepend(bitmap(buffers[index], ...size));
         return found;
       };
       this.examples.replaceChildren(...Object.entries(message.examples).map(shown));
@@ -805,21 +802,15 @@ class Page {
     const other = this.session && this.session !== message.session; // simdtex was started anew, or has forgotten the page
     this.session = message.session;
     if (!other || !message.fresh) return;
-    if (this.given && this.given.label === this.picture?.name) this.giveAgain();
-    else {
+    if (this.given && this.given.label === this.picture?.name) {
+      this.again = this.last?.job === "fill" ? null : this.last;
+      this.give(this.given);
+    } else {
       this.picture = null;
       this.start.hidden = false;
       this.columns.hidden = true;
       this.warn("The picture and the results of this page are no longer kept; give the picture again.");
     }
-  }
-
-  giveAgain() {
-    this.again = this.last?.job === "fill" ? null : this.last;
-    this.pending = this.given;
-    if (this.given.bytes) this.send({ kind: "open", name: this.given.name }, [this.given.bytes]);
-    else this.send({ kind: "example", name: this.given.name });
-    for (const { name, bytes } of this.given.maps.values()) this.send({ kind: "map", name }, [bytes]);
   }
 
   /** Play the pictures of a small run until there is a picture. */
@@ -836,11 +827,6 @@ class Page {
       setTimeout(next, last ? 2000 : 120);
     };
     next();
-  }
-
-  example(name) {
-    this.pending = { name, maps: new Map() };
-    this.send({ kind: "example", name });
   }
 
   /** Say what is wrong; with a `job`, that could not be done. */
@@ -875,7 +861,7 @@ class Page {
 
   close() {
     document.removeEventListener("paste", this.paste);
-    this.view.close();
+    this.view.observer.disconnect();
     this.connection.close();
   }
 }

@@ -138,14 +138,9 @@ class View {
     if (why) this.mark(context, frame, why);
     const { cursor } = this;
     if (cursor && this.page.brush) {
-      context.globalAlpha = 1;
-      context.lineWidth = 2;
+      const at = [(cursor[0] - this.left) * unit, (cursor[1] - this.top) * unit];
       for (const [colour, more] of [["#000", 1], ["#fff", -1]]) {
-        context.strokeStyle = colour;
-        context.beginPath();
-        const radius = Math.max(3, (this.page.brush.width * unit) / 2 + more);
-        context.arc((cursor[0] - this.left) * unit, (cursor[1] - this.top) * unit, radius, 0, 7);
-        context.stroke();
+        ring(context, ...at, Math.max(3, (this.page.brush.width * unit) / 2 + more), colour, 2);
       }
     }
   }
@@ -166,10 +161,7 @@ class View {
       context.font = `${12 * (window.devicePixelRatio || 1)}px sans-serif`;
       for (const { place, rank, taken } of [...(candidates ?? [])].reverse()) {
         this.outline(context, place[1], place[0], 1, 1, taken ? 3 : 1);
-        const at = [(place[1] + 1.5 - this.left) * this.unit, (place[0] + 1 - this.top) * this.unit];
-        [context.lineWidth, context.strokeStyle, context.fillStyle] = [3, "#000", "#fff"];
-        context.strokeText(`${rank}`, ...at);
-        context.fillText(`${rank}`, ...at);
+        lettered(context, rank, (place[1] + 1.5 - this.left) * this.unit, (place[0] + 1 - this.top) * this.unit);
       }
       return;
     }
@@ -308,9 +300,5 @@ class View {
     else return;
     event.preventDefault();
     event.stopPropagation(); // a notebook has its own meaning for keys
-  }
-
-  close() {
-    this.observer.disconnect();
   }
 }

@@ -24,7 +24,7 @@ from simdtex.ops import active, lcpdf
 from simdtex.ops.costs import Costs, Kinds, Phased, Scattered
 from simdtex.ops.lcpdf import Choice
 from simdtex.ops.nearest import TAIL, strip_of
-from simdtex.ops.neighbourhood import Confidences, Field
+from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import EXHAUSTIVE, KEPT, Everything, Listed, Relaxation
 from simdtex.ops.square import square_of
 from simdtex.ops.use import FairUse
@@ -115,22 +115,6 @@ class Part(NamedTuple):
     field: Field
 
 
-class Lists:
-    """A schedule's lists of sites as a machine holds them: each is put there once."""
-
-    def __init__(self, machine: Machine) -> None:
-        self._machine = machine
-        self._known: dict[int, tuple[NDArray[np.int32], Array, Array, NDArray[np.int64]]] = {}
-
-    def of(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, Array, NDArray[np.int64]]:
-        """Return the list on the machine, where its stretches begin, and which of them begin its groups."""
-        if id(sites) not in self._known:
-            begins, firsts = active.stretches(starts)
-            put = self._machine.put
-            self._known[id(sites)] = sites, put(sites), put(begins), firsts
-        return self._known[id(sites)][1:]
-
-
 class Lattices:
     """A plan on a machine: what stays the same throughout the run, and its levels.
 
@@ -159,71 +143,66 @@ class Lattices:
         """
         if self._last is None or self._last.number != number:
             self._last = None  # the arrays of one level are enough to keep
-            self._last = self._level(number)
-        level, machine = self._last, self.machine
-        if window is None:
-            return level
-        grid = self.grid(number).window(*window)
-        return replace(
-            level,
-            setting=level.setting._replace(grid=grid),
-            grid=replace(grid, tile=level.schedule.tile),
-            in_place=self._in_place(grid),
-            weighed=machine.put(np.zeros(grid.pixels, np.int32)),
-            lists=Lists(machine),
-            movable=self.conditions.movable(machine, number, grid),
-            phased=level.phased and level.phased._replace(sites=self._phases(grid)),
-            scattered=self._scattered(number, grid),
-            kinds=level.kinds and level.kinds._replace(sites=self._soft(number, grid)),
-        )
+            self._last = self._on(self._level(number), self.grid(number))
+        return self._last if window is None else self._on(self._last, self.grid(number).window(*window))
 
     def _level(self, number: int) -> Level:
+        """Return a level without what depends on the window."""
         options, sample, machine, offsets = self.options, self.sample, self.machine, self.offsets
-        grid = self.grid(number)
-        coarsest, count = number == self.levels - 1, self.places(number).positions.size
+        grid, places = self.grid(number), self.places(number)
+        coarsest, count = number == self.levels - 1, places.positions.size
         proposal: Everything | Listed
         if self.exhaustive(number):
-            every = sample.candidates(machine, self.places(number), self.planes, every=True)
-            proposal = Everything(every, strip_of(machine, sample, self.places(number)))
+            every = sample.candidates(machine, places, self.planes, every=True)
+            proposal = Everything(every, strip_of(machine, sample, places))
         else:
-            square = square_of(machine, sample, self.places(number))
-            proposal = Listed(self.candidates(number), square, len(offsets), options.chance_at(number))
+            listed = sample.candidates(machine, places, self.planes)
+            proposal = Listed(listed, square_of(machine, sample, places), len(offsets), options.chance_at(number))
         dimensions = sample.channels * (len(offsets) + 1)
-        variance = sample.variance
-        h = options.bandwidth * lcpdf.optimal_bandwidth(variance, count, dimensions)  # (8)
+        h = options.bandwidth * lcpdf.optimal_bandwidth(sample.variance, count, dimensions)  # (8)
         draws = options.relaxation == "gibbs" or coarsest
         freedom = min(1.0, WHOLE / count, (count / SMALL) ** 2)
         novelty = options.novelty * freedom if coarsest and proposal.slots <= KEPT else 0.0
-        return Level(
-            number=number,
-            setting=Setting(machine, grid, offsets, options.order, self.seed, number),
-            grid=replace(grid, tile=self.plan.schedule.tile),
+        relaxation = Relaxation(
+            grid=grid,
             offsets=machine.put(offsets),
-            schedule=self.plan.schedule,
-            proposal=proposal,
-            choice=Choice(draws, options.pixel == "density", lcpdf.window(h, sample.top)),
+            proposal=proposal,  # 6.2.2.1 the LCPDF, equations (6) and (12), of these candidates
             discount=np.float32(1 / (1 + options.coherence)),
-            novelty=np.float32(novelty * sample.channels * variance),
-            rate=options.balance * self.usual,
-            fair_use=self.fair_use(number),
+            novelty=np.float32(novelty * sample.channels * sample.variance),
+            costs=Costs(None, self._phased(number, proposal.candidates), None, self._kinds(proposal.candidates)),
+            choice=Choice(draws, options.pixel == "density", lcpdf.window(h, sample.top)),  # 6.2.2.2
+            xi=min(-1, round(options.xi * 1024)),  # 6.2.2.3 the temperature, equation (13)
+            seed=self.seed,
+            level=number,
             confidences=self.conditions.confidences,
-            xi=min(-1, round(options.xi * 1024)),
-            in_place=self._in_place(grid),
-            weighed=self.weighed,
-            lists=Lists(machine),
-            movable=self.conditions.movable(machine, number, grid),
-            phased=self._phased(number, proposal.candidates),
+        )
+        setting = Setting(machine, grid, offsets, options.order, self.seed, number)
+        return Level(setting, self.plan.schedule, relaxation, options.balance * self.usual, self.fair_use(number))
+
+    def _on(self, level: Level, grid: Grid) -> Level:
+        """Return a level with what depends on the window, on a lattice or a window of it."""
+        machine, schedule, number, costs = self.machine, level.schedule, level.number, level.relaxation.costs
+        costs = costs._replace(
+            phased=costs.phased and costs.phased._replace(sites=self._phases(grid)),
             scattered=self._scattered(number, grid),
-            kinds=self._kinds_of(number, proposal.candidates),
+            kinds=costs.kinds and costs.kinds._replace(sites=self._soft(number, grid)),
+        )
+        return replace(
+            level,
+            setting=level.setting._replace(grid=grid),
+            relaxation=level.relaxation._replace(grid=replace(grid, tile=schedule.tile), costs=costs),
+            in_place=schedule.independent(grid, self.offsets) and not schedule.tile,
+            weighed=machine.put(np.zeros(grid.pixels, np.int32)) if grid.part else self.weighed,
+            movable=self.conditions.movable(machine, number, grid),
+            lists={},
         )
 
-    def _kinds_of(self, number: int, candidates: Candidates) -> Kinds | None:
-        """Return the kinds of candidates that soft data know, and what they cost; None without soft data."""
+    def _kinds(self, candidates: Candidates) -> Kinds | None:
+        """Return the kinds of candidates that soft data know; None without soft data."""
         if self.plan.soft is None:
             return None
         those = self.plan.soft.kinds(self.sample, self.machine.get(candidates.positions))
-        those = np.pad(those, ((0, 0), (0, TAIL)))  # as many as `Phased` has
-        return Kinds(self.machine.put(those), self._soft(number, self.grid(number)))
+        return Kinds(self.machine.put(np.pad(those, ((0, 0), (0, TAIL)))), None)  # as many as `Phased` has
 
     def _soft(self, number: int, grid: Grid) -> Array:
         """Return what each kind costs at the sites of a lattice, or of a window of it, (kinds, H, W)."""
@@ -234,15 +213,16 @@ class Lattices:
         return self.machine.put(planes)
 
     def _phased(self, number: int, candidates: Candidates) -> Phased | None:
+        """Return the phases of candidates of a regular sample, and how much they count; None of another."""
         waves = self.sample.waves
         if not waves:
             return None
-        those = self.sample.phases_at(self.machine.get(candidates.positions)).astype(np.float32)
         certain = np.float32(round(sqrt(1.25 * len(self.offsets))))  # what a guide counts there and at the site
         step = 1 if self.options.phases == "all" else 2**number
         free = np.float32(round(float(certain) ** 2 * waves.half(step)))
+        those = self.sample.phases_at(self.machine.get(candidates.positions)).astype(np.float32)
         those = np.pad(those, ((0, 0), (0, TAIL)))  # whole vectors are read at the end, too
-        return Phased(self.machine.put(those), self._phases(self.grid(number)), certain, free)
+        return Phased(self.machine.put(those), None, certain, free)
 
     def _phases(self, grid: Grid) -> Array:
         """Return the phases (waves, H, W) of the output at the sites of a lattice, or of a window of it."""
@@ -265,10 +245,6 @@ class Lattices:
         put = self.machine.put
         return Scattered(put(begin), put(reach), put(data.values[datum]), self.conditions.confidences.hard)
 
-    def _in_place(self, grid: Grid) -> bool:
-        schedule = self.plan.schedule
-        return schedule.independent(grid, self.offsets) and not schedule.tile
-
     @property
     def usual(self) -> float:
         """N C sigma^2: half of what any two neighbourhoods differ by, on average."""
@@ -284,24 +260,16 @@ class Lattices:
         """Return where the candidates of a level lie, and how much use of each is fair."""
         step = 2**number if self.options.phases == "all" else 1
         places = self.places(number)
-        fair, kinds = self.sample.fair(places), (*self._kinds(places), STRICT * self.usual)
-        around = int(self.offsets[:, 1].max()) * step
-        return FairUse(places.shape, around, fair, not self.exhaustive(number), *kinds)
-
-    def _kinds(self, places: Places) -> tuple[NDArray[np.intp] | None, tuple[float, ...]]:
-        """Return the category of each place where candidates may lie, and the wanted shares."""
+        around, kinds = int(self.offsets[:, 1].max()) * step, None
         categories, wanted = self.sample.pictures.categories(0), self.options.proportions
-        if categories is None or wanted is None:
-            return None, ()
-        return np.searchsorted(categories, self.sample.own(places.everywhere)[..., 0]), wanted
+        if categories is not None and wanted is not None:
+            kinds = np.searchsorted(categories, self.sample.own(places.everywhere)[..., 0])
+        fair, listed = self.sample.fair(places), not self.exhaustive(number)
+        return FairUse(places.shape, around, fair, listed, kinds, wanted or (), STRICT * self.usual)
 
     def places(self, number: int) -> Places:
         """Return the places of the candidates of a level."""
         return self.sample.places(self.offsets, 2**number, self.options.phases, self.options.edges)
-
-    def candidates(self, number: int) -> Candidates:
-        """Return the candidates of a level."""
-        return self.sample.candidates(self.machine, self.places(number), self.planes)
 
 
 @dataclass(frozen=True)
@@ -310,64 +278,49 @@ class Level:
 
     Attributes
     ----------
-    number : int
-        l of Algorithm 1, 0 the finest.
     setting : simdtex.schedules.Setting
         The input of its schedule.
-    grid : Grid
-        The lattice, or a window of it with its origin in the whole.
-    offsets : (N, 2) int32 array of the machine
-        The neighbourhood, equation (11), in sites of the grid.
-    proposal : Everything or Listed
-        Which candidates a site weighs.
-    choice : simdtex.ops.lcpdf.Choice
-        What it takes of them.
-    discount : float32
-        1 / (1 + coherence).
-    novelty : float32
-        What a candidate costs for each neighbour whose source it continues; at levels but the coarsest 0.
+    schedule : simdtex.schedules.Schedule
+    relaxation : simdtex.ops.relax.Relaxation
+        How its sites relax, but for the penalty of each candidate, which changes with every sweep.
     rate : float
         lambda N C sigma^2: what a candidate costs whose surroundings are used twice as often as their share.
     fair_use : simdtex.ops.use.FairUse
         Where the candidates lie, and how much of each is fair.
-    confidences : simdtex.ops.neighbourhood.Confidences
-        Which channels are guides, and how much each value counts.
-    xi : int
-        Of equation (13), in 1/1024.
     in_place : bool
         Whether the sites of a step may be written while others of it are read: none is another's neighbour.
     weighed : (H, W) int32 array of the machine
         Counts the candidates that each site has weighed.
     movable : (H, W) uint16 array of the machine, optional
         0 at sites whose values are given, which free sweeps leave alone. None: every site may relax.
-    phased : Phased, optional
-        The phases of a regular sample and of the output.
-    scattered : Scattered, optional
-        Conditioning data between the sites.
-    kinds : Kinds, optional
-        Soft data: what candidates of each kind cost.
+    lists : dict
+        The schedule's lists of sites as the machine holds them: each is put there once.
     """
 
-    number: int
     setting: Setting
-    grid: Grid
-    offsets: Array
     schedule: schedules.Schedule
-    proposal: Everything | Listed
-    choice: Choice
-    discount: np.float32
-    novelty: np.float32
+    relaxation: Relaxation
     rate: float
     fair_use: FairUse
-    confidences: Confidences
-    xi: int
-    in_place: bool
-    weighed: Array
-    lists: Lists = field(repr=False)
+    in_place: bool = False
+    weighed: Array = None
     movable: Array | None = None
-    phased: Phased | None = None
-    scattered: Scattered | None = None
-    kinds: Kinds | None = None
+    lists: dict[int, tuple[Any, Array, Array, NDArray[np.int64]]] = field(default_factory=dict, repr=False)
+
+    @property
+    def number(self) -> int:
+        """The l of Algorithm 1, 0 the finest."""
+        return self.setting.level
+
+    @property
+    def grid(self) -> Grid:
+        """The lattice, or a window of it with its origin in the whole."""
+        return self.relaxation.grid
+
+    @property
+    def proposal(self) -> Everything | Listed:
+        """Which candidates a site weighs."""
+        return self.relaxation.proposal
 
     @property
     def machine(self) -> Machine:
@@ -384,28 +337,16 @@ class Level:
     def at_once(self) -> int:
         """Sites that are relaxed between two looks at the clock, as far as scratch memory holds what they need."""
         channels, neighbours = int(self.proposal.candidates.pixels.shape[0]), len(self.setting.offsets)
-        stores = isinstance(self.proposal, Everything) and (self.choice.draws or self.confidences.own)
+        stores = self.relaxation.choice.draws or self.relaxation.confidences.own
+        stores = stores and isinstance(self.proposal, Everything)
         most = self.machine.chunk(self.proposal.slots, neighbours, channels, stores)
         return max(most, TOGETHER) if isinstance(self.proposal, Listed) and self.in_place else most
 
 
 def rule(level: Level, penalty: NDArray[np.float32]) -> Relaxation:
-    """Return how a site of the level relaxes: what happens to all sites of a step in parallel."""
-    return Relaxation(
-        grid=level.grid,
-        offsets=level.offsets,
-        proposal=level.proposal,  # 6.2.2.1 the LCPDF, equations (6) and (12), of these candidates
-        discount=level.discount,
-        novelty=level.novelty,
-        confidences=level.confidences,
-        costs=Costs(
-            level.machine.put(np.pad(penalty, (0, -penalty.size % BLOCK))), level.phased, level.scattered, level.kinds
-        ),
-        choice=level.choice,  # 6.2.2.2 a draw from it, or its mode
-        xi=level.xi,  # 6.2.2.3 the temperature, equation (13)
-        seed=level.setting.seed,
-        level=level.number,
-    )
+    """Return how a site of the level relaxes in a sweep, with this penalty (n,) of each candidate."""
+    padded = level.machine.put(np.pad(penalty, (0, -penalty.size % BLOCK)))
+    return level.relaxation._replace(costs=level.relaxation.costs._replace(penalty=padded))
 
 
 class Active:
@@ -436,10 +377,14 @@ class Active:
 
     def among(self, sites: NDArray[np.int32], starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
         """Found on the machine."""
-        here, begins, firsts = self._level.lists.of(sites, starts)
+        known, machine = self._level.lists, self._level.machine
+        if id(sites) not in known:
+            begins, firsts = active.stretches(starts)
+            known[id(sites)] = sites, machine.put(sites), machine.put(begins), firsts
+        _, here, begins, firsts = known[id(sites)]
         if self._plane is None:
             return here, starts
-        return active.among(self._level.machine, here, begins, firsts, self._plane)
+        return active.among(machine, here, begins, firsts, self._plane)
 
 
 def parts(ranges: NDArray[np.int64], most: int) -> Iterator[tuple[NDArray[np.int64], int, bool]]:

@@ -19,7 +19,6 @@ from simdtex.methods.mrf.level import Info, Lattices, Level, Part, State
 from simdtex.model.explanation import Explanation
 from simdtex.model.lattice import Grid
 from simdtex.model.use import effective_use
-from simdtex.ops import active
 from simdtex.ops.neighbourhood import Field
 from simdtex.ops.relax import Listed, most_listed
 from simdtex.run import Callback, Output, Relaxing, Stage
@@ -127,7 +126,8 @@ class Record:
         """Return how many candidates all sites have weighed so far, if the level weighs listed ones."""
         if not self._listed:
             return self._weighed
-        return active.total(self._run.machine, self._run.grid(self.reports[-1]["level"]), self._run.weighed)
+        weighed = self._run.grid(self.reports[-1]["level"]).view(self._run.machine.get(self._run.weighed))
+        return int(weighed.sum(dtype=np.int64))
 
     def _begin(self, level: Level) -> None:
         """Begin the report of a level."""

@@ -31,7 +31,7 @@ from simdtex.methods.multires.levels import (
 from simdtex.methods.multires.options import Options
 from simdtex.model.use import effective_use
 from simdtex.ops.candidates import Sampled, candidates
-from simdtex.ops.laplacian import laplacian_blend, laplacian_collapse
+from simdtex.ops.laplacian import laplacian_collapse
 from simdtex.options import within_32_bits
 from simdtex.run import Callback, Output, Sampling, Stage, paced
 
@@ -154,8 +154,8 @@ class Run:
         if coarse is None:
             residue = self.machine.get(band)
             return self.machine.put(np.ascontiguousarray(residue.reshape(len(residue), -1)[:, source]))
-        collapse = laplacian_blend if self.options.seams == "blend" else laplacian_collapse
-        return collapse(self.machine, band, self.machine.put(source), coarse, self.analysis.torus)
+        blend = self.options.seams == "blend"
+        return laplacian_collapse(self.machine, band, self.machine.put(source), coarse, self.analysis.torus, blend)
 
     def ended(self, state: State) -> bool:
         """Return whether all levels are collapsed."""

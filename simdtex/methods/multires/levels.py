@@ -60,19 +60,14 @@ def structure_of(machine: Machine, analysis: Analysis, options: Options) -> Stru
     return Structure(analysis.features, machine.put(most), machine.put(lattice(analysis.shapes, 1)))
 
 
-def sampled_from(machine: Machine, shapes: Sequence[tuple[int, int]], source: Sequence[NDArray[np.int32]]) -> Sampled:
-    """Return levels whose pixels are copied from these places, the finest first."""
-    together = np.concatenate(source)
-    counts = np.zeros((together.size, 2), np.int32)
-    counts[-pixels(shapes[-1:]) :, 0] = 1  # of the top; the others are to be counted
-    return Sampled(machine.put(together), machine.put(counts), machine.put(lattice(shapes, 0)))
-
-
 def copied(machine: Machine, shapes: Sequence[tuple[int, int]], own: tuple[int, int]) -> Sampled:
     """Return the top level, copied and repeated to fill, and empty levels below it."""
     row, col = np.indices(shapes[-1], np.int32)
-    source = row % np.int32(own[0]) * np.int32(own[1]) + col % np.int32(own[1])
-    return sampled_from(machine, shapes, [np.zeros(pixels(shapes[:-1]), np.int32), source.ravel()])
+    top = row % np.int32(own[0]) * np.int32(own[1]) + col % np.int32(own[1])
+    source = np.concatenate([np.zeros(pixels(shapes[:-1]), np.int32), top.ravel()])
+    counts = np.zeros((source.size, 2), np.int32)
+    counts[-top.size :, 0] = 1  # the others are to be counted
+    return Sampled(machine.put(source), machine.put(counts), machine.put(lattice(shapes, 0)))
 
 
 def read_sources(

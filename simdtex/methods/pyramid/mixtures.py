@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from simdtex.driver import Call, check_shape, drive, execute, with_channels_last
+from simdtex.checkpoint import Checkpoint
+from simdtex.driver import check_shape, drive, execute, with_channels_last
 from simdtex.io.image import check_sample
 from simdtex.machine import Machine, memory
 from simdtex.methods.pyramid import algorithm as pyramid
@@ -27,22 +29,12 @@ from simdtex.run import Callback, Output
 if TYPE_CHECKING:
     from typing import Unpack
 
-    from simdtex.methods.typed_options import PyramidOptions
+    from simdtex.methods.typed_options import MixOptions
 
 
 @overload
 def mix(
-    samples: Sequence[ArrayLike],
-    shape: tuple[int, int],
-    *,
-    palette: int | None = ...,
-    pattern: int | None = ...,
-    average: Sequence[float] | None = ...,
-    low: int | None = ...,
-    high: int | None = ...,
-    split: int | None = ...,
-    full_output: Literal[True],
-    **options: Unpack[PyramidOptions],
+    samples: Sequence[ArrayLike], shape: tuple[int, int], *, full_output: Literal[True], **options: Unpack[MixOptions]
 ) -> tuple[NDArray[Any], Output]: ...
 
 
@@ -51,14 +43,8 @@ def mix(
     samples: Sequence[ArrayLike],
     shape: tuple[int, int],
     *,
-    palette: int | None = ...,
-    pattern: int | None = ...,
-    average: Sequence[float] | None = ...,
-    low: int | None = ...,
-    high: int | None = ...,
-    split: int | None = ...,
     full_output: Literal[False] = ...,
-    **options: Unpack[PyramidOptions],
+    **options: Unpack[MixOptions],
 ) -> NDArray[Any]: ...
 
 
@@ -77,7 +63,7 @@ def mix(
     device: str | Machine | None = None,
     callback: Callback | None = None,
     full_output: bool = False,
-    checkpoint: Any = None,
+    checkpoint: str | os.PathLike[str] | Checkpoint | None = None,
     **options: Any,
 ) -> NDArray[Any] | tuple[NDArray[Any], Output]:
     """Mix several textures into one, by pyramid matching.
@@ -141,8 +127,17 @@ def mix(
     chosen = resolve(Options, "mix", with_channels_last(options, channel_axis))
     sides = None if low is None or high is None else (low, high, split)
     plan = Mixture(pictures, size, chosen, weights, sides, palette)
-    call = Call(rng, device, callback, full_output, checkpoint)
-    return execute("mix", partial(drive, plan), lambda: dict(vars(plan)), channel_axis, call)
+    return execute(
+        "mix",
+        partial(drive, plan),
+        lambda: dict(vars(plan)),
+        channel_axis,
+        rng,
+        device,
+        callback,
+        full_output,
+        checkpoint,
+    )
 
 
 @dataclass(frozen=True)
@@ -161,62 +156,41 @@ class Mixture:
     palette: int | None
 
     def on(self, machine: Machine, seed: int) -> pyramid.Run:
-        """Analyse the samples on a machine."""
+        """Analyse the samples on a machine, on one scale.
+
+        Those that are blended are decorrelated together, so that their channels mean the same.
+        """
+        pictures, options = self.pictures, self.options
         used = [i for i, weight in enumerate(self.weights) if weight]
-        used += [] if self.palette is None else [self.palette]
-        sizes = (side for i in used for side in self.pictures[i].shape[:2])
-        levels = pyramid.number_of_levels(self.options, *self.shape, *sizes)
-        blender = _Blender(machine, self, levels)
+        shown = [] if self.palette is None else [self.palette]
+        weights = [self.weights[i] for i in used]
+        sizes = (side for i in (*used, *shown) for side in pictures[i].shape[:2])
+        levels = pyramid.number_of_levels(options, *self.shape, *sizes)
+        memory.require(machine, max(p.shape[0] * p.shape[1] for p in pictures) * pyramid.MEMORY)
+        stretched = Stretched(np.concatenate([p.reshape(-1, 1, p.shape[-1]) for p in pictures]))
+        planes = _parted(stretched.planes, pictures)
+        decorrelate = options.color == "decorrelate"
+        palette = blended = colours_of([planes[i] for i in used], weights, decorrelate)
+        if shown:
+            palette = colours_of([planes[i] for i in shown], [1.0], decorrelate)
+        palettes = [blended] * len(used) + [palette] * len(shown)
+        scale = decorrelated([planes[i] for i in (*used, *shown)], palettes)
+        transform = pyramid.transform(machine, options, levels, options.edges == "wrap")
+        every = {
+            i: [histograms(machine, channel, transform) for channel in channels]
+            for i, channels in zip(used, scale.channels, strict=False)
+        }
         if self.sides is not None:
             low, high, split = self.sides
-            found = blender.spliced(low, high, _high_subbands(split, levels, self.options.pyramid))
+            finest = _high_subbands(split, levels, options.pyramid)
+            found = [spliced(a, b, finest) for a, b in zip(every[low], every[high], strict=True)]
         else:
-            found = blender.averaged()
-        return pyramid.picture_run(machine, blender.texture(found), self, levels, seed)
-
-
-class _Blender:
-    """The samples of a mixture as channels of one scale, and their histograms.
-
-    Samples that are blended are decorrelated together, so that their channels mean the same.
-    """
-
-    def __init__(self, machine: Machine, mixture: Mixture, levels: int) -> None:
-        pictures, weights, options = mixture.pictures, mixture.weights, mixture.options
-        self._weights, palette = weights, mixture.palette
-        self._used = [i for i, weight in enumerate(weights) if weight]
-        memory.require(machine, max(p.shape[0] * p.shape[1] for p in pictures) * pyramid.MEMORY)
-        together = np.concatenate([p.reshape(-1, 1, p.shape[-1]) for p in pictures])
-        self._stretched = Stretched(together)
-        planes = _parted(self._stretched.planes, pictures)
-        decorrelate = options.color == "decorrelate"
-        blended = colours_of([planes[i] for i in self._used], [weights[i] for i in self._used], decorrelate)
-        self._palette = blended if palette is None else colours_of([planes[palette]], [1.0], decorrelate)
-        shown = [] if palette is None else [planes[palette]]
-        self._scale = decorrelated(
-            [*(planes[i] for i in self._used), *shown], [*[blended] * len(self._used), *[self._palette] * len(shown)]
-        )
-        transform = pyramid.transform(machine, options, levels, options.edges == "wrap")
-        self._found = {
-            i: [histograms(machine, channel, transform) for channel in channels]
-            for i, channels in zip(self._used, self._scale.channels, strict=False)
-        }
-
-    def averaged(self) -> list[Histograms]:
-        """Return the average of the samples, channel by channel."""
-        weights = [self._weights[i] for i in self._used]
-        return [averaged(channel, weights) for channel in zip(*self._found.values(), strict=True)]
-
-    def spliced(self, low: int, high: int, finest: int) -> list[Histograms]:
-        """Return the finest subbands of `high`, and the others and the pixels of `low`."""
-        return [spliced(a, b, finest) for a, b in zip(self._found[low], self._found[high], strict=True)]
-
-    def texture(self, found: list[Histograms]) -> pyramid.Texture:
-        """Return what is to be matched, with the pixels of the palette if there is one."""
-        if len(self._scale.channels) > len(self._used):
-            own: list[Sorted] = [np.sort(c.reshape(1, -1)) for c in self._scale.channels[-1]]
+            found = [averaged(channel, weights) for channel in zip(*every.values(), strict=True)]
+        if shown:  # the pixels of the palette
+            own: list[Sorted] = [np.sort(c.reshape(1, -1)) for c in scale.channels[-1]]
             found = [Histograms(pixels, one.subbands) for pixels, one in zip(own, found, strict=True)]
-        return pyramid.Texture(found, self._palette, self._scale, self._stretched)
+        texture = pyramid.Texture(found, palette, scale, stretched)
+        return pyramid.picture_run(machine, texture, self, levels, seed)
 
 
 def _parted(planes: NDArray[np.int32], pictures: list[NDArray[Any]]) -> list[NDArray[np.int32]]:

@@ -77,38 +77,33 @@ class Plan:
         -----
         Cost: 5000 multiply-adds and 25 sorted values for every voxel, channel and iteration, with four orientations.
         """
-        return block_run(machine, self, seed)
+        sample, shape, options = self.sample, self.shape, self.options
+        within_32_bits(shape, max(VALUES, sample.shape[-1]))
+        memory.require(machine, prod(shape) * MEMORY)  # before any work
+        levels, oriented = number_of_levels(options, *shape, *sample.shape[:2]), options.pyramid == "steerable"
+        wrap = options.edges == "wrap"
+        flat = transform(machine, replace(options, pyramid="laplacian"), levels, wrap)
+        steerable = [transform(machine, options, levels, wrap)] if oriented else []
+        texture = analyse(machine, sample, options, flat, *steerable)
+        check_memory(machine, shape, texture, MEMORY)
+        slices = transform(machine, options, levels, torus=True)
 
+        def turn(block: Array, wanted: list[Wanted], matcher: Matcher, tell: Callable[[float], None]) -> Array:
+            block, of_block, of_slices = block.reshape(shape), wanted[: levels + 1], wanted[levels + 1 :]
+            solids = [_matched_block(machine, block, of_block, matcher)]
+            for number, (name, (axes, back)) in enumerate(FAMILIES.items() if oriented else ()):
+                machine.sync()
+                tell((1 + number) / (1 + len(FAMILIES)))
+                before = solids[-1] if options.solids == "turns" else block
+                synthesis_pyr = slices.make(solid_turn(machine, before, axes))
+                names = [f"{name} {band}" for band in slices.names]
+                matched = match_subbands(matcher, names, synthesis_pyr, of_slices, options.slices == "together")
+                solids.append(solid_turn(machine, slices.collapse(matched), back))
+                if options.solids == "turns":
+                    del solids[0]
+            return solid_mean(machine, solids) if len(solids) > 1 else solids[0]
 
-def block_run(machine: Machine, plan: Plan, seed: int) -> Run:
-    """Return the run that makes a block match the sample."""
-    sample, shape, options = plan.sample, plan.shape, plan.options
-    within_32_bits(shape, max(VALUES, sample.shape[-1]))
-    memory.require(machine, prod(shape) * MEMORY)  # before any work
-    levels, oriented = number_of_levels(options, *shape, *sample.shape[:2]), options.pyramid == "steerable"
-    wrap = options.edges == "wrap"
-    flat = transform(machine, replace(options, pyramid="laplacian"), levels, wrap)
-    steerable = [transform(machine, options, levels, wrap)] if oriented else []
-    texture = analyse(machine, sample, options, flat, *steerable)
-    check_memory(machine, shape, texture, MEMORY)
-    slices = transform(machine, options, levels, torus=True)
-
-    def turn(block: Array, wanted: list[Wanted], matcher: Matcher, tell: Callable[[float], None]) -> Array:
-        block, of_block, of_slices = block.reshape(shape), wanted[: levels + 1], wanted[levels + 1 :]
-        solids = [_matched_block(machine, block, of_block, matcher)]
-        for number, (name, (axes, back)) in enumerate(FAMILIES.items() if oriented else ()):
-            machine.sync()
-            tell((1 + number) / (1 + len(FAMILIES)))
-            before = solids[-1] if options.solids == "turns" else block
-            synthesis_pyr = slices.make(solid_turn(machine, before, axes))
-            names = [f"{name} {band}" for band in slices.names]
-            matched = match_subbands(matcher, names, synthesis_pyr, of_slices, options.slices == "together")
-            solids.append(solid_turn(machine, slices.collapse(matched), back))
-            if options.solids == "turns":
-                del solids[0]
-        return solid_mean(machine, solids) if len(solids) > 1 else solids[0]
-
-    return Run(machine, texture, shape, turn, options, levels, seed)
+        return Run(machine, texture, shape, turn, options, levels, seed)
 
 
 def _matched_block(machine: Machine, block: Array, wanted: list[Wanted], matcher: Matcher) -> Array:
