@@ -64,8 +64,9 @@
 // strip       (C, size)  the sample's pixels of this level, row by row: candidates that follow one another side by side
 // strip_reach (N,)       pixel offset of each neighbour there
 __kernel __attribute__((vec_type_hint(vec))) void
-relax_all(__global const int *restrict sites, const int S, __global ushort *values, __global int *source,
-                        __global ushort *temperature, const Level g, __global const int2 *restrict offsets,
+relax_all(__global const int *restrict sites, const int first, const int S, __global ushort *values,
+                        __global int *source, __global ushort *temperature, const Level g,
+                        __global const int2 *restrict offsets,
                         __global const int *restrict reach, __global const int *restrict index_of,
                         __global const int *restrict positions, __global const float *restrict strip,
                         __global const int *restrict strip_reach, COSTS,
@@ -73,7 +74,7 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
                         __global ushort *restrict new_values, __global int *restrict new_source,
                         __global ushort *restrict new_temperature)
 {
-    const int s = get_global_id(0);
+    const int s = first + (int)get_global_id(0);
     if (s >= S)
         return;
     const int site = sites[s], i = ROW_OF(g.lattice, site), j = COL_OF(g.lattice, site);
@@ -194,8 +195,9 @@ relax_all(__global const int *restrict sites, const int S, __global ushort *valu
 // at      (count,)     place of each candidate in `levels`
 // levels  (C, plane)   grey levels of the sample, columns apart by the level's step side by side
 // weighed (area,)      in and out: candidates that each site has weighed so far
-__kernel void relax_list(__global const int *restrict sites, const int S, __global ushort *values, __global int *source,
-                         __global ushort *temperature, const Level g, __global const int2 *restrict offsets,
+__kernel void relax_list(__global const int *restrict sites, const int first, const int S, __global ushort *values,
+                         __global int *source, __global ushort *temperature, const Level g,
+                         __global const int2 *restrict offsets,
                          __global const int *restrict reach, __global const int *restrict index_of,
                          __global const int *restrict positions, __global const float *restrict disc,
                          __global const int *restrict at, __global const ushort *restrict levels,
@@ -204,10 +206,10 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
                          __global ushort *restrict new_values,
                          __global int *restrict new_source, __global ushort *restrict new_temperature)
 {
+    int s = first + (int)get_global_id(0);
 #ifdef APART
-    const int s = min((int)get_global_id(0), S - 1); // an idle work-item would read at wild indices on Intel's runtime
+    s = min(s, S - 1); // an idle work-item would read at wild indices on Intel's runtime
 #else
-    const int s = get_global_id(0);
     if (s >= S)
         return;
 #endif
@@ -310,7 +312,7 @@ __kernel void relax_list(__global const int *restrict sites, const int S, __glob
 #define PIXEL(k) at[list[k]]
     CHOOSE(chosen, g, d, m, levels, g.plane, noise, turn, place)
 #ifdef APART
-    if (get_global_id(0) >= S)
+    if (first + (int)get_global_id(0) >= S)
         return;
 #endif
     const int out = PLACE(s, site), step = STRIDE(S, g);

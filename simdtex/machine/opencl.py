@@ -314,17 +314,19 @@ class OpenCL:
     ) -> None:
         """Enqueue a kernel for one range of work-items after another, from ``groups[g, 0]`` up to ``groups[g, 1]``.
 
-        The kernel's second argument is the end of the range. The other arguments are set once, so that a launch takes a
+        The kernel's second and third arguments are where a launch begins and the end of its range: PoCL would compile a
+        kernel once more for launches with a global offset. The other arguments are set once, so that a launch takes a
         few microseconds.
         """
         kernel = self.kernel(function, defines)
         kernel.set_args(*map(_argument, args))
         group = self._group if self._forced or self.kind == "gpu" else SMALL_GROUP
         for begin, end in groups.tolist():
-            kernel.set_arg(1, np.int32(end))
+            kernel.set_arg(2, np.int32(end))
             for first in range(begin, end, LONGEST):
+                kernel.set_arg(1, np.int32(first))
                 size = -(-min(end - first, LONGEST) // group) * group
-                self.log.add(cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (group,), (first,)), kernel)
+                self.log.add(cl.enqueue_nd_range_kernel(self.queue, kernel, (size,), (group,)), kernel)
 
 
 def _argument(value: Any) -> Any:

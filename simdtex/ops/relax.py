@@ -307,5 +307,5 @@ def _fused(
         defines |= {"CUBE": 1} if grid.layers > 1 else {}
         defines |= {"RADIUS": square.disc.shape[0] // 2, "SLOTS": -(-proposal.slots // 64) * 64}
         name, own = "relax_list", [square.disc, square.at, square.levels, *costs, noise, weighed, key]
-    arguments = [sites, sites.size, *field, constants(grid, **level), *common, *own]
+    arguments = [sites, 0, sites.size, *field, constants(grid, **level), *common, *own]
     return name, defines, arguments
