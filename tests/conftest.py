@@ -1,11 +1,7 @@
 """Fixtures that run a test on usable OpenCL devices, and say in the end which ones did."""
 
-import os
-
-# PoCL then gives two devices, one thread and many; it reads this when first asked for platforms.
-os.environ.setdefault("POCL_DEVICES", "basic pthread")
-
 import functools
+import os
 
 import hypothesis
 import pytest

@@ -276,16 +276,17 @@ def missing(what):
     (pytest.fail if REQUIRED else pytest.skip)(f"{what} is not here")
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_any_number_of_threads_has_the_references_bits(threads):
+@pytest.mark.parametrize(("threads", "driver"), [(1, None), (2, None), (1, "basic")])
+def test_any_number_of_threads_has_the_references_bits(threads, driver):
+    """And the driver ``basic``, which has no thread of its own."""
     pocl = [info for info in usable_devices() if info.platform.startswith("Portable Computing")]
     info = next((info for info in pocl if info.compute_units > 1), None)
     if info is None:
         pytest.skip("no PoCL device of several threads here")
     # PoCL before version 4 reads the first of the two variables, from 4 on the second.
     limits = {"POCL_MAX_PTHREAD_COUNT": str(threads), "POCL_CPU_MAX_CU_COUNT": str(threads)}
-    kind = re.match(r"[a-z]+", info.name)[0]
-    done = child(CHILD, kind, "defaults", POCL_DEVICES=kind, **limits)
+    driver = driver or re.match(r"[a-z]+", info.name)[0]
+    done = child(CHILD, info.platform, "defaults", POCL_DEVICES=driver, **limits)
     assert done.returncode == 0, done.stdout
     first, *rest = done.stdout.splitlines()
     assert json.loads(first)["units"] == threads, "PoCL heeds the limit"
