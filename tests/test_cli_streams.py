@@ -38,8 +38,11 @@ def test_a_closed_stream_takes_nothing_away(folder, closed):
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no full device")
-@pytest.mark.parametrize("unbuffered", ["", "1"])
-@pytest.mark.parametrize("words", [["--help"], ["synth", "--help"], ["--version"], ["devices"], SYNTH], ids=str)
+@pytest.mark.parametrize(
+    ("words", "unbuffered"),
+    [(["--help"], "1"), (["synth", "--help"], ""), (["--version"], ""), (["devices"], ""), (SYNTH, ""), (SYNTH, "1")],
+    ids=str,
+)
 def test_a_full_standard_output_is_one_sentence(folder, words, unbuffered):
     done = run(folder, [*words, ">/dev/full"], PYTHONUNBUFFERED=unbuffered, SIMDTEX_DEVICE="reference")
     assert done.returncode == 2

@@ -2,11 +2,9 @@
 
 import doctest
 import inspect
-import os
 import re
 import runpy
 import shlex
-import subprocess
 import sys
 from pathlib import Path
 
@@ -160,18 +158,6 @@ def check_outputs(words, folder):
         assert list((folder / "stages").glob("level0-sweep*.png"))
 
 
-@pytest.mark.parametrize("line", commands(README))
-def test_readme_command_runs(any_device, material, line):
-    words = quick(line)
-    environment = os.environ | {"SIMDTEX_DEVICE": str(any_device.index)}
-    done = subprocess.run(
-        [sys.executable, "-m", *words], env=environment, capture_output=True, text=True, timeout=120, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    check_outputs(words, material)
-    assert simdtex.__file__.startswith(str(ROOT))
-
-
 @pytest.mark.parametrize(
     ("page", "line"), [(page_id(page), line) for page in PAGES for line in commands(page.read_text("utf-8"))]
 )
@@ -219,13 +205,14 @@ def test_what_a_script_needs_is_there(script, monkeypatch):
 FIRST = (ROOT / "docs" / "index.rst").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("line", [line for line in commands(FIRST) if line not in commands(README)])
-def test_command_of_the_first_page_runs(any_device, material, line, monkeypatch):
+@pytest.mark.parametrize("line", dict.fromkeys(commands(README) + commands(FIRST)))
+def test_command_of_the_first_pages_runs(any_device, material, line, monkeypatch):
     """In this process, which is quicker than one for each."""
     monkeypatch.setenv("SIMDTEX_DEVICE", str(any_device.index))
     words = quick(line)
     assert cli.main(words[1:], standalone_mode=False) in (None, 0)
     check_outputs(words, material)
+    assert simdtex.__file__.startswith(str(ROOT))
 
 
 def test_links_of_readme_exist():
