@@ -51,12 +51,14 @@ demo:
 	@$(VENV)/bin/simdtex demo
 
 # JOBS=0 runs the tests one after another in this process, as one wants in a debugger.
+# ONLY=Intel runs the tests that have a word in their name, here those on the devices of a platform.
 # The tests start some hundred processes, each of which would compile the package where no bytecode is kept.
 JOBS ?= auto
+ONLY ?=
 test:
 	$(call install,test,[test])
 	$(device)
-	@PYTHONDONTWRITEBYTECODE= $(PY) -m pytest --numprocesses $(JOBS) --maxprocesses 4 --dist worksteal
+	@PYTHONDONTWRITEBYTECODE= $(PY) -m pytest --numprocesses $(JOBS) --maxprocesses 4 --dist worksteal -k '$(ONLY)'
 
 slow:
 	$(call install,slow,[slow])

@@ -44,14 +44,7 @@ def pytest_generate_tests(metafunc):
     if metafunc.module.__name__ not in WHOLE_RUNS:
         first = {info.platform: info for info in reversed(found)}  # the best of each
         found = tuple(info for info in found if first[info.platform] is info)
-    names = [info.name for info in found]
-    params = [
-        pytest.param(
-            info,
-            id=info.name.replace(" ", "-") + (f"-{info.index}" if names.count(info.name) > 1 else ""),
-        )
-        for info in found
-    ]
+    params = [pytest.param(info, id=f"{info.platform}-{info.index}".replace(" ", "-")) for info in found]
     nothing = pytest.param(None, id="no-device")
     metafunc.parametrize("cl_device", params or [nothing], indirect=True, scope="session")
 
