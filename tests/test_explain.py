@@ -24,7 +24,7 @@ RUNS = {
     "paper": {"preset": "paper"},
     "paper in colour": {"preset": "paper", "sample": texture((24, 24), 3), "channel_axis": -1},
     "open, block": {"boundary": "open", "schedule": "block:6x7"},
-    "random": {"schedule": "random-scan", "search": "exact"},
+    "random": {"schedule": "random-scan", "search": "exact", "xi": -8.0, "free_sweeps": 1},
     "synchronous": {"schedule": "synchronous"},
     "guide": {"guide": GUIDE},
     "guide, exact": {"guide": GUIDE, "search": "exact", "coherence": 0},
