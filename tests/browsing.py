@@ -91,7 +91,7 @@ def drop(driver, path, place=".simdtex"):
     driver.execute_script(DROP, base64.b64encode(path.read_bytes()).decode(), path.name, place)
 
 
-def until(found, timeout=30):
+def until(found, timeout=90):
     """Wait until something is so; what it is."""
     end = time.monotonic() + timeout
     while True:

@@ -67,7 +67,7 @@ class Fake:
     def say(self, *buffers, **message):
         self.session.receive(message, buffers)
 
-    def wait(self, *kinds, after=0, timeout=60, **values):
+    def wait(self, *kinds, after=0, timeout=120, **values):
         """The first message of one of these kinds, with these values, that came after so many, and its buffers."""
 
         def found():

@@ -190,7 +190,7 @@ def test_ctrl_c_leaves_no_file(folder):
         assert running.poll() is None and time.monotonic() < deadline, running.communicate()
         time.sleep(0.1)
     running.send_signal(signal.SIGINT)
-    _, errors = running.communicate(timeout=60)
+    _, errors = running.communicate(timeout=120)
     assert running.returncode == 130, errors
     assert "Traceback" not in errors and "stopped" in errors
     assert not (folder / "out.png").exists()

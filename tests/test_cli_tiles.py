@@ -254,7 +254,7 @@ cli.main(["synth", "colour.png", "-o", "o.zarr", "--tiles", "16", "--size", "40x
 @pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
 def test_how_to_go_on_is_the_last_thing_said(folder, name, code):
     """Whatever Zarr had begun when the signal came."""
-    done = subprocess.run([sys.executable, "-c", STOPPED, name], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([sys.executable, "-c", STOPPED, name], capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stderr) == (code, "simdtex: stopped; continue with: simdtex resume o.zarr\n")
 
 

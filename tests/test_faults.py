@@ -293,7 +293,7 @@ def test_a_process_that_is_asked_to_end_cleans_up(tmp_path, number):
         time.sleep(0.02)
     running.send_signal(number)
     running.send_signal(number)  # as timeout does
-    _, errors = running.communicate(timeout=60)
+    _, errors = running.communicate(timeout=120)
     assert running.returncode == 128 + number, errors
     assert "Traceback" not in errors and "stopped" in errors and not (tmp_path / "out.png").exists()
     assert not [path for path in tmp_path.rglob("*") if path.name.startswith(".")]

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "memfd_create"), reason="the fuz
 ROOT = Path(__file__).resolve().parent.parent
 
 
-def fuzz(*args, module="fuzz", timeout=100):
+def fuzz(*args, module="fuzz", timeout=200):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-m", module, *map(str, args)]
     return subprocess.run(

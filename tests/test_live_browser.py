@@ -94,7 +94,7 @@ class Page:
     def results(self):
         return len(self.all(".strip li:not(.current)"))
 
-    def result(self, number, timeout=60):
+    def result(self, number, timeout=120):
         """Wait until there are so many results."""
         until(lambda: self.results == number, timeout)
 
@@ -397,7 +397,8 @@ def test_a_lost_picture_is_said_and_a_map_is_given_again(chromium, wall, tmp_pat
         port = address.split(":")[2].split("/")[0]
         drop(page.driver, wall)
         until(lambda: page.script("return Boolean(page.picture)"))
-        page.script("page.method.value = 'pyramid'; page.showJob(); page.make()")
+        page.script("page.method.value = 'pyramid'; page.width.value = page.height.value = 32")
+        page.script("page.showJob(); page.make()")
         drop(page.driver, tmp_path / "normal.png", ".maps")
         until(lambda: len(page.all(".maps li")) == 1)
         process.kill()
@@ -756,7 +757,7 @@ def test_a_saved_view_brings_all_of_it_back(inside, served):
     other = Page(inside.driver, served)
     try:
         drop(other.driver, path, ".start")
-        until(lambda: other.status == "The view is restored.", 60)
+        until(lambda: other.status == "The view is restored.")
         now = other.script("return [page.inside.at, page.inside.pixel, page.layer, page.view.unit, page.view.left]")
         assert now == wanted
         settings = other.script("return page.inside.panes.map(({result}) => page.results.get(result).settings.options)")
@@ -783,7 +784,7 @@ def test_a_result_that_cannot_be_looked_into_says_why_and_the_next_is_looked_int
 
 def test_the_tour_has_five_steps_and_needs_nothing(page):
     page.button("Tour in five steps").click()
-    until(lambda: page.one(".tour").is_displayed(), 60)
+    until(lambda: page.one(".tour").is_displayed())
     for number in range(1, 6):
         assert page.one(".tour h2").text.startswith(f"{number} of 5")
         assert page.one(".pointed").is_displayed()

@@ -50,7 +50,7 @@ def closing():
 
 
 def get(port, path, **headers):
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
     connection.request("GET", path, headers={"Host": f"127.0.0.1:{port}"} | headers)
     with closing_of(connection):
         answer = connection.getresponse()
@@ -78,8 +78,8 @@ class Client:
 
     def wait(self, *kinds):
         while True:
-            message = json.loads(self.socket.recv(timeout=60))
-            buffers = [self.socket.recv(timeout=60) for _ in range(message["buffers"])]
+            message = json.loads(self.socket.recv(timeout=120))
+            buffers = [self.socket.recv(timeout=120) for _ in range(message["buffers"])]
             if message["kind"] == "frame":
                 self.say(kind="shown")
             if message["kind"] in kinds:
@@ -237,7 +237,7 @@ def test_the_command_prints_an_address_serves_it_and_ends(number, token, tmp_pat
     page.say(**asked(width=400, height=400))
     page.wait("begun")
     process.send_signal(number)
-    output, errors = process.communicate(timeout=20)
+    output, errors = process.communicate(timeout=60)
     assert (process.returncode, output, errors) == (0, "ended\n", "")
     with pytest.raises(ConnectionClosed):
         page.wait("result")
@@ -270,7 +270,7 @@ def test_a_missing_package_is_named(monkeypatch):
     assert "pip install 'simdtex[live]'" in found.output
 
 
-def soon(found, timeout=20):
+def soon(found, timeout=60):
     """Wait until something is so."""
     end = time.monotonic() + timeout
     while not found():

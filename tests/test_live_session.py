@@ -536,7 +536,7 @@ def test_a_page_without_a_picture_gets_a_small_run_to_play(page, monkeypatch):
 
 def test_a_picture_ends_the_small_run(page):
     page.say(kind="demo")
-    assert page.ask("picture", png(texture()), kind="open", name="t.png", timeout=10)[0]["new"]
+    assert page.ask("picture", png(texture()), kind="open", name="t.png", timeout=60)[0]["new"]
     assert "demo" not in page.kinds()
 
 

@@ -71,7 +71,7 @@ def python(code, *words, **environment):
         env=os.environ | environment,
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=200,
     )
     assert result.returncode == 0, result.stderr[-2000:]
     return result.stdout.split()
