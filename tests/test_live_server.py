@@ -296,8 +296,8 @@ def test_the_run_of_a_page_that_is_gone_ends(monkeypatch):
         soon(lambda: session._wanted is None and session._begun is None)
         assert page.key in pages._sessions, "the session is kept"
         monkeypatch.setattr(serving, "KEPT", 0.0)
-        soon(lambda: not pages._sessions, 5)
-        session._thread.join(5)
+        soon(lambda: not pages._sessions)
+        session._thread.join(60)
         assert not session._thread.is_alive()
 
 
