@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -353,3 +355,20 @@ def test_render(capsys):
     assert "[bold]" in lines[4]
     assert lines[5].split()[1:4] == ["Hollow", "-", "-"]
     assert lines[6] == "Chosen by default: Slow 10 (Acme OpenCL)"
+
+
+def test_threads_list_the_platforms_one_after_another(intel, monkeypatch):
+    import pyopencl
+
+    seen = []
+
+    def get_platforms():
+        seen.append(os.environ["OCL_ICD_VENDORS"])
+        time.sleep(0.02)
+        return []
+
+    monkeypatch.setattr(pyopencl, "get_platforms", get_platforms)
+    with ThreadPoolExecutor(6) as pool:
+        assert list(pool.map(lambda _: runtimes.platforms(), range(6))) == [[]] * 6
+    assert len(set(seen)) == 6, "each has its own folder"
+    assert "OCL_ICD_VENDORS" not in os.environ

@@ -18,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from threading import RLock
+from threading import Lock, RLock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,6 +48,8 @@ forked = False
 """Whether this process was forked from one that had used OpenCL."""
 _in_use = False
 _building = RLock()
+_listing = Lock()
+"""For the environment variable that names the loader's folder."""
 
 
 class DeviceError(ValueError):
@@ -83,7 +85,7 @@ def platforms() -> list[cl.Platform]:
     _in_use = True
     _ensure_cache_folder()
     try:
-        with _icd_folder():
+        with _listing, _icd_folder():
             found = pyopencl.get_platforms()
     except pyopencl.Error:  # raised if there is no platform
         return []
