@@ -144,7 +144,7 @@ class Model:
 def prepared(machine: Machine, scale: Scale, pixels: NDArray[Any], levels: int) -> list[Array]:
     """Return the levels of a picture (rows, cols, B) on a machine, each (B, rows, cols) uint16 in sixteenths of 0..255.
 
-    Level 0 is the picture, and the others are smoothed by `SMOOTHING`, mirrored beyond the border.
+    Level 0 is the picture, and all further levels are smoothed by `SMOOTHING`, mirrored beyond the border.
     """
     planes = scale.levels(pixels).astype(np.int64) * (SIXTEENTHS if scale.top == 255 else 1)
     found = [machine.put(planes.astype(np.uint16))]

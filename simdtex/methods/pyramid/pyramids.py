@@ -110,7 +110,7 @@ class Transform:
         return coarse.reshape((1, *coarse.shape))
 
     def _previous(self, low: Array, shape: tuple[int, int]) -> tuple[Array, Array, int]:
-        """Return the term of the level below, of these rows and columns, that is L1 2up(low)."""
+        """Return the term L1 2up(low) of the level below, which has the rows and columns ``shape``."""
         if not self._folds(shape):
             return low, self._up[4], 2
         gain, spread = self._spread(low.reshape(low.shape[1:]), shape)
