@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from simdtex.methods.typed_options import SolidOptions, SynthOptions
 
 GIVEN = ("channel_axis", "mask", "known", "known_source", "guide")
-"""The parameters of a synthesis, other than sample and shape, that `check_inputs` takes."""
+"""The parameters of a synthesis, other than sample and shape, that ``check_inputs`` takes."""
 
 TILED = f"{SMALLER}, or make it in tiles: --tiles 2048, or simdtex.distributed"
 """The remedy if an output of the method ``mrf`` is too large for this machine."""

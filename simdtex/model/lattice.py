@@ -253,7 +253,7 @@ class Grid:
         return picture[..., : self.height : self.spacing, :: self.spacing]
 
     def neighbours(self, sites: NDArray[np.int32], offsets: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return the pixel index of each neighbour, (N, S); -1 outside an open lattice or a window, or for the site.
+        """Return each neighbour's pixel index, (N, S); -1 outside an open lattice or a window, and for the site itself.
 
         If there are tiles, `plane` is added to the index of a neighbour in another tile.
         """

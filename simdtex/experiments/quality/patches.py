@@ -91,7 +91,7 @@ def nearest(queries: Planes, asked: Indices, candidates: Planes, side: int, apar
     side : int
         Side of a patch, pixels.
     apart : int
-        A candidate counts only if its row or its column differs from the query's by at least `apart` pixels.
+        A candidate counts only if its row or its column differs from the query's by at least ``apart`` pixels.
 
     Returns
     -------

@@ -117,7 +117,7 @@ class Transform:
         return spread, self._up[gain], 1
 
     def _spread(self, coarse: Array, shape: tuple[int, ...]) -> tuple[int, Array]:
-        """Return a level at its places on the one below, (1, planes, ...), and what the zeros between take away."""
+        """Return the factor that zeros between pixels cost, and the level with zeros at the size of the one below."""
         spread = unfold(self._machine, coarse, shape)
         return prod(1 if n % 2 else 2 for n in shape), spread.reshape((1, *spread.shape))
 
